@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use super::{given, mistake};
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Flying;
@@ -11,7 +12,7 @@ use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
-use crate::workbench;
+use crate::workbench::{self, quoted};
 
 /// Which logs, read how.
 #[derive(Clone, clap::Args)]
@@ -54,6 +55,21 @@ impl LogArguments {
         LogArguments { paths, ..self.clone() }
     }
 
+    /// The same logs, read in the same way, as words of a command line that begin with a space.
+    pub fn words(&self) -> String {
+        let logs: String = self.paths.iter().map(|log| format!(" {}", quoted(log))).collect();
+        format!(" --log{logs}{}", self.reading.words())
+    }
+
+    /// The options that say how the logs are read, as arguments of another command.
+    pub fn reading_words(&self) -> Vec<std::ffi::OsString> {
+        let Reading { mapping, lenient, despite_problems } = &self.reading;
+        let mapping = mapping.iter().flat_map(|file| ["--mapping".into(), file.clone().into()]);
+        let flags = [(*lenient, "--lenient"), (*despite_problems, "--despite-problems")];
+        let given = flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.into());
+        mapping.chain(given).collect()
+    }
+
     /// Reads and reconstructs the logs; one that cannot be is said and left out.
     ///
     /// # Errors
@@ -82,6 +98,14 @@ impl Reading {
         }
     }
 
+    /// The same options as words of a command line, each with a space before it.
+    pub fn words(&self) -> String {
+        let mapping = self.mapping.iter().map(|file| format!(" --mapping {}", quoted(file)));
+        let flags = [(self.lenient, " --lenient"), (self.despite_problems, " --despite-problems")];
+        let given = flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.to_owned());
+        mapping.chain(given).collect()
+    }
+
     fn tolerance(&self) -> Tolerance {
         if self.lenient { Tolerance::Lenient } else { Tolerance::Strict }
     }
@@ -108,10 +132,16 @@ impl Reading {
                     intake.in_doubt |= findings.iter().any(|f| f.severity == Severity::Problem);
                     intake.notes.extend(findings.iter().map(|f| format!("{name}: {f}")));
                 }
+                Err(error) if paths.len() == 1 => {
+                    return Err(error.context("no log can be compared"));
+                }
                 Err(error) => {
-                    eprintln!("greylag: {error:#}");
+                    let said = mistake::told(&error);
+                    eprintln!("greylag: {said}");
                     intake.in_doubt = true;
-                    intake.notes.push(format!("left out: {error:#}"));
+                    intake
+                        .notes
+                        .push(format!("left out: {}", said.lines().next().unwrap_or_default()));
                 }
             }
         }
@@ -130,16 +160,43 @@ impl Reading {
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<(Reconstruction, Vec<Finding>)> {
+        given::log(path)?;
         let log = logs::load(path, reading)?;
-        if let Some(problems) = log.problems().filter(|_| !self.despite_problems) {
-            bail!(
-                "flight log {}: {problems}. Every figure would be wrong. If the log is right all the same, use it with --despite-problems",
-                path.display()
-            );
+        if !self.despite_problems {
+            refuse_problems(path, &log.findings)?;
         }
         let options = flight_path::Options::of(name, model, clock);
         let flight = reconstruct(&log.flight, &options)
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))
+    }
+}
+
+/// Refuses a log whose figures would be wrong, with the command that writes the mapping that puts it right.
+fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
+    let problems: Vec<&Finding> =
+        findings.iter().filter(|f| f.severity == Severity::Problem).collect();
+    if problems.is_empty() {
+        return Ok(());
+    }
+    let log = quoted(path);
+    // the cure is the command below, not a line to be written by hand
+    let said = |f: &&Finding| {
+        let cure = f.cure.as_ref().map_or(String::new(), ToString::to_string);
+        let text = if cure.is_empty() { f.text.clone() } else { f.text.replace(&cure, "") };
+        text.trim_end_matches([' ', ':', ';', ',', '.']).to_owned()
+    };
+    let all: Vec<String> = problems.iter().map(said).collect();
+    let right = "if the log is right all the same, use it with --despite-problems";
+    let curable = problems.iter().all(|f| f.cure.is_some());
+    match curable {
+        true => bail!(
+            "flight log {log}: {}. Every figure would be wrong; {right}\n  to put it right: greylag logs info {log} \
+             --write-mapping mapping.toml\n  then add: --mapping mapping.toml",
+            all.join("; ")
+        ),
+        false => {
+            bail!("flight log {log}: {}. Every figure would be wrong; {right}", all.join("; "))
+        }
     }
 }

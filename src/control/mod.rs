@@ -8,6 +8,7 @@ pub mod insight;
 pub mod lqi;
 pub mod pid;
 pub mod policy;
+pub mod stick_response;
 pub mod task;
 mod registry;
 

@@ -27,6 +27,7 @@ mod view;
 
 pub use act::{Act, Request};
 pub use bench::{Bench, Given};
+pub use commands::quoted;
 pub use curves::FlightData;
 pub use error::{Kind, WorkbenchError};
 #[cfg(feature = "sitl")]

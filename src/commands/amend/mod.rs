@@ -16,9 +16,11 @@ use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
+use crate::commands::given as read;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::print_summary;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
@@ -28,6 +30,7 @@ use crate::sysid::diagnose::{self, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::progress::{Progress, Stage, part};
+use crate::workbench::quoted;
 
 /// Options of `greylag amend`.
 #[derive(clap::Args)]
@@ -86,7 +89,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
-    let model = GreyBox::load(&path)?;
+    let model = read::model(&arguments.model)?;
     if let Some(path) = &arguments.report {
         files::writable(path, overwrite)?;
     }
@@ -124,7 +127,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     bar.go_on()?;
     drop(bar);
-    print(&amended.amendment);
+    let answer = amended.amendment.answer.clone().then(next(arguments, &places));
+    print(&amended.amendment, &answer);
     if all_refused {
         bail!(
             "no effect was accepted, so nothing was written; --tune-only writes the tuned model, \
@@ -135,7 +139,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some((path, page)) = drawn {
         files::write(path, &page, overwrite)?;
     }
+    print_summary(&answer);
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// What comes next: whether the amended model still lacks something.
+fn next(arguments: &Arguments, places: &Places) -> String {
+    let logs = &arguments.logs;
+    format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
 }
 
 /// Refuses effects that the program does not know or the model has already.
@@ -191,9 +202,11 @@ fn page(
     models[1].name = format!("{}-tuned", model.name);
     let held_out = compare(&models, tests, &compare::Options::default(), progress)?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
+    let answer = amended.amendment.answer.clone().then(next(arguments, places));
     let report = AmendmentReport {
         title: format!("{} amended", model.name),
         amendment: &amended.amendment,
+        answer: Some(&answer),
         held_out: Some(&held_out),
         model_files: vec![
             arguments.model.display().to_string(),

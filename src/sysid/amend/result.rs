@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::conventions::Tried;
 use super::flight::SENSORS;
-use crate::sysid::compare::HorizonScore;
+use crate::sysid::compare::{Answer, HorizonScore};
 use crate::sysid::per_flight::{Constant, PerFlight};
 
 /// A fitted coefficient.
@@ -145,6 +145,8 @@ pub struct Amendment {
     pub version: &'static str,
     /// Name of the model before.
     pub model: String,
+    /// The answer in a few sentences, with their numbers.
+    pub answer: Answer,
     /// The story in plain sentences.
     pub sentences: Vec<String>,
     /// The effects that were asked for.

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::CompareError;
+use super::answer::between::between;
 use super::bins::{self, Residual, SUPPORT};
 use super::bootstrap::{BLOCK_S, RESAMPLES};
 use super::discovery;
@@ -12,7 +13,8 @@ use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::result::{
-    ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, RegimeBins, Settings,
+    ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace, RegimeBins,
+    Settings,
 };
 use super::sentence::{Subject, sentence};
 use super::verdict;
@@ -22,7 +24,7 @@ use crate::sysid::progress::{Progress, say};
 use crate::sysid::rudder;
 use crate::sysid::weak_form::channels::ChannelId;
 use crate::sysid::weak_form::kernel::KERNEL_S;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::sysid::weak_form::prepared::{ClockError, Prepared};
 use crate::sysid::weak_form::windows::{self, Series};
 
 /// The channel's variance, less noise, must be at least this part of itself for a share to mean
@@ -77,6 +79,7 @@ pub fn compare(
         })
         .collect::<Result<Vec<_>, CompareError>>()?;
     Ok(Comparison {
+        answer: between(&models, &prepared, &forecasts),
         schema: "greylag.comparison/1",
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
         seed: options.seed,
@@ -95,6 +98,22 @@ pub fn compare(
         },
         notes,
     })
+}
+
+/// Free-run errors of `model` over `flights` at `horizons_s` (s), one for each.
+///
+/// # Errors
+/// A flight's clock does not fit.
+pub fn scores(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    horizons_s: &[f64],
+) -> Result<Vec<HorizonScore>, ClockError> {
+    let slowest = model.airframe.envelope.flying_from_mps();
+    let prepared =
+        flights.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;
+    let (runs, _) = free_run::fly(model, &prepared, horizons_s);
+    Ok(horizons_s.iter().map(|h| runs.score(*h)).collect())
 }
 
 type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);

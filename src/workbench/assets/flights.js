@@ -3,7 +3,7 @@
 import { command, el, ink, show } from "./kit.js";
 
 const ROLES = { fit: "Fit", hold_out: "Hold out", test: "Test", unused: "Unused" };
-const STRIP = [["alpha", "before", "α"], ["airspeed", "measured", "V"], ["elevator", "after", "δe"]];
+const STRIP = [["alpha", "before", "α", "°"], ["airspeed", "measured", "V", "m/s"], ["elevator", "after", "δe", "°"]];
 
 export function flights(bench) {
   const body = document.querySelector("#flights .body");
@@ -11,8 +11,9 @@ export function flights(bench) {
   const input = el("input", { type: "file", multiple: true, onchange: () => bench.upload([...input.files]) });
   const drop = el("label", { class: "drop" }, "Drop flight logs here, or choose files", input,
     el("br"), el("span", { class: "note" }, "CSV, ULog, DataFlash .bin, .tlog"));
+  const left = bench.reading > 0 && el("p", { class: "note", role: "status" }, `${bench.reading} more ${bench.reading === 1 ? "is" : "are"} being read …`);
   const list = bench.state.flights.map((flight, place) => one(bench, flight, place, kept));
-  body.replaceChildren(drop, ...list, ...[command(bench.state.commands.flights)].filter(Boolean));
+  body.replaceChildren(drop, ...list, ...[left].filter(Boolean), ...[command(bench.state.commands.flights)].filter(Boolean));
   for (const canvas of body.querySelectorAll("canvas")) strip(canvas, bench.state.flights[+canvas.dataset.flight], bench.lit.get(+canvas.dataset.flight) ?? []);
 }
 
@@ -34,7 +35,7 @@ function one(bench, flight, place, kept) {
   node.append(el("p", { class: "note" }, `${flight.format} · ${show(flight.rate_hz)} Hz · ${show(flight.flight_s)} s in flight`));
   node.append(flight.locked
     ? el("div", { class: "locked" }, "unseen until Judge")
-    : el("canvas", { "data-flight": place, role: "img", "aria-label": "angle of attack, airspeed and elevator over time" }));
+    : el("canvas", { "data-flight": place, role: "img", "aria-label": "angle of attack (°), airspeed (m/s) and elevator (°) over time", title: "angle of attack α (°), airspeed V (m/s), elevator δe (°) over time" }));
   node.append(roles, ...about(bench, flight, place, kept));
   return node;
 }
@@ -72,7 +73,7 @@ function strip(canvas, { strip: values, from_s, to_s }, lit) {
   ctx.fillStyle = ink("lit");
   for (const [from, to] of lit) ctx.fillRect(across(from), 0, Math.max(1, across(to) - across(from)), height);
   const each = height / STRIP.length;
-  STRIP.forEach(([name, tone, sign], k) => {
+  STRIP.forEach(([name, tone, sign, unit], k) => {
     const list = values[name];
     const [low, high] = [Math.min(...list), Math.max(...list)];
     ctx.strokeStyle = ink(tone);
@@ -83,5 +84,9 @@ function strip(canvas, { strip: values, from_s, to_s }, lit) {
     ctx.fillStyle = ink("muted");
     ctx.font = `10px ${ink("sans")}`;
     ctx.fillText(sign, 0, each * (k + 0.75));
+    // the range says what a pixel is worth
+    ctx.textAlign = "right";
+    ctx.fillText(`${show(low, 2)} to ${show(high, 2)} ${unit}`, width, each * (k + 0.25) + 3);
+    ctx.textAlign = "left";
   });
 }
