@@ -89,7 +89,11 @@ fn all_in_json(answer: &Value) {
             let Some(said) = word.parse::<f64>().ok().filter(|x| *x != 95.0) else { continue };
             let near = |x: &f64| {
                 // three figures, or a percentage to one
-                let least = if x.abs() > 3.0 { 0.5 } else { 0.0 };
+                let least = match x.abs() {
+                    size if size > 9.9 => 0.51,
+                    size if size > 0.5 => 0.051,
+                    _ => 0.0,
+                };
                 [1.0, 1f64.to_degrees()]
                     .iter()
                     .any(|f| (f * x - said).abs() <= 5.1e-3 * said.abs() + least)

@@ -145,6 +145,8 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis) -> String {
         (Verdict::Adequate, _) => {
             format!("greylag amend --model {model}{logs} --tune-only --out {out}")
         }
+        // a formula is tested on another flight than it is searched in
+        (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
     }
 }

@@ -180,11 +180,12 @@ fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
         return Ok(());
     }
     let log = quoted(path);
-    // the cure is the command below, not a line to be written by hand
-    let said = |f: &&Finding| {
-        let cure = f.cure.as_ref().map_or(String::new(), ToString::to_string);
-        let text = if cure.is_empty() { f.text.clone() } else { f.text.replace(&cure, "") };
-        text.trim_end_matches([' ', ':', ';', ',', '.']).to_owned()
+    // of what a factor cures the column is enough: the command below says why
+    let said = |f: &&Finding| match &f.cure {
+        Some(cure) => {
+            format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)
+        }
+        None => f.text.trim_end_matches('.').to_owned(),
     };
     let all: Vec<String> = problems.iter().map(said).collect();
     let right = "if the log is right all the same, use it with --despite-problems";

@@ -116,7 +116,9 @@ pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf>
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let model = folder.join("model.toml");
-    files::writable(&model, Overwrite::Never)?;
+    if model.exists() {
+        bail!("{} exists; name another folder", model.display());
+    }
     files::write(&folder.join("airframe.toml"), &airframe, Overwrite::Never)?;
     files::write(&model, model_text, Overwrite::Never)?;
     Ok(model)
