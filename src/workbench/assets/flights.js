@@ -3,7 +3,7 @@
 import { command, el, ink, show } from "./kit.js";
 
 const ROLES = { fit: "Fit", hold_out: "Hold out", test: "Test", unused: "Unused" };
-const STRIP = [["alpha", "before", "α", "°"], ["airspeed", "measured", "V", "m/s"], ["elevator", "after", "δe", "°"]];
+const STRIP = [["alpha", "before", "α"], ["airspeed", "measured", "V"], ["elevator", "after", "δe"]];
 
 export function flights(bench) {
   const body = document.querySelector("#flights .body");
@@ -73,7 +73,7 @@ function strip(canvas, { strip: values, from_s, to_s }, lit) {
   ctx.fillStyle = ink("lit");
   for (const [from, to] of lit) ctx.fillRect(across(from), 0, Math.max(1, across(to) - across(from)), height);
   const each = height / STRIP.length;
-  STRIP.forEach(([name, tone, sign, unit], k) => {
+  STRIP.forEach(([name, tone, sign], k) => {
     const list = values[name];
     const [low, high] = [Math.min(...list), Math.max(...list)];
     ctx.strokeStyle = ink(tone);
@@ -84,9 +84,5 @@ function strip(canvas, { strip: values, from_s, to_s }, lit) {
     ctx.fillStyle = ink("muted");
     ctx.font = `10px ${ink("sans")}`;
     ctx.fillText(sign, 0, each * (k + 0.75));
-    // the range says what a pixel is worth
-    ctx.textAlign = "right";
-    ctx.fillText(`${show(low, 2)} to ${show(high, 2)} ${unit}`, width, each * (k + 0.25) + 3);
-    ctx.textAlign = "left";
   });
 }
