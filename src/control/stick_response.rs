@@ -1,7 +1,7 @@
 //! How a model's aircraft answers its stick: steps of aileron and elevator from steady straight flight.
 
-use crate::model::{GreyBox, Trim, TrimError};
-use crate::physics::{Controls, State};
+use greylag_model::{GreyBox, Trim, TrimError};
+use greylag_physics::{Controls, State};
 
 /// Part of the travel that is stepped.
 pub const STEPPED: f64 = 0.25;
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn the_stick_rolls_right_and_pitches_up() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde/prior.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/aerosonde/prior.toml");
         let model = GreyBox::load(&path).unwrap();
         let [roll, pitch] = stick_responses(&model).unwrap();
         let at = |r: &StickResponse, t: f64| r.states[(t / STEP_S) as usize];
@@ -73,7 +73,7 @@ mod tests {
         assert!(at(&pitch, 0.2).q > 0.01 && at(&pitch, 0.5).alpha > at(&pitch, 0.0).alpha);
         // roll rate settles at what the authority of the check says, a quarter of it, within a tenth (the spiral and
         // Dutch roll act meanwhile)
-        let full = crate::control::aircraft_check::check(&model).unwrap().authority.roll_rate;
+        let full = crate::aircraft_check::check(&model).unwrap().authority.roll_rate;
         assert!(
             (at(&roll, 0.4).p / (STEPPED * full) - 1.0).abs() < 0.25,
             "{} {full}",

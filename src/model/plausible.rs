@@ -3,7 +3,7 @@
 //! H. Tennekes, "The Simple Science of Flight", 2nd ed., 2009: from insects to airliners the wing loading (N/m²) is near
 //! 47 times the cube root of the weight (N), within a factor of a few.
 
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Factor of Tennekes' line, N^(2/3)/m².
 const LINE: f64 = 47.0;

@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use crate::control::aircraft_check::AircraftCheck;
-use crate::control::stick_response::{STEPPED, StickResponse};
-use crate::model::GreyBox;
-use crate::report::Align::{Left, Right};
-use crate::report::kit::numbers::number;
-use crate::report::{
+use crate::Align::{Left, Right};
+use crate::kit::numbers::number;
+use crate::{
     Drawing, Figure, Outcome, Page, Panel, Section, Series, Style, Table, TimeFigure, Verdict,
 };
+use greylag_control::aircraft_check::AircraftCheck;
+use greylag_control::stick_response::{STEPPED, StickResponse};
+use greylag_model::GreyBox;
 
 /// What the page is made from.
 #[derive(Clone, Debug)]
@@ -161,7 +161,7 @@ impl AircraftReport<'_> {
     fn stick(&self) -> TimeFigure {
         let mut figure = TimeFigure::default();
         let [roll, pitch] = self.responses;
-        let degrees = |r: &StickResponse, of: fn(&crate::physics::State) -> f64| -> Vec<f64> {
+        let degrees = |r: &StickResponse, of: fn(&greylag_physics::State) -> f64| -> Vec<f64> {
             r.states.iter().map(|s| of(s).to_degrees()).collect()
         };
         let panel = |title: &str, unit: &str, name: &str, values: Vec<f64>| {

@@ -8,12 +8,12 @@
 mod problem;
 mod solve;
 
-use crate::control::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
-use crate::control::insight::{Insight, Path};
-use crate::control::lqi::{Ahead, Lqi};
-use crate::control::{Controller, Observation, Target};
-use crate::model::GreyBox;
-use crate::physics::Command;
+use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
+use crate::insight::{Insight, Path};
+use crate::lqi::{Ahead, Lqi};
+use crate::{Controller, Observation, Target};
+use greylag_model::GreyBox;
+use greylag_physics::Command;
 use problem::{Problem, Trajectory};
 use solve::Solver;
 

@@ -3,12 +3,12 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::{STEPS, Surfaces};
-use crate::control::Observation;
-use crate::control::lqi::{Ahead, Goal};
-use crate::model::{GreyBox, Memory, STEP, linearise_step};
-use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
-use crate::physics::{Command, Controls, State};
+use crate::Observation;
+use crate::lqi::{Ahead, Goal};
+use greylag_model::{GreyBox, Memory, STEP, linearise_step};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::{Command, Controls, State};
 
 /// States: those of eq. (4), then for aileron and elevator the deflection now and one step ago with the
 /// two last commanded deflections, rad.

@@ -1,7 +1,7 @@
 //! The answer first: sentences in large type, what is left, the command that comes next.
 
-use crate::report::kit::html::escape;
-use crate::sysid::compare::Answer;
+use crate::kit::html::escape;
+use greylag_sysid::compare::Answer;
 
 /// What an error is, said once on every page.
 const ERROR: &str = "Error: root mean square over the eight states of a free run on the recorded actuators, each state over its \
@@ -15,7 +15,7 @@ pub struct AnswerBox {
 }
 
 impl AnswerBox {
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let Answer { error, effect, left, next, .. } = &self.answer;
         let line = |class: &str, text: &str| match text.is_empty() {
             true => String::new(),

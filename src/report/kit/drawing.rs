@@ -1,6 +1,6 @@
 //! A drawing of lines and areas, to scale.
 
-use crate::report::kit::html::escape;
+use crate::kit::html::escape;
 
 /// A drawing; its parts have the classes `body`, `wing` and `surface`.
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let [width, height] = self.size;
         let edge = 0.01 * width;
         format!(

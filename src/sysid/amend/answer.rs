@@ -9,12 +9,12 @@ use super::document::{STORY, sha256};
 use super::error::AmendError;
 use super::quick::estimate;
 use super::result::{Amendment, Parameter};
-use crate::model::GreyBox;
-use crate::physics::catalogue;
-use crate::sysid::compare::answer::{Answer, Decisive, Seen, Stage, Subject, Way};
-use crate::sysid::compare::{Comparison, HorizonScore, scores};
-use crate::sysid::diagnose::{Candidate, Diagnosis, Parameter as Estimate};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::compare::answer::{Answer, Decisive, Seen, Stage, Subject, Way};
+use crate::compare::{Comparison, HorizonScore, scores};
+use crate::diagnose::{Candidate, Diagnosis, Parameter as Estimate};
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_model::GreyBox;
+use greylag_physics::catalogue;
 
 /// The answer of an amendment: the model as given, tuned, with the effects that joined.
 pub fn answer(story: &Amendment) -> Answer {

@@ -1,9 +1,9 @@
 //! The answer of a comparison: the first model, then each other beside it.
 
 use super::{ANSWER_S, Answer, Seen, Stage, Subject, Way};
-use crate::sysid::compare::forecast::ForecastResult;
-use crate::sysid::compare::result::ModelResult;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::compare::forecast::ForecastResult;
+use crate::compare::result::ModelResult;
+use crate::weak_form::prepared::Prepared;
 
 /// The answer about `models` over `flights`; a model alone stands beside the best forecast without aerodynamics.
 pub fn between(

@@ -116,7 +116,7 @@ impl Answer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sysid::compare::StateScore;
+    use crate::compare::StateScore;
 
     /// A score at 5 s whose airspeed (m/s) and sideslip (rad) are off by so much.
     fn score(rmse_scaled: f64, airspeed: f64, beta: f64) -> Vec<HorizonScore> {

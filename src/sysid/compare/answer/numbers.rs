@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{ANSWER_S, Seen, Stage, Subject};
-use crate::sysid::compare::result::{HorizonScore, StateScore};
+use crate::compare::result::{HorizonScore, StateScore};
 
 /// How a model came from the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
