@@ -211,7 +211,7 @@ fn targets_beyond_the_envelope_are_named_and_left() {
 #[test]
 fn the_version_says_what_was_built() {
     let said = String::from_utf8(greylag(&["-V"]).stdout).unwrap();
-    assert!(said.starts_with("greylag 0.") && said.contains("features: sitl"), "{said}");
+    assert!(said.starts_with("greylag 0.") && said.contains("features: demo, study"), "{said}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod export;
 mod from_log;
 mod import;
 mod import_avl;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod import_jsbsim;
 mod new;
 

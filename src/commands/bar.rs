@@ -104,6 +104,7 @@ impl Bar {
 }
 
 /// Shares of a bar: of the work, then of the report, if one is asked for.
+#[cfg(feature = "study")]
 pub fn shares(report: Option<&Path>) -> [[f64; 2]; 2] {
     let end = if report.is_some() { 0.9 } else { 1.0 };
     [[0.0, end], [end, 1.0]]

@@ -11,7 +11,7 @@ pub fn controller() -> impl TypedValueParser<Value = ControllerKind> {
 }
 
 /// The groups of targets.
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 pub fn group() -> impl TypedValueParser<Value = crate::sim::Group> {
     use crate::sim::Group;
     PossibleValuesParser::new(Group::ALL.map(Group::name)).try_map(|name| {

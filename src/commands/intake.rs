@@ -12,7 +12,8 @@ use crate::logs::{self, csv::Tolerance};
 use crate::model::GreyBox;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
-use crate::workbench::{self, quoted};
+#[cfg(feature = "study")]
+use crate::workbench;
 
 /// Which logs, read how.
 #[derive(Clone, clap::Args)]
@@ -51,6 +52,7 @@ pub struct Intake {
 
 impl LogArguments {
     /// Other logs, read in the same way.
+    #[cfg(feature = "study")]
     pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
         LogArguments { paths, ..self.clone() }
     }
@@ -90,6 +92,7 @@ impl Reading {
     }
 
     /// The same for a workbench.
+    #[cfg(feature = "study")]
     pub fn of_workbench(&self) -> workbench::Reading {
         workbench::Reading {
             mapping: self.mapping.clone(),

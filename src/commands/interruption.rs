@@ -35,7 +35,7 @@ impl Interruption {
     }
 
     /// Whether Ctrl-C was typed.
-    #[cfg_attr(not(any(feature = "sitl", feature = "learn")), expect(dead_code))]
+    #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(dead_code))]
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

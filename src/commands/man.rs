@@ -25,7 +25,7 @@ pub fn run(arguments: &Arguments, command: clap::Command) -> Result<ExitCode> {
     let context = || format!("cannot write manual pages into {}", folder.display());
     std::fs::create_dir_all(folder).with_context(context)?;
     clap_mangen::generate_to(command, folder).with_context(context)?;
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     clap_mangen::generate_to(
         <greylag_sitl::arguments::Cli as clap::CommandFactory>::command(),
         folder,

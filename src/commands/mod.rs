@@ -1,26 +1,31 @@
 //! Subcommands: arguments, then a few lines of work.
 
 mod aircraft;
+#[cfg(feature = "study")]
 mod amend;
 mod bar;
 mod campaign;
 mod choices;
 pub mod controllers;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod collect;
 mod compare;
+#[cfg(feature = "study")]
 mod completions;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod demo;
+#[cfg(feature = "study")]
 mod effect_files;
+#[cfg(feature = "study")]
 mod effects;
-#[cfg(feature = "sitl")]
+#[cfg(all(feature = "demo", feature = "study"))]
 mod design;
+#[cfg(feature = "study")]
 mod diagnose;
 pub mod distinct;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod evaluate;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod faults;
 mod files;
 mod flown_with;
@@ -33,29 +38,32 @@ mod learn;
 mod link;
 mod log_once;
 mod logs;
+#[cfg(feature = "study")]
 mod man;
 mod mapping_file;
 mod mistake;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod mystery;
 mod per_flight;
+#[cfg(feature = "study")]
 mod propose;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod recording_report;
 mod replay;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod report;
 mod said_once;
 pub mod shipped;
 mod status;
 mod terminal;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod start;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 mod targets;
 #[cfg(feature = "learn")]
 mod train;
 mod watchdog;
+#[cfg(feature = "study")]
 mod workbench;
 
 use std::ffi::OsString;
@@ -74,7 +82,11 @@ use interruption::{Ended, Interruption};
 
 /// What `-V` says: version, commit where the build was given one (`GREYLAG_COMMIT`), features.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
-    let features = [("sitl", cfg!(feature = "sitl")), ("learn", cfg!(feature = "learn"))];
+    let features = [
+        ("demo", cfg!(feature = "demo")),
+        ("study", cfg!(feature = "study")),
+        ("learn", cfg!(feature = "learn")),
+    ];
     let built: Vec<&str> =
         features.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
     let commit = option_env!("GREYLAG_COMMIT").unwrap_or("unknown");
@@ -100,31 +112,35 @@ enum Command {
     /// Describe an aircraft of your own, and check how it flies.
     Aircraft(aircraft::Arguments),
     /// Refit a model to flights and add missing effects to it, judged on flights it has not seen.
+    #[cfg(feature = "study")]
     Amend(amend::Arguments),
     /// Run a campaign over priors, controllers and seeds; gather and tabulate it.
     Campaign(campaign::Arguments),
     /// Explore in JSBSim, to have flights to learn from.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Collect(collect::Arguments),
     /// Compare models with flight logs: how far predictions stray, in which channel and regime.
     Compare(compare::Arguments),
     /// Write completions for a shell to standard output.
+    #[cfg(feature = "study")]
     Completions(completions::Arguments),
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Demo(demo::Arguments),
     /// Say what the catalogue of physical effects knows.
+    #[cfg(feature = "study")]
     Effects(effects::Arguments),
     /// Find the manoeuvre that tells two missing effects apart, as a schedule to fly.
-    #[cfg(feature = "sitl")]
+    #[cfg(all(feature = "demo", feature = "study"))]
     Design(design::Arguments),
     /// Name the physical effect that a model lacks, from flight logs.
+    #[cfg(feature = "study")]
     Diagnose(diagnose::Arguments),
     /// Score controllers on the target file, flown in JSBSim in this process.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Evaluate(evaluate::Arguments),
     /// Fly many seeded flights under faults of link, sensors, clocks; judge them.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Faults(faults::Arguments),
     /// Fly a vehicle, serving ground stations and offboard programs.
     Fly(fly::Arguments),
@@ -136,24 +152,27 @@ enum Command {
     /// Say what a flight log holds, or write it as a CSV table.
     Logs(logs::Arguments),
     /// Fly an aircraft that has an effect which its model lacks: data to find it in.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Mystery(mystery::Arguments),
     /// Propose a formula for what no effect of the catalogue explains.
+    #[cfg(feature = "study")]
     Propose(propose::Arguments),
     /// Write the manual pages of every subcommand into a folder.
+    #[cfg(feature = "study")]
     Man(man::Arguments),
     /// Replay a recorded flight, and compare the pilot's commands bit by bit.
     Replay(replay::Arguments),
     /// Draw a recorded flight as a page: attitude, commands, timing, the model's error.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Report(report::Arguments),
     /// Write a target file.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Targets(targets::Arguments),
     /// Learn a model from flights, or a policy in a model.
     #[cfg(feature = "learn")]
     Train(train::Arguments),
     /// See where a model fails, accept effects and watch the error fall, in a browser.
+    #[cfg(feature = "study")]
     Workbench(workbench::Arguments),
 }
 
@@ -219,42 +238,49 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> Result<ExitCode> {
     match command {
         Command::Aircraft(arguments) => aircraft::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Amend(arguments) => amend::run(&arguments),
         Command::Campaign(arguments) => campaign::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Collect(arguments) => collect::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Completions(arguments) => {
             completions::run(&arguments, &mut <Arguments as clap::CommandFactory>::command())
         }
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Demo(arguments) => demo::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Effects(arguments) => effects::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(all(feature = "demo", feature = "study"))]
         Command::Design(arguments) => design::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Diagnose(arguments) => diagnose::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Faults(arguments) => faults::run(&arguments),
         Command::Fly(arguments) => fly::run(&arguments),
         #[cfg(feature = "learn")]
         Command::Learn(arguments) => learn::run(&arguments),
         Command::Link(arguments) => link::run(&arguments),
         Command::Logs(arguments) => logs::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Mystery(arguments) => mystery::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Propose(arguments) => propose::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Man(arguments) => {
             man::run(&arguments, <Arguments as clap::CommandFactory>::command())
         }
         Command::Replay(arguments) => replay::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Report(arguments) => report::run(&arguments),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Targets(arguments) => targets::run(&arguments),
         #[cfg(feature = "learn")]
         Command::Train(arguments) => train::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Workbench(arguments) => workbench::run(&arguments),
     }
 }
@@ -268,7 +294,7 @@ fn command_of(line: &[OsString]) -> Result<Command> {
 /// Refuses a line that is no stage of a learning and no cell of a campaign.
 fn check_line(line: &[OsString]) -> Result<()> {
     match command_of(line)? {
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Collect(_) | Command::Evaluate(_) => Ok(()),
         #[cfg(feature = "learn")]
         Command::Train(_) => Ok(()),
@@ -277,12 +303,12 @@ fn check_line(line: &[OsString]) -> Result<()> {
 }
 
 /// Carries a stage of a learning or a cell of a campaign out, until `stop` is set.
-#[cfg_attr(not(any(feature = "sitl", feature = "learn")), expect(unused_variables))]
+#[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {
     match command_of(line)? {
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Collect(arguments) => collect::fly(&arguments, stop),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         Command::Evaluate(arguments) => evaluate::run(&arguments).map(|_| Ended::Done),
         #[cfg(feature = "learn")]
         Command::Train(arguments) => train::learn(&arguments, stop),

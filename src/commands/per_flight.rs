@@ -23,6 +23,7 @@ pub struct PerFlightArguments {
 
 impl PerFlightArguments {
     /// What is asked for.
+    #[cfg(feature = "study")]
     pub fn asked(&self) -> PerFlight {
         PerFlight { trims: self.flight_trims, askew_deg: self.axes_askew }
     }

@@ -65,7 +65,7 @@ pub struct FlownArguments {
 
 /// What flew a recording, ready to fly it again.
 #[cfg_attr(
-    not(feature = "sitl"),
+    not(feature = "demo"),
     expect(dead_code, reason = "pages are drawn with the simulator built in")
 )]
 pub struct Again {

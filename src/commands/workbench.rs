@@ -6,11 +6,11 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 use crate::commands::faults;
 use crate::commands::files::shipped;
 use crate::commands::intake::Reading;
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 use crate::workbench::Failsafes;
 use crate::workbench::Given;
 use crate::workbench::server::{random_token, serve};
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         model: model(arguments).as_deref().map(shipped),
         logs: arguments.logs.clone(),
         reading: arguments.reading.of_workbench(),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         failsafes: Failsafes::new(|kind| faults::shipped(kind).map_err(|e| format!("{e:#}"))),
     };
     let token = random_token().context("cannot draw a token for the page")?;

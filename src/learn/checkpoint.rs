@@ -183,7 +183,7 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
 }
 
 /// Writes a whole file beside `path`, then puts it in its place.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

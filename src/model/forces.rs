@@ -28,7 +28,7 @@ struct Place<'a, R> {
 }
 
 /// The coefficients by which terms are multiplied.
-pub(crate) trait Weights<R>: Copy {
+pub trait Weights<R>: Copy {
     /// `amount` times the coefficient that has this place in the model's list.
     fn weigh(self, place: usize, amount: R) -> R;
 }
@@ -55,7 +55,7 @@ struct Each<'a, F> {
 }
 
 /// Terms of an effect whose coefficients start at a given place in the model's list.
-pub(crate) trait Starting<R>: Terms<R> {
+pub trait Starting<R>: Terms<R> {
     /// The terms that follow are of an effect whose first coefficient has this place.
     fn start_at(&mut self, first: usize);
 }
@@ -90,7 +90,7 @@ impl<R: Real, F: FnMut(usize, Channel, R)> Starting<R> for Each<'_, F> {
 
 /// State, controls and airflow with the surfaces centred, then also without body rates.
 #[inline(always)]
-pub(crate) fn parted<R: Real>(
+pub fn parted<R: Real>(
     state: &State<R>,
     controls: &Controls<R>,
     air: &AirData<R>,
@@ -257,7 +257,7 @@ impl GreyBox {
     /// Hands what the effects contribute that need only the point to `terms`, as part of its caller.
     #[cfg(feature = "learn")]
     #[inline(always)]
-    pub(crate) fn report_independent<R: Real>(
+    pub fn report_independent<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
@@ -271,7 +271,7 @@ impl GreyBox {
     /// its caller: all of them where [`needs`](GreyBox::needs) says [`Needs::Point`].
     #[cfg(feature = "learn")]
     #[inline(always)]
-    pub(crate) fn independent_accelerations<R: Real>(
+    pub fn independent_accelerations<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
@@ -285,7 +285,7 @@ impl GreyBox {
     /// rates; the last two are zero where no effect needs them.
     #[cfg(feature = "learn")]
     #[inline(always)]
-    pub(crate) fn independent_sums<R: Real>(
+    pub fn independent_sums<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
@@ -303,7 +303,7 @@ impl GreyBox {
     /// effects having the coefficients `weights`.
     #[cfg(feature = "learn")]
     #[inline(always)]
-    pub(crate) fn whole_wrench<R: Real>(
+    pub fn whole_wrench<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
@@ -319,7 +319,7 @@ impl GreyBox {
     /// Places in the list of coefficients of those of the effects that need more than the point; shape constants are
     /// not among them.
     #[cfg(feature = "learn")]
-    pub(crate) fn dependent_coefficients(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn dependent_coefficients(&self) -> impl Iterator<Item = usize> + '_ {
         self.terms[self.independent..].iter().flat_map(|term| {
             let about = term.kind.describe();
             term.first..term.first + about.coefficients.len() - about.shape
@@ -339,7 +339,7 @@ impl GreyBox {
 
     /// [`accelerations`](GreyBox::accelerations) as part of its caller.
     #[inline(always)]
-    pub(crate) fn accelerations_inlined<R: Real>(
+    pub fn accelerations_inlined<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,

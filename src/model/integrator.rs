@@ -136,7 +136,7 @@ impl GreyBox {
 /// rad/s²) and the last acceleration in the horizon frame, if there is one; and what is to be
 /// remembered in its place.
 #[inline(always)]
-pub(crate) fn advance_jsbsim<R: Real>(
+pub fn advance_jsbsim<R: Real>(
     s: &State<R>,
     air: &AirData<R>,
     acceleration: Vector<R>,

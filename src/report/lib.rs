@@ -12,10 +12,13 @@
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
 mod aircraft_page;
+#[cfg(feature = "study")]
 mod amendment;
 mod campaign_page;
 mod comparison;
+#[cfg(feature = "study")]
 mod effect_page;
+#[cfg(feature = "study")]
 mod diagnosis;
 mod kit;
 #[cfg(feature = "sitl")]
@@ -28,13 +31,18 @@ mod sight;
 mod training_page;
 
 pub use aircraft_page::AircraftReport;
+#[cfg(feature = "study")]
 pub use amendment::AmendmentReport;
+#[cfg(feature = "study")]
 pub use amendment::page::amendment_page;
 pub use campaign_page::CampaignReport;
 pub use comparison::ComparisonReport;
 pub use comparison::page::comparison_page;
+#[cfg(feature = "study")]
 pub use diagnosis::DiagnosisReport;
+#[cfg(feature = "study")]
 pub use diagnosis::page::diagnosis_page;
+#[cfg(feature = "study")]
 pub use effect_page::{EffectReport, facts as effect_facts};
 #[cfg(feature = "sitl")]
 pub use evaluation_page::EvaluationReport;
@@ -51,7 +59,7 @@ pub use kit::grid::{Grid, GridCell, GridRow};
 pub use kit::heat_map::{HeatCell, HeatMap};
 pub use kit::histogram::Histogram;
 #[cfg(feature = "sitl")]
-pub(crate) use kit::html::escape;
+pub use kit::html::escape;
 pub use kit::intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use kit::loop_timing::{Cycle, LoopTiming};
 pub use kit::page::{Folding, Page, Section};

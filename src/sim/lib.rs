@@ -4,7 +4,7 @@
 pub mod collect;
 #[cfg(feature = "sitl")]
 pub mod described;
-#[cfg(feature = "sitl")]
+#[cfg(all(feature = "sitl", feature = "study"))]
 pub mod design;
 pub mod environment;
 pub mod episode;

@@ -17,7 +17,7 @@ enum From {
     /// From stability derivatives as AVL writes them (ST, SB), with textbook estimates for the rest.
     Avl(super::import_avl::Avl),
     /// From a JSBSim aircraft, by central differences of its loads.
-    #[cfg(feature = "sitl")]
+    #[cfg(feature = "demo")]
     Jsbsim(super::import_jsbsim::Jsbsim),
 }
 
@@ -25,7 +25,7 @@ enum From {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.from {
         From::Avl(avl) => super::import_avl::run(avl),
-        #[cfg(feature = "sitl")]
+        #[cfg(feature = "demo")]
         From::Jsbsim(jsbsim) => super::import_jsbsim::run(jsbsim),
     }
 }

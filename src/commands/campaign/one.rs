@@ -16,8 +16,8 @@ use crate::commands::{self, VERSION, said_once, status};
 
 /// Subcommands that a cell may be, with what a program needs to have them.
 const KNOWN: [(&str, bool, &str); 3] = [
-    ("collect", cfg!(feature = "sitl"), "sitl"),
-    ("evaluate", cfg!(feature = "sitl"), "sitl"),
+    ("collect", cfg!(feature = "demo"), "sitl"),
+    ("evaluate", cfg!(feature = "demo"), "sitl"),
     ("train", cfg!(feature = "learn"), "learn"),
 ];
 

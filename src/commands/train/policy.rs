@@ -228,7 +228,7 @@ impl Arguments {
             if self.is_analytic() {
                 bail!("JSBSim has no slopes: --algorithm analytic takes --env model:DIR");
             }
-            if cfg!(not(feature = "sitl")) {
+            if cfg!(not(feature = "demo")) {
                 bail!("this program was built without JSBSim; train in model:DIR");
             }
             let airframe = GreyBox::load(&shipped(Path::new("params/x8/jsbsim.toml")))?.airframe;
@@ -283,12 +283,12 @@ impl Arguments {
             Some(model) => {
                 run.train(recipe, Imagination::new(model.clone(), self.instances as usize, targets))
             }
-            #[cfg(feature = "sitl")]
+            #[cfg(feature = "demo")]
             None => {
                 let plant = greylag_sitl::plant::PlantOptions::default();
                 run.train(recipe, crate::sim::flown::Flown::new(&plant, targets)?)
             }
-            #[cfg(not(feature = "sitl"))]
+            #[cfg(not(feature = "demo"))]
             None => Err(anyhow::anyhow!("this program was built without JSBSim")),
         }
     }

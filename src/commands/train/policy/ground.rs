@@ -45,13 +45,13 @@ impl Ground {
 const JUDGE_SEED: u64 = 2;
 
 /// What came of flights in JSBSim, where the policy was trained there.
-#[cfg(feature = "sitl")]
+#[cfg(feature = "demo")]
 pub(super) fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
     let plant = greylag_sitl::plant::PlantOptions::default();
     Ok(crate::sim::evaluation::evaluate(&plant, make, rows, 1, &|| ())?)
 }
 
-#[cfg(not(feature = "sitl"))]
+#[cfg(not(feature = "demo"))]
 pub(super) fn flown(_: Make, _: &[Row]) -> Result<Vec<Outcome>> {
     anyhow::bail!("this program was built without JSBSim")
 }
