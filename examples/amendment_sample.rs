@@ -13,6 +13,7 @@ fn main() -> anyhow::Result<()> {
     let report = AmendmentReport {
         title: "Synthetic amendment".into(),
         amendment: &report_amendment::amendment(),
+        answer: None,
         held_out: None,
         model_files: vec!["params/x8/prior.toml".into(), "amended/model.toml".into()],
         log_files: vec!["train-1.csv".into(), "train-2.csv".into()],

@@ -57,6 +57,7 @@ fn main() {
     let page = DiagnosisReport {
         title: "Ten minutes".into(),
         diagnosis: &answer,
+        answer: None,
         failing: Some(&found),
         held_out: None,
         model_file: String::new(),

@@ -14,9 +14,11 @@ fn main() -> anyhow::Result<()> {
     let out = std::env::args_os().nth(1).context("say where: diagnosis_sample OUT.html")?;
     let failing = report_comparison::comparison(180.0);
     let held_out = report_diagnosis::held_out(report_comparison::comparison(60.0));
+    let answer = held_out.answer.clone().then("greylag amend --accept".into());
     let report = DiagnosisReport {
         title: "Synthetic diagnosis".into(),
         diagnosis: &report_diagnosis::diagnosis(),
+        answer: Some(&answer),
         failing: Some(&failing),
         held_out: Some(&held_out),
         model_file: "params/x8/prior.toml".into(),

@@ -60,21 +60,49 @@
 //!   ICUAS 2018.
 //! - **\[BM12\]** R. W. Beard, T. W. McLain, *Small Unmanned Aircraft*, Princeton, 2012.
 
-pub use greylag_campaign as campaign;
-pub use greylag_control as control;
-pub use greylag_flight as flight;
-#[cfg(feature = "learn")]
-pub use greylag_learn as learn;
-pub use greylag_link as link;
-pub use greylag_logs as logs;
-pub use greylag_manoeuvres as manoeuvres;
-pub use greylag_model as model;
+// Numbers, random streams, statistics.
 pub use greylag_num as num;
+
+// State, actuators, airframe, rigid body, effects.
 pub use greylag_physics as physics;
-pub use greylag_report as report;
+
+// The grey box: prior and residual.
+pub use greylag_model as model;
+
+// Controllers and planners.
+pub use greylag_control as control;
+
+// Flight-test schedules.
+pub use greylag_manoeuvres as manoeuvres;
+
+// MAVLink.
+pub use greylag_link as link;
+
+// Flight logs of any format.
+pub use greylag_logs as logs;
+
+// The companion in flight.
+pub use greylag_flight as flight;
+
+// From a log to the missing effect.
+pub use greylag_sysid as sysid;
+
+// Simulated and imagined flights, scored.
 #[cfg(any(feature = "demo", feature = "learn"))]
 pub use greylag_sim as sim;
-pub use greylag_sysid as sysid;
+
+// Training; the home of burn.
+#[cfg(feature = "learn")]
+pub use greylag_learn as learn;
+
+// Many runs, resumable.
+pub use greylag_campaign as campaign;
+
+// Pages.
+pub use greylag_report as report;
+
+// The session in a browser.
 #[cfg(feature = "study")]
 pub use greylag_workbench as workbench;
+
 pub mod commands;

@@ -62,7 +62,9 @@ fn a_mystery_is_made_kept_and_opened() {
     let log = csv::load(&out.join("train-2.csv"), Tolerance::Strict).unwrap();
     assert_eq!((log.flight.samples.len(), log.dropped), (5000, 0));
     coefficients_are_wrong(&out.join("model.toml"));
-    assert!(says(&["mystery", "--open", dir]).contains("pitch_break = -"));
+    // a slip does not end the game
+    refuses(&["mystery", "--open", dir], &["--give-up"]);
+    assert!(says(&["mystery", "--open", dir, "--give-up"]).contains("pitch_break = -"));
     refuses(&arguments, &["mystery exists"]);
 
     // beside a diagnosis, parameters by name
@@ -118,7 +120,7 @@ fn a_mystery_of_another_aircraft_is_flown_at_its_airspeeds_with_its_rudder() {
     // the X8 flies these flights about 20 m/s, the Aerosonde cruises at 25
     assert!((20.0..32.0).contains(&mean(|s| s.airspeed_mps)), "{}", mean(|s| s.airspeed_mps));
     assert!(mean(|s| s.rudder_cmd * s.rudder_cmd).sqrt() > 0.05);
-    assert!(says(&["mystery", "--open", dir]).contains("rudder_linear"));
+    assert!(says(&["mystery", "--open", dir, "--give-up"]).contains("rudder_linear"));
 }
 
 #[test]

@@ -51,9 +51,18 @@ fn ten_minutes_of_flight_make_a_page_under_three_megabytes() {
 fn the_leading_sentence_is_first_and_leads_to_its_channel() {
     let comparison = report_comparison::comparison(60.0);
     let page = report(&comparison).page();
-    let Figure::Findings(found) = &page.sections[0].figures[0] else {
+    // of two models the difference is said first, then where each fails
+    let Figure::Answer(answer) = &page.sections[0].figures[0] else {
         panic!("the page starts with {:?}", page.sections[0].figures[0]);
     };
+    assert_eq!(answer.answer.error, comparison.answer.error);
+    assert!(answer.answer.error.contains("falls from"), "{}", answer.answer.error);
+    let all = page.sections.iter().flat_map(|s| &s.figures);
+    let found = all.filter_map(|f| match f {
+        Figure::Findings(found) => Some(found),
+        _ => None,
+    });
+    let found = found.last().unwrap();
     assert_eq!(found.lead[0].sentence, comparison.sentences[0]);
     let link = found.lead[1].link.as_ref().expect("the sentence on lift has a figure");
     assert_eq!(link.option, "L lift");

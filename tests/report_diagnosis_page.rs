@@ -12,6 +12,7 @@ fn report<'a>(d: &'a Diagnosis, both: Option<[&'a Comparison; 2]>) -> DiagnosisR
     DiagnosisReport {
         title: "What the model lacks".into(),
         diagnosis: d,
+        answer: None,
         failing: both.map(|b| b[0]),
         held_out: both.map(|b| b[1]),
         model_file: "prior.toml".into(),

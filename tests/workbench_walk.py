@@ -340,7 +340,10 @@ def walk(browser, bench, greylag, flights, folder, session):
     wait(browser, "document.getElementById('trouble').textContent.includes('no flight log')", 10, "a foreign file is refused")
     found += shoot(browser, folder, "1-empty")
 
+    if not browser.value("document.querySelector('.welcome') && document.querySelector('.picture')"):
+        found.append("the empty page shows nothing of what will come")
     drop(browser, logs)
+    wait(browser, "document.querySelector('#flights [role=status]')", 10, "flights that are being read are counted")
     seconds = wait(browser, f"document.querySelectorAll('.flight').length == {len(logs)}", 60, "the flights are in the list")
     took(f"{len(logs)} logs dropped, read and reconstructed", seconds, "0.3 s each")
     seconds = wait(browser, "document.querySelectorAll('.grid button').length > 20", 60, "the failing grid")
@@ -366,6 +369,15 @@ def walk(browser, bench, greylag, flights, folder, session):
     found += shoot(browser, folder, "3-diagnosed")
 
     effect = browser.value("document.querySelector('.suspect input').dataset.effect")
+    if not browser.value("document.getElementById('judge').disabled"):
+        found.append("Judge can be pressed before an effect is accepted")
+    if not browser.value("document.querySelector('.suspect label').textContent.includes(document.querySelector('.suspect input').dataset.effect)"):
+        found.append("a suspect is not called by its id")
+    # the curve that proves the effect is whole without scrolling
+    whole = "(() => { const c = document.querySelector('[data-curve]').getBoundingClientRect(), p = document.querySelector('#suspects .body').getBoundingClientRect(); return c.bottom <= p.bottom + 1 && c.right <= p.right + 1; })()"
+    if not browser.value(whole):
+        found.append("the curve of the first suspect is cut by its pane at 1400 x 900")
+    acts_in = browser.value("document.querySelector('.suspect figcaption b').textContent.split(' ')[0]")
     click(browser, ".suspect input")
     begun = time.monotonic()
     wait(browser, "document.querySelector('.bars.estimated') || document.querySelector('.bars.amended')", 60, "the estimate")
@@ -373,6 +385,13 @@ def walk(browser, bench, greylag, flights, folder, session):
     wait(browser, "document.querySelector('.bars.amended')", 300, "the fit")
     took("tick to output error", time.monotonic() - begun, "2 s")
     wait(browser, "document.querySelector('.key.after') && !document.querySelector('#job progress')", 60, "the curves after")
+    if browser.value("document.querySelector('.grid button[aria-pressed=true]')?.dataset.channel") != acts_in:
+        found.append(f"the plots did not follow the tick to the effect's channel {acts_in}")
+    header = browser.value("document.getElementById('answer').textContent")
+    if "tuned" not in header or effect not in header:
+        found.append(f"the header does not tell tuning and effect apart: {header}")
+    if "by tuning" not in browser.value("document.getElementById('box')?.textContent ?? ''"):
+        found.append("the answer box is not in the model's pane")
     click(browser, "#judge")
     wait(browser, "document.getElementById('opened')", 60, "the judgement")
     if browser.value("document.querySelectorAll('.locked').length"):
@@ -385,7 +404,8 @@ def walk(browser, bench, greylag, flights, folder, session):
     # the same command gives the same file, to the bit
     out = folder / "by-command"
     train = [p for p in logs if p.name.startswith("train")]
-    fit, held = [session / "logs" / p.name for p in (train[0], *train[2:])], session / "logs" / train[1].name
+    # the last one is held out, here and there
+    fit, held = [session / "logs" / p.name for p in train[:-1]], session / "logs" / train[-1].name
     made = subprocess.run([greylag, "amend", "--model", flights / "model.toml", "--log", *fit, "--hold-out", held, "--effect", effect,
                            "--out", out], capture_output=True, text=True)
     if not (out / "model.toml").exists():

@@ -2,6 +2,7 @@
 
 mod check;
 mod export;
+mod from_log;
 mod import;
 mod import_derivatives;
 #[cfg(feature = "demo")]
@@ -26,6 +27,8 @@ enum Command {
     Check(check::Arguments),
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),
+    /// Fit an aircraft of known mass, span and area to a flight: its model, its page, what to fly next.
+    FromLog(from_log::Arguments),
     /// Make airframe and model of another program's aircraft.
     Import(import::Arguments),
     /// Write airframe and model from mass, span, area and tail: textbook estimates with their widths.
@@ -40,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(arguments) => check::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+        Command::FromLog(arguments) => from_log::run(arguments),
         Command::Import(arguments) => import::run(arguments),
         Command::New(arguments) => new::run(arguments),
     }

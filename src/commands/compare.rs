@@ -1,20 +1,28 @@
 //! `greylag compare`: where models fail against flight logs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::Table;
 
 use crate::commands::bar::Bar;
 use crate::commands::files::{self, shipped};
+use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::predictions;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::{print_answer, print_summary, table};
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
-use crate::sysid::compare::{Comparison, ModelResult, Options, compare};
+use crate::sysid::amend::Origin;
+use crate::sysid::compare::{Answer, Comparison, ModelResult, Options, compare, scores};
 use crate::sysid::flight_path::ActuatorClock;
+use crate::sysid::flight_path::reconstruction::Reconstruction;
+
+/// What the models are called in the tables, in their order.
+const LETTERS: std::ops::RangeInclusive<char> = 'A'..='Z';
 
 /// Options of `greylag compare`.
 #[derive(clap::Args)]
@@ -58,11 +66,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for path in arguments.json.iter().chain(&arguments.report).chain(&arguments.predictions) {
         files::writable(path, overwrite)?;
     }
-    let models = arguments
-        .models
-        .iter()
-        .map(|path| GreyBox::load(&shipped(path)).map_err(Into::into))
-        .collect::<Result<Vec<_>>>()?;
+    let models =
+        arguments.models.iter().map(|path| given::model(path)).collect::<Result<Vec<_>>>()?;
     let clock = match arguments.recorded_clock {
         true => ActuatorClock::AsRecorded,
         false => ActuatorClock::Estimated,
@@ -76,6 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();
     notes.append(&mut comparison.notes);
     comparison.notes = notes;
+    comparison.answer = answer(arguments, &models, &flights, &comparison)?;
     if !files::is_stdout(arguments.json.as_deref()) {
         print(&comparison);
     }
@@ -93,6 +99,32 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
+/// The answer with the command that comes next; tuning and effect apart where the second model was made of the first.
+fn answer(
+    arguments: &Arguments,
+    models: &[GreyBox],
+    flights: &[Reconstruction],
+    comparison: &Comparison,
+) -> Result<Answer> {
+    let files = &arguments.models;
+    let answer = match (models, &files[..]) {
+        ([before, _], [_, after]) => match Origin::beside(&shipped(after), before) {
+            Some(origin) => {
+                let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
+                let tuned = scores(&tuned, flights, &arguments.horizons)?;
+                origin.answer(comparison, &tuned, &arguments.logs.paths)
+            }
+            None => comparison.answer.clone(),
+        },
+        _ => comparison.answer.clone(),
+    };
+    let last = quoted(files.last().map_or(Path::new(""), PathBuf::as_path));
+    Ok(answer.then(match models.len() {
+        1 => format!("greylag diagnose --model {last}{}", arguments.logs.words()),
+        _ => format!("greylag aircraft check --model {last}"),
+    }))
+}
+
 /// The report as HTML.
 fn page(arguments: &Arguments, comparison: &Comparison) -> String {
     let paths = |all: &[PathBuf]| all.iter().map(|p| p.display().to_string()).collect();
@@ -108,49 +140,44 @@ fn page(arguments: &Arguments, comparison: &Comparison) -> String {
 }
 
 fn print(comparison: &Comparison) {
-    for model in &comparison.models {
-        println!("{}", model.name);
-        model.sentences.iter().for_each(|sentence| println!("  {sentence}"));
+    print_answer(&comparison.answer);
+    for (model, letter) in comparison.models.iter().zip(LETTERS) {
+        println!("{letter}  {}", model.name);
+        model.sentences.iter().for_each(|sentence| println!("   {sentence}"));
         println!();
     }
     println!("{}\n{}", free_run_table(comparison), channel_table(&comparison.models));
+    baselines(comparison).into_iter().for_each(|line| println!("{line}"));
     for flight in &comparison.flights {
         flight.notes.iter().for_each(|note| println!("{}: {note}", flight.name));
     }
     comparison.notes.iter().for_each(|note| println!("note: {note}"));
+    print_summary(&comparison.answer);
 }
 
-fn empty_table<const N: usize>(header: [&str; N], words: usize) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(header);
-    for column in table.column_iter_mut().skip(words) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+/// The forecasts without aerodynamics in one line.
+fn baselines(comparison: &Comparison) -> Option<String> {
+    let horizon = comparison.answer.numbers.horizon_s;
+    let error = |f: &crate::sysid::compare::forecast::ForecastResult| {
+        let at = f.free_run.iter().find(|s| s.horizon_s == horizon)?;
+        Some(format!("{} {:.3}", f.name, at.rmse_scaled))
+    };
+    let all: Vec<String> = comparison.forecasts.iter().filter_map(error).collect();
+    let said = format!("forecasts without aerodynamics at {horizon} s: {}", all.join("; "));
+    (!all.is_empty()).then_some(said)
 }
 
 /// Free-run errors in the units of a flight.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
-        "model",
-        "horizon s",
-        "NRMSE",
-        "diverged",
-        "roll °",
-        "pitch °",
-        "V m/s",
-        "p °/s",
-        "q °/s",
-        "r °/s",
-        "α °",
+        "", "s", "NRMSE", "lost", "roll °", "pitch °", "V m/s", "p °/s", "q °/s", "r °/s", "α °",
         "β °",
     ];
-    let mut table = empty_table(header, 1);
-    for (name, scores) in comparison.free_runs() {
-        for score in scores.iter().filter(|s| s.runs > 0) {
+    let mut table = table(header, 1);
+    for (model, letter) in comparison.models.iter().zip(LETTERS) {
+        for score in model.free_run.iter().filter(|s| s.runs > 0) {
             let mut row = vec![
-                name.to_owned(),
+                letter.to_string(),
                 format!("{}", score.horizon_s),
                 format!("{:.5}", score.rmse_scaled),
                 format!("{}/{}", score.diverged, score.runs),
@@ -166,16 +193,16 @@ fn free_run_table(comparison: &Comparison) -> Table {
 }
 
 fn channel_table(models: &[ModelResult]) -> Table {
-    let header = ["model", "channel", "unexplained", "measured sd", "residual", "noise", "unit"];
-    let mut table = empty_table(header, 2);
-    for model in models {
+    let header = ["", "channel", "unexplained", "measured sd", "residual", "noise", "unit"];
+    let mut table = table(header, 2);
+    for (model, letter) in models.iter().zip(LETTERS) {
         for c in &model.channels {
             let share = match c.unexplained_fraction {
                 share if share.is_nan() => "not excited".into(),
                 share => format!("{:.2} %", 100.0 * share),
             };
             table.add_row([
-                model.name.clone(),
+                letter.to_string(),
                 format!("{} {}", c.channel.symbol(), c.name),
                 share,
                 number(c.measured_sd),

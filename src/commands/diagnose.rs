@@ -1,22 +1,27 @@
 //! `greylag diagnose`: which physical effect a model lacks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
+use serde::Serialize;
 
 use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
-use crate::commands::files::{self, shipped};
+use crate::commands::files;
+use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::{self, print_answer, print_summary};
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
-use crate::sysid::compare::{self, compare};
-use crate::sysid::diagnose::{Candidate, Diagnosis, Options, Status, diagnose};
+use crate::sysid::amend::{Diagnosed, diagnosed};
+use crate::sysid::compare::{self, Answer, compare};
+use crate::sysid::diagnose::{Candidate, Diagnosis, Options, Status, Verdict, diagnose};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::askew;
@@ -68,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     distinct(&arguments.logs.paths, &[])?;
-    let model = GreyBox::load(&shipped(&arguments.model))?;
+    let model = given::model(&arguments.model)?;
     let Intake { flights, mut notes, in_doubt } =
         arguments.logs.take_in(&model, ActuatorClock::AsRecorded)?;
     let options = Options {
@@ -88,40 +93,83 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
+    let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
+    let answer = answer.then(next(arguments, &diagnosis));
     // drawn before anything is written, so that Ctrl-C leaves nothing behind
     let drawn = arguments.report.as_ref().map(|path| {
-        let page = page(arguments, &diagnosis, &model, &flights, &part(&hear, drawing))?;
+        let mut models = [tuned, model.clone()];
+        models[1].name = "as given".into();
+        let told = (&diagnosis, &answer);
+        let page = page(arguments, told, &models, &flights, &part(&hear, drawing))?;
         Ok::<_, anyhow::Error>((path, page))
     });
     let drawn = drawn.transpose()?;
     bar.go_on()?;
     drop(bar);
     if !files::is_stdout(arguments.json.as_deref()) {
+        print_answer(&answer);
         print(&diagnosis);
     }
     if let Some(path) = &arguments.json {
-        files::write(path, &(serde_json::to_string_pretty(&diagnosis)? + "\n"), overwrite)?;
+        let document = Document { diagnosis: &diagnosis, answer: &answer };
+        files::write(path, &(serde_json::to_string_pretty(&document)? + "\n"), overwrite)?;
     }
     if let Some((path, page)) = drawn {
         files::write(path, &page, overwrite)?;
     }
     let in_doubt = in_doubt || !diagnosis.doubtful.is_empty();
+    if !files::is_stdout(arguments.json.as_deref()) {
+        print_summary(&answer);
+    }
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The report as HTML, with where the model fails as given.
+/// What goes into JSON: the diagnosis, with the answer that screen and page begin with.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    answer: &'a Answer,
+}
+
+/// The command that comes next.
+fn next(arguments: &Arguments, diagnosis: &Diagnosis) -> String {
+    let model = &arguments.model;
+    let out = model.parent().unwrap_or(Path::new("")).join("amended");
+    let (model, out, logs) = (quoted(model), quoted(&out), arguments.logs.words());
+    let between = diagnosis.advice.iter().find_map(|a| a.between.as_ref());
+    match (diagnosis.verdict, between) {
+        (Verdict::Effect, Some([a, b])) if in_doubt(diagnosis) => {
+            format!("greylag design --between {a} {b}")
+        }
+        (Verdict::Effect, _) => format!("greylag amend --model {model}{logs} --accept --out {out}"),
+        (Verdict::Adequate, _) => {
+            format!("greylag amend --model {model}{logs} --tune-only --out {out}")
+        }
+        // a formula is tested on another flight than it is searched in
+        (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
+        (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
+    }
+}
+
+/// Whether an asserted effect could be another one as well.
+fn in_doubt(diagnosis: &Diagnosis) -> bool {
+    diagnosis.effects.iter().any(|c| c.asserted && !c.indistinguishable_from.is_empty())
+}
+
+/// The report as HTML, with where the models fail.
 fn page(
     arguments: &Arguments,
-    diagnosis: &Diagnosis,
-    model: &GreyBox,
+    (diagnosis, answer): (&Diagnosis, &Answer),
+    models: &[GreyBox],
     flights: &[Reconstruction],
     progress: &Progress,
 ) -> Result<String> {
-    let models = std::slice::from_ref(model);
     let failing = compare(models, flights, &compare::Options::default(), progress)?;
     let report = DiagnosisReport {
         title: format!("What {} lacks", diagnosis.model),
         diagnosis,
+        answer: Some(answer),
         failing: Some(&failing),
         held_out: None,
         model_file: arguments.model.display().to_string(),
@@ -146,10 +194,7 @@ fn print(diagnosis: &Diagnosis) {
 }
 
 fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(header);
-    table
+    terminal::table(header, usize::MAX)
 }
 
 fn effects(diagnosis: &Diagnosis) -> Table {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use super::{given, mistake};
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Flying;
@@ -62,9 +63,10 @@ impl Intake {
     }
 
     fn leave_out(&mut self, error: &anyhow::Error) {
-        eprintln!("greylag: {error:#}");
+        let said = mistake::told(error);
+        eprintln!("greylag: {said}");
         self.in_doubt = true;
-        self.notes.push(format!("left out: {error:#}"));
+        self.notes.push(format!("left out: {}", said.lines().next().unwrap_or_default()));
     }
 }
 
@@ -73,6 +75,21 @@ impl LogArguments {
     #[cfg(feature = "study")]
     pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
         LogArguments { paths, ..self.clone() }
+    }
+
+    /// The same logs, read in the same way, as words of a command line that begin with a space.
+    pub fn words(&self) -> String {
+        let logs: String = self.paths.iter().map(|log| format!(" {}", quoted(log))).collect();
+        format!(" --log{logs}{}", self.reading.words())
+    }
+
+    /// The options that say how the logs are read, as arguments of another command.
+    pub fn reading_words(&self) -> Vec<std::ffi::OsString> {
+        let Reading { mapping, lenient, despite_problems } = &self.reading;
+        let mapping = mapping.iter().flat_map(|file| ["--mapping".into(), file.clone().into()]);
+        let flags = [(*lenient, "--lenient"), (*despite_problems, "--despite-problems")];
+        let given = flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.into());
+        mapping.chain(given).collect()
     }
 
     /// Reads and reconstructs the logs; one that cannot be is said and left out.
@@ -106,6 +123,14 @@ impl Reading {
         }
     }
 
+    /// The same options as words of a command line, each with a space before it.
+    pub fn words(&self) -> String {
+        let mapping = self.mapping.iter().map(|file| format!(" --mapping {}", quoted(file)));
+        let flags = [(self.lenient, " --lenient"), (self.despite_problems, " --despite-problems")];
+        let given = flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.to_owned());
+        mapping.chain(given).collect()
+    }
+
     fn tolerance(&self) -> Tolerance {
         if self.lenient { Tolerance::Lenient } else { Tolerance::Strict }
     }
@@ -126,10 +151,14 @@ impl Reading {
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
-            let logs = match logs::flights(path, &reading) {
+            let read = given::log(path).and_then(|()| Ok(logs::flights(path, &reading)?));
+            let logs = match read {
                 Ok(logs) => logs,
+                Err(error) if paths.len() == 1 => {
+                    return Err(error.context("no log can be compared"));
+                }
                 Err(error) => {
-                    intake.leave_out(&error.into());
+                    intake.leave_out(&error);
                     continue;
                 }
             };
@@ -140,6 +169,9 @@ impl Reading {
                 let name = if several { format!("{name}#{number}") } else { name.clone() };
                 match self.reconstruct_one(path, &name, log, model, clock) {
                     Ok((flight, findings)) => intake.add(flight, &name, &findings),
+                    Err(error) if paths.len() == 1 && !several => {
+                        return Err(error.context("no log can be compared"));
+                    }
                     Err(error) => intake.leave_out(&error),
                 }
             }
@@ -159,15 +191,42 @@ impl Reading {
         model: &GreyBox,
         clock: ActuatorClock,
     ) -> Result<(Reconstruction, Vec<Finding>)> {
-        if let Some(problems) = log.problems().filter(|_| !self.despite_problems) {
-            bail!(
-                "flight log {}: {problems}. Every figure would be wrong. If the log is right all the same, use it with --despite-problems",
-                path.display()
-            );
+        if !self.despite_problems {
+            refuse_problems(path, &log.findings)?;
         }
         let options = flight_path::Options::of(name, model, clock);
         let flight = reconstruct(&log.flight, &options)
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))
+    }
+}
+
+/// Refuses a log whose figures would be wrong, with the command that writes the mapping that puts it right.
+fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
+    let problems: Vec<&Finding> =
+        findings.iter().filter(|f| f.severity == Severity::Problem).collect();
+    if problems.is_empty() {
+        return Ok(());
+    }
+    let log = quoted(path);
+    // of what a factor cures the column is enough: the command below says why
+    let said = |f: &&Finding| match &f.cure {
+        Some(cure) => {
+            format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)
+        }
+        None => f.text.trim_end_matches('.').to_owned(),
+    };
+    let all: Vec<String> = problems.iter().map(said).collect();
+    let right = "if the log is right all the same, use it with --despite-problems";
+    let curable = problems.iter().all(|f| f.cure.is_some());
+    match curable {
+        true => bail!(
+            "flight log {log}: {}. Every figure would be wrong; {right}\n  to put it right: greylag logs info {log} \
+             --write-mapping mapping.toml\n  then add: --mapping mapping.toml",
+            all.join("; ")
+        ),
+        false => {
+            bail!("flight log {log}: {}. Every figure would be wrong; {right}", all.join("; "))
+        }
     }
 }

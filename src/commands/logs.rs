@@ -3,15 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Subcommand;
 
 use crate::commands::files;
+use crate::commands::mapping_file::mapping;
 use crate::commands::status::IN_DOUBT;
 use crate::logs::finding::Severity;
 use crate::logs::info::Info;
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::{Flying, PhaseKind};
+use crate::logs::quoted;
 use crate::logs::sources::Asked;
 use crate::logs::{Flight, Log, Options, csv};
 use crate::model::GreyBox;
@@ -37,6 +39,9 @@ enum Verb {
         /// As JSON: an object, of several logs a list of them.
         #[arg(long)]
         json: bool,
+        /// Write a mapping file that puts right the units and signs that were found wrong: what --mapping takes.
+        #[arg(long, value_name = "FILE", conflicts_with = "json")]
+        write_mapping: Option<PathBuf>,
         /// The model file of the aircraft: its envelope says from which airspeed on it flies. Without it
         /// that is 7 m/s.
         #[arg(long)]
@@ -113,7 +118,10 @@ impl Reading {
 /// Does what the verb says.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
-        Verb::Info { files, json, model, reading } => {
+        Verb::Info { files, json, write_mapping, model, reading } => {
+            if let Some(path) = write_mapping {
+                files::writable(path, files::Overwrite::Never)?;
+            }
             let model =
                 model.as_deref().map(|path| GreyBox::load(&files::shipped(path))).transpose()?;
             let options = reading.options(model.as_ref())?;
@@ -124,6 +132,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 (true, [only]) => println!("{}", serde_json::to_string_pretty(only)?),
                 (true, all) => println!("{}", serde_json::to_string_pretty(all)?),
                 (false, all) => print_all(all),
+            }
+            if let Some(path) = write_mapping {
+                return write_mapping_file(path, &all);
             }
             Ok(status(all.iter().map(Info::severity).max()))
         }
@@ -146,6 +157,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
     }
+}
+
+/// Writes the mapping that puts right what was found.
+fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<ExitCode> {
+    let Some(text) = mapping(logs) else {
+        bail!("no factor puts anything of these logs right, so no mapping was written");
+    };
+    files::write(path, &text, files::Overwrite::Never)?;
+    println!("\nwrote {}; add: --mapping {}", path.display(), quoted(path));
+    Ok(ExitCode::SUCCESS)
 }
 
 fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {

@@ -31,6 +31,7 @@ mod faults;
 mod files;
 mod flown_with;
 pub mod fly;
+mod given;
 mod intake;
 mod interruption;
 #[cfg(feature = "learn")]
@@ -40,7 +41,9 @@ mod log_once;
 mod logs;
 #[cfg(feature = "study")]
 mod man;
+mod mapping_file;
 mod margin;
+mod mistake;
 #[cfg(feature = "demo")]
 mod mystery;
 mod per_flight;
@@ -56,6 +59,7 @@ mod report;
 mod said_once;
 pub mod shipped;
 mod status;
+mod terminal;
 #[cfg(feature = "demo")]
 mod start;
 #[cfg(feature = "demo")]
@@ -188,9 +192,24 @@ fn end_with_the_reader() {
     }));
 }
 
+/// The arguments of the command line; clap ends the program where they are wrong.
+fn parse() -> Arguments {
+    let line = with_signs(<Arguments as clap::CommandFactory>::command());
+    let found = line.get_matches();
+    <Arguments as clap::FromArgMatches>::from_arg_matches(&found).unwrap_or_else(|e| e.exit())
+}
+
+/// The command with values that may begin with a minus sign wherever one is taken: what a number may be is for its
+/// option to say.
+fn with_signs(command: clap::Command) -> clap::Command {
+    let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
+    let command = command.mut_args(|a| if takes(&a) { a.allow_negative_numbers(true) } else { a });
+    command.mut_subcommands(with_signs)
+}
+
 /// Runs the subcommand of the command line; what goes wrong is said in one line.
 pub fn main() -> ExitCode {
-    let Arguments { command, verbose, quiet } = Arguments::parse();
+    let Arguments { command, verbose, quiet } = parse();
     bar::silence(quiet);
     let level = match (quiet, verbose) {
         (true, _) => "error",
@@ -215,7 +234,7 @@ pub fn main() -> ExitCode {
             eprintln!("greylag: stopped by Ctrl-C; nothing was written");
             return ExitCode::from(status::INTERRUPTED);
         }
-        eprintln!("greylag: {}", said_once::said_once(&error));
+        eprintln!("greylag: {}", mistake::told(&error));
         ExitCode::FAILURE
     })
 }

@@ -22,6 +22,8 @@ use crate::sim::trial::{Subject, Trial};
 
 /// The file of the answer.
 const SEALED: &str = "answer.sealed";
+/// The diagnosis that is set beside it.
+const DIAGNOSIS: &str = "diagnosis.json";
 /// The layout of the answer.
 const SCHEMA: &str = "greylag.mystery/1";
 
@@ -59,6 +61,9 @@ pub struct Arguments {
     /// Open the answer of a folder, beside what its diagnosis.json says.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "what", "turbulence_severity"])]
     open: Option<PathBuf>,
+    /// Open the answer without a diagnosis: the game is over then.
+    #[arg(long, requires = "open")]
+    give_up: bool,
 }
 
 /// What was hidden.
@@ -79,6 +84,11 @@ struct Answer {
 /// If the folder exists, the effect cannot be hidden or flown with, or there is no answer to open.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match (&arguments.open, arguments.seed, &arguments.out) {
+        (Some(folder), _, _) if !arguments.give_up && undiagnosed(folder) => bail!(
+            "no diagnosis is in {d}, and the answer ends the game: --give-up opens it all the same\n  diagnose first: greylag \
+             diagnose --model {d}/model.toml --log {d}/train-1.csv {d}/train-2.csv {d}/train-3.csv --json {d}/{DIAGNOSIS}",
+            d = folder.display()
+        ),
         (Some(folder), _, _) => open(folder),
         (None, Some(seed), Some(out)) => make(arguments, seed, out),
         _ => bail!("give --seed and --out, or --open"),
@@ -107,7 +117,9 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     };
     // written beside it first: the folder is there complete, or not at all
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
-    let beside = beside.with_context(|| format!("creating a folder in {}", parent.display()))?;
+    let beside = beside.with_context(|| {
+        format!("cannot make a folder in {}, so name another place with --out", parent.display())
+    })?;
     let folder = beside.path().join("mystery");
     std::fs::create_dir(&folder).with_context(|| format!("creating {}", folder.display()))?;
     put(&folder, "airframe.toml", &airframe(&path, &text)?)?;
@@ -253,6 +265,11 @@ fn readme(out: &Path) -> String {
     )
 }
 
+/// Whether a folder holds an answer and no diagnosis to set beside it.
+fn undiagnosed(folder: &Path) -> bool {
+    folder.join(SEALED).exists() && !folder.join(DIAGNOSIS).exists()
+}
+
 fn open(folder: &Path) -> Result<ExitCode> {
     let path = folder.join(SEALED);
     let sealed = std::fs::read_to_string(&path).with_context(|| {
@@ -262,7 +279,7 @@ fn open(folder: &Path) -> Result<ExitCode> {
         format!("{} holds no answer; make the mystery anew from its seed", path.display())
     })?;
     println!("hidden: {} = {} {}", answer.id, answer.amplitude, answer.unit);
-    let path = folder.join("diagnosis.json");
+    let path = folder.join(DIAGNOSIS);
     if !path.exists() {
         println!("{} is not there: nothing to set beside it", path.display());
         return Ok(ExitCode::SUCCESS);

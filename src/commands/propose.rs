@@ -9,10 +9,10 @@ use comfy_table::{CellAlignment, Table};
 use crate::commands::bar::Bar;
 use crate::commands::distinct::distinct;
 use crate::commands::effect_files::named_effects;
-use crate::commands::files::{self, shipped};
+use crate::commands::files;
+use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::status::IN_DOUBT;
-use crate::model::GreyBox;
 use crate::sysid::diagnose::{Options, Proposal, Rung, propose};
 use crate::sysid::flight_path::ActuatorClock;
 
@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     for path in arguments.json.iter().chain(&arguments.out) {
         files::writable(path, overwrite)?;
     }
-    let model = GreyBox::load(&shipped(&arguments.model))?;
+    let model = given::model(&arguments.model)?;
     let with = named_effects(&arguments.effects)?;
     let (search, test) = divided(arguments)?;
     let clock = ActuatorClock::AsRecorded;

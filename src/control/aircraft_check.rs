@@ -13,6 +13,8 @@ const SPEEDS: usize = 7;
 const MUCH_TRAVEL: f64 = 0.8;
 /// Delay that sensing, link and servo of a small aircraft have together, s.
 const USUAL_DELAY: f64 = 0.04;
+/// How closely the fastest level flight is found, m/s.
+const LEVEL_WITHIN_MPS: f64 = 0.01;
 /// Roll rate at full aileron below which an aircraft is slow to roll, rad/s (20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
@@ -25,7 +27,7 @@ pub struct Level {
     pub alpha: f64,
     /// Elevator in parts of its travel, −1..1.
     pub elevator: f64,
-    /// Throttle, which may lie beyond its stops.
+    /// Throttle, 0..1.
     pub throttle: f64,
     /// Angle of the flight path above the horizon, rad: zero, or below in a descent.
     pub path: f64,
@@ -42,6 +44,15 @@ pub struct Authority {
     pub yaw_acceleration: Option<f64>,
 }
 
+/// A controller of the registry with the least delay that a loop of it bears.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Advised {
+    /// Its name.
+    pub name: &'static str,
+    /// Delay beyond which its loop that bears least is unstable, s.
+    pub delay_s: f64,
+}
+
 /// What was found.
 #[derive(Clone, Debug, Serialize)]
 pub struct AircraftCheck {
@@ -49,6 +60,10 @@ pub struct AircraftCheck {
     pub levels: Vec<Level>,
     /// The modes at the cruise airspeed.
     pub modes: Vec<Mode>,
+    /// The fastest level flight (m/s), where that is slower than the envelope's end.
+    pub level_up_to: Option<f64>,
+    /// The controller to begin with: its loops bear the delay that links and servos have.
+    pub controller: Advised,
     /// What the surfaces do there.
     pub authority: Authority,
     /// What each loop of the LQI bears there.
@@ -83,12 +98,50 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     let mut check = AircraftCheck {
         levels: speeds.clone().filter_map(|v| level(model, v, altitude)).collect(),
         modes: modes(model, cruise, altitude)?,
+        level_up_to: fastest_level(model),
+        controller: advised(model)?,
         authority: authority(model, &trim, altitude),
         loops: lqi::margins(model, cruise, &Weights::DEFAULT)?,
         findings: Vec::new(),
     };
     check.findings = findings(model, &check, speeds.count());
     Ok(check)
+}
+
+/// The LQI, or the damped one where the LQI's loops bear too little delay and those of the damped one more.
+fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
+    let cruise = model.airframe.envelope.airspeed_cruise_mps;
+    let least = |weights: &Weights| -> Result<f64, MarginsError> {
+        let loops = lqi::margins(model, cruise, weights)?;
+        Ok(loops.iter().map(|l| l.delay).fold(f64::INFINITY, f64::min))
+    };
+    let plain = Advised { name: "lqi", delay_s: least(&Weights::DEFAULT)? };
+    if plain.delay_s >= USUAL_DELAY {
+        return Ok(plain);
+    }
+    let damped = Advised { name: "lqi-damped", delay_s: least(&Weights::DAMPED)? };
+    Ok(if damped.delay_s > plain.delay_s { damped } else { plain })
+}
+
+/// Whether some throttle within its stops holds level flight at `airspeed`, m/s.
+fn flies_level(model: &GreyBox, airspeed: f64) -> bool {
+    let trim = Trim::level(model, airspeed, model.airframe.reference.altitude);
+    trim.is_ok_and(|t| (0.0..=1.0).contains(&t.controls.throttle))
+}
+
+/// The fastest level flight (m/s) between cruise and the end of the envelope; `None` if all of it can be flown level, or
+/// none.
+pub fn fastest_level(model: &GreyBox) -> Option<f64> {
+    let envelope = model.airframe.envelope;
+    let (mut slow, mut fast) = (envelope.airspeed_cruise_mps, envelope.airspeed_max_mps);
+    if flies_level(model, fast) || !flies_level(model, slow) {
+        return None;
+    }
+    while fast - slow > LEVEL_WITHIN_MPS {
+        let middle = 0.5 * (slow + fast);
+        if flies_level(model, middle) { slow = middle } else { fast = middle }
+    }
+    Some(slow)
 }
 
 fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Level> {
@@ -131,13 +184,6 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
             -path.to_degrees()
         ));
     }
-    if cruises && !(0.0..=1.0).contains(&throttle) {
-        out.push(format!(
-            "level flight at {airspeed:.1} m/s takes {:.0} % of throttle: the aircraft climbs or sinks \
-             there; correct thrust, drag or the envelope",
-            100.0 * throttle
-        ));
-    }
     out
 }
 
@@ -169,15 +215,14 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
     if let Err(why) = build(ControllerKind::Lqi, model) {
         out.push(format!("{why}; give the envelope less bank or a pitch_min_deg nearer to 0"));
     }
-    for LoopMargins { surface, delay, .. } in &check.loops {
-        if *delay < USUAL_DELAY {
-            out.push(format!(
-                "the LQI's {surface} loop bears {:.0} ms of delay, sensors, link and servos have up to \
-                 {:.0} ms: use lqi-damped",
-                1e3 * delay,
-                1e3 * USUAL_DELAY
-            ));
-        }
+    let Advised { name, delay_s } = check.controller;
+    if delay_s < USUAL_DELAY {
+        out.push(format!(
+            "the loops of {name} bear {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \
+             faster, or correct Clda, Cmde or the inertia",
+            1e3 * delay_s,
+            1e3 * USUAL_DELAY
+        ));
     }
     let stray = check
         .modes

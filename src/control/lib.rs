@@ -9,6 +9,7 @@ pub mod lqi;
 pub mod pid;
 pub mod policy;
 pub mod quality;
+pub mod stick_response;
 pub mod task;
 mod registry;
 

@@ -13,6 +13,7 @@ mod join;
 mod linear;
 pub mod jsbsim;
 pub mod modes;
+pub mod plausible;
 mod newton;
 pub mod residual;
 pub mod textbook;

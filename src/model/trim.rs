@@ -71,8 +71,11 @@ impl Trim {
     /// # Errors
     /// If no elevator holds either.
     pub fn straight(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
-        Trim::level(model, airspeed, altitude)
-            .or_else(|why| descent(model, airspeed, altitude).ok_or(why))
+        match Trim::level(model, airspeed, altitude) {
+            Ok(level) if (0.0..=1.0).contains(&level.controls.throttle) => Ok(level),
+            // a propeller that brakes at little throttle has a second, negative solution
+            level => descent(model, airspeed, altitude).map_or(level, Ok),
+        }
     }
 
     /// Angle of the flight path above the horizon with level wings and no sideslip, rad.

@@ -11,6 +11,7 @@
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 
+mod aircraft_page;
 #[cfg(feature = "study")]
 mod amendment;
 mod campaign_page;
@@ -29,6 +30,7 @@ mod sight;
 #[cfg(feature = "learn")]
 mod training_page;
 
+pub use aircraft_page::AircraftReport;
 #[cfg(feature = "study")]
 pub use amendment::AmendmentReport;
 #[cfg(feature = "study")]
@@ -47,9 +49,11 @@ pub use evaluation_page::EvaluationReport;
 pub use flight::{
     Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, Segment, SurfaceTravel,
 };
+pub use kit::answer_box::AnswerBox;
 pub use kit::bars::{BarGroup, Bars};
 pub use kit::choice::{Choice, ChoiceOption};
 pub use kit::curves::{Curves, Range};
+pub use kit::drawing::Drawing;
 pub use kit::evidence::{Evidence, EvidenceGroup, EvidenceRow};
 pub use kit::figure::{Figure, Outcome, Rule, Style, Verdict};
 pub use kit::findings::{Finding, Findings, Link};
@@ -60,7 +64,7 @@ pub use kit::histogram::Histogram;
 pub use kit::html::escape;
 pub use kit::intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use kit::loop_timing::{Cycle, LoopTiming};
-pub use kit::page::{Page, Section};
+pub use kit::page::{Folding, Page, Section};
 pub use kit::table::{Align, Column, Row, Table};
 pub use kit::time_figure::{Band, Mark, Panel, Scale, Series, TimeFigure, Track};
 pub use kit::time_line::{Span, States, TimeLine, Tone, TraceLine, Traces};

@@ -1,13 +1,12 @@
 //! The command that does the same as a click.
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::act::SAVED;
 use super::bench::{Bench, Inner};
 use super::session::Role;
 use greylag_logs::csv::Tolerance;
+use greylag_logs::quoted;
 use greylag_sysid::amend::document::MODEL;
 
 /// The commands for the session as it is.
@@ -109,26 +108,5 @@ impl Inner {
         let doubtful = |k: &usize| self.flights[*k].as_ref().is_ok_and(|f| f.in_doubt());
         let despite = self.given.despite_problems || self.usable(roles).iter().any(doubtful);
         self.mapping_words() + if despite { " --despite-problems" } else { "" }
-    }
-}
-
-/// A path as a shell takes it.
-pub(super) fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
-    match text.chars().all(plain) {
-        true => text,
-        false => format!("'{}'", text.replace('\'', r"'\''")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_with_spaces_or_quotes_stays_one_word() {
-        assert_eq!(quoted(Path::new("/a/b-1.csv")), "/a/b-1.csv");
-        assert_eq!(quoted(Path::new("/a b/it's")), r"'/a b/it'\''s'");
     }
 }

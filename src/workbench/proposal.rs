@@ -80,9 +80,9 @@ impl Bench {
     /// Makes the schedule that tells the two effects of [`Bench::start_design`] apart.
     #[cfg(feature = "sitl")]
     pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
-        use super::commands::quoted;
         use super::error::io;
         use greylag_control::{ControllerKind, build};
+        use greylag_logs::quoted;
         use greylag_sim::design::{Suspect, plan, prospects};
 
         let (model, path, between, words) = {

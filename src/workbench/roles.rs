@@ -43,6 +43,7 @@ impl Inner {
                 self.flights[place] = Ok(loaded);
             }
             None => {
+                self.session.make_room(entry.role);
                 self.session.logs.push(entry);
                 self.flights.push(Ok(loaded));
             }

@@ -235,15 +235,33 @@ impl Session {
         self.logs.iter().enumerate().filter(move |(_, log)| log.role == role).map(|(k, _)| k)
     }
 
-    /// The role that a log takes when it comes: one that is called a test is one, the second that comes is
-    /// held out.
+    /// The role that a log takes when it comes: one that is called a test is one, behind the first the last that comes
+    /// is held out, as `greylag amend` does.
     pub fn usual_role(&self, name: &str) -> Role {
         let has = |role| self.with(role).next().is_some();
         match name.to_lowercase().starts_with("test") {
             true => Role::Test,
-            false if has(Role::Fit) && !has(Role::HoldOut) => Role::HoldOut,
+            false if has(Role::Fit) && (!has(Role::HoldOut) || self.held_out_last().is_some()) => {
+                Role::HoldOut
+            }
             false => Role::Fit,
         }
+    }
+
+    /// Gives the log that is held out because it came last to the fit, where another comes with the role `next`.
+    pub fn make_room(&mut self, next: Role) {
+        if let (Role::HoldOut, Some(place)) = (next, self.held_out_last()) {
+            self.logs[place].role = Role::Fit;
+        }
+    }
+
+    /// The place of the only log that is held out, if it is the last of those to fit to and held out, and no effect is
+    /// accepted: then it is held out because it came last, and the next one takes its place.
+    pub fn held_out_last(&self) -> Option<usize> {
+        let seen = |log: &LogEntry| matches!(log.role, Role::Fit | Role::HoldOut);
+        let last = self.logs.iter().rposition(seen)?;
+        let only = self.with(Role::HoldOut).count() == 1;
+        (only && self.effects.is_empty() && self.logs[last].role == Role::HoldOut).then_some(last)
     }
 }
 
@@ -333,11 +351,12 @@ mod tests {
         for (name, expected) in [
             ("train-1.csv", Role::Fit),
             ("train-2.csv", Role::HoldOut),
-            ("train-3.csv", Role::Fit),
+            ("train-3.csv", Role::HoldOut),
             ("test-1.csv", Role::Test),
         ] {
             let role = session.usual_role(name);
             assert_eq!(role, expected, "{name}");
+            session.make_room(role);
             session.logs.push(log(name, role));
         }
     }

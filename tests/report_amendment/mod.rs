@@ -4,6 +4,7 @@ use greylag::sysid::amend::{
     AddedEffect, Amendment, FittedFlight, FlightEstimate, Parameter, Settings,
 };
 use greylag::sysid::compare::HorizonScore;
+use greylag::sysid::compare::answer::{Answer, Seen, Stage, Subject, Way};
 
 const FLIGHTS: [&str; 2] = ["train-1.csv", "train-2.csv"];
 
@@ -44,12 +45,27 @@ fn parameter(name: &str, added: bool, [prior, prior_sd, value, sd]: [f64; 4]) ->
     }
 }
 
+/// The answer as an amendment has it.
+fn answer() -> Answer {
+    let scores = [scores(0.06), scores(0.03), scores(0.007)];
+    let ways = [Way::Given, Way::Tuned, Way::Effects];
+    let stage = |(way, scores)| Stage { way, model: "prior", scores };
+    Answer::of(&Subject {
+        stages: ways.into_iter().zip(scores.iter().map(Vec::as_slice)).map(stage).collect(),
+        flights: vec!["test-1.csv".into()],
+        seen: Seen::Of(0),
+        effects: Vec::new(),
+        baseline: None,
+    })
+}
+
 /// Two flights fitted, two held out.
 pub fn amendment() -> Amendment {
     Amendment {
         schema: "greylag.amend/1",
         version: "0.1.0",
         model: "prior".into(),
+        answer: answer(),
         sentences: vec![
             "With lift_stall the error after 5 s falls from 0.15 to 0.035 on flights that the fit never saw."
                 .into(),

@@ -1,5 +1,6 @@
 //! A made-up comparison: two models with two flights, one of them wrong in ways put in by hand.
 
+use greylag::sysid::compare::answer::{Answer, Seen, Stage, Subject, Way};
 use greylag::sysid::compare::forecast::ForecastResult;
 use greylag::sysid::compare::{
     Bin, ChannelId, ChannelResult, ChannelTrace, Comparison, FlightResult, FlightTrace,
@@ -22,6 +23,7 @@ pub fn comparison(seconds: f64) -> Comparison {
         schema: "greylag.comparison/1",
         program: "greylag 0.1.0".into(),
         seed: 1,
+        answer: answer(&models),
         sentences: models[0].sentences.clone(),
         models,
         forecasts: vec![ForecastResult {
@@ -40,6 +42,22 @@ pub fn comparison(seconds: f64) -> Comparison {
         },
         notes: vec!["no stretch of flight is 60 s long: no free run reaches that horizon".into()],
     }
+}
+
+/// The answer as `compare` composes it.
+fn answer(models: &[ModelResult]) -> Answer {
+    let stages = models.iter().enumerate().map(|(k, m)| Stage {
+        way: if k == 0 { Way::Given } else { Way::Other },
+        model: &m.name,
+        scores: &m.free_run,
+    });
+    Answer::of(&Subject {
+        stages: stages.collect(),
+        flights: vec!["flight-a.csv".into(), "flight-b.ulg".into()],
+        seen: Seen::Unknown,
+        effects: Vec::new(),
+        baseline: None,
+    })
 }
 
 fn flight((name, start): (&str, f64), seconds: f64) -> FlightResult {

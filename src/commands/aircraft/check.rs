@@ -1,6 +1,6 @@
 //! `greylag aircraft check`: how a model's aircraft flies.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -9,10 +9,13 @@ use comfy_table::presets::NOTHING;
 use serde::Serialize;
 
 use crate::commands::files::{self, JsonArgument, Overwrite};
-use crate::commands::status;
+use crate::commands::given;
+use crate::commands::status::IN_DOUBT;
 use crate::control::aircraft_check::{self, AircraftCheck};
+use crate::control::stick_response::stick_responses;
 use crate::model::GreyBox;
 use crate::model::modes::Mode;
+use crate::report::AircraftReport;
 
 /// Options of `greylag aircraft check`.
 #[derive(clap::Args)]
@@ -20,6 +23,9 @@ pub struct Arguments {
     /// Model of the aircraft.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
+    /// Write the page of the aircraft: three views, trim, modes, what the stick does.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -36,7 +42,10 @@ struct Document<'a> {
 /// Checks and prints; the exit status is 3 if something should be mended before a flight.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
-    let model = GreyBox::load(&files::shipped(&arguments.model))?;
+    if let Some(path) = &arguments.report {
+        files::writable(path, Overwrite::Never)?;
+    }
+    let model = given::model(&arguments.model)?;
     let found = aircraft_check::check(&model)?;
     if !arguments.json.takes_stdout() {
         println!(
@@ -50,7 +59,30 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let document = Document { model: &model.name, airframe: &model.airframe.name, found: &found };
     arguments.json.write("greylag.aircraft-check/1", &document, Overwrite::Never)?;
-    Ok(if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(status::IN_DOUBT) })
+    if let Some(path) = &arguments.report {
+        files::write(path, &page(&arguments.model, &model)?, Overwrite::Never)?;
+    }
+    Ok(status(&found))
+}
+
+/// The exit status: 3 if something should be mended before a flight.
+pub fn status(found: &AircraftCheck) -> ExitCode {
+    if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) }
+}
+
+/// The page of the aircraft of `model`, whose file is `file`.
+///
+/// # Errors
+/// It cannot be trimmed or stabilised at its cruise airspeed.
+pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
+    let report = AircraftReport {
+        model,
+        check: &aircraft_check::check(model)?,
+        responses: &stick_responses(model)?,
+        model_file: file.display().to_string(),
+        command_line: files::command_line(),
+    };
+    Ok(report.page().render())
 }
 
 /// Prints what was found.
@@ -69,6 +101,15 @@ pub fn print(found: &AircraftCheck) {
     );
     println!("\n{}", loops(found));
     println!();
+    if let Some(fastest) = found.level_up_to {
+        println!("cannot fly level above {fastest:.1} m/s: faster is a descent at full throttle");
+    }
+    let controller = found.controller;
+    println!(
+        "controller to begin with: {}, whose loops bear {:.0} ms of delay",
+        controller.name,
+        1e3 * controller.delay_s
+    );
     match found.findings.is_empty() {
         true => println!("nothing to mend"),
         false => found.findings.iter().for_each(|finding| println!("mend: {finding}")),

@@ -9,9 +9,12 @@ use clap::ValueEnum;
 use crate::commands::files::{self, Overwrite};
 use crate::control::aircraft_check;
 use crate::model::GreyBox;
+use crate::model::plausible::Size;
 use crate::model::textbook::{Measures, Tail};
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
+/// Airspeed of the envelope's end in parts of the cruise airspeed, at least.
+const LEAST_ABOVE_CRUISE: f64 = 1.1;
 /// Static thrust by default, as a share of the weight.
 const THRUST: f64 = 0.5;
 /// Pitch speed by default, as a multiple of the airspeed of level flight at a lift coefficient of 0.6.
@@ -75,14 +78,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     write(&arguments.folder, &measures.airframe(), &measures.model())
 }
 
-/// Writes both files into `folder`, then says what they make of the aircraft.
+/// Writes both files into `folder`, then says what they make of the aircraft; 3 if something is to be mended.
 pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode> {
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let model = folder.join("model.toml");
-    files::writable(&model, Overwrite::Never)?;
-    files::write(&folder.join("airframe.toml"), airframe, Overwrite::Never)?;
-    files::write(&model, model_text, Overwrite::Never)?;
+    let model = files(folder, airframe, model_text)?;
     println!("wrote {} and airframe.toml beside it", model.display());
     let found = aircraft_check::check(&GreyBox::load(&model)?)?;
     super::check::print(&found);
@@ -90,7 +88,40 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
         "fly it, then fit it: greylag amend --model {} --log FLIGHTS --tune-only --out FOLDER",
         model.display()
     );
-    Ok(ExitCode::SUCCESS)
+    Ok(super::check::status(&found))
+}
+
+/// The airframe whose envelope ends where level flight does.
+fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
+    let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
+    let path = scratch.path().join("model.toml");
+    std::fs::write(scratch.path().join("airframe.toml"), airframe)?;
+    std::fs::write(&path, model_text)?;
+    let model = GreyBox::load(&path)?;
+    let envelope = model.airframe.envelope;
+    let Some(fastest) = aircraft_check::fastest_level(&model) else { return Ok(airframe.into()) };
+    let end = (10.0 * fastest).floor() / 10.0;
+    let leaves_room = end > LEAST_ABOVE_CRUISE * envelope.airspeed_cruise_mps;
+    let line = |v: f64| format!("airspeed_max_mps = {v:.1}\n");
+    Ok(if leaves_room {
+        airframe.replace(&line(envelope.airspeed_max_mps), &line(end))
+    } else {
+        airframe.into()
+    })
+}
+
+/// Writes both files into `folder`; the model's path.
+pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf> {
+    let airframe = flown_level(airframe, model_text)?;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let model = folder.join("model.toml");
+    if model.exists() {
+        bail!("{} exists; name another folder", model.display());
+    }
+    files::write(&folder.join("airframe.toml"), &airframe, Overwrite::Never)?;
+    files::write(&model, model_text, Overwrite::Never)?;
+    Ok(model)
 }
 
 /// The measures, each checked.
@@ -109,12 +140,9 @@ pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) ->
             bail!("{name} = {value} is not physical: give a number above 0 and at most {most}");
         }
     }
-    let aspect = span_m * span_m / area_m2;
-    if !(2.0..=40.0).contains(&aspect) {
-        bail!(
-            "the aspect ratio span²/area is {aspect:.1}, that of aircraft with a straight wing 2 to 40: \
-             check --span-m and --area-m2"
-        );
+    let size = Size { mass: mass_kg, span: span_m, area: area_m2 };
+    if let Some(doubt) = size.doubt() {
+        bail!("{doubt}");
     }
     let own = folder.file_name().map(|name| name.to_string_lossy().into_owned());
     let Some(name) = arguments.name.clone().or(own) else {
@@ -123,7 +151,11 @@ pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) ->
     let weight = mass_kg * STANDARD_GRAVITY;
     let travel = travel_deg.to_radians();
     let wing = arguments.tail == TailName::FlyingWing;
-    let level = (2.0 * weight / (1.225 * area_m2 * 0.6)).sqrt();
+    let static_thrust = arguments.static_thrust_n.unwrap_or(THRUST * weight);
+    let pitch_speed = arguments.pitch_speed_mps.unwrap_or(PITCH_SPEED * size.level_mps());
+    if let Some(doubt) = size.doubt_of_thrust(static_thrust, pitch_speed) {
+        bail!("{doubt}");
+    }
     Ok(Measures {
         name,
         mass: mass_kg,
@@ -132,7 +164,7 @@ pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) ->
         tail: if wing { Tail::FlyingWing } else { Tail::Conventional },
         rudder: (!wing && !arguments.no_rudder).then_some(travel),
         travel,
-        static_thrust: arguments.static_thrust_n.unwrap_or(THRUST * weight),
-        pitch_speed: arguments.pitch_speed_mps.unwrap_or(PITCH_SPEED * level),
+        static_thrust,
+        pitch_speed,
     })
 }

@@ -18,9 +18,12 @@ use crate::commands::bar::{Bar, shares};
 use crate::commands::distinct::distinct;
 use crate::commands::effect_files::{named_effects, own_effects};
 use crate::commands::files::{self, shipped};
+use crate::commands::given as read;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
+use crate::commands::terminal::print_summary;
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::physics::catalogue;
 use crate::report::AmendmentReport;
@@ -100,7 +103,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
-    let model = bounds::given(GreyBox::load(&path)?, &arguments.bounds)?;
+    let model = bounds::given(read::model(&arguments.model)?, &arguments.bounds)?;
     if arguments.leave_one_out {
         return structures(arguments, &model);
     }
@@ -137,7 +140,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     bar.go_on()?;
     drop(bar);
-    print(&amended.amendment);
+    let answer = amended.amendment.answer.clone().then(next(arguments, &places));
+    print(&amended.amendment, &answer);
     if all_refused {
         bail!(
             "no effect was accepted, so nothing was written; --tune-only writes the tuned model, \
@@ -152,7 +156,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some((path, page)) = drawn {
         files::write(path, &page, overwrite)?;
     }
+    print_summary(&answer);
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// What comes next: whether the amended model still lacks something.
+fn next(arguments: &Arguments, places: &Places) -> String {
+    let logs = &arguments.logs;
+    format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
 }
 
 /// What the amendment is asked for, `effects` to be added.
@@ -249,9 +260,11 @@ fn page(
     models[1].name = format!("{}-tuned", model.name);
     let held_out = compare(&models, tests, &compare::Options::default(), progress)?;
     let paths = arguments.logs.paths.iter().chain(&arguments.hold_out);
+    let answer = amended.amendment.answer.clone().then(next(arguments, places));
     let report = AmendmentReport {
         title: format!("{} amended", model.name),
         amendment: &amended.amendment,
+        answer: Some(&answer),
         held_out: Some(&held_out),
         model_files: vec![
             arguments.model.display().to_string(),

@@ -1,13 +1,15 @@
 //! What `greylag amend` prints.
 
-use comfy_table::{CellAlignment, Table};
+use comfy_table::Table;
 
+use crate::commands::terminal::{print_answer, table};
 use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
-use crate::sysid::compare::HorizonScore;
+use crate::sysid::compare::{Answer, HorizonScore};
 
-/// Parameters, errors, sentences, notes.
-pub fn print(story: &Amendment) {
-    println!("{}\n{}", parameter_table(&story.parameters), error_table(story));
+/// The answer, errors, parameters, sentences, notes.
+pub fn print(story: &Amendment, answer: &Answer) {
+    print_answer(answer);
+    println!("{}\n{}", error_table(story), parameter_table(&story.parameters));
     if story.flights.iter().any(|f| !f.own.is_empty()) {
         println!("{}", own_table(&story.flights));
     }
@@ -15,18 +17,8 @@ pub fn print(story: &Amendment) {
     story.notes.iter().for_each(|note| println!("note: {note}"));
 }
 
-fn empty_table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(header);
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
-}
-
 fn parameter_table(parameters: &[Parameter]) -> Table {
-    let mut table = empty_table(["coefficient", "before", "fitted", "95 % from", "to", ""]);
+    let mut table = table(["coefficient", "before", "fitted", "95 % from", "to", ""], 1);
     for p in parameters {
         let before = if p.added { "–".into() } else { number(p.prior) };
         let remark = match (p.at_bound, p.added) {
@@ -45,7 +37,7 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
 /// What each flight has of its own; angles in degrees.
 fn own_table(flights: &[FittedFlight]) -> Table {
     let mut table =
-        empty_table(["flight", "its own", "value", "sd", "beside the flights' mean", "sd"]);
+        table(["flight", "its own", "value", "sd", "beside the flights' mean", "sd"], 1);
     for f in flights {
         for c in &f.own {
             let (factor, unit) = own_unit(c.name);
@@ -69,7 +61,7 @@ fn own_unit(name: &str) -> (f64, &'static str) {
 /// Free-run errors on the flights that the fit did not see.
 fn error_table(story: &Amendment) -> Table {
     let header = ["NRMSE on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
-    let mut table = empty_table(header);
+    let mut table = table(header, 1);
     let rows = [("as given", &story.given), ("tuned", &story.before), ("amended", &story.after)];
     for (name, scores) in rows {
         let mut row = vec![name.to_string()];

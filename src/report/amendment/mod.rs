@@ -4,7 +4,7 @@ pub(super) mod page;
 
 use crate::Page;
 use greylag_sysid::amend::Amendment;
-use greylag_sysid::compare::Comparison;
+use greylag_sysid::compare::{Answer, Comparison};
 
 /// An amended model's story, with where it came from.
 #[derive(Clone, Debug)]
@@ -13,6 +13,8 @@ pub struct AmendmentReport<'a> {
     pub title: String,
     /// What was fitted, and what it was worth.
     pub amendment: &'a Amendment,
+    /// The amendment's answer with the command that comes next, where that is known.
+    pub answer: Option<&'a Answer>,
     /// Models in the order in which they improve (as given, tuned, amended) against flights that no fit
     /// has seen: the growth of their errors, where it was worked out.
     pub held_out: Option<&'a Comparison>,

@@ -4,7 +4,7 @@ use crate::Align::{Left, Right};
 use crate::amendment::AmendmentReport;
 use crate::diagnosis::{proof, suspects, tables};
 use crate::kit::numbers::{NORMAL_95, interval, number, percent};
-use crate::{Curves, Figure, Finding, Findings, Page, Section, Series, Style, Table};
+use crate::{AnswerBox, Curves, Figure, Finding, Findings, Page, Section, Series, Style, Table};
 use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
@@ -15,17 +15,20 @@ const LEADING: usize = 2;
 /// The page of `report`: the sentence first, then what bears it out.
 pub fn amendment_page(report: &AmendmentReport) -> Page {
     let a = report.amendment;
-    let mut sections = vec![Section::new("", "", vec![Figure::Findings(findings(a))])];
+    let answer = report.answer.unwrap_or(&a.answer).clone();
+    let answer = Figure::Answer(Box::new(AnswerBox { answer }));
+    let mut sections = vec![Section::new("", "", vec![answer])];
     sections.push(match report.held_out {
         Some(comparison) => proof::before_and_after(comparison),
         None => before_and_after(a),
     });
-    sections.push(effects(a));
     sections.push(added(a));
+    sections.push(effects(a));
+    sections.push(Section::new("In words", "", vec![Figure::Findings(findings(a))]));
     sections.push(tables::tuned(&tuned(a)));
-    sections.push(sensors(a));
-    sections.push(notes(a));
-    sections.push(provenance(report));
+    sections.push(sensors(a).folded());
+    sections.push(notes(a).folded());
+    sections.push(provenance(report).folded());
     sections.retain(|s| !s.figures.is_empty());
     let subtitle = format!("{} with {}.", a.model, report.log_files.join(", "));
     Page { title: report.title.clone(), subtitle, sections }

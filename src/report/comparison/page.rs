@@ -3,8 +3,8 @@
 use crate::comparison::ComparisonReport;
 use crate::comparison::{regimes, tables, traces};
 use crate::{
-    BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, Link, Page, Section, Series,
-    Style,
+    AnswerBox, BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, Link, Page,
+    Section, Series, Style,
 };
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
@@ -16,16 +16,25 @@ const OF_OTHERS: usize = 2;
 /// The page of `report`: the sentence first, then what bears it out.
 pub fn comparison_page(report: &ComparisonReport) -> Page {
     let c = report.comparison;
-    let mut sections = vec![Section::new("", "", vec![Figure::Findings(findings(c))])];
-    sections.push(tables::summary(c));
+    let answer = Figure::Answer(Box::new(AnswerBox { answer: c.answer.clone() }));
+    let words = Figure::Findings(findings(c));
+    // of one model the question is where it fails, of several by how much they differ
+    let (first, later) = match c.models.len() {
+        0 | 1 => (vec![answer, words], Section::default()),
+        _ => (vec![answer], Section::new("Where each fails", "", vec![words])),
+    };
+    let mut sections = vec![Section::new("", "", first)];
     sections.push(Section::new("Unexplained", UNEXPLAINED_NOTE, vec![unexplained(c)]));
+    sections.push(Section::new("Error growth", &growth_note(c), growth(c)));
     sections.extend(traces::section(c));
+    sections.push(later);
     sections.push(regimes::regimes(c));
     sections.push(regimes::maps(c));
-    sections.push(Section::new("Error growth", &growth_note(c), growth(c)));
-    sections.push(tables::nuisances(c));
-    sections.push(tables::notes(c));
-    sections.push(tables::provenance(report));
+    sections.push(tables::summary(c));
+    sections.push(tables::baselines(c).folded());
+    sections.push(tables::nuisances(c).folded());
+    sections.push(tables::notes(c).folded());
+    sections.push(tables::provenance(report).folded());
     sections.retain(|s| !s.figures.is_empty());
     Page { title: report.title.clone(), subtitle: subtitle(c), sections }
 }

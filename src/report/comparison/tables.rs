@@ -23,10 +23,8 @@ pub(crate) fn summary(c: &Comparison) -> Section {
             ("covariance (%)", Align::Right),
         ],
     );
-    for (name, scores) in c.free_runs() {
-        for score in scores {
-            table.push(summary_row(name, score));
-        }
+    for model in &c.models {
+        model.free_run.iter().for_each(|score| table.push(summary_row(&model.name, score)));
     }
     let mut figures = vec![Figure::Table(table)];
     let options: Vec<ChoiceOption> =
@@ -36,11 +34,37 @@ pub(crate) fn summary(c: &Comparison) -> Section {
         figures.push(Figure::Choice(Choice { anchor, label, options }));
     }
     let note = "Free runs from reconstructed states. NRMSE: root mean square over the eight states of RMSE over the \
-                reference scale x_c. The last rows are forecasts without aerodynamics: a model has to beat them. R²: 1 is \
+                reference scale x_c. R²: 1 is \
                 perfect, below 0 the mean is better. Theil's U: 0 is perfect, 1 is no relation; \
                 its shares say whether the error is an offset (bias), too much or too little \
                 movement (variance) or movement at the wrong time (covariance).";
     Section::new("Free runs", note, figures)
+}
+
+/// The same free runs by forecasts without aerodynamics, which a model has to beat.
+pub(crate) fn baselines(c: &Comparison) -> Section {
+    let columns = [
+        ("Forecast", Align::Left),
+        ("Horizon (s)", Align::Right),
+        ("Diverged (%)", Align::Right),
+        ("NRMSE", Align::Right),
+    ];
+    let mut table = Table::new("Forecasts without aerodynamics", &columns);
+    for forecast in &c.forecasts {
+        for s in &forecast.free_run {
+            let cells =
+                [s.horizon_s.to_string(), percent(s.divergence_rate), number(s.rmse_scaled)];
+            table.push(std::iter::once(forecast.name.to_string()).chain(cells));
+        }
+    }
+    match table.rows.is_empty() {
+        true => Section::default(),
+        false => Section::new(
+            "Forecasts without aerodynamics",
+            "They know no aerodynamics: a model has to beat them.",
+            vec![Figure::Table(table)],
+        ),
+    }
 }
 
 fn summary_row(model: &str, score: &HorizonScore) -> Vec<String> {

@@ -6,7 +6,7 @@ pub(super) mod suspects;
 pub(super) mod tables;
 
 use crate::Page;
-use greylag_sysid::compare::Comparison;
+use greylag_sysid::compare::{Answer, Comparison};
 use greylag_sysid::diagnose::Diagnosis;
 
 /// A diagnosis of what a model lacks, with what bears it out.
@@ -16,7 +16,9 @@ pub struct DiagnosisReport<'a> {
     pub title: String,
     /// What was found.
     pub diagnosis: &'a Diagnosis,
-    /// The model as given, first of its models, against the flights of the diagnosis: where it fails.
+    /// By how much the error falls, and by what.
+    pub answer: Option<&'a Answer>,
+    /// The model tuned, then as given, against the flights of the diagnosis: where it fails.
     pub failing: Option<&'a Comparison>,
     /// Models in the order in which they improve (as given, tuned, with the asserted effects) against
     /// flights that no fit has seen.

@@ -5,10 +5,10 @@ use crate::diagnosis::DiagnosisReport;
 use crate::diagnosis::{proof, suspects, tables};
 use crate::kit::numbers::percent;
 use crate::{
-    BarGroup, Bars, Figure, Finding, Findings, Grid, GridCell, GridRow, Link, Page, Section, Style,
-    Table,
+    AnswerBox, BarGroup, Bars, Choice, ChoiceOption, Figure, Finding, Findings, Grid, GridCell,
+    GridRow, Link, Page, Section, Style, Table,
 };
-use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, RegimeVariable};
+use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
 
 /// Sentences that stand large at the top.
@@ -19,21 +19,31 @@ const BLANK: f64 = 0.05;
 /// The page of `report`: the sentence first, then what bears it out.
 pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     let d = report.diagnosis;
-    let mut sections = vec![Section::new("", "", vec![Figure::Findings(findings(d))])];
+    let answer = report.answer.cloned();
+    let words = || Figure::Findings(findings(d));
+    let (first, later) = match answer {
+        Some(answer) => {
+            let answer = Figure::Answer(Box::new(AnswerBox { answer }));
+            (answer, Section::new("In words", "", vec![words()]))
+        }
+        None => (words(), Section::default()),
+    };
+    let mut sections = vec![Section::new("", "", vec![first])];
+    sections.push(suspects::curves(d));
     sections.push(where_it_fails(d, report.failing));
     sections.push(suspects::ranking(d));
-    sections.push(suspects::curves(d));
     sections.push(suspects::agreement(d));
+    sections.push(later);
     sections.push(proof::chance(d));
     sections.extend(report.held_out.map(proof::before_and_after));
     sections.push(tables::advice(d));
-    sections.push(tables::unseen(d));
+    sections.push(tables::unseen(d).folded());
     sections.push(tables::tuned(&d.tuned));
-    sections.push(tables::measurement(d));
-    sections.push(tables::trims(d));
-    sections.push(tables::candidates(d));
-    sections.push(tables::notes(d));
-    sections.push(tables::provenance(report));
+    sections.push(tables::measurement(d).folded());
+    sections.push(tables::trims(d).folded());
+    sections.push(tables::candidates(d).folded());
+    sections.push(tables::notes(d).folded());
+    sections.push(tables::provenance(report).folded());
     sections.retain(|s| !s.figures.is_empty());
     Page { title: report.title.clone(), subtitle: subtitle(report), sections }
 }
@@ -75,20 +85,33 @@ pub(crate) fn channel_of(symbol: &str) -> String {
 
 fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     let mut figures = Vec::new();
-    figures.extend(failing.and_then(map));
+    figures.extend(failing.and_then(maps));
     if !d.channels.is_empty() {
         figures.push(left(d));
         figures.push(worst(d));
     }
     let note = "The share of each channel's variation that is neither explained by the model nor by \
                 the sensors' noise. “Tuned” is the model with its own coefficients fitted first: \
-                what is left then is for a missing effect to explain.";
+                what is left then is for a missing effect to explain. What tuning takes away was wrong \
+                coefficients, no missing effect.";
     Section::new("Where it fails", note, figures)
 }
 
-/// Channels over regime variables: what each variable tells of the residual of the model as given.
-fn map(c: &Comparison) -> Option<Figure> {
-    let channels = &c.models.first()?.channels;
+/// Channels over regime variables, of each model: the first one is seen at first.
+fn maps(c: &Comparison) -> Option<Figure> {
+    // one scale of importance for all, so that a switch does not change what a colour means
+    let options: Vec<ChoiceOption> = c
+        .models
+        .iter()
+        .filter_map(|m| Some(ChoiceOption { name: m.name.clone(), figures: vec![map(m)?] }))
+        .collect();
+    let choice = Choice { anchor: "fails".into(), label: "Model".into(), options };
+    (!choice.options.is_empty()).then_some(Figure::Choice(choice))
+}
+
+/// Channels over regime variables: what each variable tells of a model's residual.
+fn map(model: &ModelResult) -> Option<Figure> {
+    let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS
         .into_iter()
         .chain([RegimeVariable::Flight])
@@ -106,7 +129,7 @@ fn map(c: &Comparison) -> Option<Figure> {
     let mut columns = vec![("left".to_string(), "share that is unexplained".to_string())];
     columns.extend(variables.iter().map(|v| (sign(*v).to_string(), v.name().to_string())));
     Some(Figure::Grid(Grid {
-        title: format!("What follows what, {}", c.models[0].name),
+        title: format!("What follows what, {}", model.name),
         unit: "how much of the unexplained follows each variable, %".into(),
         corner: "Channel".into(),
         columns,

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::kit::html::escape;
 use crate::{
-    Bars, Choice, Curves, Evidence, Findings, Grid, HeatMap, Histogram, Intervals, Table,
-    TimeFigure, Whiskers, XyFigure,
+    AnswerBox, Bars, Choice, Curves, Drawing, Evidence, Findings, Grid, HeatMap, Histogram,
+    Intervals, Table, TimeFigure, Whiskers, XyFigure,
 };
 
 /// One figure of a section.
@@ -13,6 +13,10 @@ use crate::{
 pub enum Figure {
     /// A sentence that says how it went.
     Verdict(Verdict),
+    /// The answer, before anything else.
+    Answer(Box<AnswerBox>),
+    /// Lines and areas, to scale.
+    Drawing(Drawing),
     /// Panels over time.
     Time(TimeFigure),
     /// Points or paths of one quantity against another.

@@ -1,9 +1,11 @@
 //! The figure kit: pages, tables and plots that know no aircraft.
 
+pub(super) mod answer_box;
 pub(super) mod bars;
 pub(super) mod choice;
 pub(super) mod curves;
 pub(super) mod decimate;
+pub(super) mod drawing;
 pub(super) mod evidence;
 pub(super) mod figure;
 pub(super) mod findings;

@@ -39,6 +39,18 @@ pub struct Section {
     pub note: String,
     /// The figures, in order.
     pub figures: Vec<Figure>,
+    /// Whether it is seen at first; plots, which need their size, are not folded.
+    pub folding: Folding,
+}
+
+/// Whether a section is seen at first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Folding {
+    /// It is.
+    #[default]
+    Open,
+    /// Its heading is; a click opens it.
+    Folded,
 }
 
 impl Page {
@@ -89,7 +101,12 @@ impl Page {
 impl Section {
     /// A section of figures under a heading and a note, either of which may be empty.
     pub fn new(title: &str, note: &str, figures: Vec<Figure>) -> Self {
-        Section { title: title.into(), note: note.into(), figures }
+        Section { title: title.into(), note: note.into(), figures, folding: Folding::Open }
+    }
+
+    /// The same, of which the heading alone is seen at first.
+    pub fn folded(self) -> Self {
+        Section { folding: Folding::Folded, ..self }
     }
 
     /// A section that is one verdict, without a heading.
@@ -100,9 +117,14 @@ impl Section {
     /// The section as HTML; the data of its plots is added to `data`, one JSON value a plot.
     fn html(&self, index: usize, data: &mut Vec<String>) -> String {
         let mut html = format!("<section id=\"s{index}\">\n");
-        if !self.title.is_empty() {
-            html.push_str(&format!("<h2>{}</h2>\n", escape(&self.title)));
-        }
+        let heading = match (self.title.is_empty(), self.folding) {
+            (true, _) => String::new(),
+            (false, Folding::Open) => format!("<h2>{}</h2>\n", escape(&self.title)),
+            (false, Folding::Folded) => {
+                format!("<details><summary><h2>{}</h2></summary>\n", escape(&self.title))
+            }
+        };
+        html.push_str(&heading);
         if !self.note.is_empty() {
             html.push_str(&format!("<p class=\"note\">{}</p>\n", escape(&self.note)));
         }
@@ -110,7 +132,8 @@ impl Section {
         for figure in &self.figures {
             html.push_str(&figure.html(data));
         }
-        html.push_str("</div>\n</section>\n");
+        let end = if heading.starts_with("<details>") { "</details>\n" } else { "" };
+        html.push_str(&format!("</div>\n{end}</section>\n"));
         html
     }
 }
@@ -120,6 +143,8 @@ impl Figure {
         let index = data.len();
         match self {
             Figure::Verdict(verdict) => verdict.html(),
+            Figure::Answer(answer) => answer.html(),
+            Figure::Drawing(drawing) => drawing.html(),
             Figure::Table(table) => table.html(),
             Figure::Findings(findings) => findings.html(),
             Figure::Bars(bars) => bars.html(),

@@ -9,7 +9,8 @@ use super::flight::Flight;
 use super::judge::{self, JUDGED_AT_S, Judge};
 use super::output_error::{Fit, FitOptions};
 use super::result::{Amendment, Settings};
-use super::{parameters, story};
+use super::{answer, parameters, story};
+use crate::compare::Answer;
 use crate::diagnose::Candidate;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
 use crate::per_flight::PerFlight;
@@ -165,6 +166,7 @@ pub fn amend(
         schema: "greylag.amend/1",
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
+        answer: Answer::nothing(),
         sentences: Vec::new(),
         effects,
         conventions,
@@ -186,6 +188,7 @@ pub fn amend(
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));
     amendment.sentences = rudder.map(rudder::warning).into_iter().collect();
     amendment.sentences.extend(story::sentences(&amendment));
+    amendment.answer = answer::answer(&amendment);
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 

@@ -5,6 +5,7 @@
 //! it was worth.
 
 mod amendment;
+mod answer;
 mod conventions;
 pub mod document;
 mod equation_error;
@@ -22,6 +23,7 @@ mod shooting;
 mod story;
 
 pub use amendment::{Added, Amended, Options, Prior, Refused, amend, split};
+pub use answer::{Diagnosed, Origin, diagnosed};
 pub use conventions::{Convention, Tried};
 pub use error::AmendError;
 pub use flight::Flight;

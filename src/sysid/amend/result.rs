@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::conventions::Tried;
 use super::flight::SENSORS;
 use super::judge::{judged, judged_at};
-use crate::compare::HorizonScore;
+use crate::compare::{Answer, HorizonScore};
 use crate::per_flight::{Constant, PerFlight};
 
 /// Share by which the error of unseen flights must rise for a fit to be worse than the model as given.
@@ -149,6 +149,8 @@ pub struct Amendment {
     pub version: &'static str,
     /// Name of the model before.
     pub model: String,
+    /// The answer in a few sentences, with their numbers.
+    pub answer: Answer,
     /// The story in plain sentences.
     pub sentences: Vec<String>,
     /// The effects that were asked for.

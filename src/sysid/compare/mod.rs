@@ -4,6 +4,7 @@
 //! model as given; tuning it is the business of what ranks missing effects, for which
 //! [`columns`](crate::weak_form::windows::columns) gives what to regress on.
 
+pub mod answer;
 mod bins;
 pub mod bootstrap;
 mod discovery;
@@ -19,10 +20,11 @@ mod sentence;
 mod verdict;
 
 pub use crate::weak_form::channels::{ChannelId, RegimeVariable};
+pub use answer::Answer;
 pub use error::CompareError;
 pub use result::{
     Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace, GrowthPoint,
     HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime, RegimeBins,
     Settings, StateScore,
 };
-pub use run::{Options, abstentions, compare};
+pub use run::{Options, abstentions, compare, scores};

@@ -5,6 +5,7 @@
 
 use serde::Serialize;
 
+use super::answer::Answer;
 use super::forecast::ForecastResult;
 use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
@@ -17,6 +18,8 @@ pub struct Comparison {
     pub program: String,
     /// Seed of the bootstrap.
     pub seed: u64,
+    /// The answer in a few sentences, with their numbers.
+    pub answer: Answer,
     /// The finding in plain words: the sentences of the first model, the leading ones first.
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.

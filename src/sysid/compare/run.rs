@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::CompareError;
+use super::answer::between::between;
 use super::bins::{self, Residual, SUPPORT};
 use super::bootstrap::{BLOCK_S, RESAMPLES};
 use super::discovery;
@@ -12,7 +13,8 @@ use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::result::{
-    ChannelResult, ChannelTrace, Comparison, ModelResult, ModelTrace, RegimeBins, Settings,
+    ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace, RegimeBins,
+    Settings,
 };
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
@@ -21,7 +23,7 @@ use crate::progress::{Progress, say};
 use crate::rudder;
 use crate::weak_form::channels::ChannelId;
 use crate::weak_form::kernel::KERNEL_S;
-use crate::weak_form::prepared::Prepared;
+use crate::weak_form::prepared::{ClockError, Prepared};
 use crate::weak_form::windows::{self, Series};
 use greylag_model::GreyBox;
 
@@ -81,6 +83,7 @@ pub fn compare(
         })
         .collect::<Result<Vec<_>, CompareError>>()?;
     Ok(Comparison {
+        answer: between(&models, &prepared, &forecasts),
         schema: "greylag.comparison/1",
         program: concat!("greylag ", env!("CARGO_PKG_VERSION")).into(),
         seed: options.seed,
@@ -99,6 +102,22 @@ pub fn compare(
         },
         notes,
     })
+}
+
+/// Free-run errors of `model` over `flights` at `horizons_s` (s), one for each.
+///
+/// # Errors
+/// A flight's clock does not fit.
+pub fn scores(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    horizons_s: &[f64],
+) -> Result<Vec<HorizonScore>, ClockError> {
+    let slowest = model.airframe.envelope.flying_from_mps();
+    let prepared =
+        flights.iter().map(|f| Prepared::new(f, slowest)).collect::<Result<Vec<_>, _>>()?;
+    let (runs, _) = free_run::fly(model, &prepared, horizons_s);
+    Ok(horizons_s.iter().map(|h| runs.score(*h)).collect())
 }
 
 type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);

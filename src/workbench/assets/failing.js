@@ -16,7 +16,7 @@ export function failing(of) {
   if (!found) {
     parts = null;
     const none = !state.flights.some((f) => f.role === "fit" || f.role === "hold_out");
-    return body.replaceChildren(el("p", { class: "empty" }, none ? "Drop a flight log: the model is compared with it at once." : "Comparing the model with the flights …"));
+    return body.replaceChildren(...(none ? welcome() : [el("p", { class: "empty" }, "Comparing the model with the flights …")]));
   }
   if (!parts) {
     parts = build();
@@ -24,6 +24,31 @@ export function failing(of) {
   }
   grid();
   parts.command.replaceChildren(...[command(state.commands.compare)].filter(Boolean));
+}
+
+/** What an empty session shows: what will come, and where flights are to be had. */
+function welcome() {
+  const steps = [["1", "Drop flight logs", "the model is compared with them at once: in which channel, and where, it fails"],
+    ["2", "Diagnose", "every effect of the catalogue against what the model leaves, beside what chance reaches"],
+    ["3", "Tick a suspect", "the model is fitted with it; the error falls on a flight held out, tuning and effect apart"],
+    ["4", "Judge, save, fly", "test flights stay unseen until then; the saved model is the command line's"]];
+  return [el("ol", { class: "welcome" }, steps.map(([k, what, why]) => el("li", {}, el("b", {}, what), ` – ${why}`))),
+    picture(), el("p", { class: "note" }, "No log at hand? ", el("code", {}, "greylag mystery --seed 3 --out mystery"), " flies three flights with a hidden effect, two more to judge by, and writes the model that lacks it: drop mystery/train-*.csv and mystery/test-*.csv here.")];
+}
+/** A picture of a diagnosis: what the model leaves over a variable, and the effect through it. */
+function picture() {
+  const ns = "http://www.w3.org/2000/svg";
+  const svg = document.createElementNS(ns, "svg");
+  for (const [k, v] of Object.entries({ viewBox: "0 0 320 150", role: "img", class: "picture", "aria-label": "dots of what a model leaves over sideslip, and the curve of the effect through them" })) svg.setAttribute(k, v);
+  const add = (tag, of) => { const n = document.createElementNS(ns, tag); for (const [k, v] of Object.entries(of)) n.setAttribute(k, v); svg.append(n); };
+  for (let i = 0; i < 90; i++) {
+    const x = (i - 44.5) / 45;
+    // dots scattered as measurements are, the same at every look
+    const noise = Math.sin(i * 12.9898) * 43758.5453;
+    add("circle", { cx: 160 + 150 * x, cy: 130 - 105 * x * x - 16 * (noise - Math.floor(noise) - 0.5), r: 2, class: "dot" });
+  }
+  add("path", { d: "M10 25 Q160 235 310 25", class: "curve" });
+  return svg;
 }
 
 function build() {
@@ -67,7 +92,8 @@ function grid() {
     return el("tr", {}, el("th", { scope: "row" }, c.name), el("td", { class: "fit" }, r2(share(c))), after && el("td", { class: "fit" }, r2(share(two))),
       VARIABLES.map((v) => el("td", {}, own[v] && cell(c, own[v], size))));
   });
-  parts.grid.replaceChildren(el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows)));
+  const symbols = VARIABLES.filter((v) => shown.some((c) => cells(c)[v])).map((v) => `${SYMBOL[v]} ${name(shown, v)}`).join(", ");
+  parts.grid.replaceChildren(el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows)), el("p", { class: "note" }, `Numbers: how much of what is left goes with each variable, %. ${symbols}.`));
   finding();
 }
 const r2 = (v) => (v == null ? "–" : v > 0.9995 ? "1.000" : v < -9.995 ? "under −9" : show(v, v >= 0.995 ? 4 : 3));
@@ -92,6 +118,14 @@ function pressed_cell() {
     states();
     brush();
   }
+}
+/** The channel and the variable that an effect acts in stand chosen: its own plots follow the tick. */
+export function follow(effect) {
+  const channels = bench?.failing?.models[0].channels;
+  const channel = effect && channels?.find((c) => c.channel === (effect.curve?.channel ?? effect.channels[0]));
+  if (!channel) return;
+  const named = channel.bins.find((b) => VARIABLES.includes(b.variable) && effect.curve?.variable.startsWith(b.name));
+  Object.assign(pick, { channel: channel.channel, variable: named?.variable ?? pick.variable, by_hand: true });
 }
 /** The cell that says most stands chosen at first. */
 function start(channels) {

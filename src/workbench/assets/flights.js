@@ -11,8 +11,9 @@ export function flights(bench) {
   const input = el("input", { type: "file", multiple: true, onchange: () => bench.upload([...input.files]) });
   const drop = el("label", { class: "drop" }, "Drop flight logs here, or choose files", input,
     el("br"), el("span", { class: "note" }, "CSV, ULog, DataFlash .bin, .tlog"));
+  const left = bench.reading > 0 && el("p", { class: "note", role: "status" }, `${bench.reading} more ${bench.reading === 1 ? "is" : "are"} being read …`);
   const list = bench.state.flights.map((flight, place) => one(bench, flight, place, kept));
-  body.replaceChildren(drop, ...list, ...[command(bench.state.commands.flights)].filter(Boolean));
+  body.replaceChildren(drop, ...list, ...[left].filter(Boolean), ...[command(bench.state.commands.flights)].filter(Boolean));
   for (const canvas of body.querySelectorAll("canvas")) strip(canvas, bench.state.flights[+canvas.dataset.flight], bench.lit.get(+canvas.dataset.flight) ?? []);
 }
 
@@ -34,7 +35,7 @@ function one(bench, flight, place, kept) {
   node.append(el("p", { class: "note" }, `${flight.format} · ${show(flight.rate_hz)} Hz · ${show(flight.flight_s)} s in flight`));
   node.append(flight.locked
     ? el("div", { class: "locked" }, "unseen until Judge")
-    : el("canvas", { "data-flight": place, role: "img", "aria-label": "angle of attack, airspeed and elevator over time" }));
+    : el("canvas", { "data-flight": place, role: "img", "aria-label": "angle of attack (°), airspeed (m/s) and elevator (°) over time", title: "angle of attack α (°), airspeed V (m/s), elevator δe (°) over time" }));
   node.append(roles, ...about(bench, flight, place, kept));
   return node;
 }

@@ -2,7 +2,7 @@
 
 import { complain, el, get, horizon, hush, judged, percent, post, redraw, send, show, verdicts } from "./kit.js";
 import { flights } from "./flights.js";
-import { failing, freshFailing, repaint } from "./failing.js";
+import { failing, follow, freshFailing, repaint } from "./failing.js";
 import { fly, offer, part } from "./fly.js";
 import { suspects } from "./suspects.js";
 import { text } from "./text.js";
@@ -89,6 +89,7 @@ function choose_lit() {
   return true;
 }
 function show_all() {
+  document.querySelector("main").classList.toggle("diagnosed", !!bench.diagnosis);
   document.getElementById("to-failsafes").hidden = !bench.state.fly.possible;
   answer();
   job();
@@ -116,11 +117,15 @@ function answer() {
   const story = verdicts(state);
   const name = el("b", {}, state.model.name);
   if (!story) return place.replaceChildren(name);
-  const [before, after] = [judged(story.given), judged(story.after)];
-  const fall = before && after != null ? percent(after / before - 1) : "–";
+  // tuning and effect apart: what wrong coefficients were worth, and what the effect is
   const joined = story.effects.filter((e) => e.joined).map((e) => e.id);
-  place.replaceChildren(name, ` ${joined.length ? `with ${joined.join(", ")}` : "tuned, no effect accepted"}: NRMSE${horizon(story.after)} on held-out flight `,
-    el("b", {}, `${show(before)} → ${show(after)}`), ` (${fall})`);
+  const steps = [["as given", judged(story.given)], ["tuned", judged(story.before)], ...(joined.length ? [[joined.join(" + "), judged(story.after)]] : [])];
+  const parts = steps.flatMap(([word, error], k) => {
+    const before = k && steps[k - 1][1];
+    const fall = before && error != null ? `, ${percent(error / before - 1)}` : "";
+    return [k ? " → " : "", el("b", {}, show(error)), ` (${word}${fall})`];
+  });
+  place.replaceChildren(name, `: error${horizon(story.after)} held out `, ...parts);
 }
 function job() {
   const place = document.getElementById("job");
@@ -136,6 +141,8 @@ const WORK = { diagnosis: "diagnosis", fit: "fit", proposal: "search for a formu
 async function act(what) {
   hush();
   if (what.do === "propose") bench.waited_for = "proposal";
+  // the large plot goes where the effect acts
+  if (what.do === "tick") follow(bench.diagnosis?.effects.find((e) => e.id === what.effect));
   try {
     await refresh(await post("/api/act", { revision: bench.state.revision, act: what }));
     return true;
@@ -152,7 +159,9 @@ async function take(file) {
 async function upload(files) {
   hush();
   const said = [];
-  for (const file of files) {
+  for (const [k, file] of files.entries()) {
+    bench.reading = files.length - k;
+    flights(bench);
     try {
       await take(file).catch(async (error) => {
         // the session was changed meanwhile, as by a flight that ended: what a drop means is the same
@@ -165,6 +174,7 @@ async function upload(files) {
       said.push(error.message);
     }
   }
+  bench.reading = 0;
   await refresh();
   if (said.length) complain(said.join("; "));
 }

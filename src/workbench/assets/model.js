@@ -17,11 +17,17 @@ export function model(bench) {
     el("button", { type: "button", disabled: !stack.length, onclick: () => bench.act({ do: "undo" }) }, "Undo"),
     el("button", { type: "button", disabled: !state.redo, onclick: () => bench.act({ do: "redo" }) }, state.redo ? `Redo ${state.redo}` : "Redo"),
     unfitted && el("button", { type: "button", class: "main", onclick: () => bench.act({ do: "fit" }) }, "Fit"),
-    el("button", { type: "button", id: "judge", disabled: !tests.length || state.jobs.length > 0, title: "Opens the test flights; each opening is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
+    el("button", { type: "button", id: "judge", disabled: !tests.length || !stack.length || unfitted || state.jobs.length > 0, title: stack.length ? "Opens the test flights; each opening is counted and recorded" : "Accept an effect first: each opening of the test flights is counted and recorded", onclick: () => bench.act({ do: "judge" }) }, "Judge"),
     el("button", { type: "button", id: "save", class: stack.length && !unfitted ? "main" : "", disabled: !stack.length || unfitted || state.jobs.length > 0, onclick: () => save(bench) }, "Save"),
     el("button", { type: "button", id: "fly-it", onclick: () => bench.show("fly") }, "Fly it"));
-  body.replaceChildren(...[outside, base, errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, "No effect is accepted yet: tick a suspect."),
+  body.replaceChildren(...[outside, base, box(state), errors(state), ...stack.map((s) => step(bench, s)), !stack.length && el("p", { class: "empty" }, "No effect is accepted yet: tick a suspect."),
     buttons, saved.note, opened(state), command(state.commands.amend, "Model and Save"), command(state.commands.judge, "Judge")].filter(Boolean));
+}
+
+/** The answer, as the command `amend` prints it. */
+function box(state) {
+  const told = verdicts(state)?.answer;
+  return told && el("div", { class: "verdict effect", id: "box" }, [told.error, told.effect, told.left].filter(Boolean).map((line) => el("p", {}, line)));
 }
 
 /** What a saved model is about: it is another one when the stack or the model changes. */
@@ -58,9 +64,9 @@ function errors(state) {
   const all = rows.map((r, k) => [...r, test(k)]);
   const most = Math.max(...all.flatMap((r) => r.slice(2)).filter((v) => v != null));
   const bar = (tone, v) => el("td", {}, v != null && el("div", { class: `bars ${tone}` }, el("span", {}, show(v)), el("i", { vars: { width: `${100 * v / most}%` } })));
-  const head = [`NRMSE${horizon(story?.after ?? state.stack.find((s) => s.estimated)?.estimated)}`, "Fit", "Held out", last && "Test"].filter(Boolean);
+  const head = [`Error (NRMSE)${horizon(story?.after ?? state.stack.find((s) => s.estimated)?.estimated)}`, "Fit", "Held out", last && "Test"].filter(Boolean);
   return el("table", { class: "errors" }, el("thead", {}, el("tr", {}, head.map((h) => el("th", { scope: "col" }, h)))),
-    el("tbody", {}, all.map(([name, tone, ...values]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")), values.slice(0, head.length - 1).map((v) => bar(tone, v))))));
+    el("tbody", {}, all.map(([name, tone, ...values]) => el("tr", {}, el("th", { scope: "row" }, name), values.slice(0, head.length - 1).map((v) => bar(tone, v))))));
 }
 
 function step(bench, s) {
@@ -70,7 +76,7 @@ function step(bench, s) {
   const last = bench.state.stack[bench.state.stack.length - 1].id === s.id;
   const values = (story?.parameters ?? []).filter((p) => p.added && p.name.startsWith(`${s.id}.`));
   const tag = { fitting: "fitting …", failed: "failed", unfitted: "not fitted" }[s.status];
-  return el("article", { class: "step" }, el("h3", {}, s.id.replaceAll("_", " "), " ", tag && el("span", { class: "tag" }, tag), refused.length > 0 && el("span", { class: "tag bad" }, own.joined ? "kept though refused" : "refused, not in the model")),
+  return el("article", { class: "step" }, el("h3", {}, s.id, " ", tag && el("span", { class: "tag" }, tag), refused.length > 0 && el("span", { class: "tag bad" }, own.joined ? "kept though refused" : "refused, not in the model")),
     ...values.map((p) => el("p", { class: "note" }, `${p.name.split(".")[1]} = ${show(p.value, 4)} (95 %: ${show(p.ci95[0])} to ${show(p.ci95[1])})`)),
     s.error && el("p", { class: "bad note" }, s.error), ...refused.map((why) => el("p", { class: "bad note" }, why)),
     refused.length > 0 && !own.joined && last && el("div", { class: "row" }, el("button", { type: "button", onclick: () => bench.act({ do: "keep" }) }, "Keep it anyway"), el("button", { type: "button", onclick: () => bench.act({ do: "undo" }) }, "Take it back")));

@@ -68,15 +68,16 @@ function suspect(bench, e, most) {
   if (e.selected_in_bootstraps != null) facts.push(`best in ${percent(e.selected_in_bootstraps)} of bootstraps`);
   if (e.channels.length) facts.push(`acts in ${e.channels.join(", ")}`);
   return el("article", { class: `suspect ${e.asserted ? "asserted" : ""}` },
-    el("label", {}, box, el("span", {}, e.id.replaceAll("_", " "), " ", tag)),
+    el("label", {}, box, el("span", {}, e.id, " ", tag)),
     el("p", { class: "muted" }, e.description),
+    // the curve proves it: it stands before the words
+    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`), el("span", { class: "muted" }, "dots: what the tuned model leaves; line: the effect")), el("div", { class: "plot", "data-curve": e.id })) : "",
     el("div", { class: "meter", role: "img", "aria-label": `evidence ${show(e.evidence)}, chance reaches ${show(e.threshold)}`, title: `evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)} (log scale)` },
       el("i", { vars: { width: `${log(e.evidence)}%` } }), el("b", { vars: { left: `${log(e.threshold)}%` } })),
     el("p", {}, `Evidence ${show(e.evidence)}; chance reaches ${show(e.threshold)}. `, facts.filter(Boolean).join("; "), "."),
     ...e.refused.map((why) => el("p", { class: "bad" }, why)),
     e.indistinguishable_from.length ? el("p", {}, "These flights cannot tell it from ", el("b", {}, e.indistinguishable_from.join(", ")), ".") : "",
     e.indistinguishable_from.length ? el("div", { class: "row" }, e.indistinguishable_from.map((other) => apart(bench, [e.id, other]))) : "",
-    e.curve && above ? el("figure", {}, el("figcaption", {}, el("b", {}, `${e.curve.channel} (${e.curve.unit}) over ${e.curve.variable}`)), el("div", { class: "plot", "data-curve": e.id })) : "",
     e.by_flight.length > 1 ? more("Do the flights agree?", [el("ul", {}, e.by_flight.map((f) => el("li", {}, `${f.flight}: ${show(f.value)} ± ${show(1.96 * f.sd, 2)}`)))], `agree-${e.id}`) : "");
 }
 /** The coefficient that is clearest, with its 95 % interval. */
@@ -87,7 +88,7 @@ function decisive(e) {
 }
 /** Makes a schedule that tells two effects apart. */
 function apart(bench, between) {
-  return el("button", { type: "button", "data-between": between.join(" "), onclick: () => bench.act({ do: "design", between }) }, `Make a schedule that tells it from ${between[1].replaceAll("_", " ")}`);
+  return el("button", { type: "button", "data-between": between.join(" "), onclick: () => bench.act({ do: "design", between }) }, `Make a schedule that tells it from ${between[1]}`);
 }
 function notes(bench, diagnosis) {
   const fly = diagnosis.advice.map((a) => el("p", {}, el("b", {}, a.manoeuvre), `: ${a.why} `, a.between && el("button", { type: "button", "data-between": a.between.join(" "), onclick: () => bench.act({ do: "design", between: a.between }) }, `Make a schedule between ${a.between.join(" and ")}`)));

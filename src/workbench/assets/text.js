@@ -111,7 +111,7 @@ function one(e) {
     onchange: () => bench.act(step ? { do: "undo" } : { do: "tick", effect: e.id }).then((done) => { if (!done) box.checked = !!step; }) });
   const figure = el("figure", { "data-own": e.id });
   if (step && (step.story || step.estimated)) shape(e.id, figure, step);
-  return el("article", { class: "suspect" }, el("label", {}, box, el("span", {}, e.id.replaceAll("_", " "), " ", e.status === "proposed" && el("span", { class: "tag" }, "proposed"))),
+  return el("article", { class: "suspect" }, el("label", {}, box, el("span", {}, e.id, " ", e.status === "proposed" && el("span", { class: "tag" }, "proposed"))),
     el("p", { class: "muted" }, e.description), el("p", {}, el("code", {}, e.formula)), figure,
     el("div", { class: "row" }, el("button", { type: "button", onclick: () => put(e.text) }, "Edit"), el("button", { type: "button", disabled: !!step, onclick: () => bench.act({ do: "forget", effect: e.id }) }, "Remove")));
 }

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::super::bench::Inner;
-use super::super::commands::quoted;
 use super::super::error::WorkbenchError;
 use greylag_control::ControllerKind;
+use greylag_logs::quoted;
 use greylag_manoeuvres::menu::{self, MENU};
 
 /// The schedule of `greylag demo` where no other is named.

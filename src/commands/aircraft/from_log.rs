@@ -1,0 +1,113 @@
+//! `greylag aircraft from-log`: a model of an aircraft from its measures and a flight.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+use super::check;
+use super::new::{self, Common};
+use crate::commands::files::{self, Overwrite};
+use crate::commands::intake::LogArguments;
+use crate::commands::{Command, command_of, given};
+use crate::logs::quoted;
+use crate::model::GreyBox;
+
+/// Share of its own size up to which a coefficient's standard deviation leaves it known.
+const KNOWN: f64 = 0.3;
+/// What moves the coefficients of an effect, for those that the flights leave unknown.
+const MANOEUVRES: [(&str, &str); 7] = [
+    ("roll_linear", "aileron doublets, then bank to bank reversals"),
+    ("pitch_linear", "elevator doublets at three airspeeds"),
+    ("lift_linear", "elevator doublets at three airspeeds"),
+    ("drag_", "level flight at five airspeeds, then glides at idle"),
+    ("propeller", "throttle steps at two airspeeds"),
+    ("rudder_linear", "rudder doublets"),
+    ("", "steady sideslips, or turns entered with aileron alone"),
+];
+
+/// Options of `greylag aircraft from-log`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Folder to make: the estimate in `prior`, the fitted aircraft beside it.
+    folder: PathBuf,
+    /// Span.
+    #[arg(long, value_name = "M")]
+    span_m: f64,
+    /// Wing area.
+    #[arg(long, value_name = "M2")]
+    area_m2: f64,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    logs: LogArguments,
+}
+
+/// Writes the estimate, fits it, writes its page, says what to fly next.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let Arguments { folder, span_m, area_m2, common, logs } = arguments;
+    if folder.join("model.toml").exists() {
+        bail!("{} exists; name another folder", folder.join("model.toml").display());
+    }
+    let measures = new::measures(common, folder, *span_m, *area_m2)?;
+    let prior = folder.join("prior");
+    new::files(&prior, &measures.airframe(), &measures.model())?;
+    let model = prior.join("model.toml");
+    let fitted = folder.join("model.toml");
+    let mut line: Vec<OsString> =
+        ["amend", "--from-scratch", "--tune-only", "--model"].map(Into::into).into();
+    line.push(model.into());
+    line.push("--log".into());
+    line.extend(logs.paths.iter().map(|log| log.clone().into_os_string()));
+    line.extend(logs.reading_words());
+    line.extend(["--out".into(), folder.clone().into_os_string()]);
+    line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
+    let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
+    let status = crate::commands::amend::run(&amend)?;
+    let page = folder.join("aircraft.html");
+    let found = check::page(&fitted, &given::model(&fitted)?)?;
+    files::write(&page, &found, Overwrite::Never)?;
+    println!("wrote {} and {}", page.display(), folder.join("fit.html").display());
+    next(folder, &fitted)?;
+    Ok(status)
+}
+
+/// Says what to fly, for what the flights leave unknown.
+fn next(folder: &Path, fitted: &Path) -> Result<()> {
+    let text = std::fs::read_to_string(folder.join("amend.json"))?;
+    let story: serde_json::Value = serde_json::from_str(&text)?;
+    let all = story["parameters"].as_array().into_iter().flatten();
+    let unknown = all.filter_map(|p| {
+        let (value, sd) = (p["value"].as_f64()?, p["sd"].as_f64()?);
+        (sd > KNOWN * value.abs()).then(|| p["name"].as_str().unwrap_or_default().to_owned())
+    });
+    let unknown: Vec<String> = unknown.collect();
+    let mut said: Vec<(&str, Vec<&str>)> = Vec::new();
+    for name in &unknown {
+        let of = MANOEUVRES.iter().find(|(effect, _)| name.starts_with(effect));
+        let manoeuvre = of.map_or("", |(_, manoeuvre)| manoeuvre);
+        let short = name.split_once('.').map_or(name.as_str(), |(_, short)| short);
+        match said.iter_mut().find(|(of, _)| *of == manoeuvre) {
+            Some((_, names)) => names.push(short),
+            None => said.push((manoeuvre, vec![short])),
+        }
+    }
+    match said.is_empty() {
+        true => println!("the flights know every coefficient within {:.0} %", 100.0 * KNOWN),
+        false => said.iter().for_each(|(manoeuvre, names)| {
+            println!(
+                "fly {manoeuvre}: {} not known within {:.0} %",
+                names.join(", "),
+                100.0 * KNOWN
+            );
+        }),
+    }
+    let model = GreyBox::load(fitted)?;
+    println!(
+        "{}: next: greylag compare --model {} --log ANOTHER_FLIGHT",
+        model.name,
+        quoted(fitted)
+    );
+    Ok(())
+}

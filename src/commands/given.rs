@@ -1,0 +1,56 @@
+//! Files that stand in one another's place: a log given as a model, a model given as a log.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Result, bail};
+
+use super::files::shipped;
+use crate::logs::Format;
+use crate::model::GreyBox;
+
+/// Bytes by which a file is known.
+const HEAD: u64 = 4096;
+
+/// The model at `path`, or where the program ships it.
+///
+/// # Errors
+/// It cannot be read, or is a flight log.
+pub fn model(path: &Path) -> Result<GreyBox> {
+    let found = shipped(path);
+    if is_log(&found) {
+        bail!(
+            "{} is a flight log, where a model is wanted; models are .toml files: are --model and --log swapped?",
+            path.display()
+        );
+    }
+    Ok(GreyBox::load(&found)?)
+}
+
+/// Refuses a model that is given as a log.
+///
+/// # Errors
+/// It is one.
+pub fn log(path: &Path) -> Result<()> {
+    let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    if named && path.is_file() {
+        bail!(
+            "{} is a .toml file, where a flight log is wanted (CSV, .ulg, .bin, .tlog): are --model and --log swapped?",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// Whether a file begins like a log, and is not called a model.
+fn is_log(path: &Path) -> bool {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        return false;
+    }
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    // a comment or JSON may hold a comma, too
+    let other = matches!(head.first(), Some(b'#' | b'{' | b'['));
+    read.is_ok() && !other && Format::of(&head).is_some()
+}

@@ -1,0 +1,66 @@
+//! What commands print: tables that fit a terminal, the answer in colour where it is one, the summary last.
+
+use std::io::IsTerminal;
+
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{CellAlignment, ContentArrangement, Table};
+
+use crate::sysid::compare::Answer;
+
+/// Columns of a terminal that tables fit.
+pub const WIDTH: u16 = 100;
+
+/// A table no wider than [`WIDTH`], whose columns from number `words` on hold numbers.
+pub fn table<const N: usize>(header: [&str; N], words: usize) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    table.set_header(header);
+    for column in table.column_iter_mut().skip(words) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// What a text says, for its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// It is as wished.
+    Good,
+    /// It is not.
+    Bad,
+    /// Neither.
+    Plain,
+}
+
+/// `text` in colour on a terminal, as it is elsewhere or where NO_COLOR is set.
+pub fn painted(text: &str, tone: Tone) -> String {
+    let plain = !std::io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
+    match tone {
+        _ if plain => text.to_owned(),
+        Tone::Good => format!("\u{1b}[1;32m{text}\u{1b}[0m"),
+        Tone::Bad => format!("\u{1b}[1;31m{text}\u{1b}[0m"),
+        Tone::Plain => format!("\u{1b}[1m{text}\u{1b}[0m"),
+    }
+}
+
+/// Prints the answer box: what a command says first.
+pub fn print_answer(answer: &Answer) {
+    let tone = match answer.numbers.change_percent {
+        p if p <= -0.05 => Tone::Good,
+        p if p >= 0.05 => Tone::Bad,
+        _ => Tone::Plain,
+    };
+    let mut lines = answer.lines();
+    lines.next().into_iter().for_each(|first| println!("{}", painted(first, tone)));
+    lines.for_each(|line| println!("{line}"));
+    println!();
+}
+
+/// Prints the last lines of a command: its summary, and the command that comes next.
+pub fn print_summary(answer: &Answer) {
+    println!("\n{}", answer.summary());
+    if !answer.next.is_empty() {
+        println!("next: {}", answer.next);
+    }
+}

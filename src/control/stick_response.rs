@@ -1,0 +1,83 @@
+//! How a model's aircraft answers its stick: steps of aileron and elevator from steady straight flight.
+
+use greylag_model::{GreyBox, Trim, TrimError};
+use greylag_physics::{Controls, State};
+
+/// Part of the travel that is stepped.
+pub const STEPPED: f64 = 0.25;
+/// Time flown behind the step, s.
+const FLOWN_S: f64 = 3.0;
+/// Step of the integration, s.
+const STEP_S: f64 = 0.005;
+
+/// An answer over time.
+#[derive(Clone, Debug, Default)]
+pub struct StickResponse {
+    /// Time behind the step, s.
+    pub time_s: Vec<f64>,
+    /// The states.
+    pub states: Vec<State>,
+}
+
+/// Answers to a quarter of the aileron (roll right), then of the elevator (nose up), from straight flight at the cruise
+/// airspeed with servos that settle at once.
+///
+/// # Errors
+/// The model cannot fly straight there.
+pub fn stick_responses(model: &GreyBox) -> Result<[StickResponse; 2], TrimError> {
+    let altitude = model.airframe.reference.altitude;
+    let trim = Trim::straight(model, model.airframe.envelope.airspeed_cruise_mps, altitude)?;
+    let figures = &model.airframe.actuators;
+    let aileron = STEPPED * figures.aileron.travel.smallest();
+    let elevator = STEPPED * figures.elevator.travel.smallest();
+    let held = trim.controls;
+    Ok([
+        flown(model, trim.state, Controls { aileron: held.aileron + aileron, ..held }, altitude),
+        flown(model, trim.state, Controls { elevator: held.elevator - elevator, ..held }, altitude),
+    ])
+}
+
+/// The states behind a step to `controls`, by the classical Runge–Kutta method.
+fn flown(model: &GreyBox, from: State, controls: Controls, altitude: f64) -> StickResponse {
+    let rate = |x: [f64; 8]| model.rate(&State::from_array(x), &controls, altitude).to_array();
+    let along = |x: [f64; 8], k: [f64; 8], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
+    let mut x = from.to_array();
+    let mut response = StickResponse::default();
+    for i in 0..=(FLOWN_S / STEP_S) as usize {
+        response.time_s.push(i as f64 * STEP_S);
+        response.states.push(State::from_array(x));
+        let a = rate(x);
+        let b = rate(along(x, a, 0.5 * STEP_S));
+        let c = rate(along(x, b, 0.5 * STEP_S));
+        let d = rate(along(x, c, STEP_S));
+        x = std::array::from_fn(|i| x[i] + STEP_S / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]));
+        if x.iter().any(|v| !v.is_finite()) {
+            break;
+        }
+    }
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn the_stick_rolls_right_and_pitches_up() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/aerosonde/prior.toml");
+        let model = GreyBox::load(&path).unwrap();
+        let [roll, pitch] = stick_responses(&model).unwrap();
+        let at = |r: &StickResponse, t: f64| r.states[(t / STEP_S) as usize];
+        assert!(at(&roll, 0.5).p > 0.1 && at(&roll, 0.5).roll > 0.02);
+        assert!(at(&pitch, 0.2).q > 0.01 && at(&pitch, 0.5).alpha > at(&pitch, 0.0).alpha);
+        // roll rate settles at what the authority of the check says, a quarter of it, within a tenth (the spiral and
+        // Dutch roll act meanwhile)
+        let full = crate::aircraft_check::check(&model).unwrap().authority.roll_rate;
+        assert!(
+            (at(&roll, 0.4).p / (STEPPED * full) - 1.0).abs() < 0.25,
+            "{} {full}",
+            at(&roll, 0.4).p
+        );
+    }
+}

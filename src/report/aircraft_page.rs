@@ -1,0 +1,276 @@
+//! The page of an aircraft as its model has it: three views, trim, modes, what the stick does.
+
+use std::fmt::Write;
+
+use crate::Align::{Left, Right};
+use crate::kit::numbers::number;
+use crate::{
+    Drawing, Figure, Outcome, Page, Panel, Section, Series, Style, Table, TimeFigure, Verdict,
+};
+use greylag_control::aircraft_check::AircraftCheck;
+use greylag_control::stick_response::{STEPPED, StickResponse};
+use greylag_model::GreyBox;
+
+/// What the page is made from.
+#[derive(Clone, Debug)]
+pub struct AircraftReport<'a> {
+    /// The model.
+    pub model: &'a GreyBox,
+    /// What was found of it.
+    pub check: &'a AircraftCheck,
+    /// Its answers to a quarter of the aileron, then of the elevator.
+    pub responses: &'a [StickResponse; 2],
+    /// The model's file.
+    pub model_file: String,
+    /// The command line that made the page.
+    pub command_line: String,
+}
+
+impl AircraftReport<'_> {
+    /// The page.
+    pub fn page(&self) -> Page {
+        let airframe = &self.model.airframe;
+        let sections = vec![
+            Section::verdict(self.verdict()),
+            Section::new("Three views", SKETCH_NOTE, vec![Figure::Drawing(sketch(self.model))]),
+            Section::new(
+                "Straight flight",
+                "Over the envelope; angles up positive.",
+                vec![Figure::Table(self.trim())],
+            ),
+            Section::new("What the stick does", &stick_note(), vec![Figure::Time(self.stick())]),
+            Section::new(
+                "Modes",
+                "Of straight flight at the cruise airspeed.",
+                vec![Figure::Table(self.modes())],
+            ),
+            Section::new(
+                "Loops of the LQI",
+                "Factor on the loop's gain, phase and delay that it bears.",
+                vec![Figure::Table(self.loops())],
+            ),
+            Section::new("Provenance", "", vec![Figure::Table(self.provenance())]).folded(),
+        ];
+        Page {
+            title: format!("{}: how it flies", airframe.name),
+            subtitle: format!(
+                "{} at {} m/s and {} m.",
+                self.model.name,
+                number(airframe.envelope.airspeed_cruise_mps),
+                number(airframe.reference.altitude)
+            ),
+            sections,
+        }
+    }
+
+    fn verdict(&self) -> Verdict {
+        let AircraftCheck { findings, level_up_to, controller, .. } = self.check;
+        let envelope = self.model.airframe.envelope;
+        let mut details = vec![format!(
+            "Controller to begin with: {}; its loops bear {:.0} ms of delay.",
+            controller.name,
+            1e3 * controller.delay_s
+        )];
+        details.extend(level_up_to.map(|v| {
+            format!(
+                "It cannot fly level above {} m/s: faster is a descent at full throttle.",
+                number(v)
+            )
+        }));
+        let flies = format!(
+            "flies straight from {} to {} m/s",
+            number(envelope.airspeed_min_mps),
+            number(envelope.airspeed_max_mps)
+        );
+        match findings.split_first() {
+            None => Verdict {
+                outcome: Outcome::Reached,
+                sentence: format!("It {flies}; nothing is to be mended."),
+                details,
+            },
+            Some((first, rest)) => Verdict {
+                outcome: Outcome::Missed,
+                sentence: format!("To be mended before a flight: {first}."),
+                details: rest.iter().cloned().chain(details).collect(),
+            },
+        }
+    }
+
+    fn trim(&self) -> Table {
+        let columns = [
+            ("Airspeed (m/s)", Right),
+            ("Incidence (°)", Right),
+            ("Elevator (% of travel)", Right),
+            ("Throttle (%)", Right),
+            ("Flight path (°)", Right),
+        ];
+        let mut table = Table::new("Straight flight", &columns);
+        for l in &self.check.levels {
+            let [alpha, path] = [l.alpha, l.path].map(f64::to_degrees);
+            let row = [l.airspeed, alpha, 100.0 * l.elevator, 100.0 * l.throttle];
+            let row = row.map(|x| format!("{x:.1}").replace('-', "−"));
+            // a path that is level but for rounding
+            let path = if path.abs() < 0.05 {
+                "level".into()
+            } else {
+                format!("{path:.1}").replace('-', "−")
+            };
+            table.push(row.into_iter().chain([path]));
+        }
+        table
+    }
+
+    fn modes(&self) -> Table {
+        let columns = [
+            ("Mode", Left),
+            ("Frequency (rad/s)", Right),
+            ("Damping ratio", Right),
+            ("Time constant (s)", Right),
+            ("", Left),
+        ];
+        let mut table = Table::new("Modes", &columns);
+        for m in &self.check.modes {
+            let some = |x: f64| if m.oscillates() { number(x) } else { "–".into() };
+            let constant = m.time_constant();
+            let fate = if constant < 0.0 { "grows" } else { "decays" };
+            let cells =
+                [some(m.frequency()), some(m.damping()), number(constant.abs()), fate.into()];
+            table.push(std::iter::once(m.name.to_string()).chain(cells));
+        }
+        table
+    }
+
+    fn loops(&self) -> Table {
+        let columns = [
+            ("Loop", Left),
+            ("Crossover (rad/s)", Right),
+            ("Least gain", Right),
+            ("Most gain", Right),
+            ("Phase (°)", Right),
+            ("Delay (ms)", Right),
+        ];
+        let mut table = Table::new("Loops", &columns);
+        for l in &self.check.loops {
+            let [least, most] = l.gain;
+            let cells = [l.crossover, least, most, l.phase.to_degrees(), 1e3 * l.delay].map(number);
+            table.push(std::iter::once(l.surface.to_string()).chain(cells));
+        }
+        table
+    }
+
+    fn stick(&self) -> TimeFigure {
+        let mut figure = TimeFigure::default();
+        let [roll, pitch] = self.responses;
+        let degrees = |r: &StickResponse, of: fn(&greylag_physics::State) -> f64| -> Vec<f64> {
+            r.states.iter().map(|s| of(s).to_degrees()).collect()
+        };
+        let panel = |title: &str, unit: &str, name: &str, values: Vec<f64>| {
+            Panel::new(title, unit, vec![Series::new(name, Style::Actual, values)])
+        };
+        figure.add_track(
+            &roll.time_s,
+            f64::INFINITY,
+            vec![
+                panel(
+                    "Roll rate p after a quarter of aileron",
+                    "°/s",
+                    "roll rate",
+                    degrees(roll, |s| s.p),
+                ),
+                panel("Roll φ after a quarter of aileron", "°", "roll", degrees(roll, |s| s.roll)),
+            ],
+        );
+        figure.add_track(
+            &pitch.time_s,
+            f64::INFINITY,
+            vec![
+                panel(
+                    "Pitch rate q after a quarter of up elevator",
+                    "°/s",
+                    "pitch rate",
+                    degrees(pitch, |s| s.q),
+                ),
+                panel(
+                    "Incidence α after a quarter of up elevator",
+                    "°",
+                    "incidence",
+                    degrees(pitch, |s| s.alpha),
+                ),
+            ],
+        );
+        figure
+    }
+
+    fn provenance(&self) -> Table {
+        let mut table = Table::new("Provenance", &[("Item", Left), ("Value", Left)]);
+        table.push(["Program".to_string(), concat!("greylag ", env!("CARGO_PKG_VERSION")).into()]);
+        table.push(["Model".to_string(), self.model_file.clone()]);
+        table.push(["Command line".to_string(), self.command_line.clone()]);
+        table
+    }
+}
+
+const SKETCH_NOTE: &str = "Span and mean chord to scale; the body and the tail are drawn as usual ones, for the model \
+                           knows them by their coefficients only.";
+
+fn stick_note() -> String {
+    format!(
+        "{:.0} % of the travel at once from straight flight at the cruise airspeed, nothing else moved, servos without lag.",
+        100.0 * STEPPED
+    )
+}
+
+/// Top, front and side view.
+fn sketch(model: &GreyBox) -> Drawing {
+    let g = &model.airframe.geometry;
+    let (span, chord) = (g.span, g.chord);
+    let tailed = model.has_rudder();
+    let length = if tailed { 0.7 * span } else { 1.6 * chord };
+    let body = 0.06 * span;
+    let (gap, high) = (0.12 * span, 0.16 * span);
+    let mut svg = String::new();
+    let mut rectangle = |x: f64, y: f64, w: f64, h: f64, class: &str| {
+        let _ = write!(
+            svg,
+            "<rect class=\"{class}\" x=\"{x:.4}\" y=\"{y:.4}\" width=\"{w:.4}\" height=\"{h:.4}\"/>"
+        );
+    };
+    // from above, nose up
+    let nose = 0.5 * span - 0.5 * body;
+    rectangle(nose, 0.0, body, length, "body");
+    rectangle(0.0, 0.22 * length, span, chord, "wing");
+    for side in [0.06 * span, 0.64 * span] {
+        rectangle(side, 0.22 * length + 0.75 * chord, 0.3 * span, 0.25 * chord, "surface");
+    }
+    if tailed {
+        rectangle(0.34 * span, length - 0.45 * chord, 0.32 * span, 0.45 * chord, "wing");
+        rectangle(0.34 * span, length - 0.15 * chord, 0.32 * span, 0.15 * chord, "surface");
+    }
+    // from ahead
+    let ahead = length + gap;
+    rectangle(nose, ahead + 0.5 * high - 0.5 * body, body, body, "body");
+    rectangle(0.0, ahead + 0.5 * high - 0.06 * chord, span, 0.12 * chord, "wing");
+    if tailed {
+        rectangle(0.5 * span - 0.02 * chord, ahead, 0.04 * chord, 0.5 * high, "wing");
+    }
+    // from the left
+    let left = span + gap;
+    let mid = 0.5 * high;
+    rectangle(left, mid - 0.5 * body, length, body, "body");
+    rectangle(left + 0.22 * length, mid - 0.06 * chord, chord, 0.12 * chord, "wing");
+    if tailed {
+        rectangle(left + length - 0.5 * chord, 0.0, 0.5 * chord, mid, "wing");
+        rectangle(left + length - 0.2 * chord, 0.0, 0.2 * chord, mid, "surface");
+    }
+    Drawing {
+        title: format!(
+            "Span {} m, area {} m², mean chord {} m",
+            number(span),
+            number(g.area),
+            number(chord)
+        ),
+        said: "Top, front and side view of the aircraft".into(),
+        size: [left + length, ahead + high],
+        svg,
+    }
+}

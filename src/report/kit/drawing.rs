@@ -1,0 +1,34 @@
+//! A drawing of lines and areas, to scale.
+
+use crate::kit::html::escape;
+
+/// A drawing; its parts have the classes `body`, `wing` and `surface`.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    /// What it is.
+    pub title: String,
+    /// The same for those who do not see it.
+    pub said: String,
+    /// Width and height, in the unit of its coordinates.
+    pub size: [f64; 2],
+    /// Its elements, as SVG that holds no text of a user's.
+    pub svg: String,
+}
+
+impl Drawing {
+    pub(crate) fn html(&self) -> String {
+        let [width, height] = self.size;
+        let edge = 0.01 * width;
+        format!(
+            "<figure class=\"panel drawing\"><figcaption><h3>{}</h3></figcaption><svg role=\"img\" aria-label=\"{}\" \
+             viewBox=\"{:.4} {:.4} {:.4} {:.4}\">{}</svg></figure>\n",
+            escape(&self.title),
+            escape(&self.said),
+            -edge,
+            -edge,
+            width + 2.0 * edge,
+            height + 2.0 * edge,
+            self.svg
+        )
+    }
+}

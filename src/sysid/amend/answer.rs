@@ -1,0 +1,209 @@
+//! The answer box of an amendment, and of a comparison whose models one amendment made.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::amendment::{Added, Options};
+use super::document::{STORY, sha256};
+use super::error::AmendError;
+use super::quick::estimate;
+use super::result::{Amendment, Parameter};
+use crate::compare::answer::{Answer, Decisive, Seen, Stage, Subject, Way};
+use crate::compare::{Comparison, HorizonScore, scores};
+use crate::diagnose::{Candidate, Diagnosis, Parameter as Estimate};
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_model::GreyBox;
+use greylag_physics::catalogue;
+
+/// The answer of an amendment: the model as given, tuned, with the effects that joined.
+pub fn answer(story: &Amendment) -> Answer {
+    let joined: Vec<_> = story.effects.iter().filter(|e| e.joined).collect();
+    let effects = joined.iter().filter_map(|e| {
+        let own = story.parameters.iter().filter(|p| p.added).map(Known::of);
+        decisive(&e.id, e.description, own)
+    });
+    let stage = |way, scores| Stage { way, model: &story.model, scores };
+    let mut stages =
+        vec![stage(Way::Given, &story.given[..]), stage(Way::Tuned, &story.before[..])];
+    if !joined.is_empty() {
+        stages.push(stage(Way::Effects, &story.after[..]));
+    }
+    let fitted = |name: &String| story.flights.iter().any(|f| f.flight == *name);
+    Answer::of(&Subject {
+        stages,
+        flights: story.held_out.clone(),
+        seen: if story.held_out.iter().any(fitted) { Seen::LastThird } else { Seen::Of(0) },
+        effects: effects.collect(),
+        baseline: None,
+    })
+}
+
+/// The models that a diagnosis speaks of, by equation error over its flights, and its answer.
+#[derive(Clone, Debug)]
+pub struct Diagnosed {
+    /// The model with its own coefficients tuned, no effect added.
+    pub tuned: GreyBox,
+    /// By how much the error falls on the flights of the diagnosis, by what.
+    pub answer: Answer,
+}
+
+/// What tuning and the asserted effects of `diagnosis` are worth on its own `flights`.
+///
+/// # Errors
+/// An effect cannot join the model, or a flight has no clock.
+pub fn diagnosed(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    diagnosis: &Diagnosis,
+) -> Result<Diagnosed, AmendError> {
+    let asserted: Vec<_> = diagnosis.effects.iter().filter(|c| c.asserted).collect();
+    let added: Vec<Added> = asserted.iter().map(|c| Added::of(c)).collect();
+    let given = scores(model, flights, &Options::default().horizons_s)?;
+    let tuned = estimate(model, flights, flights, &[])?;
+    let stage = |way, scores| Stage { way, model: &diagnosis.model, scores };
+    let mut stages = vec![stage(Way::Given, &given[..]), stage(Way::Tuned, &tuned.after[..])];
+    let after = match added.is_empty() {
+        true => None,
+        false => Some(estimate(model, flights, flights, &added)?.after),
+    };
+    stages.extend(after.as_ref().map(|scores| stage(Way::Effects, &scores[..])));
+    let clearest = |c: &&Candidate| {
+        let clear = |p: &&Estimate| Decisive::clearness(p.value, p.ci95);
+        let p = c.parameters.iter().max_by(|a, b| clear(a).total_cmp(&clear(b)))?;
+        Some(Decisive {
+            id: c.id.clone(),
+            description: c.description.into(),
+            coefficient: p.name.clone(),
+            value: p.value,
+            ci95: p.ci95,
+            unit: unit(&c.id, &p.name).into(),
+            alike: c.indistinguishable_from.clone(),
+        })
+    };
+    let answer = Answer::of(&Subject {
+        stages,
+        flights: flights.iter().map(|f| f.name.clone()).collect(),
+        seen: Seen::Of(flights.len()),
+        effects: asserted.iter().filter_map(clearest).collect(),
+        baseline: None,
+    });
+    let said = diagnosis.sentences.first().filter(|_| asserted.is_empty());
+    let answer = said.map_or(answer.clone(), |said| answer.saying(said.clone()));
+    let mut tuned = tuned.model;
+    tuned.name = "tuned".into();
+    Ok(Diagnosed { tuned, answer })
+}
+
+/// A fitted coefficient as files have it.
+#[derive(Clone, Debug, Deserialize)]
+struct Known {
+    name: String,
+    added: bool,
+    value: f64,
+    ci95: [Option<f64>; 2],
+}
+
+impl Known {
+    fn of(p: &Parameter) -> Known {
+        let Parameter { name, added, value, ci95, .. } = p;
+        let ci95 = ci95.map(|end| end.is_finite().then_some(end));
+        Known { name: name.clone(), added: *added, value: *value, ci95 }
+    }
+}
+
+/// The clearest of the effect's coefficients among `known`.
+fn decisive(id: &str, description: &str, known: impl Iterator<Item = Known>) -> Option<Decisive> {
+    let of = |p: Known| {
+        let (effect, coefficient) = p.name.split_once('.')?;
+        let ci95 = p.ci95.map(|end| end.unwrap_or(f64::NAN));
+        (effect == id).then(|| Decisive {
+            id: id.into(),
+            description: description.into(),
+            coefficient: coefficient.into(),
+            value: p.value,
+            ci95,
+            unit: unit(id, coefficient).into(),
+            alike: Vec::new(),
+        })
+    };
+    let clear = |d: &Decisive| Decisive::clearness(d.value, d.ci95);
+    known.filter_map(of).max_by(|a, b| clear(a).total_cmp(&clear(b)))
+}
+
+/// The unit of a coefficient of the catalogue's effect `id`; empty if it has none.
+fn unit(id: &str, coefficient: &str) -> &'static str {
+    let about = catalogue::describe(id);
+    let of = about.and_then(|a| a.coefficients.iter().find(|c| c.name == coefficient));
+    of.map_or("", |c| c.unit).trim_matches('-')
+}
+
+/// What `amend.json` beside a model tells of where it came from.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Origin {
+    /// The model before.
+    model: String,
+    effects: Vec<Effect>,
+    parameters: Vec<Known>,
+    tuned: Vec<Known>,
+    logs: Vec<Log>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Effect {
+    id: String,
+    description: String,
+    joined: bool,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Log {
+    sha256: String,
+}
+
+impl Origin {
+    /// The story beside the model file `model`; `None` where there is none, or the model was not made of `before`.
+    pub fn beside(model: &Path, before: &GreyBox) -> Option<Origin> {
+        let text = std::fs::read_to_string(model.parent()?.join(STORY)).ok()?;
+        let origin: Origin = serde_json::from_str(&text).ok()?;
+        (origin.model == before.name).then_some(origin)
+    }
+
+    /// `before` with its coefficients as the amendment tuned them, no effect added.
+    pub fn tuned(&self, before: &GreyBox) -> Option<GreyBox> {
+        let mut tuned = before.clone();
+        let set = |p: &Known| tuned.set_coefficient(&p.name, p.value);
+        self.tuned.iter().all(set).then_some(tuned)
+    }
+
+    /// The answer of a comparison of the model before with the one after; `tuned` are the free-run errors between.
+    pub fn answer(&self, c: &Comparison, tuned: &[HorizonScore], logs: &[PathBuf]) -> Answer {
+        let stage =
+            |k: usize, way| Stage { way, model: &c.models[k].name, scores: &c.models[k].free_run };
+        let joined: Vec<&Effect> = self.effects.iter().filter(|e| e.joined).collect();
+        let mut stages = vec![stage(0, Way::Given)];
+        match joined.is_empty() {
+            true => stages.push(stage(1, Way::Tuned)),
+            false => {
+                stages.push(Stage { way: Way::Tuned, model: &c.models[0].name, scores: tuned });
+                stages.push(stage(1, Way::Effects));
+            }
+        }
+        let effects = joined.iter().filter_map(|e| {
+            decisive(&e.id, &e.description, self.parameters.iter().filter(|p| p.added).cloned())
+        });
+        Answer::of(&Subject {
+            stages,
+            flights: c.flights.iter().map(|f| f.name.clone()).collect(),
+            seen: Seen::Of(logs.iter().filter(|log| self.fitted(log)).count()),
+            effects: effects.collect(),
+            baseline: None,
+        })
+    }
+
+    /// Whether the amendment was fitted to the log at `path`.
+    fn fitted(&self, path: &Path) -> bool {
+        let hash = std::fs::read(path).map(|content| sha256(&content));
+        hash.is_ok_and(|hash| self.logs.iter().any(|log| log.sha256 == hash))
+    }
+}

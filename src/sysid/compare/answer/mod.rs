@@ -1,0 +1,222 @@
+//! The answer box: by how much the error falls, by what, what is left. Composed here for terminal, page, workbench and JSON.
+
+pub(super) mod between;
+mod numbers;
+mod words;
+
+use serde::Serialize;
+
+use super::result::HorizonScore;
+pub use numbers::{Baseline, Decisive, InUse, Left, Numbers, Step, Way};
+
+/// Horizon of the answer, s; the longest one below it where no run reaches so far.
+pub const ANSWER_S: f64 = 5.0;
+
+/// The answer in sentences, with the numbers that stand in them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Answer {
+    /// By how much the error falls, step by step, on which flights.
+    pub error: String,
+    /// What the effect is, its decisive coefficient, and what it changes in use; empty where nothing was added.
+    pub effect: String,
+    /// What is left.
+    pub left: String,
+    /// The command that comes next, ready to be copied; empty where it is not known.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub next: String,
+    /// Every number of the sentences.
+    pub numbers: Numbers,
+}
+
+/// A model on the way from the one given to the last.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'a> {
+    /// How it came from the model before.
+    pub way: Way,
+    /// Its name.
+    pub model: &'a str,
+    /// Its free-run errors.
+    pub scores: &'a [HorizonScore],
+}
+
+/// What the flights of the free runs are to the fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// It is not known which flights a model was fitted to.
+    Unknown,
+    /// The fit saw so many of them.
+    Of(usize),
+    /// They are the last third of a flight whose rest was fitted.
+    LastThird,
+}
+
+/// What an answer is composed of.
+#[derive(Clone, Debug)]
+pub struct Subject<'a> {
+    /// The models, in the order in which they improve; the first is the one given.
+    pub stages: Vec<Stage<'a>>,
+    /// The names of the flights.
+    pub flights: Vec<String>,
+    /// What they are to the fit.
+    pub seen: Seen,
+    /// The effects that the last model has more than the first, each with its clearest coefficient.
+    pub effects: Vec<Decisive>,
+    /// A forecast without aerodynamics, by name.
+    pub baseline: Option<(&'a str, &'a [HorizonScore])>,
+}
+
+impl Answer {
+    /// What can be said before anything is known.
+    pub fn nothing() -> Answer {
+        Answer::of(&Subject {
+            stages: Vec::new(),
+            flights: Vec::new(),
+            seen: Seen::Unknown,
+            effects: Vec::new(),
+            baseline: None,
+        })
+    }
+
+    /// The answer about `subject`.
+    pub fn of(subject: &Subject) -> Answer {
+        let numbers = Numbers::of(subject);
+        Answer {
+            error: words::error(&numbers),
+            effect: words::effect(&numbers),
+            left: words::left(&numbers),
+            next: String::new(),
+            numbers,
+        }
+    }
+
+    /// The answer with the command that comes next.
+    pub fn then(self, next: String) -> Answer {
+        Answer { next, ..self }
+    }
+
+    /// The answer with what is said of the effects instead, where nothing was asserted say.
+    pub fn saying(self, effect: String) -> Answer {
+        Answer { effect, ..self }
+    }
+
+    /// The lines of the box without the command: those that say something.
+    pub fn lines(&self) -> impl Iterator<Item = &str> {
+        [&self.error, &self.effect, &self.left]
+            .into_iter()
+            .map(String::as_str)
+            .filter(|l| !l.is_empty())
+    }
+
+    /// The answer in half a line: `error at 5 s 0.0873 → 0.00083 (−99 %)`.
+    pub fn summary(&self) -> String {
+        words::summary(&self.numbers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::StateScore;
+
+    /// A score at 5 s whose airspeed (m/s) and sideslip (rad) are off by so much.
+    fn score(rmse_scaled: f64, airspeed: f64, beta: f64) -> Vec<HorizonScore> {
+        let state = |state, rmse: f64, scale: f64| StateScore {
+            state,
+            rmse,
+            rmse_scaled: rmse / scale,
+            r2: 0.0,
+            theil_u: 0.0,
+            bias_share: 0.0,
+            variance_share: 0.0,
+            covariance_share: 1.0,
+        };
+        let at = |horizon_s: f64, runs| HorizonScore {
+            horizon_s,
+            runs,
+            diverged: 0,
+            divergence_rate: 0.0,
+            rmse_scaled,
+            states: vec![state("airspeed_mps", airspeed, 10.0), state("beta_rad", beta, 0.3)],
+        };
+        vec![at(1.0, 9), at(5.0, 7), at(10.0, 5)]
+    }
+
+    fn drag() -> Decisive {
+        Decisive {
+            id: "drag_beta2".into(),
+            description: "Drag rises with the square of sideslip".into(),
+            coefficient: "CDbeta2".into(),
+            value: 0.9912,
+            ci95: [0.9859, 0.9965],
+            unit: String::new(),
+            alike: Vec::new(),
+        }
+    }
+
+    fn subject<'a>(scores: &'a [(Way, Vec<HorizonScore>)], effects: Vec<Decisive>) -> Subject<'a> {
+        let stage =
+            |(way, scores): &'a (Way, Vec<HorizonScore>)| Stage { way: *way, model: "m", scores };
+        Subject {
+            stages: scores.iter().map(stage).collect(),
+            flights: vec!["a".into(), "b".into()],
+            seen: Seen::Of(0),
+            effects,
+            baseline: None,
+        }
+    }
+
+    #[test]
+    fn tuning_and_effect_have_each_their_own_fall() {
+        let scores = [
+            (Way::Given, score(0.0873, 1.2, 0.01)),
+            (Way::Tuned, score(0.0234, 0.5, 0.01)),
+            (Way::Effects, score(0.00083, 0.02, 0.002)),
+        ];
+        let answer = Answer::of(&subject(&scores, vec![drag()]));
+        assert_eq!(
+            answer.error,
+            "On 2 flights not fitted the error at 5 s falls from 0.0873 to 0.0234 by tuning (−73 %) and to 0.00083 with \
+             drag_beta2 (another −96 %)."
+        );
+        // the airspeed's error falls most by the effect, 0.05 to 0.002 of its scale; sideslip's is left, 0.0067 of its own
+        assert_eq!(
+            answer.effect,
+            "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.996). With it the \
+             airspeed predicted 5 s ahead is off by 0.02 m/s instead of 0.5 m/s."
+        );
+        assert_eq!(answer.left, "Left: most in sideslip, 0.115° after 5 s.");
+        assert_eq!(answer.summary(), "error at 5 s 0.0873 → 0.00083 (−99.0 %)");
+        let json = serde_json::to_value(&answer).unwrap();
+        assert_eq!(json["numbers"]["steps"][2]["error"], 0.00083);
+        assert_eq!(json["numbers"]["fitted_flights"], 0);
+    }
+
+    #[test]
+    fn what_makes_it_worse_rises() {
+        let scores = [
+            (Way::Given, score(0.02, 0.5, 0.01)),
+            (Way::Tuned, score(0.04, 0.7, 0.01)),
+            (Way::Effects, score(0.03, 0.6, 0.01)),
+        ];
+        let said = Answer::of(&subject(&scores, vec![drag()])).error;
+        assert!(
+            said.contains("rises from 0.02 to 0.04 by tuning (+100 %) and falls to 0.03"),
+            "{said}"
+        );
+        let one = Answer::of(&subject(&scores[..1], Vec::new()));
+        assert_eq!(one.error, "On 2 flights not fitted the error at 5 s is 0.02.");
+        assert!(one.effect.is_empty() && one.summary() == "error at 5 s 0.02");
+    }
+
+    #[test]
+    fn flights_too_short_for_the_horizon_are_answered_at_a_shorter_one() {
+        let mut short = score(0.02, 0.5, 0.01);
+        short[1].runs = 0;
+        let scores = [(Way::Given, short.clone()), (Way::Other, short)];
+        let answer = Answer::of(&subject(&scores, Vec::new()));
+        assert_eq!(answer.numbers.horizon_s, 1.0);
+        assert!(answer.error.contains("at 1 s stays at 0.02"), "{}", answer.error);
+        let none = Answer::of(&subject(&[], Vec::new()));
+        assert_eq!(none.error, "No free run is long enough for an error to be given.");
+    }
+}

@@ -1,0 +1,248 @@
+//! The sentences of an answer.
+
+use super::numbers::{Decisive, InUse, Left, Numbers, Step, Way};
+
+/// By how much the error falls.
+pub fn error(n: &Numbers) -> String {
+    let Some((first, rest)) = n.steps.split_first() else {
+        return "No free run is long enough for an error to be given.".into();
+    };
+    let mut text = format!("{} the error at {} s", on(n), number(n.horizon_s));
+    if rest.is_empty() {
+        text += &format!(" is {}", number(first.error));
+        if let Some(b) = &n.baseline {
+            text += &format!(
+                "; the best forecast without aerodynamics ({}) errs by {}",
+                b.name,
+                number(b.error)
+            );
+        }
+        return text + ".";
+    }
+    let mut last = None;
+    for (k, step) in rest.iter().enumerate() {
+        let verb = verb(step);
+        let again = last == Some(verb);
+        let joint = match (k, again) {
+            (0, _) if verb == Verb::Stays => {
+                format!(" {} {}{}", verb.word(), number(step.error), by(n, step))
+            }
+            (0, _) => {
+                let name = if step.way == Way::Other {
+                    format!(" ({})", first.model)
+                } else {
+                    String::new()
+                };
+                format!(
+                    " {} from {}{name} to {}{}",
+                    verb.word(),
+                    number(first.error),
+                    number(step.error),
+                    by(n, step)
+                )
+            }
+            (_, true) if verb != Verb::Stays => {
+                format!(" and to {}{}", number(step.error), by(n, step))
+            }
+            _ => format!(" and {} {}{}", verb.toward(), number(step.error), by(n, step)),
+        };
+        let change = match step.change_percent {
+            Some(p) if again && step.way != Way::Other => format!(" (another {})", percent(p)),
+            Some(p) => format!(" ({})", percent(p)),
+            None => String::new(),
+        };
+        text += &(joint + &change);
+        last = Some(verb);
+    }
+    text + "."
+}
+
+/// What the effects are, each with its decisive coefficient, and what they change in use.
+pub fn effect(n: &Numbers) -> String {
+    let mut said: Vec<String> = n.effects.iter().map(one).collect();
+    let subject = match (n.steps.len(), n.effects.len()) {
+        (0 | 1, _) => return said.join(" "),
+        (_, 0) => match n.steps.last() {
+            Some(Step { way: Way::Other, model, .. }) => format!("With {model}"),
+            _ => "Tuned".into(),
+        },
+        (_, 1) => "With it".into(),
+        _ => "With them".into(),
+    };
+    said.extend(n.in_use.as_ref().map(|used| in_use(n, used, &subject)));
+    said.join(" ")
+}
+
+fn one(e: &Decisive) -> String {
+    let unit = if e.unit.is_empty() { String::new() } else { format!(" {}", e.unit) };
+    let [low, high] = e.ci95.map(number);
+    let what = lower(e.description.trim_end_matches('.'));
+    let mut text = format!(
+        "{} ({what}): {} = {} (95 %: {low} to {high}){unit}.",
+        e.id,
+        e.coefficient,
+        number(e.value)
+    );
+    if !e.alike.is_empty() {
+        text += &format!(" These flights cannot tell it from {}.", e.alike.join(" or "));
+    }
+    text
+}
+
+fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
+    let (name, unit, factor) = people(used.state);
+    let of = |x: f64| format!("{}{unit}", number(factor * x));
+    format!(
+        "{subject} the {name} predicted {} s ahead is off by {} instead of {}.",
+        number(n.horizon_s),
+        of(used.after),
+        of(used.before)
+    )
+}
+
+/// What is left.
+pub fn left(n: &Numbers) -> String {
+    n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
+        let (name, unit, factor) = people(state);
+        format!(
+            "Left: most in {name}, {}{unit} after {} s.",
+            number(factor * rmse),
+            number(n.horizon_s)
+        )
+    })
+}
+
+/// The answer in half a line.
+pub fn summary(n: &Numbers) -> String {
+    let at = format!("error at {} s", number(n.horizon_s));
+    match &n.steps[..] {
+        [] => "no free run is long enough for an error".into(),
+        [only] => format!("{at} {}", number(only.error)),
+        [first, .., last] => {
+            format!(
+                "{at} {} → {} ({})",
+                number(first.error),
+                number(last.error),
+                percent(n.change_percent)
+            )
+        }
+    }
+}
+
+/// "On 2 flights not fitted".
+fn on(n: &Numbers) -> String {
+    let all = n.flights.len();
+    let flights = if all == 1 { "1 flight".into() } else { format!("{all} flights") };
+    match n.fitted_flights {
+        _ if n.last_third => format!("On the last third of {}, not fitted,", n.flights.join(", ")),
+        None => format!("On {flights}"),
+        Some(0) => format!("On {flights} not fitted"),
+        Some(fitted) if fitted >= all => format!("On {flights}, fitted,"),
+        Some(fitted) => format!("On {flights}, {fitted} of them fitted,"),
+    }
+}
+
+/// Which way an error goes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Verb {
+    Falls,
+    Rises,
+    Stays,
+}
+
+impl Verb {
+    fn word(self) -> &'static str {
+        match self {
+            Verb::Falls => "falls",
+            Verb::Rises => "rises",
+            Verb::Stays => "stays at",
+        }
+    }
+
+    fn toward(self) -> &'static str {
+        match self {
+            Verb::Falls => "falls to",
+            Verb::Rises => "rises to",
+            Verb::Stays => "stays at",
+        }
+    }
+}
+
+fn verb(step: &Step) -> Verb {
+    match step.change_percent {
+        Some(p) if p <= -0.05 => Verb::Falls,
+        Some(p) if p >= 0.05 => Verb::Rises,
+        _ => Verb::Stays,
+    }
+}
+
+fn by(n: &Numbers, step: &Step) -> String {
+    match step.way {
+        Way::Given => String::new(),
+        Way::Tuned => " by tuning".into(),
+        Way::Effects => {
+            let ids: Vec<&str> = n.effects.iter().map(|e| e.id.as_str()).collect();
+            format!(
+                " with {}",
+                if ids.is_empty() { "the effects".into() } else { ids.join(" and ") }
+            )
+        }
+        Way::Other => format!(" with {}", step.model),
+    }
+}
+
+/// A change in percent with its sign; a digit more where only that tells it from all or nothing.
+fn percent(p: f64) -> String {
+    let sign = if p > 0.0 { "+" } else { "−" };
+    match p.abs() {
+        size if !size.is_finite() => "–".into(),
+        size if size < 0.05 => "±0 %".into(),
+        size if size < 9.95 || (98.0..100.0).contains(&size) => format!("{sign}{size:.1} %"),
+        size => format!("{sign}{size:.0} %"),
+    }
+}
+
+/// Three significant digits without zeros at the end, with a true minus sign.
+fn number(x: f64) -> String {
+    let text = match x.abs() {
+        0.0 => return "0".into(),
+        size if !size.is_finite() => return "–".into(),
+        size if !(1e-6..1e6).contains(&size) => format!("{x:.2e}"),
+        size => {
+            let places = (2 - size.log10().floor() as i32).clamp(0, 9) as usize;
+            let text = format!("{x:.places$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+    };
+    text.replace('-', "−")
+}
+
+/// The text with its first letter small, unless it is a word of capitals or a symbol.
+fn lower(text: &str) -> String {
+    let mut letters = text.chars();
+    match (letters.next(), text.chars().nth(1)) {
+        (Some(first), Some(second)) if second.is_lowercase() || second == ' ' => {
+            first.to_lowercase().chain(letters).collect()
+        }
+        _ => text.to_owned(),
+    }
+}
+
+/// A state's name and unit as people say them, and the factor from its SI unit.
+fn people(state: &str) -> (&str, &'static str, f64) {
+    let degrees = 1f64.to_degrees();
+    match state {
+        "roll_rad" => ("roll", "°", degrees),
+        "pitch_rad" => ("pitch", "°", degrees),
+        "airspeed_mps" => ("airspeed", " m/s", 1.0),
+        "p_radps" => ("roll rate", " °/s", degrees),
+        "q_radps" => ("pitch rate", " °/s", degrees),
+        "r_radps" => ("yaw rate", " °/s", degrees),
+        "alpha_rad" => ("angle of attack", "°", degrees),
+        "beta_rad" => ("sideslip", "°", degrees),
+        other => (other, "", 1.0),
+    }
+}
