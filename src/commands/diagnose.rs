@@ -149,6 +149,12 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis) -> String {
         // a formula is tested on another flight than it is searched in
         (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
+        // the flights are in question: what the logs hold comes first
+        (Verdict::Unknown, _) => arguments
+            .logs
+            .paths
+            .iter()
+            .fold("greylag logs info".into(), |line, log| line + " " + &quoted(log)),
     }
 }
 

@@ -8,6 +8,7 @@ use super::{given, mistake};
 use crate::logs::finding::{Finding, Severity};
 use crate::logs::mapping::Mapping;
 use crate::logs::phases::Flying;
+use crate::logs::quoted;
 use crate::logs::sources::Asked;
 use crate::logs::{self, Log, csv::Tolerance};
 use crate::model::GreyBox;
@@ -85,11 +86,12 @@ impl LogArguments {
 
     /// The options that say how the logs are read, as arguments of another command.
     pub fn reading_words(&self) -> Vec<std::ffi::OsString> {
-        let Reading { mapping, lenient, despite_problems } = &self.reading;
+        let Reading { mapping, lenient, despite_problems, source } = &self.reading;
         let mapping = mapping.iter().flat_map(|file| ["--mapping".into(), file.clone().into()]);
+        let sources = source.iter().flat_map(|s| ["--source".into(), s.to_string().into()]);
         let flags = [(*lenient, "--lenient"), (*despite_problems, "--despite-problems")];
         let given = flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.into());
-        mapping.chain(given).collect()
+        mapping.chain(sources).chain(given).collect()
     }
 
     /// Reads and reconstructs the logs; one that cannot be is said and left out.
@@ -128,7 +130,9 @@ impl Reading {
         let mapping = self.mapping.iter().map(|file| format!(" --mapping {}", quoted(file)));
         let flags = [(self.lenient, " --lenient"), (self.despite_problems, " --despite-problems")];
         let given = flags.into_iter().filter(|(given, _)| *given).map(|(_, word)| word.to_owned());
-        mapping.chain(given).collect()
+        let sources =
+            self.source.iter().map(|s| format!(" --source {}", quoted(Path::new(&s.to_string()))));
+        mapping.chain(sources).chain(given).collect()
     }
 
     fn tolerance(&self) -> Tolerance {

@@ -20,6 +20,12 @@ pub struct Asked {
     pub instance: u16,
 }
 
+impl std::fmt::Display for Asked {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}={}", self.topic, self.instance)
+    }
+}
+
 impl std::str::FromStr for Asked {
     type Err = String;
 
