@@ -12,6 +12,7 @@
 mod command;
 mod config;
 mod decision;
+mod envelope;
 mod estimate;
 mod failsafe;
 mod limits;
@@ -32,6 +33,7 @@ pub use limits::{Limits, TICK_S};
 pub use modes::mode_name;
 pub use polarity::Answers;
 
+use crate::control::envelope::EnvelopeFilter;
 use crate::control::{Controller, Observation, Target};
 use crate::flight::monitor::Monitor;
 use crate::link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
@@ -100,6 +102,8 @@ pub struct Pilot {
     refused: Option<Fault>,
     /// The model that says what it has not predicted, where there is one.
     monitor: Option<Monitor>,
+    /// What keeps the commands inside the envelope, where there is a model to predict with.
+    envelope: Option<EnvelopeFilter>,
 }
 
 /// What `observe` found, for `decide`.
@@ -119,6 +123,7 @@ struct Complaints {
     defect: Option<Time>,
     plan: Option<Time>,
     fallback: Option<Time>,
+    envelope: Option<Time>,
 }
 
 impl Pilot {
@@ -168,6 +173,7 @@ impl Pilot {
             upset: false,
             refused: None,
             monitor: None,
+            envelope: None,
         })
     }
 
@@ -303,6 +309,7 @@ impl Pilot {
 
     fn configure(&mut self, config: Config) {
         self.limits = Limits::from(&config);
+        self.envelope.iter_mut().for_each(|filter| filter.keep_to(&config.envelope));
         self.parameters = parameters::table(&config);
         self.config = config;
     }

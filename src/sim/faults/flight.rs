@@ -19,6 +19,7 @@ use super::mix::{Fault, FaultKind};
 use super::policies::Sample;
 use super::scenario::{Asking, Scenario, Setting};
 use super::wire::Wire;
+use crate::control::envelope::EnvelopeFilter;
 use crate::control::{Controller, ControllerKind, SetupError, build};
 use crate::flight::desk::Desk;
 use crate::flight::pilot::{ConfigError, Pilot};
@@ -138,7 +139,8 @@ impl CompanionFactory {
 
     fn desk(&self, counterpart: Counterpart) -> Result<Desk, FaultsError> {
         let config = self.companion.pilot.config().clone();
-        let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
+        let mut pilot = Pilot::new(config, self.fallback.boxed_clone())?;
+        pilot.protect_with(EnvelopeFilter::new(&self.model));
         let controller = self.companion.controller.boxed_clone();
         let companion = Companion { pilot, controller, placement: self.companion.placement };
         Ok(Desk::new(companion, vehicle(counterpart, &self.model)))
