@@ -60,20 +60,20 @@
 //!   ICUAS 2018.
 //! - **\[BM12\]** R. W. Beard, T. W. McLain, *Small Unmanned Aircraft*, Princeton, 2012.
 
-pub mod num;
-pub mod physics;
-pub mod model;
-pub mod control;
-pub mod manoeuvres;
-pub mod link;
-pub mod logs;
-pub mod flight;
-pub mod sysid;
-#[cfg(any(feature = "sitl", feature = "learn"))]
-pub mod sim;
+pub use greylag_campaign as campaign;
+pub use greylag_control as control;
+pub use greylag_flight as flight;
 #[cfg(feature = "learn")]
-pub mod learn;
-pub mod campaign;
-pub mod report;
-pub mod workbench;
+pub use greylag_learn as learn;
+pub use greylag_link as link;
+pub use greylag_logs as logs;
+pub use greylag_manoeuvres as manoeuvres;
+pub use greylag_model as model;
+pub use greylag_num as num;
+pub use greylag_physics as physics;
+pub use greylag_report as report;
+#[cfg(any(feature = "sitl", feature = "learn"))]
+pub use greylag_sim as sim;
+pub use greylag_sysid as sysid;
+pub use greylag_workbench as workbench;
 pub mod commands;

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::error::CampaignError;
-use crate::model::residual::hash;
+use greylag_model::residual::hash;
 
 /// The layout that this program reads.
 const SCHEMA: u32 = 1;
@@ -135,7 +135,7 @@ impl CampaignFile {
     /// If it is no campaign or names what there is not.
     pub fn parse(text: &str) -> Result<CampaignFile, String> {
         let mut file: CampaignFile =
-            toml::from_str(text).map_err(|e| crate::physics::airframe::toml_error(text, &e))?;
+            toml::from_str(text).map_err(|e| greylag_physics::airframe::toml_error(text, &e))?;
         file.sha256 = hash(text.as_bytes());
         file.check()?;
         Ok(file)

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::error::CampaignError;
-use crate::model::residual::hash;
+use greylag_model::residual::hash;
 
 /// Where `greylag evaluate` writes its scores in a cell's folder.
 pub const SCORES: &str = "evaluation.json";
@@ -83,7 +83,7 @@ fn trained(document: &Value) -> Vec<(String, f64)> {
     }
     let errors: Vec<f64> = list(document, "coefficients").iter().filter_map(relative).collect();
     if !errors.is_empty() {
-        let median = crate::num::statistics::quantile(&errors, 0.5);
+        let median = greylag_num::statistics::quantile(&errors, 0.5);
         all.push(("coefficient_error".into(), median));
     }
     all

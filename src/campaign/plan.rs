@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::cell::{Cell, OUT};
 use super::error::CampaignError;
 use super::file::{CampaignFile, Level, StageFile, levels};
-use crate::model::GreyBox;
-use crate::model::residual::hash;
+use greylag_model::GreyBox;
+use greylag_model::residual::hash;
 
 /// The placeholder of the folder that a cell writes.
 const OWN: &str = "{out}";

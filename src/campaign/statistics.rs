@@ -4,8 +4,8 @@
 //! are percentiles of a bootstrap that draws seeds with replacement within each stratum (task). Departs from it: the median
 //! is that of all runs, not the median over tasks of their means; \[GSFM26\] does not say which its tables hold.
 
-use crate::num::bootstrap;
-use crate::num::statistics::{interquartile_mean, mean, quantile};
+use greylag_num::bootstrap;
+use greylag_num::statistics::{interquartile_mean, mean, quantile};
 
 /// Seed of the resamples: the same runs have the same intervals.
 const SEED: u64 = 95;

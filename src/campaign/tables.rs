@@ -219,7 +219,7 @@ fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result
         [_, high] if high < 0.0 => Outcome::Contradicted,
         _ => Outcome::Undecided,
     };
-    let mean = crate::num::statistics::mean;
+    let mean = greylag_num::statistics::mean;
     let because = format!(
         "{}: {} has {:.3} (n = {}), {} has {:.3} (n = {}); difference{} {}",
         claim.metric,

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::control::lqi::{self, LoopMargins, MarginsError, Weights};
-use crate::control::{ControllerKind, build};
-use crate::model::modes::{Mode, modes, rates};
-use crate::model::{GreyBox, Trim, TrimError};
+use crate::lqi::{self, LoopMargins, MarginsError, Weights};
+use crate::{ControllerKind, build};
+use greylag_model::modes::{Mode, modes, rates};
+use greylag_model::{GreyBox, Trim, TrimError};
 
 /// Airspeeds of the trim table.
 const SPEEDS: usize = 7;

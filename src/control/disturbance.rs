@@ -4,10 +4,10 @@
 //! disturbance on the states: where the aircraft stands still the planner's model does so too, whatever is
 //! wrong with it.
 
-use crate::control::Observation;
-use crate::model::{GreyBox, Memory, STEP};
-use crate::physics::State;
-use crate::physics::actuators::Actuators;
+use crate::Observation;
+use greylag_model::{GreyBox, Memory, STEP};
+use greylag_physics::State;
+use greylag_physics::actuators::Actuators;
 
 /// No disturbance.
 pub(crate) const NONE: State =
@@ -129,8 +129,8 @@ impl Disturbance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::stream::stream;
-    use crate::physics::{ActuatorState, Command, Time};
+    use greylag_num::stream::stream;
+    use greylag_physics::{ActuatorState, Command, Time};
     use rand::RngExt;
     use std::path::Path;
     use std::time::Duration;
@@ -138,7 +138,7 @@ mod tests {
     /// A moment that the model lacks is found, and nothing else.
     #[test]
     fn a_constant_rate_is_found() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
         let model = GreyBox::load(&path).unwrap();
         let mut disturbance = Disturbance::new(0.2);
         let hidden = State { q: 0.3, ..NONE };
@@ -172,7 +172,7 @@ mod tests {
     /// 10 s of a `truth` with its surfaces at work, the rates kicked at random by `gust` (rad/s a step), as `model` predicts it.
     fn predicted(model: &str, truth: &str, gust: f64) -> Disturbance {
         let load = |name: &str| {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8").join(name);
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8").join(name);
             GreyBox::load(&path).unwrap()
         };
         let (model, truth) = (load(model), load(truth));

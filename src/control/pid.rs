@@ -1,8 +1,8 @@
 //! PID: three independent loops, roll by aileron, pitch by elevator, airspeed by throttle.
 
-use crate::control::{Controller, Observation, Target};
-use crate::model::STEP;
-use crate::physics::Command;
+use crate::{Controller, Observation, Target};
+use greylag_model::STEP;
+use greylag_physics::Command;
 
 /// Gains of one loop: output = trim + kp·e + ki·∫e − kd·rate, in units of the output (rad of
 /// surface, or throttle) per unit of the error (rad, or m/s).

@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::control::policy::{Agent, Policy};
-use crate::control::{Controller, cem, ilqr, lqi, pid};
-use crate::model::GreyBox;
+use crate::policy::{Agent, Policy};
+use crate::{Controller, cem, ilqr, lqi, pid};
+use greylag_model::GreyBox;
 
 /// Why a controller cannot be built.
 #[derive(Debug, thiserror::Error)]

@@ -1,8 +1,8 @@
 //! The task: what an attitude reached is worth, eq. (30) of \[GSFM26\].
 
-use crate::control::Target;
-use crate::num::Real;
-use crate::physics::State;
+use crate::Target;
+use greylag_num::Real;
+use greylag_physics::State;
 
 /// The constants of the reward.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,14 +5,14 @@
 
 use std::time::Duration;
 
-use crate::control::Controller;
-use crate::flight::pilot::{Decision, Pilot, Plan};
-use crate::flight::recorder::{Recorder, Row};
-use crate::flight::runtime::Companion;
-use crate::link::autopilot::{Autopilot, Severity, Text, Verdict};
-use crate::link::peer::{LinkId, PeerId, SERIAL};
-use crate::link::vehicle::{Notice, Order, Outputs, Telemetry, Vehicle};
-use crate::physics::Time;
+use crate::pilot::{Decision, Pilot, Plan};
+use crate::recorder::{Recorder, Row};
+use crate::runtime::Companion;
+use greylag_control::Controller;
+use greylag_link::autopilot::{Autopilot, Severity, Text, Verdict};
+use greylag_link::peer::{LinkId, PeerId, SERIAL};
+use greylag_link::vehicle::{Notice, Order, Outputs, Telemetry, Vehicle};
+use greylag_physics::Time;
 
 /// The peer that everything comes from.
 const WIRE: PeerId = PeerId { link: LinkId(0), address: SERIAL };

@@ -4,15 +4,15 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::control::Controller;
-use crate::flight::pilot::{Plan, Request};
-use crate::flight::recorder::call::{Call, CallError, HEADER, Planned, same};
-use crate::flight::runtime::Companion;
-use crate::link::autopilot::Autopilot;
-use crate::link::framing::{FrameCounts, Frames, frame_len};
-use crate::link::peer::{LinkId, PeerId, SERIAL};
-use crate::link::vehicle::{Order, Telemetry, Vehicle};
-use crate::physics::{Command, Time};
+use crate::pilot::{Plan, Request};
+use crate::recorder::call::{Call, CallError, HEADER, Planned, same};
+use crate::runtime::Companion;
+use greylag_control::Controller;
+use greylag_link::autopilot::Autopilot;
+use greylag_link::framing::{FrameCounts, Frames, frame_len};
+use greylag_link::peer::{LinkId, PeerId, SERIAL};
+use greylag_link::vehicle::{Order, Telemetry, Vehicle};
+use greylag_physics::{Command, Time};
 
 /// Seed of the controller's random numbers, as in flight.
 const SEED: u64 = 0;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use crate::learn::adam::Adam;
+use crate::adam::Adam;
 
 /// Where a training stands.
 #[derive(Clone, Debug, PartialEq)]

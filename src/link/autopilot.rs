@@ -1,6 +1,6 @@
 //! What the client side asks of an autopilot: the boundary between MAVLink and the pilot.
 
-use crate::physics::{ActuatorState, Command, Time};
+use greylag_physics::{ActuatorState, Command, Time};
 
 /// Flight modes, with the `custom_mode` numbers PX4 uses (main mode, sub mode).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -185,7 +185,7 @@ enum Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::framing::Version;
+    use crate::framing::Version;
 
     /// 21 November 2026 in µs since 1970, about.
     const NOW: u64 = 1_795_000_000_000_000;
@@ -197,7 +197,7 @@ mod tests {
     fn heartbeat(sequence: u8) -> Vec<u8> {
         let payload = [0, 0, 0, 0, 6, 8, 0, 4, 3];
         let source = Source { system: 7, component: 190 };
-        crate::link::framing::write(Version::V2, sequence, source, 0, &payload).unwrap()
+        crate::framing::write(Version::V2, sequence, source, 0, &payload).unwrap()
     }
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
     fn mavlink_1_cannot_be_signed_and_is_not_sent() {
         let mut us = Signer::new(key(1), 0);
         let source = Source { system: 7, component: 190 };
-        let old = crate::link::framing::write(Version::V1, 0, source, 0, &[0; 9]).unwrap();
+        let old = crate::framing::write(Version::V1, 0, source, 0, &[0; 9]).unwrap();
         assert!(us.sign(NOW, 0, &old).is_empty());
         assert_eq!(us.counts().unsignable, 1);
     }

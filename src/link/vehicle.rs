@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use super::autopilot::Severity;
 use super::peer::PeerId;
-use crate::physics::{ActuatorState, State, Time};
 pub use fault::{Axis, Fault};
+use greylag_physics::{ActuatorState, State, Time};
 pub use limits::Faults;
 pub use real::Real;
 pub use real::profile::{Authority, Profile, Stack};

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::Sample;
 use super::columns::{COLUMNS, index};
 use super::mapping::Mapping;
-use crate::num::statistics::quantile;
+use greylag_num::statistics::quantile;
 
 /// Fewest rows that a parabola is laid through.
 const FEWEST: usize = 5;

@@ -85,7 +85,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::logs::mapping::Mapping;
+    use crate::mapping::Mapping;
 
     #[test]
     fn the_sentence_of_a_cure_holds_a_line_of_a_mapping() {

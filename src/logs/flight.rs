@@ -1,8 +1,8 @@
 //! A flight as a table: one sample a row, the columns of the log format.
 
-use crate::logs::columns::{COLUMNS, Get, Place};
-use crate::num::statistics::quantile;
-use crate::physics::Sensors;
+use crate::columns::{COLUMNS, Get, Place};
+use greylag_num::statistics::quantile;
+use greylag_physics::Sensors;
 
 /// One row of a flight log. SI units, radians, body axes FRD, earth axes NED; a missing value is NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]

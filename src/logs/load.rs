@@ -11,7 +11,7 @@ use super::mapping::Mapping;
 use super::phases::Flying;
 use super::topics::{Topics, period_s};
 use super::{Flight, FlowAngles, Sample, dataflash, derive, rows, screening, table, tlog, ulog};
-use crate::logs::columns::COLUMNS;
+use crate::columns::COLUMNS;
 
 /// How a log is read.
 #[derive(Clone, Debug, Default)]

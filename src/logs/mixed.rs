@@ -2,7 +2,7 @@
 
 use super::columns::{COLUMNS, Place, index};
 use super::mapping::Mapping;
-use crate::physics::mixer::{Does, Mixer};
+use greylag_physics::mixer::{Does, Mixer};
 
 /// The share of one column of a file in one of the log format.
 pub(super) struct Share {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Sample, phases};
-use crate::num::statistics::mean;
+use greylag_num::statistics::mean;
 
 /// Standard deviation of a deflection that counts as movement, rad: 0.2°. By a rudder of
 /// Cn = 0.07/rad that is the moment of 0.2° of sideslip at Cnβ = 0.07/rad, less than a vane's noise

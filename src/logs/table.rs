@@ -15,7 +15,7 @@ use super::load::Channel;
 use super::mapping::rule::Rule;
 use super::resample::{Reader, SAME_S};
 use super::topics::{Topics, period_s};
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 /// The longest time that a fast channel is carried over, s.
 const GAP_S: f64 = 0.1;

@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 use super::finding::Finding;
 use super::format::MAVLINK_MARKERS;
 use super::topics::{Topic, Topics};
-use crate::link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
-use crate::link::logged::{self, Logged, Own};
+use greylag_link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
+use greylag_link::logged::{self, Logged, Own};
 
 /// Bytes of the host's time.
 const STAMP: usize = 8;

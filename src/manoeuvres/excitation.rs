@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use rand::RngExt;
 
-use crate::num::stream::stream;
+use greylag_num::stream::stream;
 
 /// Lines of a multisine.
 const LINES: usize = 7;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::manoeuvres::{
+use crate::{
     AIRSPEED_MPS, Axis, DURATION_MAX_S, Excitation, PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Shape,
     Step,
 };
-use crate::physics::airframe::{check_schema, named, toml_error};
+use greylag_physics::airframe::{check_schema, named, toml_error};
 
 /// Highest frequency of a multisine, Hz: five samples a period at 100 Hz.
 const FREQUENCY_MAX_HZ: f64 = 20.0;

@@ -2,10 +2,10 @@
 
 use rand::RngExt;
 
-use crate::manoeuvres::excitation::Axis::{self, Aileron, Elevator, Throttle};
-use crate::manoeuvres::menu::{doublet, firm, loose, pulse, push, sines, stall};
-use crate::manoeuvres::{Schedule, Shape, Step};
-use crate::num::stream::{Stream, stream};
+use crate::excitation::Axis::{self, Aileron, Elevator, Throttle};
+use crate::menu::{doublet, firm, loose, pulse, push, sines, stall};
+use crate::{Schedule, Shape, Step};
+use greylag_num::stream::{Stream, stream};
 
 /// Length of each flight, s.
 pub const FLIGHT_S: f64 = 50.0;

@@ -1,7 +1,7 @@
 //! The menu of flight-test manoeuvres, by name.
 
-use crate::manoeuvres::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
-use crate::manoeuvres::{Excitation, Schedule, Shape, Step};
+use crate::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
+use crate::{Excitation, Schedule, Shape, Step};
 
 /// Airspeeds at which speed-dependent effects are distinguished, m/s.
 const SPEEDS: [f64; 3] = [15.0, 19.0, 24.0];

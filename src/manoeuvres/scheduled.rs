@@ -1,8 +1,8 @@
 //! A controller that flies a schedule with another controller.
 
-use crate::control::{Controller, Observation, Target};
-use crate::manoeuvres::{Demand, Schedule};
-use crate::physics::{Command, Time};
+use crate::{Demand, Schedule};
+use greylag_control::{Controller, Observation, Target};
+use greylag_physics::{Command, Time};
 
 /// A schedule in flight: puts its excitation on top of whatever a controller commands.
 #[derive(Clone, Debug)]

@@ -1,10 +1,10 @@
 //! Sixteen aircraft a step on, in the widest registers that the processor has.
 
-use crate::model::{GreyBox, Memory};
+use crate::{GreyBox, Memory};
 #[cfg(target_arch = "x86_64")]
-use crate::num::{Avx2, Avx512};
-use crate::num::{Base, Lanes, Packed, ROW};
-use crate::physics::{Controls, State};
+use greylag_num::{Avx2, Avx512};
+use greylag_num::{Base, Lanes, Packed, ROW};
+use greylag_physics::{Controls, State};
 
 /// Sixteen numbers, one an aircraft.
 pub type Block = Lanes<ROW>;

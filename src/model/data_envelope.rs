@@ -7,9 +7,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::residual::INPUTS;
-use crate::num::Dense;
-use crate::num::dense::ON_STACK;
+use crate::residual::INPUTS;
+use greylag_num::Dense;
+use greylag_num::dense::ON_STACK;
 
 /// Features at most: 1, the inputs, the widest hidden layer.
 const MOST: usize = 1 + INPUTS + ON_STACK;
@@ -104,8 +104,8 @@ fn features(network: &Dense, inputs: &[f64; INPUTS]) -> ([f64; MOST], usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::residual::OUTPUTS;
-    use crate::num::stream;
+    use crate::residual::OUTPUTS;
+    use greylag_num::stream;
     use rand::RngExt;
 
     #[test]

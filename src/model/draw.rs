@@ -2,9 +2,9 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::model::{GreyBox, Named};
-use crate::num::stream;
-use crate::physics::effects::Kind;
+use crate::{GreyBox, Named};
+use greylag_num::stream;
+use greylag_physics::effects::Kind;
 
 /// Purpose of the random stream.
 const DRAWS: u64 = 40;
@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn draws_spread_by_the_widths_and_repeat() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
         let model = GreyBox::load(&path).unwrap();
         let draws: Vec<GreyBox> = (0..400).map(|k| model.drawn(7, k)).collect();
         for (i, c) in model.coefficients().iter().enumerate() {

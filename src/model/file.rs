@@ -7,18 +7,18 @@ use serde::Deserialize;
 use super::grey_box::{Points, Term};
 use super::residual::hash;
 use super::{GreyBox, Integrator, Named, Residual};
-use crate::num::{Grid, Table};
-use crate::physics::Airframe;
-use crate::physics::actuators::LAGS;
-use crate::physics::airframe::{
+use greylag_num::{Grid, Table};
+use greylag_physics::Airframe;
+use greylag_physics::actuators::LAGS;
+use greylag_physics::airframe::{
     FileError, Sourced, check_schema, named, positive, toml_error, within,
 };
-use crate::physics::atmosphere::{Atmosphere, Density};
-use crate::physics::effects::{Description, Kind};
-use crate::physics::formula::{Written, register};
-use crate::physics::rigid_body::{ForceAxes, RigidBody};
-use crate::physics::size::Size;
-use crate::physics::{catalogue, inputs};
+use greylag_physics::atmosphere::{Atmosphere, Density};
+use greylag_physics::effects::{Description, Kind};
+use greylag_physics::formula::{Written, register};
+use greylag_physics::rigid_body::{ForceAxes, RigidBody};
+use greylag_physics::size::Size;
+use greylag_physics::{catalogue, inputs};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

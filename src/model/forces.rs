@@ -9,11 +9,11 @@
 
 use super::GreyBox;
 use super::grey_box::{Named, Term};
-use crate::num::Real;
-use crate::physics::effects::{Needs, Terms};
-use crate::physics::point::Base;
-use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{AirData, Channel, Controls, Point, State, Wrench};
+use greylag_num::Real;
+use greylag_physics::effects::{Needs, Terms};
+use greylag_physics::point::Base;
+use greylag_physics::rigid_body::{self, Vector};
+use greylag_physics::{AirData, Channel, Controls, Point, State, Wrench};
 
 /// Passes over the effects that depend on the state's rate. Each brings the rate at least a factor of
 /// two closer within the bounds of `unsteady_lift`, a factor of ten at customary values.

@@ -1,15 +1,15 @@
 //! The dynamics model: which effects act, with which coefficients, on which rigid body.
 
-use crate::model::{Integrator, Residual};
-use crate::num::{Grid, Real, Table};
-use crate::physics::actuators::LAGS;
-use crate::physics::atmosphere::Atmosphere;
-use crate::physics::effects::{Description, Kind, Needs, Own};
-use crate::physics::formula::{Memory, Status, Written};
-use crate::physics::inputs::{self, InputMemory};
-use crate::physics::rigid_body::{ForceAxes, RigidBody};
-use crate::physics::size::Size;
-use crate::physics::{AirData, Airframe, Controls, State};
+use crate::{Integrator, Residual};
+use greylag_num::{Grid, Real, Table};
+use greylag_physics::actuators::LAGS;
+use greylag_physics::atmosphere::Atmosphere;
+use greylag_physics::effects::{Description, Kind, Needs, Own};
+use greylag_physics::formula::{Memory, Status, Written};
+use greylag_physics::inputs::{self, InputMemory};
+use greylag_physics::rigid_body::{ForceAxes, RigidBody};
+use greylag_physics::size::Size;
+use greylag_physics::{AirData, Airframe, Controls, State};
 
 /// A coefficient of a model: full name, value, standard deviation.
 #[derive(Clone, Debug, PartialEq)]
@@ -240,7 +240,7 @@ impl GreyBox {
     }
 
     /// What acts on the air when the actuators are measured at `controls`; called once every
-    /// [`STEP`](crate::model::STEP).
+    /// [`STEP`](crate::STEP).
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, memory: &mut InputMemory<R>) -> Controls<R> {
         let mut acting = *controls;

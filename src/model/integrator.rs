@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::GreyBox;
-use crate::num::{Real, each};
-use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
-use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{AirData, Command, Controls, State};
+use crate::GreyBox;
+use greylag_num::{Real, each};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::rigid_body::{self, Vector};
+use greylag_physics::{AirData, Command, Controls, State};
 
 /// The time step of control and simulation, s.
 pub const STEP: f64 = 0.01;

@@ -2,9 +2,9 @@
 
 use super::grey_box::{Points, Term};
 use super::{GreyBox, Named};
-use crate::physics::actuators::LAGS;
-use crate::physics::effects::{Coefficient, Description, Kind};
-use crate::physics::inputs;
+use greylag_physics::actuators::LAGS;
+use greylag_physics::effects::{Coefficient, Description, Kind};
+use greylag_physics::inputs;
 
 /// Why an effect cannot join a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -125,7 +125,7 @@ impl GreyBox {
     }
 
     /// [`join`](GreyBox::join) with the largest share of `values`, in hundredths, with which the body
-    /// [may become](crate::physics::rigid_body::RigidBody::may_become) what they make of it: all of them, but for an
+    /// [may become](greylag_physics::rigid_body::RigidBody::may_become) what they make of it: all of them, but for an
     /// estimate of mass or inertia that overshoots.
     ///
     /// # Errors

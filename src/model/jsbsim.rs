@@ -8,11 +8,11 @@ mod engine;
 use std::fmt::Write;
 
 use super::GreyBox;
-use crate::physics::airframe::ActuatorFigures;
-use crate::physics::rigid_body::ForceAxes;
-use crate::physics::servos::Surface;
 use conditions::Conditions;
 pub use conditions::ConditionsError;
+use greylag_physics::airframe::ActuatorFigures;
+use greylag_physics::rigid_body::ForceAxes;
+use greylag_physics::servos::Surface;
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;

@@ -3,8 +3,8 @@
 use nalgebra::SMatrix;
 
 use super::{GreyBox, Memory, Trim};
-use crate::num::Dual;
-use crate::physics::{Controls, State};
+use greylag_num::Dual;
+use greylag_physics::{Controls, State};
 
 /// One step of 0.01 s, linear about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use nalgebra::{Complex, Matrix4, SMatrix};
 use serde::Serialize;
 
 use super::{GreyBox, Trim, TrimError};
-use crate::num::Dual;
-use crate::physics::{Controls, State};
+use greylag_num::Dual;
+use greylag_physics::{Controls, State};
 
 /// Places of θ, V, q, α and of φ, p, r, β in the state of eq. (4).
 const LONGITUDINAL: [usize; 4] = [1, 2, 4, 6];
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn an_aerosonde_has_the_modes_of_a_conventional_aircraft() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/aerosonde/prior.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/aerosonde/prior.toml");
         let model = GreyBox::load(&path).unwrap();
         let modes = modes(&model, 25.0, 100.0).unwrap();
         let names: Vec<_> = modes.iter().map(|m| m.name).collect();

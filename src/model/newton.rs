@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::num::Dual;
+use greylag_num::Dual;
 
 /// The root of `f` near `start`, or `None` if it does not settle in 60 damped steps.
 ///

@@ -7,12 +7,12 @@ use safetensors::SafeTensorError;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::model::data_envelope::DataEnvelope;
-use crate::model::weights::{self, Square};
-use crate::num::dense::{DenseError, ON_STACK};
-use crate::num::{Dense, Real};
-use crate::physics::airframe::{ActuatorFigures, Geometry, Reference};
-use crate::physics::{Airframe, Controls, State};
+use crate::data_envelope::DataEnvelope;
+use crate::weights::{self, Square};
+use greylag_num::dense::{DenseError, ON_STACK};
+use greylag_num::{Dense, Real};
+use greylag_physics::airframe::{ActuatorFigures, Geometry, Reference};
+use greylag_physics::{Airframe, Controls, State};
 
 /// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
 ///
@@ -283,12 +283,12 @@ fn origin(bytes: &[u8]) -> Result<Origin, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::GreyBox;
-    use crate::num::stream;
+    use crate::GreyBox;
+    use greylag_num::stream;
     use rand::RngExt;
 
     fn model() -> GreyBox {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8");
         GreyBox::load(&folder.join("prior.toml")).unwrap()
     }
 

@@ -8,8 +8,8 @@ mod derivatives;
 
 use std::fmt::Write;
 
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 use derivatives::{induced, rudder};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// What balances and steers an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,7 +224,7 @@ pub(crate) fn numbers(out: &mut String, estimates: &[Estimate]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::GreyBox;
+    use crate::GreyBox;
 
     fn made(tail: Tail, rudder: Option<f64>) -> GreyBox {
         let measures = Measures {
@@ -269,7 +269,7 @@ mod tests {
         // at little throttle the propeller brakes, so the thrust of level flight has a second, negative solution
         let model = made(Tail::Conventional, Some(0.4363));
         let speed = model.airframe.reference.airspeed;
-        let trim = crate::model::Trim::level(&model, speed, 0.0).unwrap();
+        let trim = crate::Trim::level(&model, speed, 0.0).unwrap();
         assert!((0.1..1.0).contains(&trim.controls.throttle), "{trim:?}");
     }
 

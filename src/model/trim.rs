@@ -2,8 +2,8 @@
 
 use super::GreyBox;
 use super::newton;
-use crate::num::{Dual, Real};
-use crate::physics::{Controls, State};
+use greylag_num::{Dual, Real};
+use greylag_physics::{Controls, State};
 
 /// Path angle by which a descent at full throttle must be shallower than at idle to be one with an engine, rad.
 const SHALLOWER: f64 = 1e-6;

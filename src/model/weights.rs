@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::num::Dense;
+use greylag_num::Dense;
 
 /// The entry of a file's metadata that holds what it says of itself, as JSON.
 const METADATA: &str = "greylag";

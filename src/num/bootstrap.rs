@@ -43,7 +43,7 @@ pub fn stratified_interval<S: AsRef<[f64]>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::statistics::mean;
+    use crate::statistics::mean;
     use rand_distr::{Distribution, StandardNormal};
 
     /// The interval of a mean covers it about as often as it says.

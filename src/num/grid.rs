@@ -129,7 +129,7 @@ fn line<R: Real>(slopes: &[f64], ramps: &[R; MOST_COLUMNS]) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::Dual;
+    use crate::Dual;
 
     fn grid() -> Grid {
         let values = [vec![1.0, 2.0, 0.0], vec![3.0, 8.0, 1.0]];

@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn correlation_length_of_a_held_series_is_its_hold() {
         use rand::RngExt;
-        let mut rng = crate::num::stream::stream(9, &[]);
+        let mut rng = crate::stream::stream(9, &[]);
         let white: Vec<f64> = (0..5000).map(|_| rng.random_range(-1.0..1.0)).collect();
         assert!((super::correlation_length(std::slice::from_ref(&white)) - 1.0).abs() < 0.3);
         let held: Vec<f64> = white.iter().flat_map(|x| [*x; 8]).collect();

@@ -97,7 +97,7 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::Dual;
+    use crate::Dual;
 
     #[test]
     fn is_linear_between_points_and_constant_beyond() {

@@ -3,8 +3,8 @@
 //! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step, so a
 //! recurrence with the same coefficients reproduces it to rounding.
 
-use crate::num::{Real, each};
-use crate::physics::servos::{ActuatorFigures, Surface};
+use crate::servos::{ActuatorFigures, Surface};
+use greylag_num::{Real, each};
 
 /// A command, the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

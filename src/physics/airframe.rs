@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::physics::mixer::Mixer;
-use crate::physics::{Sensors, State};
+use crate::mixer::Mixer;
+use crate::{Sensors, State};
 
 pub use controls::Yaw;
 use controls::{Alike, Each};
 use effectors::{MotorFile, SurfaceFile};
 
-pub use crate::physics::servos::ActuatorFigures;
+pub use crate::servos::ActuatorFigures;
 
 /// Wing area in m², span and mean chord in m.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,8 +5,8 @@
 //! surface goes to its deflection at u_i, −1..1. Backwards, c = g⁺ u: least squares, u_i the deflection over half the
 //! travel. Forces that are linear in the surfaces' deflections are then linear in those of the controls.
 
-use crate::physics::Command;
-use crate::physics::servos::{Travel, Travels};
+use crate::Command;
+use crate::servos::{Travel, Travels};
 
 /// Names of the controls, in the order of an effector's gains.
 pub const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];

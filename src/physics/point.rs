@@ -1,9 +1,9 @@
 //! The point of the flight envelope at which forces are asked for.
 
-use crate::num::Real;
-use crate::physics::airframe::Geometry;
-use crate::physics::rigid_body::{ForceAxes, Vector};
-use crate::physics::{Controls, State, Wrench};
+use crate::airframe::Geometry;
+use crate::rigid_body::{ForceAxes, Vector};
+use crate::{Controls, State, Wrench};
+use greylag_num::Real;
 
 /// What the airflow is, worked out once for all effects.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 //! The rigid body: from forces to the rates of the state, eqs. (7)–(12) and (35) of \[GSFM26\].
 
-use crate::num::{Real, each};
-use crate::physics::wrench::Channel;
-use crate::physics::{AirData, State, Wrench};
+use crate::wrench::Channel;
+use crate::{AirData, State, Wrench};
+use greylag_num::{Real, each};
 
 /// Mass in kg, moments of inertia in kg m², axes FRD through the centre of gravity.
 ///
@@ -263,7 +263,7 @@ pub fn horizon_to_body<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::airframe::Geometry;
+    use crate::airframe::Geometry;
 
     const STATE: State = State {
         roll: 0.4,

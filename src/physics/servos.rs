@@ -1,7 +1,7 @@
 //! Servos: how far, how fast and with which lag each control follows its command.
 
-use crate::num::Real;
-use crate::physics::{Command, Controls};
+use crate::{Command, Controls};
+use greylag_num::Real;
 
 /// How far a surface goes, rad: its deflections at the commands −1 and 1.
 #[derive(Clone, Copy, Debug, PartialEq)]

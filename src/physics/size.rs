@@ -51,7 +51,7 @@ impl Size {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::effects::coefficient;
+    use crate::effects::coefficient;
 
     #[test]
     fn bounds_grow_with_the_aircraft_and_never_shrink() {

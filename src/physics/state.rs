@@ -1,6 +1,6 @@
 //! The eight variables of flight that the model predicts.
 
-use crate::num::{Real, each};
+use greylag_num::{Real, each};
 
 /// The physical state s^p = \[φ, θ, V_a, p, q, r, α, β\], eq. (4) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

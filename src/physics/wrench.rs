@@ -1,6 +1,6 @@
 //! What acts on the airframe, channel by channel.
 
-use crate::num::Real;
+use greylag_num::Real;
 
 /// A direction in which an effect may act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,9 +8,9 @@ use super::{
     Curves, Figure, Finding, Findings, Page, Range, Row, Scale, Section, Series, Style, Table,
     Whisker, Whiskers,
 };
-use crate::campaign::statistics::{Estimate, aggregate};
-use crate::campaign::tables::{self, Summary, SummaryRow};
-use crate::campaign::{CampaignFile, Record};
+use greylag_campaign::statistics::{Estimate, aggregate};
+use greylag_campaign::tables::{self, Summary, SummaryRow};
+use greylag_campaign::{CampaignFile, Record};
 
 /// Names of the three statistics.
 const STATISTICS: [&str; 3] = ["median", "interquartile mean", "mean"];

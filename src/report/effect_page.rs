@@ -1,8 +1,8 @@
 //! The page of one effect: what the catalogue knows of it, with its signature drawn.
 
 use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeries};
-use crate::physics::effects::Description;
-use crate::sysid::signature::{MANOEUVRE, Pair, Signature};
+use greylag_physics::effects::Description;
+use greylag_sysid::signature::{MANOEUVRE, Pair, Signature};
 
 /// What the page of an effect shows.
 #[derive(Clone, Debug)]

@@ -6,12 +6,12 @@ use super::{
     Band, Choice, ChoiceOption, Figure, Page, Panel, Scale, Section, Series, Style, Table,
     TimeFigure, Whisker, Whiskers,
 };
-use crate::control::Target;
-use crate::model::STEP;
-use crate::report::kit::numbers::number;
-use crate::sim::evaluation::{Evaluation, Score};
-use crate::sim::published::{Published, Value, published};
-use crate::sim::tracking::{Tracking, seconds};
+use crate::kit::numbers::number;
+use greylag_control::Target;
+use greylag_model::STEP;
+use greylag_sim::evaluation::{Evaluation, Score};
+use greylag_sim::published::{Published, Value, published};
+use greylag_sim::tracking::{Tracking, seconds};
 
 /// An evaluation's story, with where it came from.
 #[derive(Clone, Debug)]
@@ -210,9 +210,9 @@ fn whisker(label: String, style: Style, Value { value, ci95 }: Value) -> Whisker
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::insight::Insight;
-    use crate::sim::targets::Row;
-    use crate::sim::{Group, Outcome};
+    use greylag_control::insight::Insight;
+    use greylag_sim::targets::Row;
+    use greylag_sim::{Group, Outcome};
     use std::time::Duration;
 
     fn evaluated(controller: &str, settled_deg: f64) -> Evaluation {

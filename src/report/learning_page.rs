@@ -2,9 +2,9 @@
 
 use super::Align::{Left, Right};
 use super::{Choice, ChoiceOption, Curves, Figure, Page, Section, Series, Style, Table};
-use crate::learn::policy::learning_curve::{CurvePoint, best, knee, spread};
-use crate::report::kit::curves::Range;
-use crate::report::kit::numbers::{number, percent};
+use crate::kit::curves::Range;
+use crate::kit::numbers::{number, percent};
+use greylag_learn::policy::learning_curve::{CurvePoint, best, knee, spread};
 
 /// A training of one or several seeds.
 #[derive(Clone, Debug, PartialEq)]

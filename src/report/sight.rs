@@ -2,9 +2,9 @@
 
 use super::Align::Right;
 use super::{Figure, Style, Table, XyFigure, XyMark, XySeries};
-use crate::control::insight::{Insight, Path};
-use crate::model::STEP;
-use crate::report::kit::numbers::number;
+use crate::kit::numbers::number;
+use greylag_control::insight::{Insight, Path};
+use greylag_model::STEP;
 
 /// A tick of a planner that is shown.
 #[derive(Clone, Debug)]

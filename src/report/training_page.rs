@@ -5,10 +5,10 @@ use super::{
     Choice, ChoiceOption, Curves, Figure, HeatCell, HeatMap, Page, Section, Series, Style, Table,
     XyFigure, XyMark, XySeries,
 };
-use crate::learn::dynamics::residual_map::{Cell, ResidualMap};
-use crate::learn::dynamics::score::Horizon;
-use crate::learn::{Learned, Moment};
-use crate::report::kit::numbers::{number, percent};
+use crate::kit::numbers::{number, percent};
+use greylag_learn::dynamics::residual_map::{Cell, ResidualMap};
+use greylag_learn::dynamics::score::Horizon;
+use greylag_learn::{Learned, Moment};
 
 /// A trained model's story, with where it came from.
 #[derive(Clone, Debug)]
@@ -229,7 +229,7 @@ fn map(residual_map: &ResidualMap) -> Section {
         let count = ((high - low) / (2.0 * half)).round() as usize + 1;
         (0..=count).map(|k| low - half + 2.0 * half * k as f64).collect()
     };
-    let [half_alpha, half_beta] = crate::learn::dynamics::residual_map::HALF_CELL_DEG;
+    let [half_alpha, half_beta] = greylag_learn::dynamics::residual_map::HALF_CELL_DEG;
     let x_edges = edges(&|c| c.beta_deg, half_beta);
     let y_edges = edges(&|c| c.alpha_deg, half_alpha);
     let most = residual_map.map.iter().map(|c| c.norm).fold(0.0, f64::max);

@@ -4,12 +4,12 @@ use rand::seq::SliceRandom;
 use rand::{Rng, RngExt as _};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::control::{Controller, Observation, Target};
-use crate::logs::{Flight, Sample};
-use crate::num::stream::{self, Stream};
-use crate::physics::{Command, State};
-use crate::sim::episode::STEPS;
-use crate::sim::{Environment, Simulator, Trouble};
+use crate::episode::STEPS;
+use crate::{Environment, Simulator, Trouble};
+use greylag_control::{Controller, Observation, Target};
+use greylag_logs::{Flight, Sample};
+use greylag_num::stream::{self, Stream};
+use greylag_physics::{Command, State};
 
 /// Bins of roll and of pitch, each visited once before any is again.
 const BINS: usize = 5;
@@ -156,7 +156,7 @@ pub fn sample(seen: &Observation, command: Option<&Command>, target: &Target) ->
         throttle_cmd: command.throttle,
         roll_target_rad: target.roll,
         pitch_target_rad: target.pitch,
-        rate_hold_s: crate::model::STEP,
+        rate_hold_s: greylag_model::STEP,
         ..Sample::default()
     }
 }

@@ -2,8 +2,8 @@
 
 use greylag_sitl::plant::{Mixing, Moved, PlantOptions};
 
-use crate::physics::Airframe;
-use crate::physics::mixer::{Does, Effector};
+use greylag_physics::Airframe;
+use greylag_physics::mixer::{Does, Effector};
 
 /// Gives `plant` the surfaces, motors and conditions of `airframe`. Surfaces without JSBSim properties are left to the
 /// aircraft's own channels; what the command line holds is kept.

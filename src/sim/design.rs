@@ -4,22 +4,22 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use crate::control::{Controller, Observation, Target};
-use crate::logs::Sampling;
-use crate::manoeuvres::menu::{self, MENU, Manoeuvre};
-use crate::manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
-use crate::model::{GreyBox, JoinError};
-use crate::physics::catalogue;
-use crate::physics::inputs::InputMemory;
-use crate::physics::rigid_body;
-use crate::physics::{Controls, State};
-use crate::sim::instruments::{Group, Instruments};
-use crate::sim::missing::{Craft, Missing, MissingKind};
-use crate::sim::{Environment, Imagined};
-use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
-use crate::sysid::progress::{Cancelled, Progress, say};
-use crate::sysid::separation::{Separation, separation};
-use crate::sysid::weak_form::prepared::{ClockError, Prepared};
+use crate::instruments::{Group, Instruments};
+use crate::missing::{Craft, Missing, MissingKind};
+use crate::{Environment, Imagined};
+use greylag_control::{Controller, Observation, Target};
+use greylag_logs::Sampling;
+use greylag_manoeuvres::menu::{self, MENU, Manoeuvre};
+use greylag_manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
+use greylag_model::{GreyBox, JoinError};
+use greylag_physics::catalogue;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::rigid_body;
+use greylag_physics::{Controls, State};
+use greylag_sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
+use greylag_sysid::progress::{Cancelled, Progress, say};
+use greylag_sysid::separation::{Separation, separation};
+use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 
 /// Evidence that settles which of two effects it is.
 pub const ENOUGH: f64 = 10.0;

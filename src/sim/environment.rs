@@ -3,9 +3,9 @@
 #[cfg(feature = "sitl")]
 use greylag_sitl::plant::PlantError;
 
-use crate::control::Observation;
-use crate::model::{GreyBox, Twin};
-use crate::physics::{Command, Time};
+use greylag_control::Observation;
+use greylag_model::{GreyBox, Twin};
+use greylag_physics::{Command, Time};
 
 /// Why an environment cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +42,7 @@ pub trait Environment {
 }
 
 /// One aircraft imagined by a model, with the exact actuator filters as its state. Many at once, for training, are
-/// [`Imagination`](crate::sim::imagined::Imagination).
+/// [`Imagination`](crate::imagined::Imagination).
 #[derive(Clone, Debug)]
 pub struct Imagined {
     model: GreyBox,

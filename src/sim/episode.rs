@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use crate::control::{Controller, Observation, Target};
-use crate::model::STEP;
-use crate::physics::Command;
-use crate::sim::{Environment, Trouble};
+use crate::{Environment, Trouble};
+use greylag_control::{Controller, Observation, Target};
+use greylag_model::STEP;
+use greylag_physics::Command;
 
 /// Steps of an episode (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
@@ -102,7 +102,7 @@ pub fn attitude_error_deg([roll, pitch]: [f64; 2], target: &Target) -> [f64; 2] 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{ActuatorState, State, Time};
+    use greylag_physics::{ActuatorState, State, Time};
 
     const TARGET: Target = Target { roll: 0.0, pitch: 0.0, airspeed: 16.67 };
 

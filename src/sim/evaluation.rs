@@ -8,15 +8,15 @@ use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::control::{Controller, Target};
-use crate::model::GreyBox;
-use crate::num::statistics::{interquartile_mean, mean, quantile};
-use crate::num::{bootstrap, stream};
 #[cfg(feature = "sitl")]
-use crate::sim::Simulator;
-use crate::sim::episode::DIVERGED_DEG;
-use crate::sim::targets::Row;
-use crate::sim::{Environment, Episode, Group, Imagined, Outcome, Trouble};
+use crate::Simulator;
+use crate::episode::DIVERGED_DEG;
+use crate::targets::Row;
+use crate::{Environment, Episode, Group, Imagined, Outcome, Trouble};
+use greylag_control::{Controller, Target};
+use greylag_model::GreyBox;
+use greylag_num::statistics::{interquartile_mean, mean, quantile};
+use greylag_num::{bootstrap, stream};
 
 /// Seed of the intervals' resamples: the same scores have the same intervals.
 const SEED: u64 = 95;

@@ -2,10 +2,10 @@
 
 use greylag_sitl::plant::{PlantOptions, Truth};
 
-use crate::control::{Controller, Target};
-use crate::manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
-use crate::physics::Command;
-use crate::sim::{Environment, Simulator, Trouble};
+use crate::{Environment, Simulator, Trouble};
+use greylag_control::{Controller, Target};
+use greylag_manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
+use greylag_physics::Command;
 
 /// Factor by which a schedule is made gentler when an aircraft does not stay inside its bounds.
 const GENTLER: f64 = 0.75;

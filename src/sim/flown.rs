@@ -2,15 +2,15 @@
 
 use greylag_sitl::plant::PlantOptions;
 
-use crate::control::policy::{ACTIONS, OBSERVATIONS, command, observe};
-use crate::control::task::Task;
-use crate::control::{Observation, Target};
-use crate::num::{Lanes, Real};
-use crate::physics::State;
-use crate::sim::imagined::{Block, Ended, STEPS, Stepped, WIDTH, outside};
-use crate::sim::targets::Stratified;
-use crate::sim::world::World;
-use crate::sim::{Environment, Simulator, Trouble};
+use crate::imagined::{Block, Ended, STEPS, Stepped, WIDTH, outside};
+use crate::targets::Stratified;
+use crate::world::World;
+use crate::{Environment, Simulator, Trouble};
+use greylag_control::policy::{ACTIONS, OBSERVATIONS, command, observe};
+use greylag_control::task::Task;
+use greylag_control::{Observation, Target};
+use greylag_num::{Lanes, Real};
+use greylag_physics::State;
 
 /// One aircraft in JSBSim.
 pub struct Flown {

@@ -4,9 +4,9 @@
 
 use greylag_sitl::hidden::{Filter, FilterKind, Hidden, Place};
 
-use crate::physics::Channel;
-use crate::physics::formula::expression::{Expression, Function, Node};
-use crate::physics::formula::{Variable, Written};
+use greylag_physics::Channel;
+use greylag_physics::formula::expression::{Expression, Function, Node};
+use greylag_physics::formula::{Variable, Written};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;

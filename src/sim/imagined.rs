@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use crate::control::Target;
-use crate::control::policy::{ACTIONS, OBSERVATIONS, command, observe};
-use crate::control::task::Task;
-pub use crate::model::block::Block;
-use crate::model::{GreyBox, Memory};
-use crate::num::{ROW, Real};
-use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
-use crate::physics::{Controls, State};
-use crate::sim::targets::Stratified;
+use crate::targets::Stratified;
+use greylag_control::Target;
+use greylag_control::policy::{ACTIONS, OBSERVATIONS, command, observe};
+use greylag_control::task::Task;
+pub use greylag_model::block::Block;
+use greylag_model::{GreyBox, Memory};
+use greylag_num::{ROW, Real};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::{Controls, State};
 
 /// Aircraft that move together.
 pub const WIDTH: usize = ROW;
@@ -55,7 +55,7 @@ pub struct Stepped {
 }
 
 /// Aircraft imagined by a model, each with its own target, filters and episode: many at once, for training. One
-/// aircraft to fly a controller in is [`Imagined`](crate::sim::environment::Imagined).
+/// aircraft to fly a controller in is [`Imagined`](crate::environment::Imagined).
 ///
 /// The actuators' exact filters are part of the state. The air density is that of the start: over an
 /// episode it would change by less than 1 %.

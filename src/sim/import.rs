@@ -9,12 +9,12 @@ mod propulsion;
 
 use greylag_sitl::plant::{Inputs, Loads, MassProperties, Plant, PlantError, Start, Stops, Travel};
 
-use crate::physics::airframe::Geometry;
-use crate::physics::rigid_body::RigidBody;
-use crate::physics::size::Size;
 use effects::effects;
 use files::{airframe, model_file};
 use fits::{first_order, second_order};
+use greylag_physics::airframe::Geometry;
+use greylag_physics::rigid_body::RigidBody;
+use greylag_physics::size::Size;
 use lateral::{AileronOverIncidence, WithLift};
 use propeller::Propeller;
 

@@ -6,9 +6,9 @@ use greylag_sitl::plant::{DT_S, Truth};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::logs::{Flight, Sample};
-use crate::num::stream::{Stream, stream};
-use crate::sim::flight_test::Flown;
+use crate::flight_test::Flown;
+use greylag_logs::{Flight, Sample};
+use greylag_num::stream::{Stream, stream};
 
 /// What is random about instruments, each in a stream of its own.
 const DRAW: u64 = 70;

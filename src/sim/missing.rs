@@ -3,10 +3,10 @@
 use greylag_sitl::hidden::{Hidden, HiddenError};
 use rand::RngExt;
 
-use crate::model::GreyBox;
-use crate::num::stream::{Stream, stream};
-use crate::physics::formula::Written;
-use crate::sim::hidden_formula;
+use crate::hidden_formula;
+use greylag_model::GreyBox;
+use greylag_num::stream::{Stream, stream};
+use greylag_physics::formula::Written;
 
 /// Stream of what is drawn about missing effects.
 const DRAW: u64 = 80;

@@ -1,9 +1,9 @@
 //! One step of a model beside one step of what is flown, over a flight in which every control moves.
 
 use super::{Environment, Trouble};
-use crate::control::{ControllerKind, Observation, SetupError, Target, build};
-use crate::model::{GreyBox, Memory, STEP};
-use crate::physics::Command;
+use greylag_control::{ControllerKind, Observation, SetupError, Target, build};
+use greylag_model::{GreyBox, Memory, STEP};
+use greylag_physics::Command;
 
 /// Angular frequencies of the waves on aileron, elevator, throttle and rudder, rad a step.
 const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];

@@ -77,7 +77,7 @@ const ALL: [Published; 15] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::ControllerKind;
+    use greylag_control::ControllerKind;
 
     #[test]
     fn published_values_lie_in_their_intervals_and_have_controllers() {

@@ -2,9 +2,9 @@
 
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 
-use crate::control::Observation;
-use crate::physics::{ActuatorState, Command, State, Time};
-use crate::sim::{Environment, Trouble};
+use crate::{Environment, Trouble};
+use greylag_control::Observation;
+use greylag_physics::{ActuatorState, Command, State, Time};
 
 /// JSBSim.
 pub struct Simulator {

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::num::stream::stream;
-use crate::physics::catalogue::describe;
-use crate::physics::size::Size;
-use crate::sim::missing::{Missing, rounded};
+use crate::missing::{Missing, rounded};
+use greylag_num::stream::stream;
+use greylag_physics::catalogue::describe;
+use greylag_physics::size::Size;
 
 /// How wrong coefficients are: standard deviation as a share of the value, none beyond twice.
 pub const WRONG: f64 = 0.15;

@@ -6,9 +6,9 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 
-use crate::control::Target;
-use crate::num::stream;
-use crate::physics::{Airframe, State};
+use greylag_control::Target;
+use greylag_num::stream;
+use greylag_physics::{Airframe, State};
 
 /// How hard a target is, Table II of \[GSFM26\] in both its readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_shipped_file_is_the_one_of_seed_1() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/targets.csv");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/targets.csv");
         assert_eq!(TargetFile::load(&path).unwrap(), TargetFile::generate(1));
     }
 
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn half_the_targets_want_another_airspeed_of_the_envelope() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/airframe.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/airframe.toml");
         let airframe = Airframe::load(&path).unwrap();
         let mut targets = Stratified::new(3, 0, 0.0).at_airspeeds_of(&airframe);
         let mut plain = Stratified::new(3, 0, 0.0);

@@ -1,9 +1,9 @@
 //! Single flights for looking at: attitude over time, and what a planner saw at chosen moments.
 
-use crate::control::insight::Insight;
-use crate::control::{Controller, Target};
-use crate::model::STEP;
-use crate::sim::{Environment, Trouble};
+use crate::{Environment, Trouble};
+use greylag_control::insight::Insight;
+use greylag_control::{Controller, Target};
+use greylag_model::STEP;
 
 /// Steps into the flight after which the planner is asked what it saw.
 pub const ASKED: [usize; 3] = [10, 50, 150];

@@ -6,16 +6,16 @@ use greylag_sitl::air::{Air, Turbulence};
 use greylag_sitl::plant::{PlantOptions, Start};
 use rand::RngExt;
 
-use crate::control::Controller;
-use crate::logs::Flight;
-use crate::manoeuvres::{CRUISE_MPS, Schedule, flights};
-use crate::num::stream::stream;
-use crate::physics::Airframe;
-use crate::physics::airframe::Reference;
-use crate::sim::described::describe;
-use crate::sim::flight_test::{FlightTestError, fly_within_bounds};
-use crate::sim::instruments::Instruments;
-use crate::sim::missing::Missing;
+use crate::described::describe;
+use crate::flight_test::{FlightTestError, fly_within_bounds};
+use crate::instruments::Instruments;
+use crate::missing::Missing;
+use greylag_control::Controller;
+use greylag_logs::Flight;
+use greylag_manoeuvres::{CRUISE_MPS, Schedule, flights};
+use greylag_num::stream::stream;
+use greylag_physics::Airframe;
+use greylag_physics::airframe::Reference;
 
 /// Stream of the wind.
 const WIND: u64 = 82;

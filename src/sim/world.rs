@@ -1,8 +1,8 @@
 //! What a policy is trained in: blocks of aircraft that are observed and stepped together.
 
-use crate::control::policy::{ACTIONS, OBSERVATIONS};
-use crate::sim::Trouble;
-use crate::sim::imagined::{Block, Imagination, Stepped};
+use crate::Trouble;
+use crate::imagined::{Block, Imagination, Stepped};
+use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
 /// A world of one or many aircraft, each in an episode of its own that begins anew when it ends.
 pub trait World {

@@ -1,10 +1,10 @@
 //! A rudder that moves in the flights and that the model does not have.
 
-use crate::logs::rudder::RudderMotion;
-use crate::model::{GreyBox, RUDDER};
-use crate::physics::airframe::Yaw;
-use crate::sysid::compare::ChannelId;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::compare::ChannelId;
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_logs::rudder::RudderMotion;
+use greylag_model::{GreyBox, RUDDER};
+use greylag_physics::airframe::Yaw;
 
 /// The channels into which a rudder's forces and moments go: it turns the aircraft to the side, and
 /// its deflection with the sideslip that follows costs drag.

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::GreyBox;
-use crate::sysid::weak_form::prepared::Prepared;
-use crate::sysid::weak_form::windows::{channels, columns};
+use crate::weak_form::prepared::Prepared;
+use crate::weak_form::windows::{channels, columns};
+use greylag_model::GreyBox;
 
 /// Channels used: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;

@@ -1,9 +1,9 @@
 //! An effect's signature: what it changes along the airflow and the controls, then in a manoeuvre.
 
-use crate::model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
-use crate::physics::effects::Description;
-use crate::physics::rigid_body;
-use crate::physics::{Command, Controls, State};
+use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
+use greylag_physics::effects::Description;
+use greylag_physics::rigid_body;
+use greylag_physics::{Command, Controls, State};
 
 /// Altitude at which signatures are taken, m: the start of an episode.
 const ALTITUDE: f64 = 600.0;
@@ -245,14 +245,14 @@ fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{effects, inputs};
+    use greylag_physics::{effects, inputs};
     use std::path::Path;
 
     /// Every effect of the catalogue is seen at its example: in a sweep, or in the manoeuvre if it acts
     /// on how the surfaces move.
     #[test]
     fn every_effect_leaves_its_signature() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         let model = GreyBox::load(&path).unwrap();
         let catalogue = effects::Kind::ALL.iter().map(|kind| kind.describe());
         for about in catalogue.filter(|about| about.entry.is_some()) {
@@ -272,9 +272,9 @@ mod tests {
 
     #[test]
     fn an_error_of_the_measurement_has_none() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/prior.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
         let model = GreyBox::load(&path).unwrap();
-        let about = crate::sysid::flight_path::measurement_effects::MEASUREMENT_EFFECTS[0];
+        let about = crate::flight_path::measurement_effects::MEASUREMENT_EFFECTS[0];
         assert!(matches!(
             signature(&model, &about, &[]),
             Err(SignatureError::Measurement { id: "steady_wind" })

@@ -13,13 +13,13 @@ use super::fly::Order;
 use super::jobs::Work;
 use super::roles::now_s;
 use super::session::{Accepted, LogEntry, Occasion, Opening, Role};
-use crate::model::GreyBox;
-use crate::physics::catalogue;
-use crate::report::write_over;
-use crate::sysid::amend::Options;
-use crate::sysid::amend::document::sha256;
-use crate::sysid::compare::HorizonScore;
-use crate::sysid::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
+use greylag_physics::catalogue;
+use greylag_report::write_over;
+use greylag_sysid::amend::Options;
+use greylag_sysid::amend::document::sha256;
+use greylag_sysid::compare::HorizonScore;
+use greylag_sysid::weak_form::prepared::Prepared;
 
 /// The folder of the saved model, below the session's.
 pub(super) const SAVED: &str = "model";
@@ -272,7 +272,7 @@ impl Bench {
             inner.divided()?;
             if catalogue::describe(&effect).is_none() {
                 return Err(WorkbenchError::Amend(
-                    crate::model::JoinError::Unknown { id: effect.clone() }.into(),
+                    greylag_model::JoinError::Unknown { id: effect.clone() }.into(),
                 ));
             }
             let there = inner.session.effects.iter().any(|e| e.id == effect);

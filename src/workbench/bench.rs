@@ -16,12 +16,12 @@ use super::key::fingerprint;
 use super::proposal::Designed;
 use super::reading::{InUse, Reading};
 use super::session::{Claim, LogEntry, Outcome, Role, Session};
-use crate::logs;
-use crate::model::GreyBox;
-use crate::sysid::amend::document::{Original, sha256};
-use crate::sysid::amend::{Estimate, Fit};
-use crate::sysid::compare::{self, Comparison, compare};
-use crate::sysid::progress::unheard;
+use greylag_logs as logs;
+use greylag_model::GreyBox;
+use greylag_sysid::amend::document::{Original, sha256};
+use greylag_sysid::amend::{Estimate, Fit};
+use greylag_sysid::compare::{self, Comparison, compare};
+use greylag_sysid::progress::unheard;
 
 /// What a workbench begins with.
 pub struct Given {

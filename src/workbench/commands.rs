@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::act::SAVED;
 use super::bench::{Bench, Inner};
 use super::session::Role;
-use crate::logs::csv::Tolerance;
-use crate::sysid::amend::document::MODEL;
+use greylag_logs::csv::Tolerance;
+use greylag_sysid::amend::document::MODEL;
 
 /// The commands for the session as it is.
 #[derive(Clone, Debug, Serialize)]

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::sysid::compare::{ChannelId, Comparison, ModelResult, RegimeVariable};
-use crate::sysid::weak_form::prepared::Prepared;
+use greylag_sysid::compare::{ChannelId, Comparison, ModelResult, RegimeVariable};
+use greylag_sysid::weak_form::prepared::Prepared;
 
 /// Rows of a flight that are drawn at most.
 const ROWS: usize = 2500;

@@ -4,18 +4,18 @@ use std::io;
 use std::path::PathBuf;
 
 use super::session::Role;
-use crate::logs::LogError;
-use crate::logs::csv::CsvError;
-use crate::logs::mapping::MappingError;
-use crate::physics::airframe::FileError;
-use crate::report::WriteError;
-use crate::sysid::amend::AmendError;
-use crate::sysid::amend::document::DocumentError;
-use crate::sysid::compare::CompareError;
-use crate::sysid::diagnose::DiagnoseError;
-use crate::sysid::flight_path::ReconstructError;
-use crate::sysid::progress::Cancelled;
-use crate::sysid::weak_form::prepared::ClockError;
+use greylag_logs::LogError;
+use greylag_logs::csv::CsvError;
+use greylag_logs::mapping::MappingError;
+use greylag_physics::airframe::FileError;
+use greylag_report::WriteError;
+use greylag_sysid::amend::AmendError;
+use greylag_sysid::amend::document::DocumentError;
+use greylag_sysid::compare::CompareError;
+use greylag_sysid::diagnose::DiagnoseError;
+use greylag_sysid::flight_path::ReconstructError;
+use greylag_sysid::progress::Cancelled;
+use greylag_sysid::weak_form::prepared::ClockError;
 
 /// What kind of failure it is, for whoever answers a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -222,11 +222,11 @@ pub enum WorkbenchError {
     Amend(#[from] AmendError),
     /// No controller for the model.
     #[error(transparent)]
-    Control(#[from] crate::control::SetupError),
+    Control(#[from] greylag_control::SetupError),
     /// No schedule.
     #[cfg(feature = "sitl")]
     #[error(transparent)]
-    Design(#[from] crate::sim::design::DesignError),
+    Design(#[from] greylag_sim::design::DesignError),
 }
 
 impl WorkbenchError {

@@ -10,13 +10,13 @@ use super::bench::{Bench, Inner};
 use super::error::{WorkbenchError, io};
 use super::roles::Divided;
 use super::session::{Accepted, Role};
-use crate::model::GreyBox;
-use crate::report::write_over;
-use crate::sysid::amend::document::{self, Hashed, MODEL, Original, STORY, differs};
-use crate::sysid::amend::{self, Added, Amended, Options, Refused, amend, estimate, tune};
-use crate::sysid::compare::{HorizonScore, free_run};
-use crate::sysid::progress::{Progress, part, say};
-use crate::sysid::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
+use greylag_report::write_over;
+use greylag_sysid::amend::document::{self, Hashed, MODEL, Original, STORY, differs};
+use greylag_sysid::amend::{self, Added, Amended, Options, Refused, amend, estimate, tune};
+use greylag_sysid::compare::{HorizonScore, free_run};
+use greylag_sysid::progress::{Progress, part, say};
+use greylag_sysid::weak_form::prepared::Prepared;
 
 /// The file of a fit's errors over the flights that it saw.
 const ON_FIT: &str = "on_fit.json";

@@ -7,15 +7,15 @@ use serde::Serialize;
 
 use super::error::{WorkbenchError, io};
 use super::session::LogEntry;
-use crate::logs::finding::{Finding, Severity};
-use crate::logs::info::Info;
-use crate::logs::phases::Flying;
-use crate::logs::{self, Log};
-use crate::model::GreyBox;
-use crate::sysid::amend::document::sha256;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
-use crate::sysid::weak_form::prepared::Prepared;
+use greylag_logs::finding::{Finding, Severity};
+use greylag_logs::info::Info;
+use greylag_logs::phases::Flying;
+use greylag_logs::{self as logs, Log};
+use greylag_model::GreyBox;
+use greylag_sysid::amend::document::sha256;
+use greylag_sysid::flight_path::reconstruction::Reconstruction;
+use greylag_sysid::flight_path::{self, ActuatorClock, reconstruct};
+use greylag_sysid::weak_form::prepared::Prepared;
 
 /// Points of the strip that shows a flight at a glance.
 const STRIP: usize = 160;

@@ -11,10 +11,10 @@ use super::bench::{Bench, Inner};
 use super::error::WorkbenchError;
 use super::fly::Part;
 use super::roles::Divided;
-use crate::report::write_over;
-use crate::sysid::amend::tune;
-use crate::sysid::diagnose::{Options, diagnose};
-use crate::sysid::progress::{FirstLook, Progress, Stage, part};
+use greylag_report::write_over;
+use greylag_sysid::amend::tune;
+use greylag_sysid::diagnose::{Options, diagnose};
+use greylag_sysid::progress::{FirstLook, Progress, Stage, part};
 
 /// The effects of files that a diagnosis has tried, in what the workbench keeps of it.
 pub(super) const TRIED: &str = "tried";

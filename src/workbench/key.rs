@@ -5,8 +5,8 @@ use std::{fs, io};
 
 use super::bench::Inner;
 use super::session::{Accepted, Role};
-use crate::physics::formula::register;
-use crate::sysid::amend::document::sha256;
+use greylag_physics::formula::register;
+use greylag_sysid::amend::document::sha256;
 
 impl Inner {
     /// What a result is about: model, how logs are read, flights by role, effects.

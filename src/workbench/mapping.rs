@@ -7,9 +7,9 @@ use super::bench::{Bench, Inner};
 use super::error::{WorkbenchError, io};
 use super::flights::Loaded;
 use super::session::Role;
-use crate::logs::Format;
-use crate::logs::mapping::TEXT;
-use crate::report::write_over;
+use greylag_logs::Format;
+use greylag_logs::mapping::TEXT;
+use greylag_report::write_over;
 
 /// The file in the session's folder.
 pub(super) const FILE: &str = "mapping.toml";
@@ -20,7 +20,7 @@ fn number(value: &toml::Value) -> Option<f64> {
 
 /// Where a column of a log comes from, as a mapping says it.
 fn origin(flight: &Loaded, column: &str) -> String {
-    let named = |c: &&crate::logs::Channel| c.columns.iter().any(|own| own == column);
+    let named = |c: &&greylag_logs::Channel| c.columns.iter().any(|own| own == column);
     match (flight.info.format, flight.info.channels.iter().find(named)) {
         (Format::Csv, _) | (_, None) => format!("{TEXT}.{column}"),
         (_, Some(channel)) => channel.origin.clone(),

@@ -11,17 +11,17 @@ use super::curves::rows;
 use super::error::{WorkbenchError, io};
 use super::jobs::Work;
 use super::session::Role;
-use crate::model::GreyBox;
-use crate::physics::catalogue;
-use crate::physics::effects::Description;
-use crate::physics::formula::expression::Function;
-use crate::physics::formula::{Status, Variable, file, register};
-use crate::report::write_over;
-use crate::sysid::amend::document::sha256;
-use crate::sysid::compare::{self, ChannelId, compare};
-use crate::sysid::diagnose::{Curve, over_the_best};
-use crate::sysid::progress::unheard;
-use crate::sysid::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
+use greylag_physics::catalogue;
+use greylag_physics::effects::Description;
+use greylag_physics::formula::expression::Function;
+use greylag_physics::formula::{Status, Variable, file, register};
+use greylag_report::write_over;
+use greylag_sysid::amend::document::sha256;
+use greylag_sysid::compare::{self, ChannelId, compare};
+use greylag_sysid::diagnose::{Curve, over_the_best};
+use greylag_sysid::progress::unheard;
+use greylag_sysid::weak_form::prepared::Prepared;
 
 /// The folder of the effect files, below the session's.
 pub(super) const EFFECTS: &str = "effects";

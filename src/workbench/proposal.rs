@@ -12,10 +12,10 @@ use super::error::WorkbenchError;
 use super::fly::SCHEDULES;
 use super::jobs::Work;
 use super::session::Role;
-use crate::report::write_over;
-use crate::sysid::diagnose::{Options, propose};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::progress::Progress;
+use greylag_report::write_over;
+use greylag_sysid::diagnose::{Options, propose};
+use greylag_sysid::flight_path::reconstruction::Reconstruction;
+use greylag_sysid::progress::Progress;
 
 /// A schedule that was made to tell two effects apart.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -82,8 +82,8 @@ impl Bench {
     pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         use super::commands::quoted;
         use super::error::io;
-        use crate::control::{ControllerKind, build};
-        use crate::sim::design::{Suspect, plan, prospects};
+        use greylag_control::{ControllerKind, build};
+        use greylag_sim::design::{Suspect, plan, prospects};
 
         let (model, path, between, words) = {
             let inner = self.lock();

@@ -7,9 +7,9 @@ use super::bench::Inner;
 use super::error::{WorkbenchError, io};
 use super::flights::Loaded;
 use super::mapping::FILE;
-use crate::logs::csv::Tolerance;
-use crate::logs::mapping::Mapping;
-use crate::logs::{self};
+use greylag_logs as logs;
+use greylag_logs::csv::Tolerance;
+use greylag_logs::mapping::Mapping;
 
 /// How logs are read, as a command line says it.
 #[derive(Clone, Debug, Default)]

@@ -10,9 +10,9 @@ use super::bench::Inner;
 use super::error::WorkbenchError;
 use super::flights::Loaded;
 use super::session::{LogEntry, Occasion, Opening, Role};
-use crate::logs::names;
-use crate::sysid::amend::split;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
+use greylag_logs::names;
+use greylag_sysid::amend::split;
+use greylag_sysid::flight_path::reconstruction::Reconstruction;
 
 /// The flights that a fit sees and those that it is judged by, with what is odd about their logs.
 pub struct Divided {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::error::{WorkbenchError, io};
-use crate::report;
+use greylag_report as report;
 
 /// The file in the session's folder.
 pub const FILE: &str = "session.toml";

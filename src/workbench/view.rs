@@ -16,12 +16,12 @@ use super::jobs::{Job, TRIED, Work};
 use super::own::OwnView;
 use super::proposal::Designed;
 use super::session::{Flown, Opening, Role};
-use crate::logs::Format;
-use crate::logs::finding::Finding;
-use crate::logs::info::Purpose;
-use crate::logs::phases::Phase;
-use crate::sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
-use crate::sysid::progress::unheard;
+use greylag_logs::Format;
+use greylag_logs::finding::Finding;
+use greylag_logs::info::Purpose;
+use greylag_logs::phases::Phase;
+use greylag_sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
+use greylag_sysid::progress::unheard;
 
 /// Longest free run, s.
 const LONGEST_S: f64 = 60.0;
@@ -227,7 +227,7 @@ impl Bench {
         let flight = self.may_be_seen(request.flight)?;
         let models = self.lock().models();
         let seconds = request.seconds.clamp(0.1, LONGEST_S);
-        let run = |model: &crate::model::GreyBox| {
+        let run = |model: &greylag_model::GreyBox| {
             let path = free_run::from_moment(model, &flight.prepared, request.time_s, seconds)?;
             Some(OneRun {
                 model: model.name.clone(),
@@ -302,7 +302,7 @@ fn flight_view(inner: &Inner, (k, name): (usize, String)) -> FlightView<'_> {
 
 fn about(flight: &Loaded, locked: bool) -> About<'_> {
     let info = &flight.info;
-    let nuisance = |n: &crate::sysid::flight_path::reconstruction::Nuisance| json!({ "name": n.name, "value": n.value, "sd": n.sd, "unit": n.unit });
+    let nuisance = |n: &greylag_sysid::flight_path::reconstruction::Nuisance| json!({ "name": n.name, "value": n.value, "sd": n.sd, "unit": n.unit });
     About {
         format: info.format,
         rate_hz: info.rate_hz,
@@ -336,7 +336,7 @@ fn step(inner: &Inner, count: usize) -> StepView {
     };
     StepView {
         id: effect.id.clone(),
-        description: crate::physics::catalogue::describe(&effect.id).map_or("", |a| a.description),
+        description: greylag_physics::catalogue::describe(&effect.id).map_or("", |a| a.description),
         anyway: effect.anyway,
         status,
         error: error.filter(|_| status == "failed"),

@@ -2,11 +2,11 @@
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
-use crate::control::Observation;
-use crate::control::insight::{Insight, Path};
-use crate::model::STEP;
-use crate::physics::Command;
-use crate::physics::actuators::Actuators;
+use crate::Observation;
+use crate::insight::{Insight, Path};
+use greylag_model::STEP;
+use greylag_physics::Command;
+use greylag_physics::actuators::Actuators;
 
 /// Candidates kept for the report, spread over all.
 const SHOWN: usize = 48;

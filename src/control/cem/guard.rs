@@ -2,9 +2,9 @@
 
 use super::rollout::{Actions, HORIZON, WIDTH};
 use super::{Cem, Settings, flown};
-use crate::control::disturbance::{Disturbance, TIME_CONSTANT_S};
-use crate::control::{Observation, Target};
-use crate::physics::Command;
+use crate::disturbance::{Disturbance, TIME_CONSTANT_S};
+use crate::{Observation, Target};
+use greylag_physics::Command;
 
 /// What compares the model's predictions with what happened, if the settings ask for it.
 pub(super) fn predictions(settings: &Settings) -> Option<Disturbance> {

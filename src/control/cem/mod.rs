@@ -11,17 +11,17 @@ mod surrogate;
 
 use std::time::{Duration, Instant};
 
-use crate::control::disturbance::{self, Disturbance};
-use crate::control::ilqr::Ilqr;
-use crate::control::insight::Insight;
-use crate::control::lqi::{Ahead, Lqi};
-use crate::control::policy::Agent;
-use crate::control::{Controller, Observation, Target};
-use crate::model::{GreyBox, STEP};
-use crate::num::stream;
-use crate::physics::actuators::Actuators;
-use crate::physics::{Command, Time};
+use crate::disturbance::{self, Disturbance};
+use crate::ilqr::Ilqr;
+use crate::insight::Insight;
+use crate::lqi::{Ahead, Lqi};
+use crate::policy::Agent;
+use crate::{Controller, Observation, Target};
 pub use changes::{Change, ChangeError};
+use greylag_model::{GreyBox, STEP};
+use greylag_num::stream;
+use greylag_physics::actuators::Actuators;
+use greylag_physics::{Command, Time};
 use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
 pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;

@@ -8,9 +8,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::rollout::{Actions, HORIZON, Scene, WIDTH, Worth};
 use super::{Cem, Plan, Update, Valued};
-use crate::control::disturbance::{self, Disturbance};
-use crate::control::task::Task;
-use crate::control::{Observation, Target};
+use crate::disturbance::{self, Disturbance};
+use crate::task::Task;
+use crate::{Observation, Target};
 
 impl Cem {
     /// Draws the candidates of an iteration into the blocks from `first` on.

@@ -1,18 +1,18 @@
 //! Rollouts of many candidates at once, in the widest vectors that the processor has.
 
 use super::surrogate::Surrogate;
-use crate::control::lqi::Ahead;
-use crate::control::policy::{ACTIONS, Agent, OBSERVATIONS, command, observe};
-use crate::control::task::Task;
-use crate::control::{Observation, Target};
-use crate::model::{GreyBox, Memory, STEP};
-use crate::num::dense::Units;
+use crate::lqi::Ahead;
+use crate::policy::{ACTIONS, Agent, OBSERVATIONS, command, observe};
+use crate::task::Task;
+use crate::{Observation, Target};
+use greylag_model::{GreyBox, Memory, STEP};
+use greylag_num::dense::Units;
 #[cfg(target_arch = "x86_64")]
-use crate::num::{Avx2, Lanes, Pair};
-use crate::num::{BASE_FUSED, Base, Packed, ROW, Real};
-use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
-use crate::physics::{ActuatorState, Airframe, Command, State};
+use greylag_num::{Avx2, Lanes, Pair};
+use greylag_num::{BASE_FUSED, Base, Packed, ROW, Real};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::{ActuatorState, Airframe, Command, State};
 
 /// Candidates of a block.
 pub(super) const WIDTH: usize = ROW;

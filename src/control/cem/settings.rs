@@ -2,7 +2,7 @@
 
 use super::changes::Change;
 use super::rollout::HORIZON;
-use crate::control::disturbance::{TIME_CONSTANT_S, TRUST};
+use crate::disturbance::{TIME_CONSTANT_S, TRUST};
 
 /// How the candidates of an iteration make the next distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +91,7 @@ pub struct Settings {
     /// It needs either of them.
     pub trust: Option<f64>,
     /// Largest distance from the data that the model's residual was trained on, see
-    /// [`Residual::distance`](crate::model::Residual::distance), at which plans are made
+    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made
     /// (1 holds 99.9 % of the training samples); beyond it, as with `trust`.
     pub known: Option<f64>,
     /// What flies the candidates.

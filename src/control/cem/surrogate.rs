@@ -7,8 +7,8 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::rollout::Worth;
-use crate::control::policy::OBSERVATIONS as N;
-use crate::num::Real;
+use crate::policy::OBSERVATIONS as N;
+use greylag_num::Real;
 
 /// Part of an observation's variance that is added to it: ends that lie on a plane themselves have
 /// a slope along it only.

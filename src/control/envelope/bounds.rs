@@ -1,7 +1,7 @@
 //! The limits of the envelope as predictions are held against them.
 
-use crate::physics::Airframe;
-use crate::physics::airframe::{Envelope, Incidence};
+use greylag_physics::Airframe;
+use greylag_physics::airframe::{Envelope, Incidence};
 
 /// Attitude beyond its largest command that a transient may have, rad: 3 % of a step from −60° to 60°.
 const OVERSHOOT: f64 = 0.0628;

@@ -6,13 +6,13 @@
 //! in which the actuators and the short period answer. Since the check is repeated every tick, a command that is allowed now and
 //! would break a limit later is taken back in time.
 
-use crate::control::Observation;
-use crate::control::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
-use crate::control::envelope::{Bounds, load_factor};
-use crate::model::{GreyBox, STEP};
-use crate::physics::actuators::Actuators;
-use crate::physics::airframe::Envelope;
-use crate::physics::{Command, State};
+use crate::Observation;
+use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
+use crate::envelope::{Bounds, load_factor};
+use greylag_model::{GreyBox, STEP};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::airframe::Envelope;
+use greylag_physics::{Command, State};
 
 /// Steps predicted: 80 ms, some four time constants of a surface's actuator and as long as the short period needs to show where it goes.
 const HORIZON: usize = 8;

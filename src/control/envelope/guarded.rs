@@ -1,10 +1,10 @@
 //! A controller behind the envelope filter, as it flies in the pilot.
 
-use crate::control::envelope::EnvelopeFilter;
-use crate::control::insight::Insight;
-use crate::control::{Controller, Observation, Target};
-use crate::model::GreyBox;
-use crate::physics::Command;
+use crate::envelope::EnvelopeFilter;
+use crate::insight::Insight;
+use crate::{Controller, Observation, Target};
+use greylag_model::GreyBox;
+use greylag_physics::Command;
 
 /// A controller whose commands pass the filter.
 pub struct Guarded {

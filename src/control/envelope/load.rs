@@ -1,7 +1,7 @@
 //! The load factor of a step of the model.
 
-use crate::model::STEP;
-use crate::physics::State;
+use greylag_model::STEP;
+use greylag_physics::State;
 
 /// Standard gravity, m/s²: what load factors are counted in.
 pub const G0: f64 = 9.806_65;

@@ -10,15 +10,15 @@ mod problem;
 mod settings;
 mod solve;
 
-use crate::control::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
-use crate::control::envelope::Bounds;
-use crate::control::insight::{Insight, Path};
-use crate::control::lqi::{Ahead, Lqi};
-use crate::control::policy::{Actor, Agent};
-use crate::control::{Controller, Observation, Target};
-use crate::model::GreyBox;
-use crate::num::dense::Units;
-use crate::physics::Command;
+use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
+use crate::envelope::Bounds;
+use crate::insight::{Insight, Path};
+use crate::lqi::{Ahead, Lqi};
+use crate::policy::{Actor, Agent};
+use crate::{Controller, Observation, Target};
+use greylag_model::GreyBox;
+use greylag_num::dense::Units;
+use greylag_physics::Command;
 use std::sync::Arc;
 
 use problem::{Problem, Trajectory};

@@ -5,15 +5,15 @@ use nalgebra::{SMatrix, SVector};
 use super::cost::{Cost, attitude, beyond, square};
 use super::settings::Settings;
 use super::{STEPS, Surfaces};
-use crate::control::envelope::{Bounds, load_factor, load_factor_slopes};
-use crate::control::lqi::{Ahead, Goal};
-use crate::control::policy::{Actor, observe};
-use crate::control::{Observation, Target};
-use crate::model::{GreyBox, Memory, STEP, linearise_step};
-use crate::num::dense::Units;
-use crate::physics::actuators::Actuators;
-use crate::physics::inputs::InputMemory;
-use crate::physics::{Command, Controls, State};
+use crate::envelope::{Bounds, load_factor, load_factor_slopes};
+use crate::lqi::{Ahead, Goal};
+use crate::policy::{Actor, observe};
+use crate::{Observation, Target};
+use greylag_model::{GreyBox, Memory, STEP, linearise_step};
+use greylag_num::dense::Units;
+use greylag_physics::actuators::Actuators;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::{Command, Controls, State};
 
 /// States: those of eq. (4), then for aileron and elevator the deflection now and one step ago with the
 /// two last commanded deflections, rad.

@@ -2,12 +2,12 @@
 
 use super::design::{RUDDER_STATES, STATES};
 use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING};
-use crate::control::lqi::gain_schedule::Entry;
-use crate::model::STEP;
-use crate::num::{Real, each};
-use crate::physics::airframe::Incidence;
-use crate::physics::servos::ActuatorFigures;
-use crate::physics::{ActuatorState, Airframe, Command, State};
+use crate::lqi::gain_schedule::Entry;
+use greylag_model::STEP;
+use greylag_num::{Real, each};
+use greylag_physics::airframe::Incidence;
+use greylag_physics::servos::ActuatorFigures;
+use greylag_physics::{ActuatorState, Airframe, Command, State};
 
 /// The law of one condition: the gain, and the steady flight that it holds.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,8 @@
 use nalgebra::{RowSVector, SMatrix, SVector};
 
 use super::riccati;
-use crate::model::{GreyBox, Linear, STEP, Trim, linearise};
-use crate::physics::servos::Surface;
+use greylag_model::{GreyBox, Linear, STEP, Trim, linearise};
+use greylag_physics::servos::Surface;
 
 /// States of the design: φ θ p q r α β, then for aileron and elevator the deflection now and one
 /// step ago with the two last commanded deflections, then ∫φ and ∫θ.

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::control::SetupError;
-use crate::control::lqi::design::{Gain, Weights, design};
-use crate::model::{GreyBox, Trim};
-use crate::physics::State;
-use crate::physics::airframe::{Envelope, Incidence};
+use crate::SetupError;
+use crate::lqi::design::{Gain, Weights, design};
+use greylag_model::{GreyBox, Trim};
+use greylag_physics::State;
+use greylag_physics::airframe::{Envelope, Incidence};
 
 /// Equally spaced values of one scheduling variable.
 #[derive(Clone, Copy, Debug)]

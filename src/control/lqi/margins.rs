@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Weights;
 use super::design::{ALL, Loops, STATES, loops};
-use crate::model::{GreyBox, STEP, Trim, TrimError};
+use greylag_model::{GreyBox, STEP, Trim, TrimError};
 
 /// Frequencies at which a loop is looked at, from [`LOWEST`] to half the sampling frequency.
 const FREQUENCIES: usize = 1500;

@@ -9,13 +9,13 @@ mod riccati;
 
 use std::sync::Arc;
 
-use crate::control::{Controller, Observation, SetupError, Target};
-use crate::model::{GreyBox, STEP};
-use crate::physics::Command;
+use crate::{Controller, Observation, SetupError, Target};
 pub(crate) use ahead::Ahead;
 use ahead::{HOLD, Inner, Law, Surfaces};
 pub use design::Weights;
 use gain_schedule::Schedule;
+use greylag_model::{GreyBox, STEP};
+use greylag_physics::Command;
 pub use margins::{LoopMargins, MarginsError, margins};
 
 /// Largest rate of the roll reference, rad/s: commanded steps become ramps that the surfaces can

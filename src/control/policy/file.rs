@@ -6,11 +6,11 @@ use std::sync::Arc;
 use safetensors::SafeTensorError;
 use serde::{Deserialize, Serialize};
 
-use crate::control::policy::{Actor, Agent, Critic, ShapeError};
-use crate::model::residual::fingerprint;
-use crate::model::weights;
-use crate::num::Dense;
-use crate::physics::Airframe;
+use crate::policy::{Actor, Agent, Critic, ShapeError};
+use greylag_model::residual::fingerprint;
+use greylag_model::weights;
+use greylag_num::Dense;
+use greylag_physics::Airframe;
 
 /// The files of a folder, the actor last: where it is, the others are.
 const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
@@ -159,11 +159,11 @@ fn read(path: &Path) -> Result<(Dense, Origin), AgentError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::policy::{ACTIONS, OBSERVATIONS};
-    use crate::num::stream;
+    use crate::policy::{ACTIONS, OBSERVATIONS};
+    use greylag_num::stream;
 
     fn airframe() -> Airframe {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8");
         Airframe::load(&folder.join("airframe.toml")).unwrap()
     }
 

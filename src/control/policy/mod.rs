@@ -12,9 +12,9 @@ pub use file::{AgentError, Evaluated, Origin};
 pub use networks::{ACTIONS, Actor, Critic, ShapeError, command};
 pub use observation::{OBSERVATIONS, observe};
 
-use crate::control::{Controller, Observation, Target};
-use crate::num::dense::Units;
-use crate::physics::Command;
+use crate::{Controller, Observation, Target};
+use greylag_num::dense::Units;
+use greylag_physics::Command;
 
 /// The networks of a policy with what its files say of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,8 +67,8 @@ impl Controller for Policy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::{Dense, stream};
-    use crate::physics::{ActuatorState, State, Time};
+    use greylag_num::{Dense, stream};
+    use greylag_physics::{ActuatorState, State, Time};
 
     #[test]
     fn commands_are_the_actors_and_a_lost_state_is_not_hidden() {

@@ -1,9 +1,9 @@
 //! The networks of a policy: the actor π and its critics Q.
 
-use crate::control::policy::OBSERVATIONS;
-use crate::num::dense::Units;
-use crate::num::{Dense, Lanes, Real};
-use crate::physics::Command;
+use crate::policy::OBSERVATIONS;
+use greylag_num::dense::Units;
+use greylag_num::{Dense, Lanes, Real};
+use greylag_physics::Command;
 
 /// Components of an action: aileron, elevator and throttle, each in −1..1 (eq. 29 of \[GSFM26\]).
 pub const ACTIONS: usize = 3;
@@ -183,7 +183,7 @@ impl Critic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::stream;
+    use greylag_num::stream;
 
     #[test]
     fn every_instruction_set_gives_the_same_action_to_the_bit() {

@@ -1,8 +1,8 @@
 //! What a policy observes: the fifteen numbers of eq. (28) of \[GSFM26\] with the airspeed error, of order one.
 
-use crate::control::Target;
-use crate::num::Real;
-use crate::physics::{ActuatorState, State};
+use crate::Target;
+use greylag_num::Real;
+use greylag_physics::{ActuatorState, State};
 
 /// Numbers observed.
 pub const OBSERVATIONS: usize = 16;

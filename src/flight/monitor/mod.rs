@@ -15,9 +15,9 @@ pub use channel::{Channel, Warning};
 use prediction::{Predictor, Six};
 use watch::Watch;
 
-use crate::link::vehicle::{Faults, Telemetry};
-use crate::model::GreyBox;
-use crate::physics::{State, Time};
+use greylag_link::vehicle::{Faults, Telemetry};
+use greylag_model::GreyBox;
+use greylag_physics::{State, Time};
 
 /// Steps from which angular acceleration is taken, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
@@ -158,9 +158,9 @@ impl Monitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::vehicle::{Order, VANE_SD};
-    use crate::model::Trim;
-    use crate::physics::{ActuatorState, Controls};
+    use greylag_link::vehicle::{Order, VANE_SD};
+    use greylag_model::Trim;
+    use greylag_physics::{ActuatorState, Controls};
     use std::path::Path;
     use std::time::Duration;
 
@@ -188,7 +188,7 @@ mod tests {
             let air = truth.air(&state, altitude);
             let (linear, _) = truth.accelerations(&state, &controls, &air);
             let gravity =
-                crate::physics::rigid_body::gravity_in_body(&state, truth.atmosphere.gravity);
+                greylag_physics::rigid_body::gravity_in_body(&state, truth.atmosphere.gravity);
             let Controls { aileron, elevator, throttle, rudder, .. } = reported;
             let frame = Telemetry {
                 time: Time::default().plus(Duration::from_millis(10 * i)),

@@ -1,10 +1,10 @@
 //! What the model predicts of accelerations, with the width of that prediction.
 
-use crate::link::vehicle::Telemetry;
-use crate::model::GreyBox;
-use crate::physics::Channel as Part;
-use crate::physics::rigid_body::{RigidBody, acceleration_of, gravity_in_body};
-use crate::physics::{AirData, Controls, State};
+use greylag_link::vehicle::Telemetry;
+use greylag_model::GreyBox;
+use greylag_physics::Channel as Part;
+use greylag_physics::rigid_body::{RigidBody, acceleration_of, gravity_in_body};
+use greylag_physics::{AirData, Controls, State};
 
 /// Specific force (m/s², body x, y, z), then angular acceleration (rad/s², about x, y, z).
 pub type Six = [f64; 6];
@@ -66,7 +66,7 @@ const CHANGES: [Change; 10] = [
 impl Predictor {
     /// A predictor of what `model` says of itself.
     pub fn new(model: GreyBox) -> Self {
-        let widths = model.coefficients().iter().map(crate::model::Named::width).collect();
+        let widths = model.coefficients().iter().map(greylag_model::Named::width).collect();
         let span = model.airframe.geometry.span;
         let air_rotation = 1.9 * GUSTS_MPS / (GUST_SCALE_M * span).sqrt();
         Predictor { model, widths, air_rotation }

@@ -3,10 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
 use super::{Pilot, Plan, Source, due, within};
-use crate::control::Observation;
-use crate::link::autopilot::Severity;
-use crate::link::vehicle::Axis;
-use crate::physics::{Command, Time};
+use greylag_control::Observation;
+use greylag_link::autopilot::Severity;
+use greylag_link::vehicle::Axis;
+use greylag_physics::{Command, Time};
 
 /// Part of a controller's deflections beyond their mean that is flown while they are eased. It divides the loop's gain at the
 /// frequency at which it swings, and so multiplies the delay that the loop bears by about as much.

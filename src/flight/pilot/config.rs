@@ -4,8 +4,8 @@
 //! no throttle holds level flight.
 
 use super::polarity::Answers;
-use crate::model::{GreyBox, Trim, TrimError};
-use crate::physics::airframe::Envelope;
+use greylag_model::{GreyBox, Trim, TrimError};
+use greylag_physics::airframe::Envelope;
 
 /// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
 const TRIM_SPACING: f64 = 1.0;

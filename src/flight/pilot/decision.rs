@@ -1,9 +1,9 @@
 //! What the pilot asks of a planner, and what it answers to the vehicle.
 
-use crate::control::{Observation, Target};
-use crate::link::autopilot::Mode;
-use crate::link::vehicle::{Demand, Fault, Outputs};
-use crate::physics::{Command, Time};
+use greylag_control::{Observation, Target};
+use greylag_link::autopilot::Mode;
+use greylag_link::vehicle::{Demand, Fault, Outputs};
+use greylag_physics::{Command, Time};
 
 /// What a planner is asked for at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! Commands on their way to the surfaces pass the envelope filter, whoever gave them.
 
 use super::{Pilot, due};
-use crate::control::Observation;
-use crate::control::envelope::{EnvelopeFilter, Limit};
-use crate::link::autopilot::Severity;
-use crate::physics::Command;
+use greylag_control::Observation;
+use greylag_control::envelope::{EnvelopeFilter, Limit};
+use greylag_link::autopilot::Severity;
+use greylag_physics::Command;
 
 impl Pilot {
     /// Keeps every command of a controller inside the envelope by what `filter` predicts. Where a flight controller flies

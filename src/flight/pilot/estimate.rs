@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use super::telemetry::{defect, repeats};
-use crate::link::vehicle::Telemetry;
-use crate::physics::Time;
+use greylag_link::vehicle::Telemetry;
+use greylag_physics::Time;
 
 /// How far vehicle time may run backwards before the vehicle counts as restarted. Frames that
 /// overtake one another do so by one or two cycles.

@@ -3,8 +3,8 @@
 use super::estimate::{Estimate, Frame};
 use super::oscillation::Oscillation;
 use super::{Complaints, Pilot};
-use crate::link::autopilot::{Mode, Severity};
-use crate::physics::Time;
+use greylag_link::autopilot::{Mode, Severity};
+use greylag_physics::Time;
 
 /// Change of a command that a flying aircraft shows within a fifth of a second, in units of 0..1:
 /// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), which no sensor misses.

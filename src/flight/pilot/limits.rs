@@ -1,8 +1,8 @@
 //! The limits: what may be commanded at an airspeed, and how fast a command may change.
 
 use super::config::Config;
-use crate::control::Target;
-use crate::physics::Command;
+use greylag_control::Target;
+use greylag_physics::Command;
 
 /// Time between two ticks of the control loop, s.
 pub const TICK_S: f64 = 0.01;
@@ -112,7 +112,7 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::Airframe;
+    use greylag_physics::Airframe;
     use std::path::Path;
 
     fn x8() -> Limits {

@@ -1,9 +1,9 @@
 //! The model monitor of the pilot: channels that depart from the model are reported to the ground stations.
 
 use super::Pilot;
-use crate::flight::monitor::Monitor;
-use crate::link::autopilot::Severity;
-use crate::link::vehicle::Telemetry;
+use crate::monitor::Monitor;
+use greylag_link::autopilot::Severity;
+use greylag_link::vehicle::Telemetry;
 
 impl Pilot {
     /// Compares what is measured with what `monitor` predicts from now on, whenever the aircraft is flown.

@@ -2,11 +2,11 @@
 
 use super::estimate::within;
 use super::{Pilot, Source, parameters};
-use crate::link::autopilot::{
+use greylag_link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, Parameter, ParameterValue, Severity, Status, Sticks, Text,
     Verdict,
 };
-use crate::physics::{ActuatorState, Command, Time};
+use greylag_physics::{ActuatorState, Command, Time};
 
 /// The name of a mode as ground stations show it.
 pub fn mode_name(mode: Mode) -> &'static str {

@@ -7,8 +7,8 @@
 //! or twice; air does not make a command sweep like that.
 
 use super::limits::TICK_S;
-use crate::link::vehicle::Axis;
-use crate::physics::{Command, State, Time};
+use greylag_link::vehicle::Axis;
+use greylag_physics::{Command, State, Time};
 
 /// A steady turn has a pitch rate: what is slower than this is taken off, s.
 const SLOW_S: f64 = 0.5;

@@ -1,7 +1,7 @@
 //! The parameter table: names and ranges that clients see, tied to the pilot's settings.
 
 use super::config::{Config, ThrustSource};
-use crate::link::autopilot::{Parameter, ParameterValue, Verdict};
+use greylag_link::autopilot::{Parameter, ParameterValue, Verdict};
 
 /// A real parameter: its name, how to read it, how to write it.
 type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
@@ -93,8 +93,8 @@ fn denied(words: String) -> Result<Config, Verdict> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight::pilot::TrimPoint;
-    use crate::physics::Airframe;
+    use crate::pilot::TrimPoint;
+    use greylag_physics::Airframe;
     use std::path::Path;
 
     fn x8() -> Config {

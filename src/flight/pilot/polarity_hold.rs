@@ -3,8 +3,8 @@
 use super::estimate::Frame;
 use super::polarity::Verdict;
 use super::{Pending, Pilot};
-use crate::link::autopilot::Severity;
-use crate::physics::{Command, Time};
+use greylag_link::autopilot::Severity;
+use greylag_physics::{Command, Time};
 
 impl Pilot {
     /// Takes the state into the check of signs, if there is one; what is pending while it lasts.

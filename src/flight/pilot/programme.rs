@@ -1,10 +1,10 @@
 //! The flight-test schedule that a pilot flies in offboard, if it was given one.
 
 use super::texts::Texts;
-use crate::control::Target;
-use crate::link::autopilot::Severity;
-use crate::manoeuvres::{Demand, Overlay, Schedule};
-use crate::physics::{Command, Time};
+use greylag_control::Target;
+use greylag_link::autopilot::Severity;
+use greylag_manoeuvres::{Demand, Overlay, Schedule};
+use greylag_physics::{Command, Time};
 
 /// Where a schedule stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Whether a state frame of the vehicle can be believed.
 
-use crate::link::vehicle::limits;
-use crate::link::vehicle::{Faults, Telemetry};
+use greylag_link::vehicle::limits;
+use greylag_link::vehicle::{Faults, Telemetry};
 
 /// The faults that make a state unusable. Specific force is recorded, not flown on.
 const STATE_FAULTS: [(Faults, &str); 5] = [
@@ -52,8 +52,8 @@ const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::vehicle::{Order, VANE_SD};
-    use crate::physics::{ActuatorState, State, Time};
+    use greylag_link::vehicle::{Order, VANE_SD};
+    use greylag_physics::{ActuatorState, State, Time};
 
     fn good() -> Telemetry {
         Telemetry {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::link::autopilot::{Severity, Text};
+use greylag_link::autopilot::{Severity, Text};
 
 /// Lines kept at most: an hour without a client must not fill the memory.
 const CAPACITY: usize = 32;

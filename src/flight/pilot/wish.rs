@@ -1,9 +1,9 @@
 //! What is wished for: the target of the schedule, of the mode, or level.
 
 use super::{Pilot, ThrustSource};
-use crate::control::Target;
-use crate::link::autopilot::Mode;
-use crate::physics::Time;
+use greylag_control::Target;
+use greylag_link::autopilot::Mode;
+use greylag_physics::Time;
 
 impl Pilot {
     /// The target of the schedule, if one is flown at `now`.

@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::flight::pilot::mode_name;
-use crate::link::autopilot::{AttitudeSetpoint, Mode, ParameterValue, Sticks};
-use crate::physics::{Command, Time};
+use crate::pilot::mode_name;
+use greylag_link::autopilot::{AttitudeSetpoint, Mode, ParameterValue, Sticks};
+use greylag_physics::{Command, Time};
 
 /// The first line of the file.
 pub const HEADER: &str = "greylag-calls 1";

@@ -16,9 +16,9 @@ pub use call::Call;
 pub use folder::{Place, RecordError};
 pub use row::Row;
 
-use crate::flight::threads::{Receiver, RecvTimeoutError, Sender, bounded};
-use crate::link::framing::{FrameCounts, Frames};
-use crate::logs::csv::Rows;
+use crate::threads::{Receiver, RecvTimeoutError, Sender, bounded};
+use greylag_link::framing::{FrameCounts, Frames};
+use greylag_logs::csv::Rows;
 use queue::Queue;
 
 /// Entries that may wait: four seconds of a 100 Hz loop with its traffic.
@@ -226,12 +226,12 @@ impl<C: Write, T: Write, L: Write> Files<C, T, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::Target;
-    use crate::flight::pilot::{Decision, Source};
-    use crate::link::autopilot::Mode;
-    use crate::logs::Sample;
-    use crate::logs::csv::{self, Tolerance};
-    use crate::physics::{Command, Time};
+    use crate::pilot::{Decision, Source};
+    use greylag_control::Target;
+    use greylag_link::autopilot::Mode;
+    use greylag_logs::Sample;
+    use greylag_logs::csv::{self, Tolerance};
+    use greylag_physics::{Command, Time};
 
     fn row(i: u64) -> Row {
         let sample = Sample {

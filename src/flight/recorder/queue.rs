@@ -1,6 +1,6 @@
 //! A queue into a thread that never holds up whoever fills it: what does not fit is dropped and counted.
 
-use crate::flight::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
+use crate::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
 
 /// The filling end of a queue of `E` into a thread that comes to a `W`.
 #[derive(Debug)]

@@ -2,11 +2,11 @@
 
 use std::io::Write;
 
-use crate::flight::pilot::{Decision, mode_name};
-use crate::link::autopilot::RESIDUALS;
-use crate::link::vehicle::{Faults, Telemetry};
-use crate::logs::Sample;
-use crate::logs::csv::Rows;
+use crate::pilot::{Decision, mode_name};
+use greylag_link::autopilot::RESIDUALS;
+use greylag_link::vehicle::{Faults, Telemetry};
+use greylag_logs::Sample;
+use greylag_logs::csv::Rows;
 
 /// One tick: what was seen, what was decided, how long it took.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::physics::Time;
+use greylag_physics::Time;
 
 /// How the vehicle's time passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,15 +15,15 @@ use super::stamps::{Stamps, unix_us};
 use super::summary::Summary;
 use super::timing::Timing;
 use super::{Event, FlightOptions};
-use crate::flight::pilot::{Decision, Pilot, Plan};
-use crate::flight::recorder::call::Planned;
-use crate::flight::recorder::{Call, Recorder, Row};
-use crate::link::autopilot::{Autopilot, Severity};
-use crate::link::client::{Clients, Now};
-use crate::link::framing::Source;
-use crate::link::routing::Router;
-use crate::link::transport::{Arrival, Packet, Remark};
-use crate::link::vehicle::{Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
+use crate::pilot::{Decision, Pilot, Plan};
+use crate::recorder::call::Planned;
+use crate::recorder::{Call, Recorder, Row};
+use greylag_link::autopilot::{Autopilot, Severity};
+use greylag_link::client::{Clients, Now};
+use greylag_link::framing::Source;
+use greylag_link::routing::Router;
+use greylag_link::transport::{Arrival, Packet, Remark};
+use greylag_link::vehicle::{Notice, Order, Outputs, Real, Sitl, Telemetry, Vehicle};
 
 /// Between two looks at what is due: heartbeats, streams, lost links.
 const POLL: Duration = Duration::from_millis(10);

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::FlightOptions;
-use crate::link::address::Address;
-use crate::link::peer::LinkId;
-use crate::link::signing::{Key, KeyError, Signer, SigningCounts, StampError, StampFile};
+use greylag_link::address::Address;
+use greylag_link::peer::LinkId;
+use greylag_link::signing::{Key, KeyError, Signer, SigningCounts, StampError, StampFile};
 
 /// How links are signed.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -31,17 +31,17 @@ pub use guard::{Signing, SigningError, VehicleLink};
 pub use summary::Summary;
 pub use timing::{Histogram, Timing};
 
-use crate::control::Controller;
-use crate::flight::pilot::Pilot;
-use crate::flight::recorder::{Place, RecordError, Recorder};
-use crate::link::address::Address;
-use crate::link::autopilot::Text;
-use crate::link::peer::PeerId;
-use crate::link::transport::TransportError;
-use crate::link::vehicle::Profile;
-use crate::physics::mixer::Mixer;
-use crate::physics::servos::Travels;
+use crate::pilot::Pilot;
+use crate::recorder::{Place, RecordError, Recorder};
 use control::Control;
+use greylag_control::Controller;
+use greylag_link::address::Address;
+use greylag_link::autopilot::Text;
+use greylag_link::peer::PeerId;
+use greylag_link::transport::TransportError;
+use greylag_link::vehicle::Profile;
+use greylag_physics::mixer::Mixer;
+use greylag_physics::servos::Travels;
 use planner::{Planner, Threaded};
 use ports::Ports;
 

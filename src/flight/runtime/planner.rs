@@ -4,8 +4,8 @@ mod threaded;
 
 use std::time::Instant;
 
-use crate::control::Controller;
-use crate::flight::pilot::{Plan, Request};
+use crate::pilot::{Plan, Request};
+use greylag_control::Controller;
 pub(super) use threaded::Threaded;
 use threaded::run;
 
@@ -30,10 +30,10 @@ impl Planner {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::{Observation, Target};
-    use crate::flight::runtime::Pace;
-    use crate::flight::threads::{Receiver, Sender, bounded};
-    use crate::physics::{ActuatorState, Command, State, Time};
+    use crate::runtime::Pace;
+    use crate::threads::{Receiver, Sender, bounded};
+    use greylag_control::{Observation, Target};
+    use greylag_physics::{ActuatorState, Command, State, Time};
     use std::time::Duration;
 
     /// Something to plan for, of no interest beside its being there.

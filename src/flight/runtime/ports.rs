@@ -6,9 +6,9 @@ use crossbeam_channel::{Receiver, bounded};
 
 use super::guard::Guard;
 use super::{FlightError, FlightOptions};
-use crate::link::peer::{LinkId, PeerId};
-use crate::link::signing::SigningCounts;
-use crate::link::transport::{Arrival, Link, Network, Packet};
+use greylag_link::peer::{LinkId, PeerId};
+use greylag_link::signing::SigningCounts;
+use greylag_link::transport::{Arrival, Link, Network, Packet};
 
 /// Packets of the vehicle that may wait: two seconds, far beyond what control may stall.
 const VEHICLE_QUEUE: usize = 256;

@@ -1,13 +1,13 @@
 //! The pilot as clients see it, with an ear on the lines it says to them, a note of each call.
 
 use super::Event;
-use crate::flight::pilot::Pilot;
-use crate::flight::recorder::{Call, Recorder};
-use crate::link::autopilot::{
+use crate::pilot::Pilot;
+use crate::recorder::{Call, Recorder};
+use greylag_link::autopilot::{
     AttitudeSetpoint, Autopilot, Mode, Parameter, ParameterValue, Status, Sticks, Text, Verdict,
 };
-use crate::link::vehicle::Vehicle;
-use crate::physics::Time;
+use greylag_link::vehicle::Vehicle;
+use greylag_physics::Time;
 
 /// Passes everything on to the pilot; each line for the ground stations becomes an event as well.
 pub(super) struct RecordingAutopilot<'a, F: FnMut(Event)> {

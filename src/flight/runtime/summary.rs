@@ -6,10 +6,10 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::timing::Timing;
-use crate::flight::recorder::Written;
-use crate::link::client::ClientCounts;
-use crate::link::signing::SigningCounts;
-use crate::link::vehicle::VehicleCounts;
+use crate::recorder::Written;
+use greylag_link::client::ClientCounts;
+use greylag_link::signing::SigningCounts;
+use greylag_link::vehicle::VehicleCounts;
 
 /// The end of a flight.
 #[derive(Clone, Debug)]

@@ -2,14 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::learn::dynamics::windows::Track;
-use crate::model::GreyBox;
-use crate::num::{Dual, Real};
-use crate::physics::effects::Kind;
-use crate::physics::formula::Variable;
-use crate::physics::point::AirData;
-use crate::physics::rigid_body::{self, RigidBody};
-use crate::physics::{Channel, State, Wrench};
+use crate::dynamics::windows::Track;
+use greylag_model::GreyBox;
+use greylag_num::{Dual, Real};
+use greylag_physics::effects::Kind;
+use greylag_physics::formula::Variable;
+use greylag_physics::point::AirData;
+use greylag_physics::rigid_body::{self, RigidBody};
+use greylag_physics::{Channel, State, Wrench};
 
 /// The name under which the product of inertia is trainable.
 ///
@@ -233,7 +233,7 @@ fn gram(model: &GreyBox, places: &[usize], tracks: &[Track]) -> DMatrix<f64> {
 }
 
 /// ∂F_p/∂θ of every coefficient, then of Jxz, at a sample.
-pub(in crate::learn) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
+pub(crate) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]> {
     let (state, controls) = (&track.states[k], &track.controls[k]);
     let air = model.air(state, track.altitude[k]);
     let mut wrenches = vec![Wrench::zero(); model.coefficients().len()];
@@ -251,12 +251,7 @@ pub(in crate::learn) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec
 }
 
 /// The rates that a wrench alone makes of the state.
-pub(in crate::learn) fn rate_of(
-    model: &GreyBox,
-    state: &State,
-    air: &AirData,
-    wrench: &Wrench,
-) -> [f64; 8] {
+pub(crate) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wrench) -> [f64; 8] {
     let still = rigid_body::state_rate(state, air, [0.0; 3], [0.0; 3]).to_array();
     let none = State { p: 0.0, q: 0.0, r: 0.0, ..*state };
     let force = rigid_body::body_force(wrench, air, model.axes);

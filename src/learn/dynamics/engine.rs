@@ -1,13 +1,13 @@
 //! The engine: minibatches in the precision asked for, in the widest vectors there are.
 
-use crate::learn::dynamics::kernel::Double;
+use crate::dynamics::kernel::Double;
 #[cfg(target_arch = "aarch64")]
-use crate::learn::dynamics::kernel::Neon;
+use crate::dynamics::kernel::Neon;
 #[cfg(target_arch = "x86_64")]
-use crate::learn::dynamics::kernel::{In256, In512};
-use crate::learn::dynamics::loss::{Loss, Minibatch, Objective};
-use crate::learn::dynamics::rollout::{Gradient, Subject};
-use crate::learn::dynamics::windows::{Track, Window};
+use crate::dynamics::kernel::{In256, In512};
+use crate::dynamics::loss::{Loss, Minibatch, Objective};
+use crate::dynamics::rollout::{Gradient, Subject};
+use crate::dynamics::windows::{Track, Window};
 
 /// What an engine computes in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

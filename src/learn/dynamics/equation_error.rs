@@ -16,11 +16,11 @@ use std::ops::{AddAssign, SubAssign};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::learn::dynamics::basis::{Basis, columns, rate_of};
-use crate::learn::dynamics::windows::{Track, Window, windows};
-use crate::model::{GreyBox, Integrator, STEP};
-use crate::num::statistics::correlation_length;
-use crate::physics::{Channel, Controls, State, Wrench};
+use crate::dynamics::basis::{Basis, columns, rate_of};
+use crate::dynamics::windows::{Track, Window, windows};
+use greylag_model::{GreyBox, Integrator, STEP};
+use greylag_num::statistics::correlation_length;
+use greylag_physics::{Channel, Controls, State, Wrench};
 
 /// Steps of a window: noise of the states is divided by it, slow effects are still seen.
 const STEPS: usize = 5;

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::learn::checkpoint::write_whole;
-use crate::learn::dynamics::basis::JXZ;
-use crate::model::residual::{Origin, fingerprint};
-use crate::model::{GreyBox, Integrator};
+use crate::checkpoint::write_whole;
+use crate::dynamics::basis::JXZ;
+use greylag_model::residual::{Origin, fingerprint};
+use greylag_model::{GreyBox, Integrator};
 
 /// Why a model cannot be written.
 #[derive(Debug, thiserror::Error)]

@@ -4,14 +4,14 @@
 //! the same instructions, and two schemes through time share one copy of its value, its slopes and its
 //! coefficients' slopes.
 
-use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::prior::{At, Said, Slopes};
-use crate::learn::dynamics::rollout::{Gradient, Pass, SumSlopes, Sums, Trace};
-use crate::model::GreyBox;
+use crate::dynamics::packet::Packet;
+use crate::dynamics::prior::{At, Said, Slopes};
+use crate::dynamics::rollout::{Gradient, Pass, SumSlopes, Sums, Trace};
+use greylag_model::GreyBox;
 #[cfg(target_arch = "aarch64")]
-use crate::num::Base;
+use greylag_num::Base;
 #[cfg(target_arch = "x86_64")]
-use crate::num::{Avx2, Avx512};
+use greylag_num::{Avx2, Avx512};
 
 /// A set of instructions with the numbers that it moves.
 pub trait InstructionSet: Copy + Send + Sync {

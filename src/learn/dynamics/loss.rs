@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::learn::dynamics::kernel::InstructionSet;
-use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::rollout::{Gradient, Pass, Recorded, Subject, SumSlopes, Sums, Trace};
-use crate::learn::dynamics::windows::{Track, Window};
+use crate::dynamics::kernel::InstructionSet;
+use crate::dynamics::packet::Packet;
+use crate::dynamics::rollout::{Gradient, Pass, Recorded, Subject, SumSlopes, Sums, Trace};
+use crate::dynamics::windows::{Track, Window};
 
 /// How the residual is kept small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

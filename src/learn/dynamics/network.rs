@@ -1,9 +1,9 @@
 //! The network's forward pass with its trace kept, and the backward pass through it.
 
-use crate::learn::dynamics::packet::Packet;
-use crate::model::residual::{INPUTS, OUTPUTS};
-use crate::num::dense::{Layer, rectify};
-use crate::num::{Dense, Real};
+use crate::dynamics::packet::Packet;
+use greylag_model::residual::{INPUTS, OUTPUTS};
+use greylag_num::dense::{Layer, rectify};
+use greylag_num::{Dense, Real};
 
 /// Inputs and outputs of a tile of a weight matrix whose gradient is summed in registers.
 const TILE: usize = 4;

@@ -1,6 +1,6 @@
 //! Packets: a scalar, or a block of lanes, that rollouts move in together.
 
-use crate::num::{Lanes, Packed, ROW, Real, Register};
+use greylag_num::{Lanes, Packed, ROW, Real, Register};
 
 /// A [`Real`] of which the single numbers can be reached.
 pub trait Packet: Real {

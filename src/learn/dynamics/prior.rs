@@ -1,11 +1,11 @@
 //! The prior at a point: its rates, and the slopes through it to state and coefficients.
 
-use crate::learn::dynamics::packet::Packet;
-use crate::model::{GreyBox, Starting, Weights, parted};
-use crate::num::{Dual, Real, each};
-use crate::physics::effects::{Needs, Terms};
-use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{AirData, Channel, Controls, State, Wrench};
+use crate::dynamics::packet::Packet;
+use greylag_model::{GreyBox, Starting, Weights, parted};
+use greylag_num::{Dual, Real, each};
+use greylag_physics::effects::{Needs, Terms};
+use greylag_physics::rigid_body::{self, Vector};
+use greylag_physics::{AirData, Channel, Controls, State, Wrench};
 
 /// Altitude given to the airflow, m: far from the ground. What air there is comes with the density.
 pub const ALOFT: f64 = f64::INFINITY;

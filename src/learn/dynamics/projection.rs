@@ -9,10 +9,10 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::learn::dynamics::basis::{Basis, columns};
-use crate::learn::dynamics::equation_error::{CHANNELS, Fit, Row, Weighting, solve};
-use crate::learn::dynamics::windows::{Track, regular};
-use crate::model::{GreyBox, Residual};
+use crate::dynamics::basis::{Basis, columns};
+use crate::dynamics::equation_error::{CHANNELS, Fit, Row, Weighting, solve};
+use crate::dynamics::windows::{Track, regular};
+use greylag_model::{GreyBox, Residual};
 
 /// Samples that take part, at most.
 const SAMPLES: usize = 8192;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::learn::dynamics::loss::Penalty;
-use crate::model::GreyBox;
+use crate::dynamics::loss::Penalty;
+use greylag_model::GreyBox;
 
 /// Whose loss is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -4,8 +4,8 @@
 //! smooth, so a cubic is off by a few parts in a thousand of what happens between samples at 25 Hz; at 10 Hz
 //! the fastest motions of a small aircraft lie between the samples.
 
-use crate::model::STEP;
-use crate::physics::{Controls, State};
+use greylag_model::STEP;
+use greylag_physics::{Controls, State};
 
 /// Longest time between samples that learning takes, s.
 pub const SLOWEST_S: f64 = 0.1;

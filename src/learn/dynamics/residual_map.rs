@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::learn::dynamics::windows::{Track, regular};
-use crate::model::GreyBox;
-use crate::physics::State;
+use crate::dynamics::windows::{Track, regular};
+use greylag_model::GreyBox;
+use greylag_physics::State;
 
 /// Names of the state's rates, in the order of [`State::to_array`].
 pub const CHANNELS: [&str; 8] = ["roll", "pitch", "airspeed", "p", "q", "r", "alpha", "beta"];

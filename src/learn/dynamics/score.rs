@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::learn::dynamics::windows::{Track, Window, windows};
-use crate::model::{GreyBox, Memory};
+use crate::dynamics::windows::{Track, Window, windows};
+use greylag_model::{GreyBox, Memory};
 
 /// Steps between starts.
 const EVERY: usize = 50;
@@ -52,12 +52,7 @@ fn horizon(model: &GreyBox, tracks: &[Track], steps: usize) -> Horizon {
 
 /// The error of one run after `steps` steps from `window` on: the root mean square over the states of
 /// (ŝ − s)/x_c, 1 at most.
-pub(in crate::learn) fn off_after(
-    model: &GreyBox,
-    tracks: &[Track],
-    window: &Window,
-    steps: usize,
-) -> f64 {
+pub(crate) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, steps: usize) -> f64 {
     let (track, start) = (&tracks[window.track as usize], window.start as usize);
     let mut memory = Memory::default();
     let advance = |k: usize, state, memory: &mut Memory| {

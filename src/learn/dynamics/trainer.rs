@@ -8,20 +8,20 @@ pub use reports::Moment;
 pub use reports::Progress;
 pub use reports::TrainError;
 
-use crate::learn::adam::Adam;
-use crate::learn::checkpoint::Checkpoint;
-use crate::learn::dynamics::basis::{self, Basis};
-use crate::learn::dynamics::engine::{Arithmetic, Engine};
-use crate::learn::dynamics::equation_error::{self, Weighting};
-use crate::learn::dynamics::loss::{Loss, Objective};
-use crate::learn::dynamics::network::Passes;
-use crate::learn::dynamics::projection;
-use crate::learn::dynamics::recipe::{Joint, Recipe, Start};
-use crate::learn::dynamics::rollout::{PriorSlopes, Subject};
-use crate::learn::dynamics::windows::{Track, regular};
-use crate::model::residual::{INPUTS, OUTPUTS, Scales, fingerprint, hash};
-use crate::model::{GreyBox, Residual};
-use crate::num::{Dense, stream};
+use crate::adam::Adam;
+use crate::checkpoint::Checkpoint;
+use crate::dynamics::basis::{self, Basis};
+use crate::dynamics::engine::{Arithmetic, Engine};
+use crate::dynamics::equation_error::{self, Weighting};
+use crate::dynamics::loss::{Loss, Objective};
+use crate::dynamics::network::Passes;
+use crate::dynamics::projection;
+use crate::dynamics::recipe::{Joint, Recipe, Start};
+use crate::dynamics::rollout::{PriorSlopes, Subject};
+use crate::dynamics::windows::{Track, regular};
+use greylag_model::residual::{INPUTS, OUTPUTS, Scales, fingerprint, hash};
+use greylag_model::{GreyBox, Residual};
+use greylag_num::{Dense, stream};
 use stage::Stage;
 
 /// Samples that the envelope of the data is made from, at most.
@@ -95,7 +95,7 @@ impl Trainer {
         let begun = subject.prior.clone();
         let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
         Ok(Trainer {
-            data: crate::learn::dynamics::windows::hash(&tracks),
+            data: crate::dynamics::windows::hash(&tracks),
             adam: Adam::new(count + basis.len()),
             coordinates,
             lambda: recipe.lambda,

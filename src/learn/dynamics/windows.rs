@@ -2,12 +2,12 @@
 
 use sha2::{Digest, Sha256};
 
-use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::rollout::Recorded;
-use crate::logs::Flight;
-use crate::model::GreyBox;
-use crate::physics::inputs::InputMemory;
-use crate::physics::{Controls, State};
+use crate::dynamics::packet::Packet;
+use crate::dynamics::rollout::Recorded;
+use greylag_logs::Flight;
+use greylag_model::GreyBox;
+use greylag_physics::inputs::InputMemory;
+use greylag_physics::{Controls, State};
 
 /// A stretch of flight without gaps, a sample every 0.01 s.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,7 +88,7 @@ const STEEPEST: f64 = 1.4;
 const SLOWEST: f64 = 5.0;
 
 /// Whether the eight variables describe the flight well there.
-pub(in crate::learn) fn regular(state: &State) -> bool {
+pub(crate) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 

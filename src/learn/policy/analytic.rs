@@ -11,14 +11,14 @@ mod slopes;
 use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 
-use crate::control::Target;
-use crate::control::policy::{ACTIONS, Actor, OBSERVATIONS};
-use crate::learn::{Mlp, Optimiser};
-use crate::model::{GreyBox, Memory};
-use crate::num::dense::{DenseError, Units};
-use crate::num::{Dense, stream};
-use crate::physics::{ActuatorState, Command, Controls, State};
-use crate::sim::targets::Stratified;
+use crate::{Mlp, Optimiser};
+use greylag_control::Target;
+use greylag_control::policy::{ACTIONS, Actor, OBSERVATIONS};
+use greylag_model::{GreyBox, Memory};
+use greylag_num::dense::{DenseError, Units};
+use greylag_num::{Dense, stream};
+use greylag_physics::{ActuatorState, Command, Controls, State};
+use greylag_sim::targets::Stratified;
 use slopes::{Aircraft, Flyer, INPUTS, NUMBERS, Step, observation_slopes};
 
 /// What an actor is trained by.

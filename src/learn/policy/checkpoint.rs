@@ -6,10 +6,10 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use crate::learn::checkpoint::{CheckpointError, write_whole};
-use crate::learn::policy::mlp::Moments;
-use crate::learn::policy::td3::Standing;
-use crate::learn::policy::trainer::PolicyStanding;
+use crate::checkpoint::{CheckpointError, write_whole};
+use crate::policy::mlp::Moments;
+use crate::policy::td3::Standing;
+use crate::policy::trainer::PolicyStanding;
 
 const SCHEMA: &str = "greylag.policy-checkpoint/1";
 const METADATA: &str = "greylag";

@@ -10,15 +10,15 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
-use crate::control::policy::{ACTIONS, Actor, Critic, OBSERVATIONS, ShapeError};
-use crate::control::task::Task;
-use crate::learn::{Mlp, Optimiser};
-use crate::num::dense::{DenseError, Units};
-use crate::num::stream::{self, Stream};
-use crate::num::{Dense, Real};
-use crate::sim::Trouble;
-use crate::sim::imagined::{Block, Ended, Stepped, WIDTH};
-use crate::sim::world::World;
+use crate::{Mlp, Optimiser};
+use greylag_control::policy::{ACTIONS, Actor, Critic, OBSERVATIONS, ShapeError};
+use greylag_control::task::Task;
+use greylag_num::dense::{DenseError, Units};
+use greylag_num::stream::{self, Stream};
+use greylag_num::{Dense, Real};
+use greylag_sim::Trouble;
+use greylag_sim::imagined::{Block, Ended, Stepped, WIDTH};
+use greylag_sim::world::World;
 
 /// Purposes of the random streams.
 const START: u64 = 40;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::num::statistics::{interquartile_mean, quantile};
+use greylag_num::statistics::{interquartile_mean, quantile};
 
 /// The name of a curve's file.
 pub const CURVE: &str = "curve.csv";

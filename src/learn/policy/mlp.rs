@@ -2,8 +2,8 @@
 
 use burn::tensor::{Device, Gradients, Tensor, TensorData, activation};
 
-use crate::num::Dense;
-use crate::num::dense::DenseError;
+use greylag_num::Dense;
+use greylag_num::dense::DenseError;
 
 /// A dense network as tensors: weights `[in, out]` with biases, layer after layer.
 #[derive(Clone, Debug)]

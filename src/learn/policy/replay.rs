@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt};
 
-use crate::control::policy::{ACTIONS, OBSERVATIONS};
+use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
 /// A step of an aircraft: what was observed, done, earned and observed then.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +118,7 @@ impl Replay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::stream;
+    use greylag_num::stream;
 
     fn transition(k: usize) -> Transition {
         let x = k as f32;

@@ -2,7 +2,7 @@
 //!
 //! What departs from the paper:
 //! - Observations are scaled, and targets observed as what is left to them
-//!   ([`crate::control::policy::observe`]): the same information.
+//!   ([`greylag_control::policy::observe`]): the same information.
 //! - An aircraft that leaves the model's envelope earns the worst reward for ever,
 //!   −(κ_φ + κ_θ + κ_v)/(1 − γ), and nothing follows. The end of an episode's time is no end: what
 //!   follows is valued as ever. The paper says nothing of either.
@@ -12,11 +12,11 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::control::policy::{ACTIONS, OBSERVATIONS};
-use crate::learn::policy::mlp::{Mlp, Moments, Optimiser};
-use crate::learn::policy::replay::Batch;
-use crate::num::Dense;
-use crate::num::dense::DenseError;
+use crate::policy::mlp::{Mlp, Moments, Optimiser};
+use crate::policy::replay::Batch;
+use greylag_control::policy::{ACTIONS, OBSERVATIONS};
+use greylag_num::Dense;
+use greylag_num::dense::DenseError;
 
 /// Hyperparameters; [`Hyperparameters::default`] is Table VII.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

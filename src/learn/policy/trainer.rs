@@ -6,16 +6,16 @@ use rand::RngExt as _;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::control::policy::{ACTIONS, Actor, Critic, OBSERVATIONS, ShapeError};
-use crate::control::task::Task;
-use crate::learn::policy::replay::{Batch, Replay, Transition};
-use crate::learn::policy::td3::{Hyperparameters, Standing, Td3};
-use crate::num::dense::{DenseError, Units};
-use crate::num::stream::{self, Stream};
-use crate::num::{Real, statistics};
-use crate::sim::Trouble;
-use crate::sim::imagined::{Block, Ended, Stepped, WIDTH};
-use crate::sim::world::World;
+use crate::policy::replay::{Batch, Replay, Transition};
+use crate::policy::td3::{Hyperparameters, Standing, Td3};
+use greylag_control::policy::{ACTIONS, Actor, Critic, OBSERVATIONS, ShapeError};
+use greylag_control::task::Task;
+use greylag_num::dense::{DenseError, Units};
+use greylag_num::stream::{self, Stream};
+use greylag_num::{Real, statistics};
+use greylag_sim::Trouble;
+use greylag_sim::imagined::{Block, Ended, Stepped, WIDTH};
+use greylag_sim::world::World;
 
 /// Purposes of the random streams.
 const START: u64 = 20;

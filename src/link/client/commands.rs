@@ -1,13 +1,13 @@
 //! The command protocol: every command addressed to us is answered, known or not.
 
 use super::{Clients, Now};
-use crate::link::autopilot::{Autopilot, Mode, Verdict};
-use crate::link::framing::{Source, Version};
-use crate::link::wire::Message;
-use crate::link::wire::answer::{self, CommandResult};
-use crate::link::wire::mode::{self, ModeRequest};
-use crate::link::wire::request::CommandRequest;
-use crate::link::wire::telemetry;
+use crate::autopilot::{Autopilot, Mode, Verdict};
+use crate::framing::{Source, Version};
+use crate::wire::Message;
+use crate::wire::answer::{self, CommandResult};
+use crate::wire::mode::{self, ModeRequest};
+use crate::wire::request::CommandRequest;
+use crate::wire::telemetry;
 
 /// The number in param2 of an arming command that skips the checks.
 const FORCE: f64 = 21196.0;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{Clients, Now};
-use crate::link::framing::FrameCounts;
+use crate::framing::FrameCounts;
 
 /// Between lines in the program's own log about what could not be used.
 const SUMMARY: Duration = Duration::from_secs(10);

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use super::{Clients, Now};
-use crate::link::autopilot::Status;
-use crate::link::wire::mode::{self, Pulse};
-use crate::link::wire::telemetry::{self, Home, NAMED_VALUE_FLOAT, STREAMS, Scene};
+use crate::autopilot::Status;
+use crate::wire::mode::{self, Pulse};
+use crate::wire::telemetry::{self, Home, NAMED_VALUE_FLOAT, STREAMS, Scene};
 
 /// Between heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);

@@ -1,6 +1,6 @@
 //! Frames waiting to be fetched by whoever owns the sockets.
 
-use crate::link::peer::PeerId;
+use crate::peer::PeerId;
 
 /// Frames held at most; a caller that drains after every call stays far below.
 const CAPACITY: usize = 4096;

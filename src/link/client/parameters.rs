@@ -1,10 +1,10 @@
 //! The parameter protocol.
 
 use super::{Clients, Now};
-use crate::link::autopilot::{Autopilot, Parameter, ParameterValue, Verdict};
-use crate::link::framing::Source;
-use crate::link::wire::answer::{self, ParameterFault};
-use crate::link::wire::request::{ParameterKey, ParameterName};
+use crate::autopilot::{Autopilot, Parameter, ParameterValue, Verdict};
+use crate::framing::Source;
+use crate::wire::answer::{self, ParameterFault};
+use crate::wire::request::{ParameterKey, ParameterName};
 
 /// The greatest whole number below which every other one is exact in a float.
 const EXACT: f32 = 16_777_216.0;

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use super::outbox::Outbox;
 use super::streams::StreamTable;
-use crate::link::autopilot::Severity;
-use crate::link::framing::{Frame, Source, Version};
-use crate::link::peer::PeerId;
-use crate::link::wire::Message;
-use crate::link::wire::answer::{self, CommandResult, TEXT_CHUNK};
-use crate::link::wire::request::CommandRequest;
+use crate::autopilot::Severity;
+use crate::framing::{Frame, Source, Version};
+use crate::peer::PeerId;
+use crate::wire::Message;
+use crate::wire::answer::{self, CommandResult, TEXT_CHUNK};
+use crate::wire::request::CommandRequest;
 
 /// After this silence a peer may have been replaced by one that speaks the other version.
 const VERSION_MEMORY: Duration = Duration::from_secs(5);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::link::peer::PeerId;
+use crate::peer::PeerId;
 
 /// After this silence another client may take control authority. It equals the time after which a lost
 /// setpoint stream ends OFFBOARD, so that a restarted client waits no longer than the aircraft.

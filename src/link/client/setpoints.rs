@@ -1,8 +1,8 @@
 //! Setpoints: followed, refused or contested.
 
 use super::{Clients, Now};
-use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Sticks};
-use crate::link::wire::setpoint::SetpointFault;
+use crate::autopilot::{AttitudeSetpoint, Autopilot, Sticks};
+use crate::wire::setpoint::SetpointFault;
 
 /// What a client hears that sends positions, velocities or raw actuators.
 pub const OTHER_SETPOINT: &str = "Setpoint refused: only attitudes (SET_ATTITUDE_TARGET) are flown";

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use crate::link::wire::telemetry::STREAMS;
+use crate::wire::telemetry::STREAMS;
 
 /// The fastest stream: one message per control cycle.
 const SHORTEST: Duration = Duration::from_millis(10);

@@ -9,8 +9,8 @@ use tokio::time::{sleep, timeout};
 use tokio_serial::{ErrorKind, SerialPort, SerialPortBuilderExt, SerialStream};
 
 use super::{Arrival, Port, Remark, count};
-use crate::link::framing::StreamCutter;
-use crate::link::peer::{self, PeerId};
+use crate::framing::StreamCutter;
+use crate::peer::{self, PeerId};
 
 /// Bytes read at once.
 const CHUNK: usize = 1024;

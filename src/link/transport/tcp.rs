@@ -13,7 +13,7 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::time::{sleep, timeout};
 
 use super::{Arrival, Port, count};
-use crate::link::framing::StreamCutter;
+use crate::framing::StreamCutter;
 
 /// Connections on one listening link.
 const MAX_CONNECTIONS: usize = 16;

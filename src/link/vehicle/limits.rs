@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use crate::physics::servos::Travels;
+use greylag_physics::servos::Travels;
 
 /// Parts of a state frame that were not believable, as a set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

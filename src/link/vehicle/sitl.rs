@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 use super::{Faults, Notice, Order, Outputs, Telemetry, VANE_SD, limits};
-use crate::link::autopilot::Severity;
-use crate::link::framing::{Frame, FrameCounts, Frames, Source, Version};
-use crate::link::peer::PeerId;
-use crate::link::wire::Message;
-use crate::link::wire::setpoint::euler;
-use crate::link::wire::sitl::{self as wire, VehicleMessage};
-use crate::physics::mixer::Mixer;
-use crate::physics::servos::{Travel, Travels};
-use crate::physics::{ActuatorState, Command, State, Time};
+use crate::autopilot::Severity;
+use crate::framing::{Frame, FrameCounts, Frames, Source, Version};
+use crate::peer::PeerId;
+use crate::wire::Message;
+use crate::wire::setpoint::euler;
+use crate::wire::sitl::{self as wire, VehicleMessage};
+use greylag_physics::mixer::Mixer;
+use greylag_physics::servos::{Travel, Travels};
+use greylag_physics::{ActuatorState, Command, State, Time};
 
 /// The shim's component id.
 const SHIM: u8 = 200;

@@ -10,9 +10,9 @@ use mavlink::types::CharArray;
 use super::Message;
 use super::request::ParameterName;
 use super::telemetry::Home;
-use crate::link::autopilot::{Parameter, ParameterValue, Severity};
-use crate::link::framing::Source;
-use crate::physics::Time;
+use crate::autopilot::{Parameter, ParameterValue, Severity};
+use crate::framing::Source;
+use greylag_physics::Time;
 
 /// The length of one STATUSTEXT.
 pub const TEXT_CHUNK: usize = 50;

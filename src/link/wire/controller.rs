@@ -9,8 +9,8 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::fields::Fields;
 use super::{Frame, Message, decode, setpoint};
-use crate::link::framing::Source;
-use crate::physics::Time;
+use crate::framing::Source;
+use greylag_physics::Time;
 
 /// MAV_CMD_DO_SET_MODE.
 pub const SET_MODE: u16 = 176;

@@ -6,7 +6,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::Message;
-use crate::link::autopilot::{Mode, Status};
+use crate::autopilot::{Mode, Status};
 
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 const CUSTOM: u8 = 1;

@@ -7,8 +7,8 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::mode::{self, ModeRequest};
 use super::{Message, decode, setpoint};
-use crate::link::autopilot::Mode;
-use crate::link::framing::{Frame, Source};
+use crate::autopilot::Mode;
+use crate::framing::{Frame, Source};
 
 /// What an autopilot was heard to say.
 #[derive(Clone, Debug, PartialEq)]

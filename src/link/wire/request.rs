@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::MavMessage;
 use super::fields::Fields;
 use super::setpoint::{self, SetpointFault};
 use super::{Frame, decode};
-use crate::link::autopilot::{AttitudeSetpoint, ParameterValue, Sticks};
+use crate::autopilot::{AttitudeSetpoint, ParameterValue, Sticks};
 
 /// Whom a message is for; 0 stands for everybody.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

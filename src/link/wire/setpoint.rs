@@ -2,7 +2,7 @@
 
 use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 
-use crate::link::autopilot::{AttitudeSetpoint, Sticks};
+use crate::autopilot::{AttitudeSetpoint, Sticks};
 
 /// Mask bit: thrust is to be ignored.
 const IGNORE_THRUST: u8 = 64;

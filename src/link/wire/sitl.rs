@@ -6,9 +6,9 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Frame, Message, decode};
-use crate::physics::mixer::Mixer;
-use crate::physics::servos::{Travel, Travels};
-use crate::physics::{Command, Time};
+use greylag_physics::mixer::Mixer;
+use greylag_physics::servos::{Travel, Travels};
+use greylag_physics::{Command, Time};
 
 /// MAV_MODE_FLAG_SAFETY_ARMED.
 const ARMED: u8 = 128;

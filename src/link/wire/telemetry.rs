@@ -8,8 +8,8 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Message, answer, mode, setpoint};
-use crate::link::autopilot::{RESIDUALS, Status};
-use crate::physics::Time;
+use crate::autopilot::{RESIDUALS, Status};
+use greylag_physics::Time;
 
 /// A message that can be streamed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use super::CsvError;
-use crate::logs::columns::COLUMNS;
-use crate::logs::{Flight, Sample};
+use crate::columns::COLUMNS;
+use crate::{Flight, Sample};
 
 /// Writes `flight` to `out`. Missing values become empty fields; numbers are written so that they
 /// read back to the bit.

@@ -5,8 +5,8 @@
 
 use super::rule::Rule;
 use super::servos;
-use crate::logs::topics::Topics;
-use crate::physics::mixer::Mixer;
+use crate::topics::Topics;
+use greylag_physics::mixer::Mixer;
 
 /// The record types that the rules use.
 pub const TOPICS: [&str; 11] =

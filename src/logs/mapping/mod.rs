@@ -30,9 +30,9 @@ use super::columns::index;
 use super::derive;
 use super::format::Format;
 use super::topics::Topics;
-use crate::physics::Sensors;
-use crate::physics::mixer::Mixer;
-use crate::physics::sensors::CONSTANTS;
+use greylag_physics::Sensors;
+use greylag_physics::mixer::Mixer;
+use greylag_physics::sensors::CONSTANTS;
 use rule::Rule;
 
 /// The topic name by which a mapping means the columns of a CSV file.

@@ -5,7 +5,7 @@
 //! (the first counts), and `wind`, which the log format has no column for.
 
 use super::rule::{Rule, Shape, Term, Tilt};
-use crate::logs::topics::Topics;
+use crate::topics::Topics;
 
 /// The topics that the rules use.
 pub const TOPICS: [&str; 19] = [

@@ -1,6 +1,6 @@
 //! One way to fill columns from a topic.
 
-use crate::logs::topics::Topic;
+use crate::topics::Topic;
 
 /// How a field's value is shaped before it is summed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! ArduPilot's servo outputs undone into commands by the SERVOn parameters.
 
 use super::rule::{Rule, Shape, Term};
-use crate::logs::topics::Topics;
-use crate::physics::mixer::{Does, Effector, Mixer};
+use crate::topics::Topics;
+use greylag_physics::mixer::{Does, Effector, Mixer};
 
 /// Channels of RCOU.
 const CHANNELS: usize = 16;

@@ -6,9 +6,9 @@
 
 use super::rule::Rule;
 use super::servos;
-use crate::logs::topics::{Topic, Topics};
-use crate::physics::atmosphere::STANDARD_GRAVITY;
-use crate::physics::mixer::Mixer;
+use crate::topics::{Topic, Topics};
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
+use greylag_physics::mixer::Mixer;
 
 /// The messages that the rules use.
 pub const TOPICS: [&str; 15] = [

@@ -4,9 +4,9 @@ use super::cured;
 use super::relation::{
     Relation, change, integral, near, quantile, through_origin, values, windows, with_intercept,
 };
-use crate::logs::Sample;
-use crate::logs::finding::Finding;
-use crate::physics::atmosphere::{STANDARD_GRAVITY, standard_density};
+use crate::Sample;
+use crate::finding::Finding;
+use greylag_physics::atmosphere::{STANDARD_GRAVITY, standard_density};
 
 /// Units of speed other than m/s: name, m/s in one.
 const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("ft/s", 0.3048)];

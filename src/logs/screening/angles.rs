@@ -6,8 +6,8 @@ use super::cured;
 use super::relation::{
     Relation, change, integral, near, quantile, through_origin, values, windows,
 };
-use crate::logs::Sample;
-use crate::logs::finding::Finding;
+use crate::Sample;
+use crate::finding::Finding;
 
 const DEGREE: f64 = PI / 180.0;
 /// Window over which angles and rates are compared, s.

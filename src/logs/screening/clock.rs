@@ -2,8 +2,8 @@
 
 use super::cured;
 use super::relation::{near, quantile, through_origin, values};
-use crate::logs::Sample;
-use crate::logs::finding::Finding;
+use crate::Sample;
+use crate::finding::Finding;
 
 /// Median time between rows above which the clock is looked at, s. A log of 1 Hz is no use anyway.
 const SUSPICIOUS_S: f64 = 0.9;

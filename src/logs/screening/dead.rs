@@ -2,9 +2,9 @@
 
 use super::ENOUGH;
 use super::relation::values;
-use crate::logs::Sample;
-use crate::logs::columns::{COLUMNS, NEEDED};
-use crate::logs::finding::Finding;
+use crate::Sample;
+use crate::columns::{COLUMNS, NEEDED};
+use crate::finding::Finding;
 
 /// Columns that show one and the same value, though they should move.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {

@@ -2,9 +2,9 @@
 
 use super::cured;
 use super::relation::{change, mean, quantile, values, windows, with_intercept};
-use crate::logs::Sample;
-use crate::logs::finding::Finding;
-use crate::physics::atmosphere::STANDARD_GRAVITY;
+use crate::Sample;
+use crate::finding::Finding;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
 const G: f64 = STANDARD_GRAVITY;
 /// Window over which accelerations are compared, s.

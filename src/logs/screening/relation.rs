@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::logs::Sample;
-use crate::num::statistics;
+use crate::Sample;
+use greylag_num::statistics;
 
 /// A pause of so many median periods ends a window.
 const PAUSE_PERIODS: f64 = 5.0;

@@ -2,9 +2,9 @@
 
 use super::cured;
 use super::relation::{change, mean, partial_correlation, quantile, values, windows};
-use crate::logs::Sample;
-use crate::logs::finding::Finding;
-use crate::logs::phases::Flying;
+use crate::Sample;
+use crate::finding::Finding;
+use crate::phases::Flying;
 
 /// Deflection beyond which no surface is for a hundredth of the time, rad (69°).
 const DEFLECTION_LARGE: f64 = 1.2;

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use super::conditions::Conditions;
 use super::{AILERON, ALPHA, BETA, ELEVATOR, RUDDER, coefficient, engine, product};
-use crate::model::GreyBox;
-use crate::num::Table;
+use crate::GreyBox;
+use greylag_num::Table;
 
 /// Where a coefficient acts: axis, then the factors beside q S (and b or c for a moment).
 type Factor = (&'static str, &'static str, &'static [&'static str]);

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::aerodynamics;
-use crate::model::GreyBox;
+use crate::GreyBox;
 
 /// Settings that every aircraft of JSBSim has.
 const OF_JSBSIM: [&str; 4] =

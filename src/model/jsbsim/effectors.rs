@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use super::{AILERON, ELEVATOR, RUDDER, surface};
-use crate::physics::airframe::ActuatorFigures;
-use crate::physics::mixer::{CONTROLS, Does, Effector, Mixer};
-use crate::physics::servos::{Surface, Travel};
+use greylag_physics::airframe::ActuatorFigures;
+use greylag_physics::mixer::{CONTROLS, Does, Effector, Mixer};
+use greylag_physics::servos::{Surface, Travel};
 
 /// The surfaces of `mixer` that have JSBSim properties, with these; none if one has not.
 fn named(mixer: &Mixer) -> Option<Vec<(&Effector, Travel, &str, &str)>> {

@@ -1,8 +1,8 @@
 //! The engine of an exported aircraft: thrust as an external force, its lag, its arm and its torque.
 
 use super::{FT, LBF, THROTTLE, coefficient, product};
-use crate::model::GreyBox;
-use crate::num::Grid;
+use crate::GreyBox;
+use greylag_num::Grid;
 
 const SPEED: &str = "velocities/vt-fps";
 /// The throttle that acts on the engine where its thrust lags.

@@ -1,7 +1,7 @@
 //! Tests of networks: by hand, over every scalar, against central differences.
 
 use super::*;
-use crate::num::{Dual, Lanes, stream};
+use crate::{Dual, Lanes, stream};
 
 /// A network none of whose layers is a multiple of the block.
 fn network() -> Dense {

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::{Sourced, positive};
-use crate::physics::servos::{ActuatorFigures, Surface, Travel};
+use crate::servos::{ActuatorFigures, Surface, Travel};
 
 /// Time step of the filters, s.
 const STEP: f64 = 0.01;

@@ -6,8 +6,8 @@ use serde::Deserialize;
 
 use super::Sourced;
 use super::controls::travel;
-use crate::physics::mixer::{Does, Effector, Mixer};
-use crate::physics::servos::{Travel, Travels};
+use crate::mixer::{Does, Effector, Mixer};
+use crate::servos::{Travel, Travels};
 
 /// Servo outputs of a flight controller.
 const CHANNELS: u8 = 32;

@@ -1,8 +1,8 @@
 //! Surfaces that twist the wing under them as airspeed grows.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point, State};
+use greylag_num::Real;
+use crate::{Channel, Point, State};
 
 /// Airspeed at which the effectiveness of the model holds, m/s: that of the neutral start.
 const V0: f64 = State::NEUTRAL.airspeed;

@@ -1,8 +1,8 @@
 //! Air that is denser or thinner than the model has it.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Every aerodynamic force and moment changed by the same share.
 pub struct AirDensity;

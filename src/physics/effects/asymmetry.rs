@@ -1,8 +1,8 @@
 //! An airframe whose left half is not the mirror of its right half.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Constant roll, yaw and side force coefficients.
 pub struct Asymmetry;

@@ -1,8 +1,8 @@
 //! A centre of gravity that is not where the model has it.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Moments of the forces about a centre of gravity that lies aft of the model's (along x only; a negative distance is
 /// forward of it).

@@ -4,8 +4,8 @@
 //! coefficients `CL0` and `CLalpha` (`CD0`) of the effects it stands beside.
 
 use super::Terms;
-use crate::num::Real;
-use crate::physics::Channel;
+use crate::Channel;
+use greylag_num::Real;
 
 /// The first place of the grid, °.
 const FIRST_DEG: f64 = -8.0;
@@ -74,7 +74,7 @@ fn in_line<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Term
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::effects::Effect;
+    use crate::effects::Effect;
 
     const KNOTS: usize = PLACES - ZERO.len();
 

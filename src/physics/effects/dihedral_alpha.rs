@@ -1,8 +1,8 @@
 //! Dihedral effect that changes with incidence, as sweep makes it.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point, State};
+use greylag_num::Real;
+use crate::{Channel, Point, State};
 
 /// Rolling moment due to sideslip in proportion to angle of attack.
 pub struct DihedralAlpha;

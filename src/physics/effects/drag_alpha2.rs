@@ -1,8 +1,8 @@
 //! Drag that grows with the square of incidence.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Induced drag as the square of angle of attack.
 pub struct DragAlpha2;

@@ -1,8 +1,8 @@
 //! Drag of flying sideways.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Drag due to sideslip, by its magnitude and its square.
 pub struct DragBeta2;

@@ -1,8 +1,8 @@
 //! Drag as flown: what no formula says of it.
 
 use super::{Coefficient, Effect, Own, Terms, curve};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// What the drag has more than the other effects say, as a curve over the angle of attack.
 pub struct DragCurve;

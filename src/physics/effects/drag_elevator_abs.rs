@@ -1,8 +1,8 @@
 //! Drag of a deflected elevator, up or down alike.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Drag due to the magnitude of the elevator deflection.
 pub struct DragElevatorAbs;

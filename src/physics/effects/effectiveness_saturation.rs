@@ -1,8 +1,8 @@
 //! Surfaces whose moments do not grow in proportion to their deflection.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Roll and pitch effectiveness that changes with the square of the deflection.
 pub struct EffectivenessSaturation;

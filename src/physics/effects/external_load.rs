@@ -1,8 +1,8 @@
 //! A load that hangs on the aircraft and pulls straight down.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point, rigid_body};
+use greylag_num::Real;
+use crate::{Channel, Point, rigid_body};
 
 /// A constant force at the centre of gravity along gravity.
 ///

@@ -1,8 +1,8 @@
 //! Lift gained, drag lost, within a span of the ground.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Lift slope and induced drag that change towards the ground.
 ///

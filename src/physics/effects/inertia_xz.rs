@@ -1,9 +1,9 @@
 //! A product of inertia that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::rigid_body::RigidBody;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::rigid_body::RigidBody;
+use crate::{Channel, Point};
 
 /// An addition to the product of inertia Jxz.
 pub struct InertiaXz;

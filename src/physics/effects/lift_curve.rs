@@ -1,8 +1,8 @@
 //! Lift as flown: what no formula says of it.
 
 use super::{Coefficient, Effect, Needs, Own, Terms, curve};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// What the lift has more than the other effects say, as a curve over the angle of attack.
 pub struct LiftCurve;

@@ -1,8 +1,8 @@
 //! Stall: lift that goes over from the linear law to that of a flat plate.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Lift lost beyond the stall, blended as in \[BM12\] section 4.2.
 pub struct LiftStall;

@@ -1,8 +1,8 @@
 //! Lift from a table over incidence, stall included.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Lift as a table over angle of attack, stall included.
 pub struct LiftTable;

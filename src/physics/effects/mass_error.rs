@@ -1,9 +1,9 @@
 //! An aircraft that is heavier or lighter than the model has it.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::rigid_body::RigidBody;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::rigid_body::RigidBody;
+use crate::{Channel, Point};
 
 /// Mass changed by a share; gravity, inertia and forces stay.
 pub struct MassError;

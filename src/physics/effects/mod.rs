@@ -3,12 +3,12 @@
 //! To add one: write its file beside these and name it in the list at the end of this file. It
 //! then takes part in the model, its trim and its linearisation, the planner, the parameter
 //! files, the search for missing effects and the report under its id. Effects on what the surfaces
-//! do with their commands are in [`inputs`](crate::physics::inputs).
+//! do with their commands are in [`inputs`](crate::inputs).
 
-use crate::num::{Grid, Real, Table};
-use crate::physics::formula::{Written, register};
-use crate::physics::rigid_body::RigidBody;
-use crate::physics::{Channel, Point};
+use crate::formula::{Written, register};
+use crate::rigid_body::RigidBody;
+use crate::{Channel, Point};
+use greylag_num::{Grid, Real, Table};
 
 /// A coefficient of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Coefficient {
     /// The physically possible values.
     pub bounds: (f64, f64),
     /// Whether `bounds` are those of an aircraft of up to 25 kg and grow with a larger one; see
-    /// [`Size`](crate::physics::size::Size).
+    /// [`Size`](crate::size::Size).
     pub grows: bool,
 }
 
@@ -56,10 +56,10 @@ pub enum Needs {
     Point,
     /// Also [`Point::base`]: the forces and moments of the effects that need only the point.
     Base,
-    /// Also [`Base::deflected`](crate::physics::point::Base::deflected) and
-    /// [`Base::still`](crate::physics::point::Base::still).
+    /// Also [`Base::deflected`](crate::point::Base::deflected) and
+    /// [`Base::still`](crate::point::Base::still).
     Parts,
-    /// Also [`Base::rate`](crate::physics::point::Base::rate).
+    /// Also [`Base::rate`](crate::point::Base::rate).
     Rate,
 }
 
@@ -72,7 +72,7 @@ pub struct Own<'a> {
     pub grid: Option<&'a Grid>,
     /// The values of its shape constants: the last [`Effect::SHAPE`] coefficients.
     pub shape: &'a [f64],
-    /// Place of its first lag among those of the model, [`Controls::lagged`](crate::physics::Controls::lagged).
+    /// Place of its first lag among those of the model, [`Controls::lagged`](crate::Controls::lagged).
     pub first_lag: usize,
 }
 

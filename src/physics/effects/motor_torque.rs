@@ -1,8 +1,8 @@
 //! The torque that turns the propeller, taken up by the airframe.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Rolling moment against the propeller's turn, proportional to throttle.
 pub struct MotorTorque;

@@ -1,8 +1,8 @@
 //! Pitching moment that breaks away from the straight line at large incidence.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point, State};
+use greylag_num::Real;
+use crate::{Channel, Point, State};
 
 /// Pitching moment as the cube of angle of attack.
 pub struct PitchBreak;

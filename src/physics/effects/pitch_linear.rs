@@ -1,8 +1,8 @@
 //! Pitching moment that is linear in incidence, pitch rate and elevator.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Pitching moment linear in angle of attack, pitch rate and elevator.
 pub struct PitchLinear;

@@ -1,8 +1,8 @@
 //! Pitching moment from a table over incidence.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Pitching moment as a table over angle of attack.
 pub struct PitchTable;

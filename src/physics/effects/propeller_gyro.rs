@@ -1,8 +1,8 @@
 //! A propeller that resists being turned out of its plane.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Gyroscopic moments of a rotor whose axis is body x.
 pub struct PropellerGyro;

@@ -1,8 +1,8 @@
 //! Surfaces that work better in the wash of the propeller.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Throttle at which the model's effectiveness holds: level flight of the X8 at 16.67 m/s.
 const THROTTLE0: f64 = 0.118;

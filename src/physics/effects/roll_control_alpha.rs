@@ -1,8 +1,8 @@
 //! Ailerons whose effect changes with incidence.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Rolling and yawing moments of the aileron in proportion to angle of attack.
 pub struct RollControlAlpha;

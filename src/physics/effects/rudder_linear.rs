@@ -1,8 +1,8 @@
 //! Side force with rolling and yawing moment that are linear in the rudder.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Side force, rolling and yawing moment linear in the rudder's deflection.
 pub struct RudderLinear;

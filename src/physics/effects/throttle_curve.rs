@@ -1,8 +1,8 @@
 //! Thrust that is not in proportion to the throttle.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Thrust that bends over the throttle, as that of a motor whose voltage follows it.
 pub struct ThrottleCurve;

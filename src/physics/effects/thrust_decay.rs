@@ -1,8 +1,8 @@
 //! Thrust that falls with airspeed.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point, State};
+use greylag_num::Real;
+use crate::{Channel, Point, State};
 
 /// Airspeed at which nothing is lost, m/s: that of the neutral start.
 const V0: f64 = State::NEUTRAL.airspeed;

@@ -1,8 +1,8 @@
 //! A line of thrust that passes the centre of gravity.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Pitching moment of a thrust that acts below the centre of gravity.
 pub struct ThrustLineOffset;

@@ -1,8 +1,8 @@
 //! Thrust that is proportional to throttle, whatever the airspeed.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Thrust along body x, proportional to throttle.
 pub struct ThrustLinear;

@@ -1,8 +1,8 @@
 //! Thrust that the model has too much or too little of.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Thrust in proportion to throttle beside that of the model.
 pub struct ThrustScale;

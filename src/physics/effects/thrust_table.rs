@@ -1,9 +1,9 @@
 //! Thrust from a table over throttle and airspeed.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::atmosphere::SEA_LEVEL_DENSITY;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::atmosphere::SEA_LEVEL_DENSITY;
+use crate::{Channel, Point};
 
 /// Thrust as a table over throttle and airspeed.
 pub struct ThrustTable;

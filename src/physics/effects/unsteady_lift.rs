@@ -1,8 +1,8 @@
 //! Lift that depends on how fast the angle of attack changes.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Lift and pitching moment due to the rate of the angle of attack.
 pub struct UnsteadyLift;

@@ -1,8 +1,8 @@
 //! Yawing moment that is linear in sideslip, rates and aileron.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
-use crate::num::Real;
-use crate::physics::{Channel, Point};
+use greylag_num::Real;
+use crate::{Channel, Point};
 
 /// Yawing moment linear in sideslip, roll and yaw rate and aileron.
 pub struct YawLinear;

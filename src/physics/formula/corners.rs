@@ -2,11 +2,11 @@
 
 use super::variable::Variable;
 use super::written::Written;
-use crate::physics::airframe::Geometry;
-use crate::physics::effects::{Own, Terms};
-use crate::physics::point::Base;
-use crate::physics::rigid_body::ForceAxes;
-use crate::physics::{AirData, Channel, Controls, Point, State};
+use crate::airframe::Geometry;
+use crate::effects::{Own, Terms};
+use crate::point::Base;
+use crate::rigid_body::ForceAxes;
+use crate::{AirData, Channel, Controls, Point, State};
 
 /// Variables whose corners are all tried; of more, as many corners are taken as these have.
 const ALL_CORNERS: usize = 12;

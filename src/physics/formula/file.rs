@@ -14,11 +14,11 @@ use super::tape::Tape;
 use super::units;
 use super::written::{Line, Status, Written};
 use super::{corners, variable::Variable};
-use crate::physics::Channel;
-use crate::physics::actuators::LAGS;
-use crate::physics::airframe::{check_schema, toml_error};
-use crate::physics::effects::{Coefficient, Description, Entry, Kind, Needs};
-use crate::physics::inputs;
+use crate::Channel;
+use crate::actuators::LAGS;
+use crate::airframe::{check_schema, toml_error};
+use crate::effects::{Coefficient, Description, Entry, Kind, Needs};
+use crate::inputs;
 
 /// Longest id and longest name of a parameter, bytes.
 const LONGEST_NAME: usize = 40;

@@ -5,7 +5,7 @@ use rand::RngExt;
 use super::expression::Function;
 use super::file;
 use super::variable::Variable;
-use crate::num::stream::{Stream, stream};
+use greylag_num::stream::{Stream, stream};
 
 /// Stream of the mutations.
 const DRAW: u64 = 31;

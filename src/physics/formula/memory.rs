@@ -4,12 +4,12 @@ use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 use super::tape::Tape;
 use super::variable::Variable;
-use crate::num::Real;
-use crate::physics::airframe::Geometry;
-use crate::physics::inputs::{ActuatorLag, InputEffect, PAST, Past, STEP, TimeDelay};
-use crate::physics::point::Base;
-use crate::physics::rigid_body::ForceAxes;
-use crate::physics::{AirData, Controls, Point, State};
+use crate::airframe::Geometry;
+use crate::inputs::{ActuatorLag, InputEffect, PAST, Past, STEP, TimeDelay};
+use crate::point::Base;
+use crate::rigid_body::ForceAxes;
+use crate::{AirData, Controls, Point, State};
+use greylag_num::Real;
 
 /// Longest delay, s: so many samples are remembered.
 pub const LONGEST_DELAY_S: f64 = (PAST - 2) as f64 * STEP;

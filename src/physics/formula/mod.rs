@@ -1,8 +1,8 @@
 //! Formulas that are read from files: effects that need no compiler.
 //!
 //! A text becomes a tree ([`parser`]), its units are balanced ([`units`]), it is divided into what each coefficient
-//! multiplies ([`split`]), and that becomes a list of operations over [`Real`](crate::num::Real) ([`tape`]). An
-//! effect file ([`mod@file`]) holds one effect; once read, [`Kind::Written`](crate::physics::effects::Kind::Written)
+//! multiplies ([`split`]), and that becomes a list of operations over [`Real`](greylag_num::Real) ([`tape`]). An
+//! effect file ([`mod@file`]) holds one effect; once read, [`Kind::Written`](crate::effects::Kind::Written)
 //! is an effect like all others.
 
 mod corners;

@@ -11,11 +11,11 @@ use include_dir::{Dir, include_dir};
 
 use super::file;
 use super::written::Written;
-use crate::physics::airframe::FileError;
+use crate::airframe::FileError;
 
 static READ: RwLock<Vec<&'static Written>> = RwLock::new(Vec::new());
 
-static FOLDER: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/params/catalogue");
+static FOLDER: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../params/catalogue");
 
 static SHIPPED: LazyLock<Vec<Written>> = LazyLock::new(|| {
     let texts = FOLDER.files().filter_map(|f| f.contents_utf8());

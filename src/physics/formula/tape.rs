@@ -1,13 +1,13 @@
 //! A formula as a list of operations, the same for all kinds of numbers.
 //!
 //! It is a stack machine whose top is kept in a register. Derivatives come from running it with
-//! [`Dual`](crate::num::Dual) numbers: of eight states and three controls at once.
+//! [`Dual`](greylag_num::Dual) numbers: of eight states and three controls at once.
 
 use super::expression::{Expression, Function, Node};
 use super::memory::Memory;
 use super::variable::Variable;
-use crate::num::{Real, Table};
-use crate::physics::{Channel, Point};
+use crate::{Channel, Point};
+use greylag_num::{Real, Table};
 
 /// Numbers that wait below the top.
 const DEPTH: usize = 12;

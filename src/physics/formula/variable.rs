@@ -1,9 +1,9 @@
 //! The variables that a formula may name: one line each.
 
 use super::dimension::Dimension;
-use crate::num::Real;
-use crate::physics::effects::Needs;
-use crate::physics::{Channel, Point};
+use crate::effects::Needs;
+use crate::{Channel, Point};
+use greylag_num::Real;
 
 const ANGLE: Dimension = Dimension::NONE;
 const RATE: Dimension = Dimension::new(0, 0, -1);

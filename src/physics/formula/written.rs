@@ -4,10 +4,10 @@ use super::expression::{Expression, Node};
 use super::memory::Memory;
 use super::tape::Tape;
 use super::variable::Variable;
-use crate::num::Real;
-use crate::physics::airframe::Sourced;
-use crate::physics::effects::{Description, Needs, Own, Terms};
-use crate::physics::{Channel, Point};
+use crate::airframe::Sourced;
+use crate::effects::{Description, Needs, Own, Terms};
+use crate::{Channel, Point};
+use greylag_num::Real;
 
 /// Whether an effect may fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
@@ -65,7 +65,7 @@ impl Written {
         });
     }
 
-    /// Its lags and delays; at most [`LAGS`](crate::physics::actuators::LAGS).
+    /// Its lags and delays; at most [`LAGS`](crate::actuators::LAGS).
     pub fn memories(&self) -> &[Memory] {
         self.tape.memories()
     }

@@ -1,8 +1,8 @@
 //! Surfaces that follow their measured position with a lag.
 
 use super::{InputEffect, Past, STEP};
-use crate::num::Real;
-use crate::physics::effects::{Coefficient, Entry, coefficient};
+use greylag_num::Real;
+use crate::effects::{Coefficient, Entry, coefficient};
 
 /// A first-order lag behind the measured position.
 pub struct ActuatorLag;

@@ -1,8 +1,8 @@
 //! Play in the linkage.
 
 use super::{InputEffect, Past};
-use crate::num::Real;
-use crate::physics::effects::{Coefficient, Entry, coefficient};
+use greylag_num::Real;
+use crate::effects::{Coefficient, Entry, coefficient};
 
 /// A play that must be crossed whenever the direction turns.
 pub struct Backlash;

@@ -1,8 +1,8 @@
 //! Surfaces that do nothing for small deflections.
 
 use super::{InputEffect, Past};
-use crate::num::Real;
-use crate::physics::effects::{Coefficient, Entry, coefficient};
+use greylag_num::Real;
+use crate::effects::{Coefficient, Entry, coefficient};
 
 /// A dead zone about the centre.
 pub struct DeadZone;

@@ -10,10 +10,10 @@
 //! LQI, leaves out all. The LQI's integrators take up what is constant in them; what a lag or delay costs
 //! is shown in `tests/effects_lqi.rs`.
 
-use crate::num::Real;
-use crate::physics::Controls;
-use crate::physics::actuators::LAGS;
-use crate::physics::effects::{Coefficient, Description, Entry};
+use crate::Controls;
+use crate::actuators::LAGS;
+use crate::effects::{Coefficient, Description, Entry};
+use greylag_num::Real;
 
 /// Time between two calls of [`InputEffect::act`], s.
 pub const STEP: f64 = 0.01;
@@ -79,7 +79,7 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// What a model remembers of its controls' past; [`GreyBox::at_rest`](crate::model::GreyBox::at_rest) makes it.
+/// What a model remembers of its controls' past; [`GreyBox::at_rest`](greylag_model::GreyBox::at_rest) makes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMemory<R = f64> {
     /// What its input effects remember of aileron, elevator and throttle; on a rudder they do not act.

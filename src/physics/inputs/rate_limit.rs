@@ -1,8 +1,8 @@
 //! Surfaces that cannot move faster than a limit.
 
 use super::{InputEffect, Past, STEP};
-use crate::num::Real;
-use crate::physics::effects::{Coefficient, Entry, coefficient};
+use greylag_num::Real;
+use crate::effects::{Coefficient, Entry, coefficient};
 
 /// A limit to how fast a surface moves.
 pub struct RateLimit;

@@ -1,8 +1,8 @@
 //! Thrust that follows the throttle with a lag: a propeller's inertia, a turbine's spool.
 
 use super::{ActuatorLag, Acts, InputEffect, Past};
-use crate::num::Real;
-use crate::physics::effects::{Coefficient, Entry, coefficient};
+use greylag_num::Real;
+use crate::effects::{Coefficient, Entry, coefficient};
 
 /// A first-order lag between the measured throttle and the thrust.
 pub struct ThrustLag;

@@ -1,8 +1,8 @@
 //! Surfaces that act later than their measured position says.
 
 use super::{InputEffect, PAST, Past, STEP};
-use crate::num::Real;
-use crate::physics::effects::{Coefficient, Entry, coefficient};
+use greylag_num::Real;
+use crate::effects::{Coefficient, Entry, coefficient};
 
 /// A pure delay, linear between samples.
 pub struct TimeDelay;

@@ -2,9 +2,9 @@
 
 pub(super) mod page;
 
-use crate::report::Page;
-use crate::sysid::amend::Amendment;
-use crate::sysid::compare::Comparison;
+use crate::Page;
+use greylag_sysid::amend::Amendment;
+use greylag_sysid::compare::Comparison;
 
 /// An amended model's story, with where it came from.
 #[derive(Clone, Debug)]

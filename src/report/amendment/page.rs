@@ -1,13 +1,13 @@
 //! The page of one amendment: the error before and after, the effects added, every coefficient.
 
-use crate::report::Align::{Left, Right};
-use crate::report::amendment::AmendmentReport;
-use crate::report::diagnosis::{proof, suspects, tables};
-use crate::report::kit::numbers::{NORMAL_95, interval, number, percent};
-use crate::report::{Curves, Figure, Finding, Findings, Page, Section, Series, Style, Table};
-use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
-use crate::sysid::compare::HorizonScore;
-use crate::sysid::diagnose::Tuned;
+use crate::Align::{Left, Right};
+use crate::amendment::AmendmentReport;
+use crate::diagnosis::{proof, suspects, tables};
+use crate::kit::numbers::{NORMAL_95, interval, number, percent};
+use crate::{Curves, Figure, Finding, Findings, Page, Section, Series, Style, Table};
+use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
+use greylag_sysid::compare::HorizonScore;
+use greylag_sysid::diagnose::Tuned;
 
 /// Sentences that stand large at the top.
 const LEADING: usize = 2;
@@ -129,7 +129,7 @@ fn added(a: &Amendment) -> Section {
     Section::new("The effects as fitted", note, figures)
 }
 
-fn by_flight(p: &Parameter) -> crate::report::Whiskers {
+fn by_flight(p: &Parameter) -> crate::Whiskers {
     let flights = p.by_flight.iter().map(|f| (f.flight.as_str(), f.value, f.sd));
     suspects::flight_by_flight(p.name.clone(), "", flights, (p.value, p.ci95))
 }

@@ -5,8 +5,8 @@ pub(super) mod regimes;
 pub(super) mod tables;
 pub(super) mod traces;
 
-use crate::report::Page;
-use crate::sysid::compare::Comparison;
+use crate::Page;
+use greylag_sysid::compare::Comparison;
 
 /// A comparison of models with flights, with where it came from.
 #[derive(Clone, Debug)]

@@ -1,12 +1,12 @@
 //! The page of one comparison of models with flights.
 
-use crate::report::comparison::ComparisonReport;
-use crate::report::comparison::{regimes, tables, traces};
-use crate::report::{
+use crate::comparison::ComparisonReport;
+use crate::comparison::{regimes, tables, traces};
+use crate::{
     BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, Link, Page, Section, Series,
     Style,
 };
-use crate::sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
+use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
 /// Sentences of the first model that stand large at the top.
 const LEADING: usize = 2;
@@ -31,7 +31,7 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
 }
 
 /// The short section of a flight report: what its own model gets wrong about it.
-pub(in crate::report) fn short_section(c: &Comparison) -> Section {
+pub(crate) fn short_section(c: &Comparison) -> Section {
     let mut found = findings(c);
     // The figures that the links point to are on the page of the comparison itself.
     for finding in found.lead.iter_mut().chain(&mut found.rest) {
@@ -56,7 +56,7 @@ fn subtitle(c: &Comparison) -> String {
 }
 
 /// What a channel is called on buttons and in tables.
-pub(in crate::report) fn channel_name(id: ChannelId) -> String {
+pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
@@ -92,11 +92,11 @@ fn link(model: &ModelResult, sentence: &str) -> Option<Link> {
 }
 
 /// The models with their colours.
-pub(in crate::report) fn keys(c: &Comparison) -> Vec<(String, Style)> {
+pub(crate) fn keys(c: &Comparison) -> Vec<(String, Style)> {
     c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
 }
 
-pub(in crate::report) fn unexplained(c: &Comparison) -> Figure {
+pub(crate) fn unexplained(c: &Comparison) -> Figure {
     let share = |model: &ModelResult, id: ChannelId| {
         let of = model.channels.iter().find(|ch| ch.channel == id);
         of.map_or(f64::NAN, |ch| 100.0 * ch.unexplained_fraction)
@@ -129,7 +129,7 @@ fn growth_note(c: &Comparison) -> String {
     )
 }
 
-pub(in crate::report) fn growth(c: &Comparison) -> Vec<Figure> {
+pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     let longest = c.models.iter().map(|m| &m.growth).max_by_key(|g| g.len());
     let Some(longest) = longest.filter(|g| !g.is_empty()) else { return Vec::new() };
     let curves = |title: &str, value: fn(&GrowthPoint) -> f64| {
@@ -155,7 +155,7 @@ pub(in crate::report) fn growth(c: &Comparison) -> Vec<Figure> {
 }
 
 /// Alternatives by channel, those that `figures` has something for.
-pub(in crate::report) fn by_channel(
+pub(crate) fn by_channel(
     c: &Comparison,
     figures: impl Fn(ChannelId) -> Vec<Figure>,
 ) -> Vec<ChoiceOption> {

@@ -1,17 +1,15 @@
 //! Where a model fails: its residual over each regime variable, over α with β.
 
-use crate::report::comparison::page::{by_channel, keys};
-use crate::report::{
-    Choice, Figure, HeatCell, HeatMap, IntervalBins, IntervalPanel, Intervals, Section,
-};
-use crate::sysid::compare::{
+use crate::comparison::page::{by_channel, keys};
+use crate::{Choice, Figure, HeatCell, HeatMap, IntervalBins, IntervalPanel, Intervals, Section};
+use greylag_sysid::compare::{
     ChannelId, ChannelResult, Comparison, Map, RegimeBins, RegimeVariable,
 };
 
 /// Where the sentences lead to.
-pub(in crate::report) const ANCHOR: &str = "regimes";
+pub(crate) const ANCHOR: &str = "regimes";
 
-pub(in crate::report) fn regimes(c: &Comparison) -> Section {
+pub(crate) fn regimes(c: &Comparison) -> Section {
     let options = by_channel(c, |id| panels(c, id).map(Figure::Intervals).into_iter().collect());
     let note = format!(
         "Mean of measured less model in bins, with its 95 % interval by block bootstrap and the \
@@ -21,19 +19,14 @@ pub(in crate::report) fn regimes(c: &Comparison) -> Section {
     choice("Where it fails", &note, ANCHOR, options)
 }
 
-pub(in crate::report) fn maps(c: &Comparison) -> Section {
+pub(crate) fn maps(c: &Comparison) -> Section {
     let options = by_channel(c, |id| heat_maps(c, id));
     let note = "Mean of measured less model over angle of attack and sideslip, one map a model on \
                 one scale. Orange: the model is too low; blue: too high.";
     choice("α–β map", note, "map", options)
 }
 
-fn choice(
-    title: &str,
-    note: &str,
-    anchor: &str,
-    options: Vec<crate::report::ChoiceOption>,
-) -> Section {
+fn choice(title: &str, note: &str, anchor: &str, options: Vec<crate::ChoiceOption>) -> Section {
     if options.is_empty() {
         return Section::default();
     }
@@ -119,7 +112,7 @@ fn heat_maps(c: &Comparison, id: ChannelId) -> Vec<Figure> {
 }
 
 fn heat_map(title: &str, id: ChannelId, map: &Map, limit: f64) -> HeatMap {
-    let cell = |c: &crate::sysid::compare::MapCell| HeatCell {
+    let cell = |c: &greylag_sysid::compare::MapCell| HeatCell {
         x: c.alpha,
         y: c.beta,
         value: c.mean,

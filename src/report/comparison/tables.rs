@@ -1,11 +1,11 @@
 //! The tables of a comparison: free-run errors, nuisances, notes, provenance.
 
-use crate::report::comparison::ComparisonReport;
-use crate::report::kit::numbers::{NORMAL_95, interval, number, percent};
-use crate::report::{Align, Choice, ChoiceOption, Figure, Section, Table};
-use crate::sysid::compare::{Comparison, HorizonScore, NuisanceResult, StateScore};
+use crate::comparison::ComparisonReport;
+use crate::kit::numbers::{NORMAL_95, interval, number, percent};
+use crate::{Align, Choice, ChoiceOption, Figure, Section, Table};
+use greylag_sysid::compare::{Comparison, HorizonScore, NuisanceResult, StateScore};
 
-pub(in crate::report) fn summary(c: &Comparison) -> Section {
+pub(crate) fn summary(c: &Comparison) -> Section {
     let mut table = Table::new(
         "Free-run error",
         &[
@@ -116,7 +116,7 @@ fn by_state(c: &Comparison, horizon_s: f64) -> Option<ChoiceOption> {
     (!table.rows.is_empty()).then(|| ChoiceOption { name, figures: vec![Figure::Table(table)] })
 }
 
-pub(in crate::report) fn nuisances(c: &Comparison) -> Section {
+pub(crate) fn nuisances(c: &Comparison) -> Section {
     let mut table = Table::new(
         "Sensor errors and wind",
         &[
@@ -158,7 +158,7 @@ fn nuisance_row(flight: &str, n: &NuisanceResult) -> Vec<String> {
     ]
 }
 
-pub(in crate::report) fn notes(c: &Comparison) -> Section {
+pub(crate) fn notes(c: &Comparison) -> Section {
     let mut table = Table::new("Notes", &[("About", Align::Left), ("Note", Align::Left)]);
     for note in &c.notes {
         table.push(["the comparison".to_string(), note.clone()]);
@@ -174,7 +174,7 @@ pub(in crate::report) fn notes(c: &Comparison) -> Section {
     Section::new("Notes", "What was assumed, skipped or lost.", vec![Figure::Table(table)])
 }
 
-pub(in crate::report) fn provenance(report: &ComparisonReport) -> Section {
+pub(crate) fn provenance(report: &ComparisonReport) -> Section {
     let c = report.comparison;
     let mut table = Table::new("Provenance", &[("Item", Align::Left), ("Value", Align::Left)]);
     let mut push = |item: &str, value: String| table.push([item.to_string(), value]);

@@ -1,8 +1,8 @@
 //! Measured against predicted over time: telling stretches of the flights, then each as a whole.
 
-use crate::report::comparison::page::channel_name;
-use crate::report::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
-use crate::sysid::compare::{ChannelId, ChannelTrace, Comparison, FlightTrace, ModelTrace};
+use crate::comparison::page::channel_name;
+use crate::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
+use greylag_sysid::compare::{ChannelId, ChannelTrace, Comparison, FlightTrace, ModelTrace};
 
 /// Length of a stretch, s: several free runs of the usual 3 s.
 const STRETCH_S: f64 = 30.0;
@@ -35,7 +35,7 @@ struct Stretch {
 }
 
 /// The section, if the comparison holds what was flown.
-pub(in crate::report) fn section(c: &Comparison) -> Option<Section> {
+pub(crate) fn section(c: &Comparison) -> Option<Section> {
     let mut stretches = stretches(c);
     let mut options = Vec::new();
     stretches.sort_by(|a, b| b.error.total_cmp(&a.error));

@@ -5,9 +5,9 @@ pub(super) mod proof;
 pub(super) mod suspects;
 pub(super) mod tables;
 
-use crate::report::Page;
-use crate::sysid::compare::Comparison;
-use crate::sysid::diagnose::Diagnosis;
+use crate::Page;
+use greylag_sysid::compare::Comparison;
+use greylag_sysid::diagnose::Diagnosis;
 
 /// A diagnosis of what a model lacks, with what bears it out.
 #[derive(Clone, Debug)]

@@ -1,15 +1,15 @@
 //! The page of one diagnosis: what a model lacks, from the sentence to the proof.
 
-use crate::report::comparison::page::channel_name;
-use crate::report::diagnosis::DiagnosisReport;
-use crate::report::diagnosis::{proof, suspects, tables};
-use crate::report::kit::numbers::percent;
-use crate::report::{
+use crate::comparison::page::channel_name;
+use crate::diagnosis::DiagnosisReport;
+use crate::diagnosis::{proof, suspects, tables};
+use crate::kit::numbers::percent;
+use crate::{
     BarGroup, Bars, Figure, Finding, Findings, Grid, GridCell, GridRow, Link, Page, Section, Style,
     Table,
 };
-use crate::sysid::compare::{ChannelId, ChannelResult, Comparison, RegimeVariable};
-use crate::sysid::diagnose::{Diagnosis, Verdict};
+use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, RegimeVariable};
+use greylag_sysid::diagnose::{Diagnosis, Verdict};
 
 /// Sentences that stand large at the top.
 const LEADING: usize = 2;
@@ -67,7 +67,7 @@ fn link(d: &Diagnosis, sentence: &str) -> Option<Link> {
 }
 
 /// A channel's name from its symbol; the symbol itself where it is none.
-pub(in crate::report) fn channel_of(symbol: &str) -> String {
+pub(crate) fn channel_of(symbol: &str) -> String {
     let id = ChannelId::ALL.into_iter().find(|id| id.symbol() == symbol);
     id.map_or_else(|| symbol.to_string(), channel_name)
 }
@@ -150,7 +150,7 @@ fn left(d: &Diagnosis) -> Figure {
     if asserted {
         keys.push(("with the asserted effects".to_string(), Style::Second));
     }
-    let group = |ch: &crate::sysid::diagnose::ChannelLeft| BarGroup {
+    let group = |ch: &greylag_sysid::diagnose::ChannelLeft| BarGroup {
         label: channel_of(&ch.channel),
         values: [ch.tuned_unexplained_fraction, ch.unexplained_fraction]
             .iter()
@@ -166,7 +166,7 @@ fn left(d: &Diagnosis) -> Figure {
 }
 
 fn worst(d: &Diagnosis) -> Figure {
-    use crate::report::Align::Left;
+    use crate::Align::Left;
     let columns = [("Channel", Left), ("What is left", Left), ("Goes with", Left)];
     let mut table = Table::new("Worst regime", &columns);
     for channel in &d.channels {

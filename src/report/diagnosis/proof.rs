@@ -1,12 +1,12 @@
 //! What bears a diagnosis out: what chance reaches, the error on flights that no fit has seen.
 
-use crate::report::Align::{Left, Right};
-use crate::report::comparison::page::{growth, unexplained};
-use crate::report::comparison::tables::summary;
-use crate::report::kit::numbers::{evidence, number, percent};
-use crate::report::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
-use crate::sysid::compare::{Comparison, ModelResult};
-use crate::sysid::diagnose::Diagnosis;
+use crate::Align::{Left, Right};
+use crate::comparison::page::{growth, unexplained};
+use crate::comparison::tables::summary;
+use crate::kit::numbers::{evidence, number, percent};
+use crate::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
+use greylag_sysid::compare::{Comparison, ModelResult};
+use greylag_sysid::diagnose::Diagnosis;
 
 /// Evidence under which a null is not drawn: decades of nothing would fill the scale.
 const DRAWN: f64 = 0.1;
@@ -16,7 +16,7 @@ const DECOYS: usize = 8;
 const SHOWN_S: f64 = 5.0;
 
 /// What chance reaches: nulls that lack nothing, columns that cannot be effects.
-pub(in crate::report) fn chance(d: &Diagnosis) -> Section {
+pub(crate) fn chance(d: &Diagnosis) -> Section {
     let mut figures = Vec::new();
     let best = d.effects.iter().find(|c| c.asserted).or(d.effects.first());
     if !d.nulls.best.is_empty() {
@@ -78,7 +78,7 @@ fn decoys(d: &Diagnosis) -> Table {
 }
 
 /// Free runs and what is unexplained on flights that no fit has seen, model by model.
-pub(in crate::report) fn before_and_after(c: &Comparison) -> Section {
+pub(crate) fn before_and_after(c: &Comparison) -> Section {
     let mut figures = vec![Figure::Findings(statement(c))];
     figures.extend(growth(c));
     figures.push(unexplained(c));

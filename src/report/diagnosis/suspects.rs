@@ -1,16 +1,16 @@
 //! The suspects of a diagnosis: evidence, curves, agreement between flights.
 
-use crate::report::Align::{Left, Right};
-use crate::report::diagnosis::page::channel_of;
-use crate::report::kit::numbers::{NORMAL_95, interval, number};
-use crate::report::{
+use crate::Align::{Left, Right};
+use crate::diagnosis::page::channel_of;
+use crate::kit::numbers::{NORMAL_95, interval, number};
+use crate::{
     Choice, ChoiceOption, Evidence, EvidenceGroup, EvidenceRow, Figure, Section, Style, Table,
     Whisker, Whiskers, XyBand, XyFigure, XyMark, XySeries,
 };
-use crate::sysid::diagnose::{Candidate, Curve, Diagnosis};
+use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis};
 
 /// Where sentences on an effect lead to.
-pub(in crate::report) const ANCHOR: &str = "effect";
+pub(crate) const ANCHOR: &str = "effect";
 /// Candidates under their thresholds that are drawn; the table has all.
 const BELOW: usize = 8;
 /// Candidates that are not asserted whose curves are drawn.
@@ -18,7 +18,7 @@ const CURVES: usize = 3;
 /// Points drawn of the measured scatter.
 const POINTS: usize = 1500;
 
-pub(in crate::report) fn ranking(d: &Diagnosis) -> Section {
+pub(crate) fn ranking(d: &Diagnosis) -> Section {
     let mut seen: Vec<&str> = Vec::new();
     let mut groups = Vec::new();
     for found in d.effects.iter().filter(|c| c.asserted) {
@@ -97,7 +97,7 @@ fn detail(c: &Candidate) -> Vec<String> {
     std::iter::once(what).chain(refused).collect()
 }
 
-pub(in crate::report) fn curves(d: &Diagnosis) -> Section {
+pub(crate) fn curves(d: &Diagnosis) -> Section {
     let with = |asserted: bool| {
         let of = d.effects.iter().filter(move |c| c.asserted == asserted);
         of.filter_map(|c| Some((c, c.curve.as_ref()?)))
@@ -164,7 +164,7 @@ fn parameters(c: &Candidate) -> Table {
     table
 }
 
-pub(in crate::report) fn agreement(d: &Diagnosis) -> Section {
+pub(crate) fn agreement(d: &Diagnosis) -> Section {
     let figures: Vec<Figure> = d
         .effects
         .iter()
@@ -185,7 +185,7 @@ fn by_flight(c: &Candidate) -> Option<Whiskers> {
 
 /// What each flight alone says of a value (flight, value, standard deviation), above what all say
 /// together (value with its 95 % interval).
-pub(in crate::report) fn flight_by_flight<'a>(
+pub(crate) fn flight_by_flight<'a>(
     title: String,
     unit: &str,
     flights: impl Iterator<Item = (&'a str, f64, f64)>,
@@ -208,7 +208,7 @@ pub(in crate::report) fn flight_by_flight<'a>(
     Whiskers {
         title,
         unit: unit.into(),
-        scale: crate::report::Scale::Linear,
+        scale: crate::Scale::Linear,
         lines: vec![0.0],
         legend,
         rows,

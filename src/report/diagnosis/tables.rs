@@ -1,12 +1,12 @@
 //! The tables of a diagnosis: advice, what could not have been seen, coefficients, sensors, candidates.
 
-use crate::report::Align::{Left, Right};
-use crate::report::diagnosis::DiagnosisReport;
-use crate::report::kit::numbers::{NORMAL_95, evidence, interval, number, percent};
-use crate::report::{Figure, Finding, Findings, Section, Style, Table, Whisker, Whiskers};
-use crate::sysid::diagnose::{Advice, Candidate, Diagnosis, Tuned};
+use crate::Align::{Left, Right};
+use crate::diagnosis::DiagnosisReport;
+use crate::kit::numbers::{NORMAL_95, evidence, interval, number, percent};
+use crate::{Figure, Finding, Findings, Section, Style, Table, Whisker, Whiskers};
+use greylag_sysid::diagnose::{Advice, Candidate, Diagnosis, Tuned};
 
-pub(in crate::report) fn advice(d: &Diagnosis) -> Section {
+pub(crate) fn advice(d: &Diagnosis) -> Section {
     let finding = |a: &Advice| {
         let command = match &a.between {
             Some([a, b]) => format!(" Its schedule: greylag design --between {a} {b}."),
@@ -25,7 +25,7 @@ pub(in crate::report) fn advice(d: &Diagnosis) -> Section {
 }
 
 /// The smallest amounts that the data would have shown, of what is not asserted.
-pub(in crate::report) fn unseen(d: &Diagnosis) -> Section {
+pub(crate) fn unseen(d: &Diagnosis) -> Section {
     let columns = [("Effect", Left), ("Not seen below", Right), ("of", Left), ("What it is", Left)];
     let mut table = Table::new("What could not have been seen", &columns);
     for c in d.effects.iter().filter(|c| !c.asserted) {
@@ -43,7 +43,7 @@ pub(in crate::report) fn unseen(d: &Diagnosis) -> Section {
 }
 
 /// The prior's coefficients as tuned, those that moved most first.
-pub(in crate::report) fn tuned(tuned: &[Tuned]) -> Section {
+pub(crate) fn tuned(tuned: &[Tuned]) -> Section {
     if tuned.is_empty() {
         return Section::default();
     }
@@ -53,7 +53,7 @@ pub(in crate::report) fn tuned(tuned: &[Tuned]) -> Section {
     let figure = Whiskers {
         title: "Prior to tuned".into(),
         unit: "in standard deviations of the prior".into(),
-        scale: crate::report::Scale::Linear,
+        scale: crate::Scale::Linear,
         lines: vec![-2.0, 0.0, 2.0],
         legend: "dashed: the prior and ± 2".into(),
         rows: sorted.iter().map(|t| tuned_row(t)).collect(),
@@ -81,7 +81,7 @@ fn tuned_row(t: &Tuned) -> Whisker {
     }
 }
 
-pub(in crate::report) fn measurement(d: &Diagnosis) -> Section {
+pub(crate) fn measurement(d: &Diagnosis) -> Section {
     let columns = [
         ("Flight", Left),
         ("What", Left),
@@ -117,7 +117,7 @@ pub(in crate::report) fn measurement(d: &Diagnosis) -> Section {
 }
 
 /// The trims of each flight, where they were asked for.
-pub(in crate::report) fn trims(d: &Diagnosis) -> Section {
+pub(crate) fn trims(d: &Diagnosis) -> Section {
     let columns = [
         ("Flight", Left),
         ("Trim", Left),
@@ -148,7 +148,7 @@ pub(in crate::report) fn trims(d: &Diagnosis) -> Section {
     section("Trims of the flights", note, table)
 }
 
-pub(in crate::report) fn candidates(d: &Diagnosis) -> Section {
+pub(crate) fn candidates(d: &Diagnosis) -> Section {
     let columns = [
         ("Effect", Left),
         ("Asserted", Left),
@@ -193,13 +193,13 @@ fn first(c: &Candidate) -> String {
     })
 }
 
-pub(in crate::report) fn notes(d: &Diagnosis) -> Section {
+pub(crate) fn notes(d: &Diagnosis) -> Section {
     let mut table = Table::new("Notes", &[("Note", Left)]);
     d.notes.iter().for_each(|note| table.push([note.clone()]));
     section("Notes", "What was assumed, skipped or lost.", table)
 }
 
-pub(in crate::report) fn provenance(report: &DiagnosisReport) -> Section {
+pub(crate) fn provenance(report: &DiagnosisReport) -> Section {
     let d = report.diagnosis;
     let mut table = Table::new("Provenance", &[("Item", Left), ("Value", Left)]);
     let mut push = |item: &str, value: String| table.push([item.to_string(), value]);

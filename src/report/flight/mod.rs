@@ -4,10 +4,10 @@ pub(super) mod page;
 pub(super) mod targets;
 pub(super) mod verdict;
 
-use crate::logs::Flight;
-use crate::report::Sight;
-use crate::report::{LoopTiming, Page};
-use crate::sysid::compare::Comparison;
+use crate::Sight;
+use crate::{LoopTiming, Page};
+use greylag_logs::Flight;
+use greylag_sysid::compare::Comparison;
 
 /// A flight with what is known about it.
 #[derive(Clone, Debug)]

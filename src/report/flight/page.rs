@@ -1,21 +1,21 @@
 //! The page of one flight.
 
-use crate::logs::Sample;
-use crate::report::comparison;
-use crate::report::flight::FlightReport;
-use crate::report::flight::targets;
-use crate::report::flight::verdict::{degrees, duration_s, verdict};
-use crate::report::{
+use crate::comparison;
+use crate::flight::FlightReport;
+use crate::flight::targets;
+use crate::flight::verdict::{degrees, duration_s, verdict};
+use crate::{
     Align, Band, Choice, ChoiceOption, Figure, Histogram, LoopTiming, Mark, Page, Panel, Rule,
     Scale, Section, Series, Sight, Style, Table, TimeFigure, sight,
 };
+use greylag_logs::Sample;
 
 /// A pause longer than this breaks the lines, s: the log format splits a flight there.
 const GAP_S: f64 = 0.1;
 /// Events up to this number are marked in the plots; more would hide the lines.
 const MARKED_EVENTS: usize = 40;
 
-pub(in crate::report) fn page(report: &FlightReport) -> Page {
+pub(crate) fn page(report: &FlightReport) -> Page {
     let mut sections = vec![Section::verdict(verdict(report)), attitude(report)];
     sections.extend([air_data(report), surfaces(report)]);
     sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));

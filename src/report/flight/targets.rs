@@ -1,14 +1,14 @@
 //! The targets of a flight: what each was, how well it was held, where it lay.
 
-use crate::report::flight::FlightReport;
-use crate::report::flight::verdict::signed;
-use crate::report::{Align, Figure, Row, Section, Style, Table, XyFigure, XyMark, XySeries};
+use crate::flight::FlightReport;
+use crate::flight::verdict::signed;
+use crate::{Align, Figure, Row, Section, Style, Table, XyFigure, XyMark, XySeries};
 
 /// Samples up to this number are drawn as a path in the roll and pitch plane.
 const PATH_POINTS: usize = 20_000;
 
 /// The section of the targets: a table, and the plane of roll and pitch.
-pub(in crate::report) fn section(report: &FlightReport) -> Section {
+pub(crate) fn section(report: &FlightReport) -> Section {
     let mut table = Table::new(
         "Segments",
         &[

@@ -1,14 +1,14 @@
 //! The sentence that says what happened in a flight, with what bears it out.
 
-use crate::logs::Sample;
-use crate::report::flight::{Difficulty, FlightReport, Segment};
-use crate::report::{LoopTiming, Outcome, Verdict};
+use crate::flight::{Difficulty, FlightReport, Segment};
+use crate::{LoopTiming, Outcome, Verdict};
+use greylag_logs::Sample;
 
 /// Targets that were not tracked up to this number are listed under the sentence.
 const LISTED_TARGETS: usize = 6;
 
 /// From the first time to the last, s.
-pub(in crate::report) fn duration_s(samples: &[Sample]) -> f64 {
+pub(crate) fn duration_s(samples: &[Sample]) -> f64 {
     let times = || samples.iter().map(|s| s.time_s).filter(|t| t.is_finite());
     match (times().next(), times().next_back()) {
         (Some(first), Some(last)) => last - first,
@@ -16,7 +16,7 @@ pub(in crate::report) fn duration_s(samples: &[Sample]) -> f64 {
     }
 }
 
-pub(in crate::report) fn verdict(report: &FlightReport) -> Verdict {
+pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let late = report.timing.as_ref().map(LoopTiming::late);
     let mut parts = Vec::new();
@@ -94,12 +94,12 @@ fn not_tracked(report: &FlightReport) -> Vec<String> {
 }
 
 /// Degrees with a sign, by a true minus.
-pub(in crate::report) fn signed(rad: f64) -> String {
+pub(crate) fn signed(rad: f64) -> String {
     format!("{:+.1}", rad.to_degrees()).replace('-', "−")
 }
 
 /// An error in degrees, with digits enough that a small one is not shown as zero.
-pub(in crate::report) fn degrees(rad: f64) -> String {
+pub(crate) fn degrees(rad: f64) -> String {
     let deg = rad.to_degrees();
     match deg.abs() {
         _ if !deg.is_finite() => "unknown".into(),

@@ -1,7 +1,7 @@
 //! Horizontal bars: one quantity for several things, side by side for several models.
 
-use crate::report::Style;
-use crate::report::kit::html::escape;
+use crate::Style;
+use crate::kit::html::escape;
 
 /// Groups of bars from zero.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct BarGroup {
 }
 
 impl Bars {
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let groups: String = self.groups.iter().map(|g| self.group_html(g)).collect();
         format!(
             "<figure class=\"panel bars\"><figcaption><h3>{}</h3><span class=\"unit\">{}</span>{}\
@@ -70,7 +70,7 @@ fn value_text(value: f64, unit: &str) -> String {
 }
 
 /// A key of colours; empty if there is one only.
-pub(in crate::report) fn keys_html(keys: &[(String, Style)]) -> String {
+pub(crate) fn keys_html(keys: &[(String, Style)]) -> String {
     if keys.len() < 2 {
         return String::new();
     }

@@ -1,7 +1,7 @@
 //! Alternatives of which the reader sees one at a time.
 
-use crate::report::Figure;
-use crate::report::kit::html::escape;
+use crate::Figure;
+use crate::kit::html::escape;
 
 /// Named alternatives behind a row of buttons; choices with the same label switch together.
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ pub struct ChoiceOption {
 }
 
 impl Choice {
-    pub(in crate::report) fn html(&self, data: &mut Vec<String>) -> String {
+    pub(crate) fn html(&self, data: &mut Vec<String>) -> String {
         let (anchor, label) = (escape(&self.anchor), escape(&self.label));
         let mut html = format!("<div class=\"choice\" id=\"{anchor}\" data-label=\"{label}\">\n");
         if self.options.len() > 1 {

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::report::Series;
-use crate::report::kit::html::{compact, escape};
+use crate::Series;
+use crate::kit::html::{compact, escape};
 
 /// Lines over one horizontal quantity.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -40,7 +40,7 @@ pub struct Range {
 }
 
 impl Curves {
-    pub(in crate::report) fn html(&self, index: usize) -> String {
+    pub(crate) fn html(&self, index: usize) -> String {
         let title = escape(&self.title);
         format!(
             "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\

@@ -2,7 +2,7 @@
 
 /// Indices of the rows whose times ascend, with `None` where a pause longer than `gap_s` (s) lies
 /// between two of them.
-pub(in crate::report) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
+pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(time_s.len());
     let mut last = f64::NEG_INFINITY;
     for (i, &t) in time_s.iter().enumerate() {
@@ -19,7 +19,7 @@ pub(in crate::report) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option
 }
 
 /// The times of `rows`; a pause gets the middle of its two neighbours.
-pub(in crate::report) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
+pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
     let at = |k: usize| rows.get(k).copied().flatten().map_or(f64::NAN, |i| time_s[i]);
     (0..rows.len())
         .map(|k| match rows[k] {
@@ -30,12 +30,12 @@ pub(in crate::report) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec
 }
 
 /// The values of `rows`; NaN at a pause or where `values` ends early.
-pub(in crate::report) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
+pub(crate) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }
 
 /// Two values for every `group` values: the smallest and the largest, in the order they came.
-pub(in crate::report) fn extremes(values: &[f64], group: usize) -> Vec<f64> {
+pub(crate) fn extremes(values: &[f64], group: usize) -> Vec<f64> {
     values.chunks(group).flat_map(pair_of_extremes).collect()
 }
 
@@ -51,7 +51,7 @@ fn pair_of_extremes(chunk: &[f64]) -> [f64; 2] {
 }
 
 /// The two times that go with [`extremes`]: the start and the middle of every group.
-pub(in crate::report) fn pair_times(time_s: &[f64], group: usize) -> Vec<f64> {
+pub(crate) fn pair_times(time_s: &[f64], group: usize) -> Vec<f64> {
     time_s
         .chunks(group)
         .flat_map(|chunk| {

@@ -1,8 +1,8 @@
 //! Evidence for things, each as a bar against its own threshold, in groups that belong together.
 
-use crate::report::Style;
-use crate::report::kit::html::escape;
-use crate::report::kit::numbers::evidence;
+use crate::Style;
+use crate::kit::html::escape;
+use crate::kit::numbers::evidence;
 
 /// Longest bars, in thresholds; longer ones are cut, and marked.
 const FULL: f64 = 6.0;
@@ -57,7 +57,7 @@ impl Evidence {
         longest.clamp(1.5, FULL)
     }
 
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let full = self.full();
         let groups: String = self.groups.iter().map(|g| g.html(full)).collect();
         format!(

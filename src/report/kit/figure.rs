@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::report::kit::html::escape;
-use crate::report::{
+use crate::kit::html::escape;
+use crate::{
     Bars, Choice, Curves, Evidence, Findings, Grid, HeatMap, Histogram, Intervals, Table,
     TimeFigure, Whiskers, XyFigure,
 };
@@ -64,7 +64,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let (class, word) = match self.outcome {
             Outcome::Reached => ("reached", "Reached"),
             Outcome::Missed => ("missed", "Missed"),
@@ -105,7 +105,7 @@ impl Style {
     }
 
     /// Its name in the style sheet.
-    pub(in crate::report) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Style::Command => "command",
             Style::Actual => "actual",

@@ -1,6 +1,6 @@
 //! Findings in plain words, each with a link to what bears it out.
 
-use crate::report::kit::html::escape;
+use crate::kit::html::escape;
 
 /// Sentences, the leading ones large.
 #[derive(Clone, Debug, Default)]
@@ -20,7 +20,7 @@ pub struct Finding {
     pub link: Option<Link>,
 }
 
-/// A way to one alternative of a [`crate::report::Choice`].
+/// A way to one alternative of a [`crate::Choice`].
 #[derive(Clone, Debug)]
 pub struct Link {
     /// Anchor of the choice.
@@ -30,7 +30,7 @@ pub struct Link {
 }
 
 impl Findings {
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let lead: String = self.lead.iter().map(|f| format!("<p>{}</p>", f.html())).collect();
         let rest: String = self.rest.iter().map(|f| format!("<li>{}</li>", f.html())).collect();
         let list = if rest.is_empty() { rest } else { format!("<ul>{rest}</ul>") };

@@ -1,6 +1,6 @@
 //! A table of numbers whose cells are coloured by their weight.
 
-use crate::report::kit::html::escape;
+use crate::kit::html::escape;
 
 /// Rows and columns of numbers from nothing to much.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub struct GridCell {
 }
 
 impl Grid {
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let head: String = self
             .columns
             .iter()

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::report::kit::html::{compact, escape};
+use crate::kit::html::{compact, escape};
 
 /// Cells coloured from blue (negative) to orange (positive).
 #[derive(Clone, Debug, Serialize)]
@@ -53,7 +53,7 @@ fn compact_one<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok
 }
 
 impl HeatMap {
-    pub(in crate::report) fn html(&self, index: usize) -> String {
+    pub(crate) fn html(&self, index: usize) -> String {
         let title = escape(&self.title);
         let limit = three_digits(self.limit);
         let unit = escape(&self.unit);

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::report::Rule;
-use crate::report::kit::html::{compact, escape};
+use crate::Rule;
+use crate::kit::html::{compact, escape};
 
 /// Bins in one decade of a logarithmic histogram.
 const BINS_PER_DECADE: f64 = 20.0;
@@ -57,7 +57,7 @@ impl Histogram {
         }
     }
 
-    pub(in crate::report) fn html(&self, index: usize) -> String {
+    pub(crate) fn html(&self, index: usize) -> String {
         let title = escape(&self.title);
         format!(
             "<figure class=\"panel histogram\"><figcaption><h3>{title}</h3>\

@@ -23,7 +23,7 @@ pub(crate) fn escape(text: &str) -> String {
 
 /// `data` as JSON that may stand in a `<script>` element: no `<` is left in it, so neither
 /// `</script>` nor `<!--` can end it.
-pub(in crate::report) fn script_json<T: Serialize>(data: &T) -> String {
+pub(crate) fn script_json<T: Serialize>(data: &T) -> String {
     serde_json::to_string(data)
         .expect("figures are structs of strings and numbers, which JSON can hold")
         .replace('<', "\\u003c")
@@ -31,18 +31,12 @@ pub(in crate::report) fn script_json<T: Serialize>(data: &T) -> String {
 
 /// Serialises values with six significant digits, which is more than a screen shows and less
 /// than an f32 holds; what is not finite becomes `null`.
-pub(in crate::report) fn compact<S: Serializer>(
-    values: &[f64],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+pub(crate) fn compact<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(values.iter().map(|&v| six_digits(v)))
 }
 
 /// Serialises times to 0.1 ms: six digits would not do after the first 1000 s.
-pub(in crate::report) fn compact_time<S: Serializer>(
-    times: &[f64],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+pub(crate) fn compact_time<S: Serializer>(times: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(times.iter().map(|t| (t * 1e4).round() / 1e4))
 }
 

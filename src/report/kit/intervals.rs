@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::report::Style;
-use crate::report::kit::bars::keys_html;
-use crate::report::kit::html::{compact, escape};
+use crate::Style;
+use crate::kit::bars::keys_html;
+use crate::kit::html::{compact, escape};
 
 /// Small plots of means in bins that share one vertical scale.
 #[derive(Clone, Debug, Serialize)]
@@ -60,7 +60,7 @@ pub struct IntervalBins {
 }
 
 impl Intervals {
-    pub(in crate::report) fn html(&self, index: usize) -> String {
+    pub(crate) fn html(&self, index: usize) -> String {
         let mut html = format!(
             "<div class=\"intervals\"><div class=\"keys\"><span class=\"unit\">{}</span>{}\
              <span class=\"legend\"><span class=\"entry\"><i class=\"swatch thin\"></i>\

@@ -1,10 +1,10 @@
 //! Numbers as people read them.
 
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
-pub(in crate::report) const NORMAL_95: f64 = 1.96;
+pub(crate) const NORMAL_95: f64 = 1.96;
 
 /// Three significant digits with a true minus sign; a dash for what is no number.
-pub(in crate::report) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
     }
@@ -18,7 +18,7 @@ pub(in crate::report) fn number(value: f64) -> String {
 }
 
 /// Evidence to a tenth, from a hundred on to one; a dash for what is no number.
-pub(in crate::report) fn evidence(value: f64) -> String {
+pub(crate) fn evidence(value: f64) -> String {
     let text = match value {
         v if !v.is_finite() => return "–".into(),
         v if v.abs() < 99.95 => format!("{v:.1}"),
@@ -29,7 +29,7 @@ pub(in crate::report) fn evidence(value: f64) -> String {
 }
 
 /// A share as a whole percentage; a dash for what is no number.
-pub(in crate::report) fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     if share.is_finite() {
         format!("{:.0}", 100.0 * share).replace('-', "−")
     } else {
@@ -38,7 +38,7 @@ pub(in crate::report) fn percent(share: f64) -> String {
 }
 
 /// Two ends of an interval.
-pub(in crate::report) fn interval(low: f64, high: f64) -> String {
+pub(crate) fn interval(low: f64, high: f64) -> String {
     format!("{} to {}", number(low), number(high))
 }
 

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::report::kit::html::{escape, script_json};
-use crate::report::{Figure, Verdict};
+use crate::kit::html::{escape, script_json};
+use crate::{Figure, Verdict};
 
 const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
@@ -116,7 +116,7 @@ impl Section {
 }
 
 impl Figure {
-    pub(in crate::report) fn html(&self, data: &mut Vec<String>) -> String {
+    pub(crate) fn html(&self, data: &mut Vec<String>) -> String {
         let index = data.len();
         match self {
             Figure::Verdict(verdict) => verdict.html(),

@@ -1,6 +1,6 @@
 //! Rows and columns of text.
 
-use crate::report::kit::html::escape;
+use crate::kit::html::escape;
 
 /// Letters above which a text of the last column is broken into lines of some width.
 const LONG: usize = 28;
@@ -63,7 +63,7 @@ impl Table {
         self.rows.push(Row { cells: cells.into_iter().collect(), ..Row::default() });
     }
 
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let class = |i: usize| match self.columns.get(i).map(|c| c.align) {
             Some(Align::Right) => " class=\"number\"",
             _ => "",

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::report::kit::decimate;
-use crate::report::kit::html::{compact, compact_time, escape};
-use crate::report::{Rule, Style};
+use crate::kit::decimate;
+use crate::kit::html::{compact, compact_time, escape};
+use crate::{Rule, Style};
 
 /// Rows above which a track is thinned for drawing.
 const DRAWN_ROWS: usize = 20_000;
@@ -177,7 +177,7 @@ impl TimeFigure {
         kept
     }
 
-    pub(in crate::report) fn html(&self, index: usize) -> String {
+    pub(crate) fn html(&self, index: usize) -> String {
         let columns = match self.tracks.iter().map(|t| t.panels.len()).sum::<usize>() {
             0 | 1 => "one",
             n if n % 3 == 0 => "three",

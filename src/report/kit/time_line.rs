@@ -3,8 +3,8 @@
 //! Positions along the time are shares of the width, so that words keep their size. Colours are classes, `tone-…` and
 //! `line-…`, for the style sheet of the page.
 
-use crate::report::kit::html::escape;
-use crate::report::kit::numbers::number;
+use crate::kit::html::escape;
+use crate::kit::numbers::number;
 
 /// Height of a row of states, and of a panel of lines, px.
 const ROW_PX: f64 = 26.0;
@@ -87,7 +87,7 @@ pub struct TraceLine {
     /// Its name.
     pub label: String,
     /// Its colour.
-    pub style: crate::report::Style,
+    pub style: crate::Style,
     /// Time (s) and value; what is not finite is a gap.
     pub points: Vec<[f64; 2]>,
 }
@@ -299,7 +299,7 @@ fn level(value: f64, [low, high]: [f64; 2]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::Style;
+    use crate::Style;
 
     fn time_line() -> TimeLine {
         let span =

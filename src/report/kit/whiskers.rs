@@ -1,8 +1,8 @@
 //! Values with their intervals, one a line, on one horizontal scale.
 
-use crate::report::kit::html::escape;
-use crate::report::kit::numbers::number;
-use crate::report::{Scale, Style};
+use crate::kit::html::escape;
+use crate::kit::numbers::number;
+use crate::{Scale, Style};
 
 /// Room beside the outermost intervals, in the width of all of them.
 const ROOM: f64 = 0.06;
@@ -61,7 +61,7 @@ impl Whiskers {
         (low <= high && width.is_finite()).then_some([low - room, high + room])
     }
 
-    pub(in crate::report) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let [low, high] = self.ends().unwrap_or([0.0, 1.0]);
         let place = |x: f64| (100.0 * (self.on_scale(x) - low) / (high - low)).clamp(0.0, 100.0);
         let shown = |x: f64| match self.scale {

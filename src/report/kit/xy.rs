@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::report::Style;
-use crate::report::kit::html::{compact, escape};
+use crate::Style;
+use crate::kit::html::{compact, escape};
 
 /// A pair of axes with points or paths.
 #[derive(Clone, Debug, Serialize)]
@@ -71,7 +71,7 @@ pub enum XyMark {
 }
 
 impl XyFigure {
-    pub(in crate::report) fn html(&self, index: usize) -> String {
+    pub(crate) fn html(&self, index: usize) -> String {
         let title = escape(&self.title);
         format!(
             "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\

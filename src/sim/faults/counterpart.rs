@@ -9,8 +9,8 @@ use greylag_sitl::shim::{Distortion, Launch, Noise, Personality, ShimError, Shim
 use serde::{Deserialize, Serialize};
 
 use super::scenario::{ControllerSetting, Scenario};
-use crate::link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
-use crate::model::GreyBox;
+use greylag_link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
+use greylag_model::GreyBox;
 
 /// What is at the other end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

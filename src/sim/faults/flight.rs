@@ -19,17 +19,17 @@ use super::mix::{Fault, FaultKind};
 use super::policies::Sample;
 use super::scenario::{Asking, Scenario, Setting};
 use super::wire::Wire;
-use crate::control::envelope::EnvelopeFilter;
-use crate::control::{Controller, ControllerKind, SetupError, build};
-use crate::flight::desk::Desk;
-use crate::flight::pilot::{ConfigError, Pilot};
-use crate::flight::recorder::Recorder;
-use crate::flight::runtime::Companion;
-use crate::link::autopilot::{Autopilot, ParameterValue, Verdict};
-use crate::link::vehicle::Vehicle;
-use crate::model::GreyBox;
-use crate::physics::airframe::Envelope;
 use disk::Disk;
+use greylag_control::envelope::EnvelopeFilter;
+use greylag_control::{Controller, ControllerKind, SetupError, build};
+use greylag_flight::desk::Desk;
+use greylag_flight::pilot::{ConfigError, Pilot};
+use greylag_flight::recorder::Recorder;
+use greylag_flight::runtime::Companion;
+use greylag_link::autopilot::{Autopilot, ParameterValue, Verdict};
+use greylag_link::vehicle::Vehicle;
+use greylag_model::GreyBox;
+use greylag_physics::airframe::Envelope;
 use traced::Follower;
 
 /// Steps of a flight: 60 s.

@@ -3,9 +3,9 @@
 use greylag_sitl::plant::Truth;
 
 use super::mix::FaultKind;
-use crate::flight::pilot::{Decision, Source};
-use crate::physics::Command;
-use crate::physics::airframe::Envelope;
+use greylag_flight::pilot::{Decision, Source};
+use greylag_physics::Command;
+use greylag_physics::airframe::Envelope;
 
 /// Overshoot of bank and pitch beyond the envelope that is still no violation, degrees: a gust of
 /// the surfaces' full slew takes about so far.

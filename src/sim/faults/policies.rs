@@ -3,11 +3,11 @@
 use super::counterpart::ControllerMode;
 use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
 use super::temporal::Formula;
-use crate::control::Target;
-use crate::flight::pilot::{Decision, Source, TICK_S};
-use crate::link::autopilot::Mode;
-use crate::physics::Command;
-use crate::physics::airframe::Envelope;
+use greylag_control::Target;
+use greylag_flight::pilot::{Decision, Source, TICK_S};
+use greylag_link::autopilot::Mode;
+use greylag_physics::Command;
+use greylag_physics::airframe::Envelope;
 
 /// Angle that is one unit of distance, degrees; likewise altitude (m), time (s).
 const UNIT_DEG: f64 = 30.0;

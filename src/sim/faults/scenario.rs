@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::counterpart::Counterpart;
 use super::mix::{FIRST_S, Fault, FaultKind, LAST_S, draw, one};
-use crate::link::autopilot::Mode;
+use greylag_link::autopilot::Mode;
 
 /// Fewest and most faults, requests and legs of a scenario that is varied.
 const MOST: usize = 4;

@@ -12,8 +12,8 @@ use super::flight::{CompanionFactory, FaultsError};
 use super::judge::{Finding, Found};
 use super::policies::{Policy, Sample, policies};
 use super::scenario::Scenario;
-use crate::flight::pilot::TICK_S;
-use crate::num::stream::stream;
+use greylag_flight::pilot::TICK_S;
+use greylag_num::stream::stream;
 
 /// Flights that are flown side by side; the search is the same on any number of cores.
 const TOGETHER: u64 = 16;

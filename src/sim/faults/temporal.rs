@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::flight::pilot::TICK_S;
+use greylag_flight::pilot::TICK_S;
 
 /// A formula over samples `S`, one every tick of 10 ms.
 pub enum Formula<S> {

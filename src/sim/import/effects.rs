@@ -3,9 +3,9 @@
 use super::fits::line;
 use super::propeller::Propeller;
 use super::{Beside, Polar, Slopes};
-use crate::model::textbook::Estimate;
-use crate::physics::catalogue::describe;
-use crate::physics::size::Size;
+use greylag_model::textbook::Estimate;
+use greylag_physics::catalogue::describe;
+use greylag_physics::size::Size;
 
 /// An effect of the model file with its numbers.
 pub(super) type Effect = (&'static str, Vec<Estimate>);

@@ -6,9 +6,9 @@ use super::effects::Effect;
 use super::fits::line;
 use super::propulsion::Propulsion;
 use super::{Polar, Subject};
-use crate::model::textbook::{Estimate, incidence_limits, numbers};
-use crate::num::{Grid, Table};
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
+use greylag_model::textbook::{Estimate, incidence_limits, numbers};
+use greylag_num::{Grid, Table};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
 
 /// Share of the pitching moment's variation below which it is a line over incidence.
 const STRAIGHT: f64 = 1e-3;

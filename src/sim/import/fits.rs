@@ -3,9 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::Polar;
-use crate::num::least_squares;
-use crate::num::statistics::mean;
-use crate::physics::servos::{Surface, Travel};
+use greylag_num::least_squares;
+use greylag_num::statistics::mean;
+use greylag_physics::servos::{Surface, Travel};
 
 /// Incidences over which the pitching moment is taken as a line, degrees.
 const LINE_DEG: [f64; 2] = [-4.0, 10.0];

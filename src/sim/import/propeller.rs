@@ -4,7 +4,7 @@ use greylag_sitl::plant::{Inputs, PlantError, Start, Travel};
 
 use super::propulsion::{LBF_FT, NO_ARM};
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
-use crate::num::least_squares;
+use greylag_num::least_squares;
 
 /// Throttles at which the engines are settled.
 const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];

@@ -4,9 +4,9 @@ use greylag_sitl::plant::{PlantError, Start};
 
 use super::fits::{ThrustLag, thrust_lag};
 use super::{ALPHA, Subject};
-use crate::model::textbook::Estimate;
-use crate::num::{Grid, least_squares};
-use crate::physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
+use greylag_model::textbook::Estimate;
+use greylag_num::{Grid, least_squares};
+use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Share of a channel's variation that is worth a word when it is left.
 const WORTH_SAYING: f64 = 0.02;

@@ -10,14 +10,14 @@ use super::judge::{self, JUDGED_AT_S, Judge};
 use super::output_error::{Fit, FitOptions};
 use super::result::{Amendment, Settings};
 use super::{parameters, story};
-use crate::model::GreyBox;
-use crate::physics::catalogue;
-use crate::physics::effects::{Coefficient, Description, Kind};
-use crate::sysid::diagnose::Candidate;
-use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
-use crate::sysid::per_flight::PerFlight;
-use crate::sysid::progress::Progress;
-use crate::sysid::rudder;
+use crate::diagnose::Candidate;
+use crate::flight_path::reconstruction::{Reconstruction, Segment};
+use crate::per_flight::PerFlight;
+use crate::progress::Progress;
+use crate::rudder;
+use greylag_model::GreyBox;
+use greylag_physics::catalogue;
+use greylag_physics::effects::{Coefficient, Description, Kind};
 use selection::{Ask, Selection};
 
 /// An effect to add.

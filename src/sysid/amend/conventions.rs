@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::normal::Weights;
 use super::output_error::{Fit, Left};
-use crate::model::{GreyBox, Integrator};
-use crate::physics::atmosphere::Density;
-use crate::physics::rigid_body::ForceAxes;
+use greylag_model::{GreyBox, Integrator};
+use greylag_physics::atmosphere::Density;
+use greylag_physics::rigid_body::ForceAxes;
 
 /// Standard errors of the difference between two fits that are clear (two-sided 95 %, as Vuong has it).
 const CLEARLY: f64 = 1.96;

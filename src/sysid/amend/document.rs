@@ -6,10 +6,10 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::{Amended, Amendment, Convention};
-use crate::model::GreyBox;
-use crate::model::edit::{Edit, EditError, Number};
-use crate::physics::catalogue;
-use crate::physics::formula::Written;
+use greylag_model::GreyBox;
+use greylag_model::edit::{Edit, EditError, Number};
+use greylag_physics::catalogue;
+use greylag_physics::formula::Written;
 
 /// Characters of a file's SHA-256 that sources carry.
 const PREFIX: usize = 12;
@@ -134,7 +134,7 @@ pub fn files(
 fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) -> Edit {
     let fitted = &amended.amendment.parameters;
     let known = before.coefficients().len();
-    let number = |c: &crate::model::Named| {
+    let number = |c: &greylag_model::Named| {
         let sd = fitted.iter().find(|p| p.name == c.name).map(|p| p.sd);
         Number { name: c.name.clone(), value: c.value, sd }
     };

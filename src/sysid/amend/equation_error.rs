@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::flight::Flight;
 use super::parameters::{self, Free};
-use crate::model::GreyBox;
-use crate::sysid::weak_form::windows;
+use crate::weak_form::windows;
+use greylag_model::GreyBox;
 
 /// Channels that tell of coefficients: three forces, NaN where they are not measured, and three moments.
 const CHANNELS: usize = 6;

@@ -1,8 +1,8 @@
 //! Why a model cannot be amended.
 
-use crate::model::JoinError;
-use crate::sysid::progress::Cancelled;
-use crate::sysid::weak_form::prepared::ClockError;
+use crate::progress::Cancelled;
+use crate::weak_form::prepared::ClockError;
+use greylag_model::JoinError;
 
 /// Why a model cannot be amended.
 #[derive(Debug, thiserror::Error)]

@@ -1,10 +1,10 @@
 //! A flight with what is left in doubt of its sensors.
 
-use crate::sysid::diagnose::search::clocks::{BLURRED, Doubt};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::per_flight::trims::TRIMS;
-use crate::sysid::per_flight::{PerFlight, askew};
-use crate::sysid::weak_form::prepared::{ClockError, Prepared};
+use crate::diagnose::search::clocks::{BLURRED, Doubt};
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::trims::TRIMS;
+use crate::per_flight::{PerFlight, askew};
+use crate::weak_form::prepared::{ClockError, Prepared};
 
 /// Constants of a flight's sensors that are estimated along.
 pub(super) const SENSORS: usize = 8;

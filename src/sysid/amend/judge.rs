@@ -6,8 +6,8 @@ use super::flight::Flight;
 use super::output_error::Fit;
 use super::parameters;
 use super::result::{AddedEffect, Parameter};
-use crate::model::GreyBox;
-use crate::sysid::compare::{HorizonScore, free_run};
+use crate::compare::{HorizonScore, free_run};
+use greylag_model::GreyBox;
 
 /// Horizon at which improvement is judged, s.
 pub const JUDGED_AT_S: f64 = 5.0;

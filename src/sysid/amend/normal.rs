@@ -7,9 +7,9 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, Own, SENSORS, SKEW};
 use super::parameters::{self, Free};
 use super::shooting::{self, Shot};
-use crate::model::GreyBox;
-use crate::physics::Controls;
-use crate::sysid::per_flight::{PerFlight, trims};
+use crate::per_flight::{PerFlight, trims};
+use greylag_model::GreyBox;
+use greylag_physics::Controls;
 
 /// Steps of derivatives in the initial state, in the units of the state.
 const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];

@@ -3,7 +3,7 @@
 //! Each shot starts from a reconstructed state whose error is an unknown of its own, eliminated from
 //! the normal equations; the sensors' remaining biases and the actuators' delay are unknowns of each
 //! flight. Residuals are weighted by their own variance and by how long they hang together, both
-//! estimated along. Priors are Gaussian, with [`Named::width`](crate::model::Named::width).
+//! estimated along. Priors are Gaussian, with [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
 mod gauss_newton;
@@ -18,11 +18,11 @@ use super::normal::{self, Neighbourhood, Place, Weights};
 use super::parameters::{self, Free};
 use super::result::{FittedFlight, Parameter};
 use super::shooting::{self, Shot};
-use crate::model::GreyBox;
-use crate::num::statistics::{correlation_length, quantile};
-use crate::sysid::diagnose::search::clocks::{self, Clocks};
-use crate::sysid::per_flight::{PerFlight, trims};
-use crate::sysid::progress::{Cancelled, Progress, say};
+use crate::diagnose::search::clocks::{self, Clocks};
+use crate::per_flight::{PerFlight, trims};
+use crate::progress::{Cancelled, Progress, say};
+use greylag_model::GreyBox;
+use greylag_num::statistics::{correlation_length, quantile};
 
 /// Shortest flight to fit to, s.
 pub const LEAST_S: f64 = 10.0;

@@ -1,10 +1,10 @@
 //! The coefficients that a fit may change, with their priors, bounds and steps.
 
-use crate::model::{GreyBox, Named};
-use crate::physics::catalogue;
-use crate::physics::effects::Description;
-use crate::physics::formula::register;
-use crate::physics::inputs;
+use greylag_model::{GreyBox, Named};
+use greylag_physics::catalogue;
+use greylag_physics::effects::Description;
+use greylag_physics::formula::register;
+use greylag_physics::inputs;
 
 /// Coefficients of added effects that stay where they start: shares of a whole, which cannot be determined
 /// from the shape beside them.

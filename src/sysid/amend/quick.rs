@@ -9,10 +9,10 @@ use super::flight::Flight;
 use super::judge::Judge;
 use super::output_error::{self, Fit, FitOptions};
 use super::parameters;
-use crate::model::GreyBox;
-use crate::sysid::compare::HorizonScore;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::progress::Progress;
+use crate::compare::HorizonScore;
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::progress::Progress;
+use greylag_model::GreyBox;
 
 /// A model by equation error alone: forces and moments fitted, no free run.
 #[derive(Clone, Debug)]

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::conventions::Tried;
 use super::flight::SENSORS;
-use crate::sysid::compare::HorizonScore;
-use crate::sysid::per_flight::{Constant, PerFlight};
+use crate::compare::HorizonScore;
+use crate::per_flight::{Constant, PerFlight};
 
 /// A fitted coefficient.
 #[derive(Clone, Debug, Serialize)]

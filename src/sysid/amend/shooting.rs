@@ -3,12 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use super::flight::{AIRSPEED, BLUR, Flight, OFFSETS, Own, SENSORS, SKEW};
-use crate::logs::Sampling;
-use crate::model::{GreyBox, Memory};
-use crate::physics::{Controls, State};
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::per_flight::askew;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::flight_path::reconstruction::Instant;
+use crate::per_flight::askew;
+use crate::weak_form::prepared::Prepared;
+use greylag_logs::Sampling;
+use greylag_model::{GreyBox, Memory};
+use greylag_physics::{Controls, State};
 
 /// A run whose scaled error exceeds this has left the flight.
 const LEFT: f64 = 0.7;

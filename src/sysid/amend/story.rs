@@ -3,7 +3,7 @@
 use super::conventions::Tried;
 use super::judge::{judged, judged_at};
 use super::result::Amendment;
-use crate::sysid::per_flight::PerFlight;
+use crate::per_flight::PerFlight;
 
 /// The amendment in words: what became of the error, of the conventions, and of every effect.
 pub fn sentences(story: &Amendment) -> Vec<String> {

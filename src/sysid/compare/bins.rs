@@ -3,10 +3,10 @@
 use super::bootstrap::{self, BLOCK_S, Block};
 use super::doubt::{self, NORMAL_95, Shift};
 use super::result::{Bin, Map, MapCell, RegimeBins};
-use crate::num::statistics::{mean, quantile};
-use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
-use crate::sysid::weak_form::prepared::Prepared;
-use crate::sysid::weak_form::windows::Series;
+use crate::weak_form::channels::{ChannelId, RegimeVariable};
+use crate::weak_form::prepared::Prepared;
+use crate::weak_form::windows::Series;
+use greylag_num::statistics::{mean, quantile};
 
 /// Fewest independent samples that support a bin.
 pub const SUPPORT: usize = 20;

@@ -2,8 +2,8 @@
 
 use rand::RngExt;
 
-use crate::num::statistics::quantile;
-use crate::num::stream::stream;
+use greylag_num::statistics::quantile;
+use greylag_num::stream::stream;
 
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 1.0;

@@ -47,8 +47,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::num::stream::stream;
-    use crate::sysid::weak_form::channels::RegimeVariable;
+    use crate::weak_form::channels::RegimeVariable;
+    use greylag_num::stream::stream;
 
     /// Cells of noise of unit standard deviation, the first `real` of them about 4.
     fn cells(trial: u64, real: usize) -> Vec<RegimeBins> {

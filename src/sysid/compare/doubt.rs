@@ -4,13 +4,13 @@
 //! alike, so no bootstrap over windows sees it. The constants are taken as independent of one
 //! another, with the standard deviations that the reconstruction gives them.
 
-use crate::model::GreyBox;
-use crate::num::statistics::mean;
-use crate::physics::{Controls, State};
-use crate::sysid::flight_path::reconstruction::{Instant, Nuisance};
-use crate::sysid::weak_form::channels::ChannelId;
-use crate::sysid::weak_form::prepared::Prepared;
-use crate::sysid::weak_form::windows;
+use crate::flight_path::reconstruction::{Instant, Nuisance};
+use crate::weak_form::channels::ChannelId;
+use crate::weak_form::prepared::Prepared;
+use crate::weak_form::windows;
+use greylag_model::GreyBox;
+use greylag_num::statistics::mean;
+use greylag_physics::{Controls, State};
 
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;

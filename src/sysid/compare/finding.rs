@@ -3,8 +3,8 @@
 use super::bins::{self, Residual, SUPPORT};
 use super::discovery;
 use super::result::{Bin, Regime, RegimeBins};
-use crate::sysid::weak_form::channels::RegimeVariable;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::weak_form::channels::RegimeVariable;
+use crate::weak_form::prepared::Prepared;
 
 /// A variable that explains less of the residual's variance than this tells nothing apart.
 const SHARE_FLOOR: f64 = 0.1;

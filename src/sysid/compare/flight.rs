@@ -1,8 +1,8 @@
 //! What a comparison says of one flight.
 
-use crate::sysid::compare::result::{FlightResult, FlightTrace, NuisanceResult};
-use crate::sysid::flight_path::reconstruction::{Instant, Nuisance, Reconstruction};
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::compare::result::{FlightResult, FlightTrace, NuisanceResult};
+use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction};
+use crate::weak_form::prepared::Prepared;
 
 /// What the result says of `flight`, which was made from `from`.
 pub fn result(flight: &Prepared, from: &Reconstruction) -> FlightResult {

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::free_run::{DIVERGENCE_BOUND, Look, Runs, START_EVERY_S, error, scaled};
 use super::result::HorizonScore;
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
 
 /// Regressors of the linear model: the eight states, the four deflections, one.
 const REGRESSORS: usize = 13;
@@ -143,9 +143,9 @@ fn flown(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::logs::Sampling;
-    use crate::physics::{Controls, State};
-    use crate::sysid::flight_path::reconstruction::{Reconstruction, Segment};
+    use crate::flight_path::reconstruction::{Reconstruction, Segment};
+    use greylag_logs::Sampling;
+    use greylag_physics::{Controls, State};
 
     /// 20 s at 100 Hz in which each state follows its own linear law, the elevator moving.
     fn flight() -> Prepared {

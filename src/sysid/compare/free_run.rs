@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 use rayon::prelude::*;
 
 use super::result::{GrowthPoint, HorizonScore, StateScore};
-use crate::model::{GreyBox, Memory};
-use crate::num::statistics::{mean, quantile};
-use crate::physics::State;
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
+use greylag_model::{GreyBox, Memory};
+use greylag_num::statistics::{mean, quantile};
+use greylag_physics::State;
 
 /// Time between starts, s.
 pub const START_EVERY_S: f64 = 3.0;

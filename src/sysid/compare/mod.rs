@@ -2,7 +2,7 @@
 //!
 //! The method stands in `docs/explanation/comparison.md`. "Before" is the
 //! model as given; tuning it is the business of what ranks missing effects, for which
-//! [`columns`](crate::sysid::weak_form::windows::columns) gives what to regress on.
+//! [`columns`](crate::weak_form::windows::columns) gives what to regress on.
 
 mod bins;
 pub mod bootstrap;
@@ -18,7 +18,7 @@ mod run;
 mod sentence;
 mod verdict;
 
-pub use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
+pub use crate::weak_form::channels::{ChannelId, RegimeVariable};
 pub use error::CompareError;
 pub use result::{
     Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace, GrowthPoint,

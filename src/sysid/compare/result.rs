@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::forecast::ForecastResult;
-use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
+use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
 /// The comparison of one or several models with one or several flights.
 #[derive(Clone, Debug, Serialize)]

@@ -16,14 +16,14 @@ use super::result::{
 };
 use super::sentence::{Subject, sentence};
 use super::verdict;
-use crate::model::GreyBox;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::progress::{Progress, say};
-use crate::sysid::rudder;
-use crate::sysid::weak_form::channels::ChannelId;
-use crate::sysid::weak_form::kernel::KERNEL_S;
-use crate::sysid::weak_form::prepared::Prepared;
-use crate::sysid::weak_form::windows::{self, Series};
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::progress::{Progress, say};
+use crate::rudder;
+use crate::weak_form::channels::ChannelId;
+use crate::weak_form::kernel::KERNEL_S;
+use crate::weak_form::prepared::Prepared;
+use crate::weak_form::windows::{self, Series};
+use greylag_model::GreyBox;
 
 /// The channel's variance, less noise, must be at least this part of itself for a share to mean
 /// something.

@@ -2,7 +2,7 @@
 
 use super::finding::{Finding, Trend};
 use super::result::Regime;
-use crate::sysid::weak_form::channels::{ChannelId, RegimeVariable};
+use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
 /// A channel that the model explains but for less than this is said to be explained.
 const EXPLAINED: f64 = 0.01;

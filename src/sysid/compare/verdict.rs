@@ -2,7 +2,7 @@
 
 use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
-use crate::sysid::weak_form::channels::ChannelId;
+use crate::weak_form::channels::ChannelId;
 
 /// The sentences of a model: the worst of forces (they move V, α, β) and the worst of moments (they
 /// move p, q, r) lead, the others follow. The rates of V, α, β repeat the forces and are left out

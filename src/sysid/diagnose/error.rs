@@ -1,7 +1,7 @@
 //! Why a diagnosis cannot be made.
 
-use crate::sysid::progress::Cancelled;
-use crate::sysid::weak_form::prepared::ClockError;
+use crate::progress::Cancelled;
+use crate::weak_form::prepared::ClockError;
 
 /// Why a diagnosis cannot be made.
 #[derive(Debug, thiserror::Error)]

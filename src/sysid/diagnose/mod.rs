@@ -2,7 +2,7 @@
 //!
 //! The method stands in `docs/explanation/diagnosis.md`. Flights must be
 //! reconstructed with their deflections as recorded
-//! ([`ActuatorClock::AsRecorded`](crate::sysid::flight_path::ActuatorClock)): what is clock and what is
+//! ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)): what is clock and what is
 //! physics is decided here.
 
 mod answer;
@@ -10,7 +10,7 @@ mod error;
 mod options;
 mod proposal;
 mod regression;
-pub(in crate::sysid) mod search;
+pub(crate) mod search;
 
 pub use answer::curves::over_the_best;
 pub use answer::result::{

@@ -1,6 +1,6 @@
 //! What a diagnosis is asked for.
 
-use crate::sysid::per_flight::PerFlight;
+use crate::per_flight::PerFlight;
 
 /// How much a diagnosis works out besides its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,9 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::logs::Sampling;
-use crate::sysid::flight_path::nuisance::SKEW_SAMPLES;
-use crate::sysid::flight_path::reconstruction::{Instant, Segment};
+use crate::flight_path::nuisance::SKEW_SAMPLES;
+use crate::flight_path::reconstruction::{Instant, Segment};
+use greylag_logs::Sampling;
 
 /// Length of the averaging kernel, s.
 const KERNEL: f64 = 0.15;

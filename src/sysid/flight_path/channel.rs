@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use crate::num::statistics::quantile;
+use greylag_num::statistics::quantile;
 
 /// Share of repeated values above which a channel is taken to be slower than the log's rows.
 const HELD_SHARE: f64 = 0.3;

@@ -5,16 +5,16 @@ mod erring;
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
-use crate::logs::Sampling;
-use crate::num::statistics;
-use crate::sysid::flight_path::band::{self, Left, Link, Node, Stretch, add_gram};
-use crate::sysid::flight_path::intake::{Log, Track};
-use crate::sysid::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
-use crate::sysid::flight_path::levels::Levels;
-use crate::sysid::flight_path::measurement::{self, AT, Others, Reading};
-use crate::sysid::flight_path::nuisance::{self, COUNT, INERTIAL, Values, WIND};
-use crate::sysid::flight_path::path::{CHANNELS, Path};
-use crate::sysid::flight_path::{Options, ReconstructError, noise};
+use crate::flight_path::band::{self, Left, Link, Node, Stretch, add_gram};
+use crate::flight_path::intake::{Log, Track};
+use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
+use crate::flight_path::levels::Levels;
+use crate::flight_path::measurement::{self, AT, Others, Reading};
+use crate::flight_path::nuisance::{self, COUNT, INERTIAL, Values, WIND};
+use crate::flight_path::path::{CHANNELS, Path};
+use crate::flight_path::{Options, ReconstructError, noise};
+use greylag_logs::Sampling;
+use greylag_num::statistics;
 
 /// Columns where the constants are free: all, those between instants; right-hand side last.
 const WIDTH: usize = COUNT + 1;

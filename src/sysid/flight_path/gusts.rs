@@ -7,12 +7,12 @@
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::num::stream::{Stream, stream};
-use crate::sysid::flight_path::equations::{Found, Problem};
-use crate::sysid::flight_path::kinematics::gust_kept;
-use crate::sysid::flight_path::measurement::{OTHERS, Others, by_gust};
-use crate::sysid::flight_path::nuisance::{COUNT, Values};
-use crate::sysid::flight_path::path::Path;
+use crate::flight_path::equations::{Found, Problem};
+use crate::flight_path::kinematics::gust_kept;
+use crate::flight_path::measurement::{OTHERS, Others, by_gust};
+use crate::flight_path::nuisance::{COUNT, Values};
+use crate::flight_path::path::Path;
+use greylag_num::stream::{Stream, stream};
 
 /// Pairs of draws in one set of equations: without gusts, with them.
 const PAIRS: usize = OTHERS / 2;

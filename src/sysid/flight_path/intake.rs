@@ -4,12 +4,12 @@ mod channels;
 mod stretches;
 mod track;
 
-use crate::logs::rudder::RudderMotion;
-use crate::logs::{Flight, FlowAngles};
-use crate::physics::{Command, Controls, Sensors};
-use crate::sysid::flight_path::channel::Channel;
-use crate::sysid::flight_path::{Options, ReconstructError, lever_arm};
+use crate::flight_path::channel::Channel;
+use crate::flight_path::{Options, ReconstructError, lever_arm};
 use channels::Channels;
+use greylag_logs::rudder::RudderMotion;
+use greylag_logs::{Flight, FlowAngles};
+use greylag_physics::{Command, Controls, Sensors};
 use stretches::{gap, step, stretches};
 use track::track;
 
@@ -78,7 +78,7 @@ pub struct Span {
     pub length: f64,
 }
 
-/// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`](crate::logs::Sample).
+/// A stretch without gaps, as measured; a missing measurement is NaN. Units as in [`Sample`](greylag_logs::Sample).
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Time of the first sample, s.

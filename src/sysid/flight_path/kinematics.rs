@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::logs::Sampling;
-use crate::sysid::flight_path::band::{Block, Wide};
-use crate::sysid::flight_path::channel::cubic;
-use crate::sysid::flight_path::intake::{Span, Track};
-use crate::sysid::flight_path::nuisance::{self, EARTH, FORCE, INERTIAL, SKEW_FORCE, Values};
-use crate::sysid::flight_path::path::Path;
-use crate::sysid::flight_path::rotation::{self, cross, exp, log};
+use crate::flight_path::band::{Block, Wide};
+use crate::flight_path::channel::cubic;
+use crate::flight_path::intake::{Span, Track};
+use crate::flight_path::nuisance::{self, EARTH, FORCE, INERTIAL, SKEW_FORCE, Values};
+use crate::flight_path::path::Path;
+use crate::flight_path::rotation::{self, cross, exp, log};
+use greylag_logs::Sampling;
 
 /// Time over which a gust is forgotten, s: the length scale of turbulence some hundred metres up over
 /// the airspeed of a small aircraft.

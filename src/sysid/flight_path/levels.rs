@@ -1,10 +1,10 @@
 //! The noise levels: first from the data alone, then from what the fit leaves.
 
-use crate::physics::sensors::Noisy;
-use crate::sysid::flight_path::intake::{Log, Track};
-use crate::sysid::flight_path::measurement::{self, Reading};
-use crate::sysid::flight_path::noise;
-use crate::sysid::flight_path::path::CHANNELS;
+use crate::flight_path::intake::{Log, Track};
+use crate::flight_path::measurement::{self, Reading};
+use crate::flight_path::noise;
+use crate::flight_path::path::CHANNELS;
+use greylag_physics::sensors::Noisy;
 
 /// Smallest noise levels, of the size of what the kinematics leave out: gyro rad/s, force m/s².
 const GYRO_FLOOR: f64 = 2e-4;

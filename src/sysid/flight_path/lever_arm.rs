@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::sysid::flight_path::intake::Track;
+use crate::flight_path::intake::Track;
 
 /// Half of the time over which an angular acceleration is taken from the gyros, s.
 const HALF_S: f64 = 0.02;

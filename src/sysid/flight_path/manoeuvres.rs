@@ -5,7 +5,7 @@
 //! else to a change of thrust if the throttle moves; else to a turn if the bank is large; else the flight
 //! is steady. Stretches under half a second join the one before them.
 
-use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
+use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 
 /// Roll rate that is a manoeuvre, rad/s.
 const ROLL_RATE: f64 = 0.15;

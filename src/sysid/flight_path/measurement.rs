@@ -3,17 +3,17 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::sysid::flight_path::band::{Corner, Node, add_gram};
-use crate::sysid::flight_path::channel::{cubic, wrap};
-use crate::sysid::flight_path::intake::Track;
-use crate::sysid::flight_path::kinematics::MOTION_AND_GUST;
-use crate::sysid::flight_path::lever_arm::air_at;
-use crate::sysid::flight_path::nuisance::{
+use crate::flight_path::band::{Corner, Node, add_gram};
+use crate::flight_path::channel::{cubic, wrap};
+use crate::flight_path::intake::Track;
+use crate::flight_path::kinematics::MOTION_AND_GUST;
+use crate::flight_path::lever_arm::air_at;
+use crate::flight_path::nuisance::{
     ALPHA, BETA, INERTIAL, SCALE, SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_VANES, SKEW_VELOCITY, Values,
     WIND,
 };
-use crate::sysid::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
-use crate::sysid::flight_path::rotation::{cross, euler_by_turn, to_euler};
+use crate::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
+use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
 
 /// Columns of the constants that act at instants, right-hand side last.
 pub const AT: usize = INERTIAL + 1;

@@ -1,9 +1,9 @@
 //! Errors of the measurement that look like missing physics, as entries of the catalogue of effects.
 //!
 //! They are decided by the reconstruction of the flight path, before any aerodynamics: their
-//! parameters are its [nuisances](crate::sysid::flight_path), under the same names.
+//! parameters are its [nuisances](crate::flight_path), under the same names.
 
-use crate::physics::effects::{Coefficient, Description, Entry, coefficient};
+use greylag_physics::effects::{Coefficient, Description, Entry, coefficient};
 
 /// Source of the formulas of sensor errors that act on the path.
 const PATH: &str = "kinematics of a rigid body, which hold no aerodynamics; Klein and Morelli, Aircraft System \
@@ -150,7 +150,7 @@ const fn measured(entry: &Entry) -> Description {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sysid::flight_path::nuisance;
+    use crate::flight_path::nuisance;
 
     /// The reconstruction estimates exactly these constants, under these names and in these units;
     /// the Earth's rate, known from the latitude, is no error of a sensor.

@@ -18,7 +18,7 @@ mod lever_arm;
 mod manoeuvres;
 mod measurement;
 mod noise;
-pub(in crate::sysid) mod nuisance;
+pub(crate) mod nuisance;
 mod outcome;
 mod path;
 mod rotation;
@@ -30,12 +30,12 @@ pub use manoeuvres::{Manoeuvre, ManoeuvreKind, manoeuvres};
 use equations::Problem;
 use sampling::Chosen;
 
-use crate::logs::phases::Flying;
-use crate::logs::{Flight, Sampling};
-use crate::model::GreyBox;
-use crate::physics::Sensors;
-use crate::physics::airframe::ActuatorFigures;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_logs::phases::Flying;
+use greylag_logs::{Flight, Sampling};
+use greylag_model::GreyBox;
+use greylag_physics::Sensors;
+use greylag_physics::airframe::ActuatorFigures;
 
 /// Which clock the deflections are handed out on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

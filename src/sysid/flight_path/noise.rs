@@ -1,6 +1,6 @@
 //! Noise levels, taken from the data.
 
-use crate::num::statistics::quantile;
+use greylag_num::statistics::quantile;
 
 /// Fewest values from which a level is taken.
 const FEWEST: usize = 8;
@@ -58,7 +58,7 @@ pub fn colour(residuals: &[f64], block: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::stream::stream;
+    use greylag_num::stream::stream;
     use rand_distr::{Distribution, StandardNormal};
 
     fn noise(n: usize) -> Vec<f64> {

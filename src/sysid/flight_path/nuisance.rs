@@ -1,8 +1,8 @@
 //! The constants estimated along with the path: their names, units and prior widths.
 
-use crate::physics::sensors::CONSTANTS;
-use crate::sysid::flight_path::Options;
-use crate::sysid::flight_path::intake::{Log, Present, Span};
+use crate::flight_path::Options;
+use crate::flight_path::intake::{Log, Present, Span};
+use greylag_physics::sensors::CONSTANTS;
 
 /// Number of constants.
 pub const COUNT: usize = 31;

@@ -2,22 +2,20 @@
 
 use nalgebra::Vector3;
 
-use crate::num::statistics::mean;
-use crate::num::stream::stream;
-use crate::physics::sensors::Known;
-use crate::physics::{Controls, State};
-use crate::sysid::flight_path::actuator_skew::{self, Skew};
-use crate::sysid::flight_path::channel::wrap;
-use crate::sysid::flight_path::equations::{Found, Problem, no_path};
-use crate::sysid::flight_path::intake::{Log, Track};
-use crate::sysid::flight_path::kinematics::shifted;
-use crate::sysid::flight_path::nuisance::{
-    self, BEND, COUNT, DRIFT, FORCE, SKEW_FORCE, Values, WIND,
-};
-use crate::sysid::flight_path::path::{Path, flow_angles};
-use crate::sysid::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
-use crate::sysid::flight_path::rotation::to_euler;
-use crate::sysid::flight_path::{ActuatorClock, ReconstructError};
+use crate::flight_path::actuator_skew::{self, Skew};
+use crate::flight_path::channel::wrap;
+use crate::flight_path::equations::{Found, Problem, no_path};
+use crate::flight_path::intake::{Log, Track};
+use crate::flight_path::kinematics::shifted;
+use crate::flight_path::nuisance::{self, BEND, COUNT, DRIFT, FORCE, SKEW_FORCE, Values, WIND};
+use crate::flight_path::path::{Path, flow_angles};
+use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction, Segment};
+use crate::flight_path::rotation::to_euler;
+use crate::flight_path::{ActuatorClock, ReconstructError};
+use greylag_num::statistics::mean;
+use greylag_num::stream::stream;
+use greylag_physics::sensors::Known;
+use greylag_physics::{Controls, State};
 
 /// Part of the prior width above which the data is said not to see a constant.
 const UNSEEN: f64 = 0.7;

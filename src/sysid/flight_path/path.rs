@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::sysid::flight_path::intake::Track;
-use crate::sysid::flight_path::kinematics::MOTION_AND_GUST;
-use crate::sysid::flight_path::rotation;
+use crate::flight_path::intake::Track;
+use crate::flight_path::kinematics::MOTION_AND_GUST;
+use crate::flight_path::rotation;
 
 /// Number of measured channels: roll, pitch, yaw, airspeed, α, β, velocity north, east, down.
 pub const CHANNELS: usize = 9;

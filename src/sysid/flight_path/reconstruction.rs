@@ -1,9 +1,9 @@
 //! A flight after reconstruction: one clock, no sensor errors, no gaps inside a segment.
 
-use crate::logs::rudder::RudderMotion;
-use crate::logs::{Flight, Sample, Sampling};
-use crate::physics::sensors::Known;
-use crate::physics::{Command, Controls, State};
+use greylag_logs::rudder::RudderMotion;
+use greylag_logs::{Flight, Sample, Sampling};
+use greylag_physics::sensors::Known;
+use greylag_physics::{Command, Controls, State};
 
 /// One instant of a reconstructed flight.
 #[derive(Clone, Copy, Debug, PartialEq)]

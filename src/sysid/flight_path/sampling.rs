@@ -7,14 +7,14 @@
 //! Means over a sample period need no case of their own: their gyros are late by half a period, which the
 //! clock skews take up.
 
-use crate::logs::Sampling;
-use crate::sysid::flight_path::ReconstructError;
-use crate::sysid::flight_path::equations::{Found, Problem};
-use crate::sysid::flight_path::intake::Log;
-use crate::sysid::flight_path::nuisance::{
+use crate::flight_path::ReconstructError;
+use crate::flight_path::equations::{Found, Problem};
+use crate::flight_path::intake::Log;
+use crate::flight_path::nuisance::{
     SKEW_AIRSPEED, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VANES, SKEW_VELOCITY, concerned,
 };
-use crate::sysid::flight_path::smoother::smooth;
+use crate::flight_path::smoother::smooth;
+use greylag_logs::Sampling;
 
 /// Clocks that must agree.
 const FEWEST: usize = 2;

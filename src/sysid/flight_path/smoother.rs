@@ -7,13 +7,13 @@
 
 use nalgebra::Vector3;
 
-use crate::sysid::flight_path::ReconstructError;
-use crate::sysid::flight_path::equations::{Found, Problem, Solved, no_path};
-use crate::sysid::flight_path::gusts;
-use crate::sysid::flight_path::kinematics::MOTION;
-use crate::sysid::flight_path::levels::{CALM, Levels};
-use crate::sysid::flight_path::nuisance::WIND;
-use crate::sysid::flight_path::path::Path;
+use crate::flight_path::ReconstructError;
+use crate::flight_path::equations::{Found, Problem, Solved, no_path};
+use crate::flight_path::gusts;
+use crate::flight_path::kinematics::MOTION;
+use crate::flight_path::levels::{CALM, Levels};
+use crate::flight_path::nuisance::WIND;
+use crate::flight_path::path::Path;
 
 /// Levels of gusts that are tried, m/s, then the factors around the best of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];

@@ -6,7 +6,7 @@
 //! smoothed in the axes of gyros and attitude, so α and β are of these axes too. Vanes keep the body's: what the turn makes of α
 //! and β on the average the reconstruction takes for their bias, and the rest the path has from the vanes.
 
-use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
 /// Id of the angles among the errors of the measurement.
 pub const ID: &str = "axes_askew";

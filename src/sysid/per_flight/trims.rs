@@ -2,8 +2,8 @@
 //!
 //! They join a model as an effect that the catalogue does not have, so that a model needs no coefficient of such a name.
 
-use crate::model::{GreyBox, JoinError};
-use crate::physics::formula::register;
+use greylag_model::{GreyBox, JoinError};
+use greylag_physics::formula::register;
 
 /// A trim with its width.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,11 +59,12 @@ pub fn set(model: &mut GreyBox, values: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{Channel, Controls, State};
+    use greylag_physics::{Channel, Controls, State};
 
     #[test]
     fn trims_stand_behind_the_models_coefficients_in_their_order() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         let model = GreyBox::load(&path).unwrap();
         let mut with = joined(&model).unwrap();
         let count = model.coefficients().len();

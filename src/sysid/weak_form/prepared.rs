@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 
-use crate::logs::Sampling;
-use crate::model::{GreyBox, Integrator, Memory, STEP};
-use crate::physics::State;
-use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction};
-use crate::sysid::per_flight::askew::Turning;
-use crate::sysid::weak_form::channels::RegimeVariable;
-use crate::sysid::weak_form::kernel::{Kernel, weigh};
+use crate::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::per_flight::askew::Turning;
+use crate::weak_form::channels::RegimeVariable;
+use crate::weak_form::kernel::{Kernel, weigh};
+use greylag_logs::Sampling;
+use greylag_model::{GreyBox, Integrator, Memory, STEP};
+use greylag_physics::State;
 
 /// Slower than this (m/s) an aircraft of any size is taken to stand, not to fly.
 const FLYING_FLOOR: f64 = 3.0;

@@ -5,15 +5,15 @@
 
 use rayon::prelude::*;
 
-use crate::logs::Sampling;
-use crate::model::{GreyBox, Integrator, Memory};
-use crate::num::Real;
-use crate::physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
-use crate::physics::{AirData, Channel, State, Wrench};
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::channels::ChannelId;
-use crate::sysid::weak_form::kernel::{Kernel, weigh};
-use crate::sysid::weak_form::prepared::{Prepared, Window};
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::channels::ChannelId;
+use crate::weak_form::kernel::{Kernel, weigh};
+use crate::weak_form::prepared::{Prepared, Window};
+use greylag_logs::Sampling;
+use greylag_model::{GreyBox, Integrator, Memory};
+use greylag_num::Real;
+use greylag_physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
+use greylag_physics::{AirData, Channel, State, Wrench};
 
 /// Windows in which the sensitivity to sensor noise is worked out, a flight.
 const NOISE_WINDOWS: usize = 40;
@@ -164,7 +164,7 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
 
 /// D less thrust, L and Y, N, of a force in body axes: in the order of [`ChannelId::ALL`], not in that of
 /// [`rigid_body::aerodynamic_force`], which is D, Y, L.
-pub(in crate::sysid) fn to_force_axes<R: Real>(
+pub(crate) fn to_force_axes<R: Real>(
     force: Vector<R>,
     air: &AirData<R>,
     axes: ForceAxes,
@@ -187,7 +187,7 @@ fn measured_moment(
 }
 
 /// J ω.
-pub(in crate::sysid) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vector<R> {
+pub(crate) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vector<R> {
     [
         w[0].scale(body.jx) - w[2].scale(body.jxz),
         w[1].scale(body.jy),
@@ -196,7 +196,7 @@ pub(in crate::sysid) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vect
 }
 
 /// ω × J ω.
-pub(in crate::sysid) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<R> {
+pub(crate) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<R> {
     let w = [state.p, state.q, state.r];
     let h = inertia(body, w);
     [w[1] * h[2] - w[2] * h[1], w[2] * h[0] - w[0] * h[2], w[0] * h[1] - w[1] * h[0]]
@@ -269,7 +269,7 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
 
 /// Predicted less what the state's noise moves of the measured side too: the forces turned by α and
 /// β, the gyroscopic moments.
-pub(in crate::sysid) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
+pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());
     let force = std::array::from_fn(|k| force[k] - if known { measured[k] } else { 0.0 });

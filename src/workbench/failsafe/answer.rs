@@ -2,9 +2,9 @@
 
 use super::Flown;
 use super::verdict::Happened;
-use crate::control::ControllerKind;
-use crate::report::{TimeLine, escape};
-use crate::sim::faults::policies::Policy;
+use greylag_control::ControllerKind;
+use greylag_report::{TimeLine, escape};
+use greylag_sim::faults::policies::Policy;
 
 /// File of the command that flies the scenario again.
 const FILE: &str = "scenario.json";

@@ -3,10 +3,10 @@
 use super::Flown;
 use super::choices::{fault, request};
 use super::form::FLIGHT_S;
-use crate::flight::pilot::{Source, TICK_S, mode_name};
-use crate::report::{Span, States, Style, TimeLine, Tone, TraceLine, Traces};
-use crate::sim::faults::policies::Sample;
-use crate::sim::faults::{ControllerMode, Fault};
+use greylag_flight::pilot::{Source, TICK_S, mode_name};
+use greylag_report::{Span, States, Style, TimeLine, Tone, TraceLine, Traces};
+use greylag_sim::faults::policies::Sample;
+use greylag_sim::faults::{ControllerMode, Fault};
 
 /// Time before and after what happens first that is shown large, s.
 const BEFORE_S: f64 = 1.0;
@@ -98,11 +98,11 @@ impl Flown {
             let points = self.witnessed.samples.iter().enumerate().map(point).collect();
             TraceLine { label: label.into(), style, points }
         };
-        let asked = |s: &Sample, angle: fn(&crate::control::Target) -> f64| {
+        let asked = |s: &Sample, angle: fn(&greylag_control::Target) -> f64| {
             let fresh = s.decision.filter(|d| s.age_s <= STALE_S && d.armed);
             fresh.map_or(f64::NAN, |d| angle(&d.target).to_degrees())
         };
-        let attitude = |label: &str, k: usize, angle: fn(&crate::control::Target) -> f64| Traces {
+        let attitude = |label: &str, k: usize, angle: fn(&greylag_control::Target) -> f64| Traces {
             label: label.into(),
             lines: vec![
                 line("flown", Style::Actual, &move |s| s.attitude_deg[k]),

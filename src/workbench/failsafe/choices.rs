@@ -1,7 +1,7 @@
 //! What can be chosen: counterparts, controllers, faults, requests, each with its words.
 
-use crate::control::{ControllerKind, Pace};
-use crate::sim::faults::{Asking, Counterpart, FaultKind};
+use greylag_control::{ControllerKind, Pace};
+use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 
 /// Nothing goes wrong, or is asked for.
 pub(super) const NOTHING: &str = "none";

@@ -4,8 +4,8 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::choices::{AGAIN, NOTHING, REQUESTS, TURBULENCE, controllers};
-use crate::control::ControllerKind;
-use crate::sim::faults::{
+use greylag_control::ControllerKind;
+use greylag_sim::faults::{
     Asked, Asking, ControllerSetting, Counterpart, Fault, FaultKind, Leg, Scenario,
 };
 
@@ -341,7 +341,7 @@ mod tests {
 
     #[test]
     fn every_fault_and_request_of_the_page_is_a_scenario() {
-        use crate::workbench::failsafe::choices::{FAULTS, file_name};
+        use crate::failsafe::choices::{FAULTS, file_name};
         for kind in FAULTS {
             let scenario = chosen(&[("fault", &file_name(kind))]).unwrap().scenario;
             assert_eq!(scenario.faults[0].kind, kind);

@@ -11,11 +11,11 @@ mod verdict;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::control::ControllerKind;
-use crate::sim::faults::policies::{Policy, policies};
-use crate::sim::faults::search::judged;
-use crate::sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
 use form::Form;
+use greylag_control::ControllerKind;
+use greylag_sim::faults::policies::{Policy, policies};
+use greylag_sim::faults::search::judged;
+use greylag_sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
 
 /// Makes the companions with a controller, or says why it cannot.
 type Make = Box<dyn Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync>;

@@ -4,8 +4,8 @@ use super::choices::{
     FAULTS, NOTHING, REQUESTS, TURBULENCE, controllers, counterpart, fault, file_name,
 };
 use super::form::{Form, NUMBERS, Wrong};
-use crate::report::escape;
-use crate::sim::faults::{Counterpart, FaultKind};
+use greylag_report::escape;
+use greylag_sim::faults::{Counterpart, FaultKind};
 
 /// Flights to begin with: their name, and what they change of the defaults.
 const EXAMPLES: [(&str, &str); 8] = [

@@ -4,11 +4,11 @@ use super::Flown;
 use super::bands::{companion, spans};
 use super::choices::{fault, request};
 use super::form::FLIGHT_S;
-use crate::flight::pilot::{TICK_S, mode_name};
-use crate::link::autopilot::Verdict;
-use crate::report::{Span, Tone};
-use crate::sim::faults::policies::Sample;
-use crate::sim::faults::{Asking, Fault, Finding, Found};
+use greylag_flight::pilot::{TICK_S, mode_name};
+use greylag_link::autopilot::Verdict;
+use greylag_report::{Span, Tone};
+use greylag_sim::faults::policies::Sample;
+use greylag_sim::faults::{Asking, Fault, Finding, Found};
 
 /// Changes that a sentence names at most.
 const NAMED: usize = 4;

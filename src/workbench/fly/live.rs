@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::flight::monitor::{Channel, Compared, Monitor};
-use crate::link::autopilot::RESIDUALS;
-use crate::link::vehicle::{Faults, Order, Telemetry, VANE_SD};
-use crate::logs::Sample;
-use crate::model::GreyBox;
-use crate::physics::{ActuatorState, State, Time};
+use greylag_flight::monitor::{Channel, Compared, Monitor};
+use greylag_link::autopilot::RESIDUALS;
+use greylag_link::vehicle::{Faults, Order, Telemetry, VANE_SD};
+use greylag_logs::Sample;
+use greylag_model::GreyBox;
+use greylag_physics::{ActuatorState, State, Time};
 
 /// Time between two points, s; rows in between are averaged.
 const STEP_S: f64 = 0.1;

@@ -23,8 +23,8 @@ use super::error::{WorkbenchError, io};
 use super::jobs::{Event, Stop};
 use super::roles::now_s;
 use super::session::{Flown, Outcome, Role};
-use crate::logs::Growing;
-use crate::model::GreyBox;
+use greylag_logs::Growing;
+use greylag_model::GreyBox;
 use live::Watcher;
 use program::Program;
 
@@ -286,7 +286,7 @@ struct Tail {
 
 impl Tail {
     /// The rows that came since the last look; none as long as there is no file.
-    fn rows(&mut self, log: &Path) -> Result<Vec<crate::logs::Sample>, WorkbenchError> {
+    fn rows(&mut self, log: &Path) -> Result<Vec<greylag_logs::Sample>, WorkbenchError> {
         let mut file = match File::open(log) {
             Ok(file) => file,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::super::bench::Inner;
 use super::super::commands::quoted;
 use super::super::error::WorkbenchError;
-use crate::control::ControllerKind;
-use crate::manoeuvres::menu::{self, MENU};
+use greylag_control::ControllerKind;
+use greylag_manoeuvres::menu::{self, MENU};
 
 /// The schedule of `greylag demo` where no other is named.
 pub const ATTITUDES: &str = "attitudes";
@@ -75,7 +75,7 @@ impl Inner {
         let fitted = self.fits.get(&key).filter(|f| !f.all_refused());
         match fitted {
             Some(_) => {
-                self.folder.join("fits").join(key).join(crate::sysid::amend::document::MODEL)
+                self.folder.join("fits").join(key).join(greylag_sysid::amend::document::MODEL)
             }
             None => self.session.model.clone(),
         }
@@ -143,7 +143,7 @@ impl Order {
         if let Some(manoeuvre) = menu::named(&self.schedule) {
             let place = file.parent().unwrap_or(folder);
             std::fs::create_dir_all(place).map_err(|e| super::super::error::io(place, e))?;
-            crate::report::write_over(&file, manoeuvre.schedule().to_toml())?;
+            greylag_report::write_over(&file, manoeuvre.schedule().to_toml())?;
         }
         if file.exists() { Ok(Some(file)) } else { Err(unknown()) }
     }

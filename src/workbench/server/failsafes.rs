@@ -32,5 +32,5 @@ pub async fn page(
 #[cfg(not(feature = "sitl"))]
 pub async fn page(_: State<Shared>, _: Query<Vec<(String, String)>>) -> Response {
     use axum::response::IntoResponse;
-    crate::workbench::WorkbenchError::NoSimulator.into_response()
+    crate::WorkbenchError::NoSimulator.into_response()
 }

@@ -16,10 +16,10 @@ use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::{Stream, StreamExt};
 
 use super::{LARGEST_LOG, Shared};
-use crate::workbench::act::Request;
-use crate::workbench::bench::Bench;
-use crate::workbench::error::{Kind, WorkbenchError};
-use crate::workbench::view::RunRequest;
+use crate::act::Request;
+use crate::bench::Bench;
+use crate::error::{Kind, WorkbenchError};
+use crate::view::RunRequest;
 
 /// A failure in words.
 pub fn failure(status: StatusCode, why: &str) -> Response {
@@ -76,7 +76,7 @@ pub async fn proposal(State(shared): State<Shared>) -> Response {
 
 /// What an effect file may name.
 pub async fn grammar() -> Response {
-    Json(crate::workbench::grammar()).into_response()
+    Json(crate::grammar()).into_response()
 }
 
 /// A text that may be an effect file.
@@ -88,7 +88,7 @@ pub struct Text {
 
 /// What an effect file says, or what is wrong with it.
 pub async fn check(Json(Text { text }): Json<Text>) -> Response {
-    match crate::workbench::check(&text) {
+    match crate::check(&text) {
         Ok(checked) => Json(checked).into_response(),
         // a text that is being written is no failure of the request
         Err(error) => Json(json!({ "error": error.to_string() })).into_response(),

@@ -1,14 +1,14 @@
 //! Every instruction set flies the same rollout.
 
 use super::*;
-use crate::control::disturbance;
-use crate::physics::Time;
+use crate::disturbance;
+use greylag_physics::Time;
 use std::path::Path;
 
 /// The same candidates are worth the same in every instruction set.
 #[test]
 fn instruction_sets_agree() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
     let model = GreyBox::load(&path).unwrap();
     let seen = Observation {
         time: Time::default(),
@@ -59,7 +59,7 @@ fn instruction_sets_agree() {
 #[test]
 fn surfaces_of_a_plan_move_no_faster_than_the_airframe_allows() {
     for (aircraft, rudder) in [("x8/jsbsim.toml", 1.0), ("aerosonde/jsbsim.toml", 0.3)] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params").join(aircraft);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params").join(aircraft);
         let mut model = GreyBox::load(&path).unwrap();
         model.airframe.envelope.surface_slew_per_s = 20.0;
         let last = Command { aileron: 0.1, elevator: 0.1, throttle: 0.0, rudder: 0.1 };

@@ -1,7 +1,7 @@
 //! What the model answers to a small step of each surface.
 
-use crate::model::{GreyBox, Trim, TrimError, Twin};
-use crate::physics::Command;
+use greylag_model::{GreyBox, Trim, TrimError, Twin};
+use greylag_physics::Command;
 
 /// States for which an answer is known, the one on which the step is commanded included: 0.4 s, by
 /// when the roll has settled; the short period, which has nearly done so, goes on with the last.

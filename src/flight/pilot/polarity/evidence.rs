@@ -129,8 +129,8 @@ impl Evidence {
 mod tests {
     use super::super::{LONGEST, SEEN, Verdict, judged};
     use super::*;
-    use crate::link::vehicle::{Axis, Fault};
-    use crate::model::GreyBox;
+    use greylag_link::vehicle::{Axis, Fault};
+    use greylag_model::GreyBox;
     use std::path::Path;
 
     /// A gain that is certain by so many standard errors.

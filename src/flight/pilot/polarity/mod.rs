@@ -13,8 +13,8 @@ mod evidence;
 pub use answers::Answers;
 use evidence::{Evidence, Fit};
 
-use crate::link::vehicle::{Axis, Fault};
-use crate::physics::{Command, State, Time};
+use greylag_link::vehicle::{Axis, Fault};
+use greylag_physics::{Command, State, Time};
 
 /// Pulses of each round, normalised deflection: 0.06 is 1.9° for the X8, which rolls it at 9 °/s.
 const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
@@ -199,7 +199,7 @@ fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{GreyBox, Trim, Twin};
+    use greylag_model::{GreyBox, Trim, Twin};
     use std::collections::VecDeque;
     use std::path::Path;
 

@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use super::Control;
-use crate::flight::runtime::recording_autopilot::RecordingAutopilot;
-use crate::flight::runtime::stamps::unix_us;
-use crate::link::autopilot::Severity;
-use crate::link::transport::{Arrival, Packet};
-use crate::link::vehicle::Outputs;
+use crate::runtime::recording_autopilot::RecordingAutopilot;
+use crate::runtime::stamps::unix_us;
+use greylag_link::autopilot::Severity;
+use greylag_link::transport::{Arrival, Packet};
+use greylag_link::vehicle::Outputs;
 
 impl Control {
     /// Passes on to the controller what a client has sent it.

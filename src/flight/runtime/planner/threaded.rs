@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use crate::control::Controller;
-use crate::flight::pilot::{Plan, Request};
-use crate::flight::runtime::Pace;
-use crate::flight::threads::{Builder, JoinHandle, Receiver, RecvTimeoutError, Sender, bounded};
-use crate::physics::Command;
+use crate::pilot::{Plan, Request};
+use crate::runtime::Pace;
+use crate::threads::{Builder, JoinHandle, Receiver, RecvTimeoutError, Sender, bounded};
+use greylag_control::Controller;
+use greylag_physics::Command;
 
 /// Seed of a controller's random numbers, the same at every engagement.
 const SEED: u64 = 0;

@@ -1,14 +1,14 @@
 //! Rollouts by the scheme of JSBSim, which asks the model once a step and remembers the last time.
 
-use crate::learn::dynamics::kernel::InstructionSet;
-use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::prior::{ALOFT, At, Said, Sloped, Slopes, add, fixed, transposed};
-use crate::learn::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
-use crate::model::{STEP, advance_jsbsim};
-use crate::num::{Dual, Real};
-use crate::physics::airframe::Geometry;
-use crate::physics::rigid_body::{self, Vector};
-use crate::physics::{AirData, State};
+use crate::dynamics::kernel::InstructionSet;
+use crate::dynamics::packet::Packet;
+use crate::dynamics::prior::{ALOFT, At, Said, Sloped, Slopes, add, fixed, transposed};
+use crate::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
+use greylag_model::{STEP, advance_jsbsim};
+use greylag_num::{Dual, Real};
+use greylag_physics::airframe::Geometry;
+use greylag_physics::rigid_body::{self, Vector};
+use greylag_physics::{AirData, State};
 
 impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     #[inline(always)]

@@ -3,17 +3,17 @@
 mod jsbsim;
 mod rk4;
 
-use crate::learn::dynamics::kernel::InstructionSet;
-use crate::learn::dynamics::network::Passes;
-use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::prior::{At, Said, Slopes};
-use crate::model::residual::Scales;
-use crate::model::{GreyBox, Integrator};
-use crate::num::Real;
-use crate::physics::actuators::LAGS;
-use crate::physics::effects::Needs;
-use crate::physics::rigid_body::Vector;
-use crate::physics::{Controls, State};
+use crate::dynamics::kernel::InstructionSet;
+use crate::dynamics::network::Passes;
+use crate::dynamics::packet::Packet;
+use crate::dynamics::prior::{At, Said, Slopes};
+use greylag_model::residual::Scales;
+use greylag_model::{GreyBox, Integrator};
+use greylag_num::Real;
+use greylag_physics::actuators::LAGS;
+use greylag_physics::effects::Needs;
+use greylag_physics::rigid_body::Vector;
+use greylag_physics::{Controls, State};
 
 /// Points whose weight gradients are summed at once, so that what they read stays in the cache.
 const CHUNK: usize = 20;

@@ -1,11 +1,11 @@
 //! Rollouts by the classical Runge–Kutta scheme.
 
-use crate::learn::dynamics::kernel::InstructionSet;
-use crate::learn::dynamics::packet::Packet;
-use crate::learn::dynamics::prior::Slopes;
-use crate::learn::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
-use crate::model::STEP;
-use crate::physics::State;
+use crate::dynamics::kernel::InstructionSet;
+use crate::dynamics::packet::Packet;
+use crate::dynamics::prior::Slopes;
+use crate::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
+use greylag_model::STEP;
+use greylag_physics::State;
 
 /// Weights of the four slopes, in steps.
 const WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];

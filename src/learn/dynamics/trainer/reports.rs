@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::learn::checkpoint::CheckpointError;
-use crate::learn::dynamics::basis::TrainableError;
-use crate::learn::dynamics::loss::Loss;
-use crate::model::residual::ResidualError;
-use crate::num::dense::DenseError;
+use crate::checkpoint::CheckpointError;
+use crate::dynamics::basis::TrainableError;
+use crate::dynamics::loss::Loss;
+use greylag_model::residual::ResidualError;
+use greylag_num::dense::DenseError;
 
 /// Why a training cannot begin or go on.
 #[derive(Debug, thiserror::Error)]

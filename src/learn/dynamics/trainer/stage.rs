@@ -4,14 +4,14 @@ use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
 use super::reports::TrainError;
-use crate::learn::dynamics::engine::{Arithmetic, Engine};
-use crate::learn::dynamics::loss::Objective;
-use crate::learn::dynamics::recipe::{Criterion, Recipe};
-use crate::learn::dynamics::rollout::Subject;
-use crate::learn::dynamics::score::off_after;
-use crate::learn::dynamics::windows::{Track, Window, windows};
-use crate::model::GreyBox;
-use crate::num::stream;
+use crate::dynamics::engine::{Arithmetic, Engine};
+use crate::dynamics::loss::Objective;
+use crate::dynamics::recipe::{Criterion, Recipe};
+use crate::dynamics::rollout::Subject;
+use crate::dynamics::score::off_after;
+use crate::dynamics::windows::{Track, Window, windows};
+use greylag_model::GreyBox;
+use greylag_num::stream;
 
 /// Windows over which the bare prior's error is taken, L_prior of eq. (23).
 const PRIOR_WINDOWS: usize = 4096;

@@ -1,14 +1,14 @@
 //! One step of an aircraft and its slopes: by what was, by the action, and of the reward.
 
 use super::AnalyticRecipe;
-use crate::control::Target;
-use crate::control::policy::{ACTIONS, OBSERVATIONS, command, observe};
-use crate::control::task::Task;
-use crate::model::block::Block;
-use crate::model::{GreyBox, Memory};
-use crate::num::{Dual, Real};
-use crate::physics::actuators::Actuators;
-use crate::physics::{ActuatorState, Command, State};
+use greylag_control::Target;
+use greylag_control::policy::{ACTIONS, OBSERVATIONS, command, observe};
+use greylag_control::task::Task;
+use greylag_model::block::Block;
+use greylag_model::{GreyBox, Memory};
+use greylag_num::{Dual, Real};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::{ActuatorState, Command, State};
 
 /// Numbers of an aircraft: state, actuators, last commands, the integrator's memory.
 pub(super) const NUMBERS: usize = 8 + 5 + 5 + 3;

@@ -14,7 +14,7 @@
 //! ground are reported, the sideways velocity that follows from them. The state being a velocity, a
 //! constant wind cancels; a steady updraught of 1 m/s shows as w/V, 3° at 20 m/s.
 
-use crate::physics::atmosphere::MIDDLE_GRAVITY;
+use greylag_physics::atmosphere::MIDDLE_GRAVITY;
 
 /// Standard deviation of what the accelerations do not explain (gusts, their own noise), m/s² in
 /// a step of 10 ms: light turbulence changes the air's velocity by about that.

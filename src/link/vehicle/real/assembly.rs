@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use super::air_data::{self, AirData, Measured};
-use crate::link::vehicle::{Faults, Order, Telemetry, VehicleCounts, limits};
-use crate::link::wire::controller::ControllerMessage;
-use crate::link::wire::setpoint::euler;
-use crate::physics::actuators::Actuators;
-use crate::physics::airframe::ActuatorFigures;
-use crate::physics::atmosphere::{self, SEA_LEVEL_DENSITY};
-use crate::physics::{Command, Controls, State, Time};
+use crate::vehicle::{Faults, Order, Telemetry, VehicleCounts, limits};
+use crate::wire::controller::ControllerMessage;
+use crate::wire::setpoint::euler;
+use greylag_physics::actuators::Actuators;
+use greylag_physics::airframe::ActuatorFigures;
+use greylag_physics::atmosphere::{self, SEA_LEVEL_DENSITY};
+use greylag_physics::{Command, Controls, State, Time};
 
 /// Time between states, µs.
 const PERIOD_US: u64 = 10_000;
@@ -277,7 +277,7 @@ fn standard_density(altitude: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::Airframe;
+    use greylag_physics::Airframe;
     use std::path::Path;
 
     fn assembly() -> Assembly {

@@ -3,7 +3,7 @@
 //! A step of the bank from one side to the other drives a controller's loops to their stops, and its pitch errs by 20° meanwhile.
 //! A ramp that the loops can follow keeps the attitude where the envelope wants it.
 
-use crate::physics::Time;
+use greylag_physics::Time;
 
 /// Fastest change of the commanded roll and pitch, rad/s: below the limits that controllers set themselves (PX4's default is 70°/s in
 /// roll, 60°/s in pitch; ArduPilot's autotune takes 75°/s).

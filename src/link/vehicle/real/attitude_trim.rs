@@ -4,7 +4,7 @@
 //! The error that stays is integrated over seconds, within narrow bounds, and only while the wanted attitude has stood
 //! still and is nearly reached. So it takes away what is constant and leaves every transient to the controller.
 
-use crate::physics::Time;
+use greylag_physics::Time;
 
 /// An error is taken away within about this time, s: five times slower than a controller's attitude loop.
 const TIME_S: f64 = 2.5;

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use super::profile::{Authority, Stack};
 use super::{ENOUGH, GONE, Real};
-use crate::link::autopilot::Severity;
-use crate::link::framing::Source;
-use crate::link::wire::controller as wire;
+use crate::autopilot::Severity;
+use crate::framing::Source;
+use crate::wire::controller as wire;
 
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Between two measurements of the latency.

@@ -7,18 +7,18 @@ use super::profile::Stack;
 use super::requests::{Answer, Requests};
 use super::survey::Survey;
 use super::{AUTOPILOT, Controller, GONE, ONBOARD, Real};
-use crate::link::autopilot::Severity;
-use crate::link::framing::{Frame, FrameCounts, Frames, Source};
-use crate::link::peer::PeerId;
-use crate::link::vehicle::{Notice, Telemetry};
-use crate::link::wire::controller as wire;
-use crate::link::wire::controller::ControllerMessage;
+use crate::autopilot::Severity;
+use crate::framing::{Frame, FrameCounts, Frames, Source};
+use crate::peer::PeerId;
+use crate::vehicle::{Notice, Telemetry};
+use crate::wire::controller as wire;
+use crate::wire::controller::ControllerMessage;
 
 /// MAV_AUTOPILOT_INVALID: whoever says this is no flight controller.
 const NO_AUTOPILOT: u8 = 8;
 
 impl Real {
-    /// See [`crate::link::vehicle::Vehicle::handle`].
+    /// See [`crate::vehicle::Vehicle::handle`].
     pub fn handle(
         &mut self,
         host: Duration,

@@ -2,7 +2,7 @@
 
 use super::profile::{Authority, Stack};
 use super::{ENOUGH, Real};
-use crate::link::framing::Source;
+use crate::framing::Source;
 
 /// What a controller that signs means for a companion that does not.
 const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which carry no right \

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use crate::physics::airframe::ActuatorFigures;
+use greylag_physics::airframe::ActuatorFigures;
 
 /// A flight stack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Commands as sticks: thousandths for PX4, pulse widths for ArduPilot.
 
 use super::parameters::Parameters;
-use crate::physics::Command;
+use greylag_physics::Command;
 
 /// Rounds to whole counts and carries what was cut off over to the next command, so that the mean
 /// of what is sent is what was meant.

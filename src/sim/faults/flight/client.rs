@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use super::Flight;
-use crate::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
-use crate::sim::faults::mix::{Fault, FaultKind};
-use crate::sim::faults::scenario::{Asking, mode_of};
+use crate::faults::mix::{Fault, FaultKind};
+use crate::faults::scenario::{Asking, mode_of};
+use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
 /// Setpoints come at 10 Hz.
 const SETPOINT_EVERY: u64 = 10;

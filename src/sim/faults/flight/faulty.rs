@@ -8,9 +8,9 @@ use greylag_sitl::shim::Distortion;
 use rand::RngExt;
 
 use super::Flight;
-use crate::sim::faults::counterpart::Aircraft;
-use crate::sim::faults::judge::{Exposure, Finding};
-use crate::sim::faults::mix::{Fault, FaultKind};
+use crate::faults::counterpart::Aircraft;
+use crate::faults::judge::{Exposure, Finding};
+use crate::faults::mix::{Fault, FaultKind};
 
 impl Flight {
     /// Steps until the companion has the processor again.

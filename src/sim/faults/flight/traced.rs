@@ -1,11 +1,11 @@
 //! What the rules of flight need to know of a flight under way.
 
 use super::Flight;
-use crate::flight::pilot::{Decision, Source, TICK_S};
-use crate::link::autopilot::{Autopilot, Mode, Status};
-use crate::link::vehicle::Vehicle;
-use crate::sim::faults::mix::{Fault, FaultKind};
-use crate::sim::faults::policies::{Sample, Shown};
+use crate::faults::mix::{Fault, FaultKind};
+use crate::faults::policies::{Sample, Shown};
+use greylag_flight::pilot::{Decision, Source, TICK_S};
+use greylag_link::autopilot::{Autopilot, Mode, Status};
+use greylag_link::vehicle::Vehicle;
 
 /// Time constants of what a surface does slowly, and of the mean square of the rest, s.
 const SLOW_S: f64 = 0.5;

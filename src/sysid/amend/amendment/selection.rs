@@ -3,16 +3,16 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::{Added, Options, joined};
-use crate::model::GreyBox;
-use crate::sysid::amend::conventions::{Convention, Tried, closer};
-use crate::sysid::amend::error::AmendError;
-use crate::sysid::amend::flight::Flight;
-use crate::sysid::amend::judge::{self, Judge, Kept, SETTLED_OR_NOT, settled};
-use crate::sysid::amend::output_error::{self, Fit, FitOptions};
-use crate::sysid::amend::parameters;
-use crate::sysid::amend::result::AddedEffect;
-use crate::sysid::compare::HorizonScore;
-use crate::sysid::progress::{self, Progress, say};
+use crate::amend::conventions::{Convention, Tried, closer};
+use crate::amend::error::AmendError;
+use crate::amend::flight::Flight;
+use crate::amend::judge::{self, Judge, Kept, SETTLED_OR_NOT, settled};
+use crate::amend::output_error::{self, Fit, FitOptions};
+use crate::amend::parameters;
+use crate::amend::result::AddedEffect;
+use crate::compare::HorizonScore;
+use crate::progress::{self, Progress, say};
+use greylag_model::GreyBox;
 
 /// Times that all effects are asked for at most.
 const ROUNDS: usize = 3;

@@ -4,13 +4,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::gauss_newton::System;
 use super::{Fit, Left, Search};
-use crate::model::GreyBox;
-use crate::sysid::amend::error::AmendError;
-use crate::sysid::amend::flight::{Flight, SENSORS};
-use crate::sysid::amend::interval::{self, Covariance};
-use crate::sysid::amend::parameters::{self, Free};
-use crate::sysid::amend::result::{FittedFlight, FlightEstimate, OwnConstant, Parameter};
-use crate::sysid::amend::shooting::Shot;
+use crate::amend::error::AmendError;
+use crate::amend::flight::{Flight, SENSORS};
+use crate::amend::interval::{self, Covariance};
+use crate::amend::parameters::{self, Free};
+use crate::amend::result::{FittedFlight, FlightEstimate, OwnConstant, Parameter};
+use crate::amend::shooting::Shot;
+use greylag_model::GreyBox;
 
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.96;

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::Search;
-use crate::sysid::amend::error::AmendError;
-use crate::sysid::amend::flight::SENSORS;
-use crate::sysid::amend::normal::{self, Normal, Place};
-use crate::sysid::amend::parameters::Free;
+use crate::amend::error::AmendError;
+use crate::amend::flight::SENSORS;
+use crate::amend::normal::{self, Normal, Place};
+use crate::amend::parameters::Free;
 
 /// The equations of all shots together.
 pub(super) struct System {

@@ -1,9 +1,9 @@
 //! What to fly next.
 
-use crate::physics::catalogue::describe;
-use crate::sysid::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
-use crate::sysid::diagnose::answer::sentences::figures;
-use crate::sysid::diagnose::search::stepwise::Found;
+use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
+use crate::diagnose::answer::sentences::figures;
+use crate::diagnose::search::stepwise::Found;
+use greylag_physics::catalogue::describe;
 
 /// Pieces of advice on effects that these data could not have shown.
 const UNSEEN: usize = 2;

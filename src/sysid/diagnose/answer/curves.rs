@@ -1,9 +1,9 @@
 //! An effect's contribution over the regime variable that shows it best.
 
-use crate::sysid::compare::{ChannelId, RegimeVariable};
-use crate::sysid::diagnose::answer::result::Curve;
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::search::round::Round;
+use crate::compare::{ChannelId, RegimeVariable};
+use crate::diagnose::answer::result::Curve;
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::search::round::Round;
 
 /// Bins of equal count, by which the variable is chosen.
 const PLACES: usize = 12;

@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 
 use rand::RngExt;
 
-use crate::num::stream::{Stream, stream};
-use crate::sysid::diagnose::answer::result::Decoy;
-use crate::sysid::diagnose::regression::cells::Placed;
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::projected::Projected;
-use crate::sysid::diagnose::regression::rank::{Draw, Point, Trial};
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::search::stepwise::Found;
+use crate::diagnose::answer::result::Decoy;
+use crate::diagnose::regression::cells::Placed;
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::projected::Projected;
+use crate::diagnose::regression::rank::{Draw, Point, Trial};
+use crate::diagnose::search::round::Round;
+use crate::diagnose::search::stepwise::Found;
+use greylag_num::stream::{Stream, stream};
 
 /// Random stream of the phases.
 const DECOYS: u64 = 84;

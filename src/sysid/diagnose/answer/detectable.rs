@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 
-use crate::sysid::diagnose::regression::catalogue::Entry;
-use crate::sysid::diagnose::regression::cells::Placed;
-use crate::sysid::diagnose::regression::projected::Projected;
-use crate::sysid::diagnose::regression::rank::{Draw, Trial, deviations};
-use crate::sysid::diagnose::search::round::Round;
+use crate::diagnose::regression::catalogue::Entry;
+use crate::diagnose::regression::cells::Placed;
+use crate::diagnose::regression::projected::Projected;
+use crate::diagnose::regression::rank::{Draw, Trial, deviations};
+use crate::diagnose::search::round::Round;
 
 /// Most amounts that are tried.
 const TRIED: usize = 8;
@@ -201,7 +201,7 @@ fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::inputs::Kind;
+    use greylag_physics::inputs::Kind;
 
     /// Seeks the amount of the effect `id` whose evidence, a power of its size, is as much as needed at `amount`.
     fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {

@@ -1,7 +1,7 @@
 //! Sensor errors and wind, as the reconstruction decided them before any aerodynamics.
 
-use crate::sysid::diagnose::answer::result::Measurement;
-use crate::sysid::flight_path::reconstruction::{Nuisance, Reconstruction};
+use crate::diagnose::answer::result::Measurement;
+use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
 /// A constant's prefix, its id in the catalogue, its nominal value, what its kind allows.
 const KINDS: [(&str, &str, f64, f64); 9] = [

@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use crate::sysid::diagnose::answer::result::{FlightTrim, Measurement};
-use crate::sysid::diagnose::answer::sentences::figures;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::per_flight::{Constant, askew};
+use crate::diagnose::answer::result::{FlightTrim, Measurement};
+use crate::diagnose::answer::sentences::figures;
+use crate::diagnose::search::round::Round;
+use crate::per_flight::{Constant, askew};
 
 /// Standard deviations beyond which a constant is clearly not zero.
 const CLEARLY: f64 = 4.0;

@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::physics::catalogue::describe;
-use crate::physics::effects::Description;
-use crate::sysid::compare::ChannelId;
-use crate::sysid::diagnose::answer::curves;
-use crate::sysid::diagnose::answer::detectable::detectable;
-use crate::sysid::diagnose::answer::result::{Candidate, FlightEstimate, Parameter};
-use crate::sysid::diagnose::options::{Detail, Options};
-use crate::sysid::diagnose::regression::columns::Ready;
-use crate::sysid::diagnose::regression::rank::{Score, Trial};
-use crate::sysid::diagnose::search::checks;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::search::stepwise::{Found, Selected};
+use crate::compare::ChannelId;
+use crate::diagnose::answer::curves;
+use crate::diagnose::answer::detectable::detectable;
+use crate::diagnose::answer::result::{Candidate, FlightEstimate, Parameter};
+use crate::diagnose::options::{Detail, Options};
+use crate::diagnose::regression::columns::Ready;
+use crate::diagnose::regression::rank::{Score, Trial};
+use crate::diagnose::search::checks;
+use crate::diagnose::search::round::Round;
+use crate::diagnose::search::stepwise::{Found, Selected};
+use greylag_physics::catalogue::describe;
+use greylag_physics::effects::Description;
 
 /// Runners-up with a curve.
 const RUNNERS_UP: usize = 2;

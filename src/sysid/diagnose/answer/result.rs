@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::sysid::per_flight::PerFlight;
+use crate::per_flight::PerFlight;
 
 /// The answer in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -1,27 +1,27 @@
 //! The diagnosis itself: flights in, answer out.
 
-use crate::model::{GreyBox, RUDDER};
-use crate::physics;
-use crate::sysid::diagnose::answer::advice;
-use crate::sysid::diagnose::answer::decoys;
-use crate::sysid::diagnose::answer::measurement;
-use crate::sysid::diagnose::answer::per_flight;
-use crate::sysid::diagnose::answer::ranking;
-use crate::sysid::diagnose::answer::result::{Diagnosis, Nulls, Settings, Verdict};
-use crate::sysid::diagnose::answer::sentences;
-use crate::sysid::diagnose::answer::shares;
-use crate::sysid::diagnose::error::DiagnoseError;
-use crate::sysid::diagnose::options::{Detail, Options};
-use crate::sysid::diagnose::regression::catalogue;
-use crate::sysid::diagnose::regression::sensors;
-use crate::sysid::diagnose::regression::shared;
-use crate::sysid::diagnose::search::excitation;
-use crate::sysid::diagnose::search::round::Problem;
-use crate::sysid::diagnose::search::stepwise::{Found, search};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::progress::{Progress, say};
-use crate::sysid::rudder;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::answer::advice;
+use crate::diagnose::answer::decoys;
+use crate::diagnose::answer::measurement;
+use crate::diagnose::answer::per_flight;
+use crate::diagnose::answer::ranking;
+use crate::diagnose::answer::result::{Diagnosis, Nulls, Settings, Verdict};
+use crate::diagnose::answer::sentences;
+use crate::diagnose::answer::shares;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::options::{Detail, Options};
+use crate::diagnose::regression::catalogue;
+use crate::diagnose::regression::sensors;
+use crate::diagnose::regression::shared;
+use crate::diagnose::search::excitation;
+use crate::diagnose::search::round::Problem;
+use crate::diagnose::search::stepwise::{Found, search};
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::progress::{Progress, say};
+use crate::rudder;
+use crate::weak_form::prepared::Prepared;
+use greylag_model::{GreyBox, RUDDER};
+use greylag_physics as physics;
 
 /// Least share of the error beyond noise that must be learnable before something is said to be missing:
 /// what the reconstruction leaves is no effect.

@@ -1,14 +1,12 @@
 //! The answer in plain sentences.
 
-use crate::model::GreyBox;
-use crate::physics::catalogue::describe;
-use crate::sysid::diagnose::answer::result::{
-    Candidate, ChannelLeft, Measurement, Parameter, Verdict,
-};
-use crate::sysid::diagnose::answer::{per_flight, shares};
-use crate::sysid::diagnose::options::Options;
-use crate::sysid::diagnose::search::stepwise::Found;
-use crate::sysid::per_flight::askew;
+use crate::diagnose::answer::result::{Candidate, ChannelLeft, Measurement, Parameter, Verdict};
+use crate::diagnose::answer::{per_flight, shares};
+use crate::diagnose::options::Options;
+use crate::diagnose::search::stepwise::Found;
+use crate::per_flight::askew;
+use greylag_model::GreyBox;
+use greylag_physics::catalogue::describe;
 
 /// Prior standard deviations beyond which a tuned coefficient is worth a note.
 const FAR: f64 = 3.0;

@@ -1,12 +1,12 @@
 //! What is left of each channel, with the prior as tuned.
 
-use crate::model::GreyBox;
-use crate::num::statistics::mean;
-use crate::sysid::compare::{ChannelId, RegimeVariable};
-use crate::sysid::diagnose::answer::result::{ChannelLeft, Tuned};
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::search::stepwise::Found;
+use crate::compare::{ChannelId, RegimeVariable};
+use crate::diagnose::answer::result::{ChannelLeft, Tuned};
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::search::round::Round;
+use crate::diagnose::search::stepwise::Found;
+use greylag_model::GreyBox;
+use greylag_num::statistics::mean;
 
 /// Bins over a regime variable.
 const BINS: usize = 5;

@@ -4,13 +4,13 @@ use super::forward::{Ask, Climbed, ORDER, candidates};
 use super::free::search::{Fitted, Searched, searched};
 use super::library::{self, Form, Shape};
 use super::result::{FreeForms, Rung};
-use crate::model::GreyBox;
-use crate::physics::Channel;
-use crate::sysid::diagnose::DiagnoseError;
-use crate::sysid::diagnose::proposal::draft::{self, Term};
-use crate::sysid::diagnose::search::remainder::remainder;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::progress::{Progress, part, say};
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::proposal::draft::{self, Term};
+use crate::diagnose::search::remainder::remainder;
+use crate::diagnose::search::round::Round;
+use crate::progress::{Progress, part, say};
+use greylag_model::GreyBox;
+use greylag_physics::Channel;
 
 /// Share of what a formula took that a flexible model must still remove for the formula to be in doubt.
 const MATERIAL: f64 = 0.02;

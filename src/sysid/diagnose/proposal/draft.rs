@@ -2,7 +2,7 @@
 
 use super::grades;
 use super::library::{Form, Shape};
-use crate::physics::formula::file::channel_name;
+use greylag_physics::formula::file::channel_name;
 
 /// A term with its coefficient.
 #[derive(Clone, Copy, Debug)]
@@ -106,8 +106,8 @@ pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> 
 mod tests {
     use super::super::free::Free;
     use super::*;
-    use crate::physics::Channel;
-    use crate::physics::formula::{Status, Variable, file as reader, parser};
+    use greylag_physics::Channel;
+    use greylag_physics::formula::{Status, Variable, file as reader, parser};
 
     #[test]
     fn a_draft_is_an_effect_file_that_nothing_flies() {

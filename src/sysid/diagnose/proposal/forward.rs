@@ -5,17 +5,17 @@ use super::grades;
 use super::held_out;
 use super::library::{self, Form};
 use super::result::{Alternative, Grades, Rung};
-use crate::model::GreyBox;
-use crate::num::statistics::quantile;
-use crate::physics::Channel;
-use crate::physics::formula::Variable;
-use crate::sysid::diagnose::Options;
-use crate::sysid::diagnose::regression::catalogue::Entry;
-use crate::sysid::diagnose::regression::rank::Score;
-use crate::sysid::diagnose::search::checks;
-use crate::sysid::diagnose::search::round::{Problem, Round};
-use crate::sysid::diagnose::search::settling::{Ranked, ranked};
-use crate::sysid::diagnose::search::stepwise::{Found, SELECTED};
+use crate::diagnose::Options;
+use crate::diagnose::regression::catalogue::Entry;
+use crate::diagnose::regression::rank::Score;
+use crate::diagnose::search::checks;
+use crate::diagnose::search::round::{Problem, Round};
+use crate::diagnose::search::settling::{Ranked, ranked};
+use crate::diagnose::search::stepwise::{Found, SELECTED};
+use greylag_model::GreyBox;
+use greylag_num::statistics::quantile;
+use greylag_physics::Channel;
+use greylag_physics::formula::Variable;
 
 /// Terms of a formula.
 const MOST: usize = 3;

@@ -3,8 +3,8 @@
 use super::free::{self, trend::plain};
 use super::library::{Form, Shape};
 use super::result::Grades;
-use crate::physics::Channel;
-use crate::physics::formula::Variable;
+use greylag_physics::Channel;
+use greylag_physics::formula::Variable;
 
 /// How a form runs with each of its variables.
 fn trend(form: &Form) -> Option<String> {

@@ -3,15 +3,15 @@
 use super::draft::Term;
 use super::forward::ORDER;
 use super::result::HeldOut;
-use crate::model::GreyBox;
-use crate::physics::formula::Written;
-use crate::sysid::diagnose::Options;
-use crate::sysid::diagnose::regression::catalogue::Entry;
-use crate::sysid::diagnose::regression::rank::{Draw, quadratic};
-use crate::sysid::diagnose::search::checks;
-use crate::sysid::diagnose::search::nulls;
-use crate::sysid::diagnose::search::round::{Beside, Problem, Round};
-use crate::sysid::diagnose::search::stepwise::HELD_OUT;
+use crate::diagnose::Options;
+use crate::diagnose::regression::catalogue::Entry;
+use crate::diagnose::regression::rank::{Draw, quadratic};
+use crate::diagnose::search::checks;
+use crate::diagnose::search::nulls;
+use crate::diagnose::search::round::{Beside, Problem, Round};
+use crate::diagnose::search::stepwise::HELD_OUT;
+use greylag_model::GreyBox;
+use greylag_physics::formula::Written;
 
 /// The share of the error of `before` beyond noise in `channels` that `after` does not have. Both are measured by the noise
 /// that `after` leaves: each by its own would count a better model's smaller noise against it.

@@ -5,9 +5,9 @@
 
 use super::forward::{Ask, Climbed, candidates};
 use super::library::{self, CONTROLS, Form};
-use crate::model::GreyBox;
-use crate::physics::Channel;
-use crate::physics::formula::Variable;
+use greylag_model::GreyBox;
+use greylag_physics::Channel;
+use greylag_physics::formula::Variable;
 
 /// The lags that are worth their time beside the library's formula: those of its own controls, and of all controls in the
 /// channels `doubted`, where it leaves something.

@@ -1,10 +1,10 @@
 //! The shapes that are tried: each one variable or two in a known factor of a channel.
 
 use super::free::Free;
-use crate::physics::Channel;
-use crate::physics::formula::dimension::Dimension;
-use crate::physics::formula::file::channel_name;
-use crate::physics::formula::{Variable, Written, register};
+use greylag_physics::Channel;
+use greylag_physics::formula::dimension::Dimension;
+use greylag_physics::formula::file::channel_name;
+use greylag_physics::formula::{Variable, Written, register};
 
 /// Variables of shapes that grow with dynamic pressure: all are numbers without a unit.
 pub(super) const OF_AIR: [Variable; 9] = [

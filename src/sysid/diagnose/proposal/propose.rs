@@ -9,16 +9,16 @@ use super::held_out::{objection, tested};
 use super::lags;
 use super::result::{HeldOut, Proposal, Rung, Settings};
 use super::sentences::{capital, sentences};
-use crate::model::{GreyBox, RUDDER};
-use crate::physics::Channel;
-use crate::sysid::diagnose::answer::run::{known, problem, verdict};
-use crate::sysid::diagnose::search::excitation;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::search::stepwise::{Found, search};
-use crate::sysid::diagnose::{DiagnoseError, Options, Verdict};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::progress::{Progress, part, say};
-use crate::sysid::rudder;
+use crate::diagnose::answer::run::{known, problem, verdict};
+use crate::diagnose::search::excitation;
+use crate::diagnose::search::round::Round;
+use crate::diagnose::search::stepwise::{Found, search};
+use crate::diagnose::{DiagnoseError, Options, Verdict};
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::progress::{Progress, part, say};
+use crate::rudder;
+use greylag_model::{GreyBox, RUDDER};
+use greylag_physics::Channel;
 
 /// Shares of the work after the diagnosis, before the lags, of the free forms, and before the test.
 const SEARCHED: f64 = 0.3;
@@ -30,7 +30,7 @@ const TESTED: f64 = 0.9;
 /// it on `held_out`; `progress` hears what is being done.
 ///
 /// # Errors
-/// As of [`diagnose`](crate::sysid::diagnose::diagnose).
+/// As of [`diagnose`](crate::diagnose::diagnose).
 pub fn propose(
     model: &GreyBox,
     flights: &[Reconstruction],

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::sysid::diagnose::Verdict;
+use crate::diagnose::Verdict;
 
 /// What is sure of the form that was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -5,8 +5,8 @@ use super::free::grammar::MOST_NODES;
 use super::grades;
 use super::library;
 use super::result::{HeldOut, Proposal};
-use crate::physics::formula::Variable;
-use crate::sysid::diagnose::answer::sentences::figures;
+use crate::diagnose::answer::sentences::figures;
+use greylag_physics::formula::Variable;
 
 /// `text` as a sentence.
 pub(super) fn capital(text: &str) -> String {
@@ -34,7 +34,7 @@ pub(super) fn sentences(
             figures(term.value),
             figures(term.sd),
             if unit.is_empty() { String::new() } else { format!(" {unit}") },
-            crate::physics::formula::file::channel_name(term.form.channel),
+            greylag_physics::formula::file::channel_name(term.form.channel),
             if term.form.of_air { format!("{}*", term.form.factor()) } else { String::new() },
             term.form.shape.text(None)
         ));

@@ -4,12 +4,12 @@ use std::fmt::Write;
 
 use super::forward::ORDER;
 use super::free::samples::{Samples, VARIABLES};
-use crate::model::GreyBox;
-use crate::physics::formula::file::channel_name;
-use crate::sysid::diagnose::answer::run::problem;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::{DiagnoseError, Options};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::diagnose::answer::run::problem;
+use crate::diagnose::search::round::Round;
+use crate::diagnose::{DiagnoseError, Options};
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_model::GreyBox;
+use greylag_physics::formula::file::channel_name;
 
 /// The residual of `model`, tuned to `flights` and their sensors' errors taken out, as CSV: a row a window of the weak
 /// form (0.37 s, half overlapping), with the flight, the mean of each variable over the window (SI units), dynamic
@@ -17,7 +17,7 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 /// not measured).
 ///
 /// # Errors
-/// As of [`diagnose`](crate::sysid::diagnose::diagnose).
+/// As of [`diagnose`](crate::diagnose::diagnose).
 pub fn signals(
     model: &GreyBox,
     flights: &[Reconstruction],

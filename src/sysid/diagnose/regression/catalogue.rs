@@ -2,16 +2,16 @@
 
 use rayon::prelude::*;
 
-use crate::model::GreyBox;
-use crate::physics::catalogue::on_air;
-use crate::physics::effects::{Description, Kind};
-use crate::physics::formula::register;
-use crate::physics::inputs;
-use crate::physics::size::Size;
-use crate::sysid::diagnose::regression::columns::{Ready, combine};
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::diagnose::regression::rank::{Point, Trial};
+use crate::diagnose::regression::columns::{Ready, combine};
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::local::CHANNELS;
+use crate::diagnose::regression::rank::{Point, Trial};
+use greylag_model::GreyBox;
+use greylag_physics::catalogue::on_air;
+use greylag_physics::effects::{Description, Kind};
+use greylag_physics::formula::register;
+use greylag_physics::inputs;
+use greylag_physics::size::Size;
 
 /// Share of a shape constant by which its derivative is taken.
 const MOVED: f64 = 0.02;

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::sysid::diagnose::regression::columns::Ready;
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::diagnose::regression::whiten::Whitener;
+use crate::diagnose::regression::columns::Ready;
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::local::CHANNELS;
+use crate::diagnose::regression::whiten::Whitener;
 
 /// Length of a block of windows that are taken to hang together, s.
 pub const BLOCK_S: f64 = 4.0;

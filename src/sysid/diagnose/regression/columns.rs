@@ -2,15 +2,15 @@
 
 use std::ops::Range;
 
-use crate::logs::Sampling;
-use crate::model::GreyBox;
-use crate::physics::rigid_body::{self, RigidBody, Vector};
-use crate::physics::{Channel, Wrench};
-use crate::sysid::diagnose::regression::gather::{Column, gather, rates};
-use crate::sysid::diagnose::regression::local::{self, ALPHA, CHANNELS, CONTROLS, INPUTS};
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Prepared;
-use crate::sysid::weak_form::windows::{gyroscopic, inertia, to_force_axes};
+use crate::diagnose::regression::gather::{Column, gather, rates};
+use crate::diagnose::regression::local::{self, ALPHA, CHANNELS, CONTROLS, INPUTS};
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
+use crate::weak_form::windows::{gyroscopic, inertia, to_force_axes};
+use greylag_logs::Sampling;
+use greylag_model::GreyBox;
+use greylag_physics::rigid_body::{self, RigidBody, Vector};
+use greylag_physics::{Channel, Wrench};
 
 /// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
 /// lateness of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of the

@@ -5,12 +5,12 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::model::{GreyBox, Integrator};
-use crate::num::stream::{Stream, stream};
-use crate::sysid::diagnose::regression::columns::Ready;
-use crate::sysid::diagnose::regression::gather::{Column, gather};
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::regression::columns::Ready;
+use crate::diagnose::regression::gather::{Column, gather};
+use crate::diagnose::regression::local::CHANNELS;
+use crate::weak_form::prepared::Prepared;
+use greylag_model::{GreyBox, Integrator};
+use greylag_num::stream::{Stream, stream};
 
 /// Random stream of the features.
 const FEATURES: u64 = 81;

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use crate::logs::Sampling;
-use crate::model::Integrator;
-use crate::physics::Controls;
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::regression::local::CHANNELS;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
+use greylag_logs::Sampling;
+use greylag_model::Integrator;
+use greylag_physics::Controls;
 
 /// A value a window in each of the channels D, L, Y, l, m, n; an empty list stands for zeros.
 pub type Column = [Vec<f64>; CHANNELS];

@@ -1,11 +1,11 @@
 //! The residual at one sample, with its derivatives by what may be in error there.
 
-use crate::model::GreyBox;
-use crate::num::{Dual, Real};
-use crate::physics::rigid_body;
-use crate::physics::{Channel, Controls, State};
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::windows::{gyroscopic, to_force_axes};
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::windows::{gyroscopic, to_force_axes};
+use greylag_model::GreyBox;
+use greylag_num::{Dual, Real};
+use greylag_physics::rigid_body;
+use greylag_physics::{Channel, Controls, State};
 
 /// Channels: D, L, Y (N), l, m, n (N m).
 pub const CHANNELS: usize = 6;

@@ -2,9 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::sysid::diagnose::regression::cells::{Cell, Cells, Placed};
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::diagnose::regression::whiten::Whitener;
+use crate::diagnose::regression::cells::{Cell, Cells, Placed};
+use crate::diagnose::regression::local::CHANNELS;
+use crate::diagnose::regression::whiten::Whitener;
 
 /// Order of the autoregressive whitening.
 const ORDER: usize = 8;

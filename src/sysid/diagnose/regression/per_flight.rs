@@ -1,13 +1,13 @@
 //! What one unit of each constant that a flight has of its own adds to its residual.
 
-use crate::model::GreyBox;
-use crate::physics::rigid_body::Vector;
-use crate::sysid::diagnose::regression::columns::Ready;
-use crate::sysid::diagnose::regression::gather::{Column, gather, rates};
-use crate::sysid::diagnose::regression::local::{self, ALPHA, RATES};
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::per_flight::{PerFlight, askew, trims};
-use crate::sysid::weak_form::windows::{inertia, to_force_axes};
+use crate::diagnose::regression::columns::Ready;
+use crate::diagnose::regression::gather::{Column, gather, rates};
+use crate::diagnose::regression::local::{self, ALPHA, RATES};
+use crate::flight_path::reconstruction::Instant;
+use crate::per_flight::{PerFlight, askew, trims};
+use crate::weak_form::windows::{inertia, to_force_axes};
+use greylag_model::GreyBox;
+use greylag_physics::rigid_body::Vector;
 
 /// The columns of `flight` under `model`, in the order of [`PerFlight::constants`].
 pub fn columns(asked: &PerFlight, model: &GreyBox, flight: &Ready) -> Vec<Column> {

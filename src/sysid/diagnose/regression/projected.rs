@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::sysid::diagnose::regression::cells::{Cells, Placed};
-use crate::sysid::diagnose::regression::noise::Noise;
-use crate::sysid::diagnose::regression::whiten::Whitener;
+use crate::diagnose::regression::cells::{Cells, Placed};
+use crate::diagnose::regression::noise::Noise;
+use crate::diagnose::regression::whiten::Whitener;
 
 /// A known unknown: a coefficient of the prior, or a sensor's error.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::sysid::diagnose::regression::projected::{Grams, scaled_inverse};
+use crate::diagnose::regression::projected::{Grams, scaled_inverse};
 
 /// Where a candidate is linearised.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! What the sensors may still have wrong after the reconstruction.
 
-use crate::logs::Sampling;
-use crate::sysid::diagnose::regression::columns::SENSORS;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
+use crate::diagnose::regression::columns::SENSORS;
+use crate::flight_path::reconstruction::Reconstruction;
+use greylag_logs::Sampling;
 
 /// Names of the sensor errors, in the order of [`Ready::sensors`](super::columns::Ready::sensors).
 pub const NAMES: [&str; SENSORS] = [

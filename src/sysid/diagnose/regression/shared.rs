@@ -6,12 +6,12 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::num::stream::stream;
-use crate::sysid::diagnose::regression::cells::{Cells, Placed};
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::noise::Noise;
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::regression::cells::{Cells, Placed};
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::noise::Noise;
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::weak_form::prepared::Prepared;
+use greylag_num::stream::stream;
 
 /// Random stream of the disturbance.
 const DISTURBANCE: u64 = 85;

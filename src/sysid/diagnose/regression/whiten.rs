@@ -68,7 +68,7 @@ fn autocovariance(runs: &[Vec<f64>], lag: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::stream::stream;
+    use greylag_num::stream::stream;
     use rand_distr::{Distribution, StandardNormal};
 
     #[test]

@@ -7,13 +7,13 @@ use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rayon::prelude::*;
 
-use crate::num::stream::stream;
-use crate::sysid::diagnose::regression::cells::{Cells, Placed};
-use crate::sysid::diagnose::regression::columns::combine;
-use crate::sysid::diagnose::regression::noise::Noise;
-use crate::sysid::diagnose::regression::projected::{Known, Projected, scaled_inverse};
-use crate::sysid::diagnose::regression::rank::{Draw, Point, Score, Trial, quadratic};
-use crate::sysid::diagnose::search::round::Round;
+use crate::diagnose::regression::cells::{Cells, Placed};
+use crate::diagnose::regression::columns::combine;
+use crate::diagnose::regression::noise::Noise;
+use crate::diagnose::regression::projected::{Known, Projected, scaled_inverse};
+use crate::diagnose::regression::rank::{Draw, Point, Score, Trial, quadratic};
+use crate::diagnose::search::round::Round;
+use greylag_num::stream::stream;
 
 /// Folds of the held-out segments.
 const FOLDS: usize = 5;

@@ -4,15 +4,15 @@
 //! it does to the forces tells the two apart, and free runs, in which the thrust is only an acceleration, do
 //! not.
 
-use crate::model::GreyBox;
-use crate::sysid::diagnose::regression::columns::SENSORS;
-use crate::sysid::diagnose::regression::sensors;
-pub use crate::sysid::diagnose::regression::sensors::BLURRED;
-use crate::sysid::diagnose::regression::shared::{self, PathError};
-use crate::sysid::diagnose::search::round::{Problem, Round};
-use crate::sysid::flight_path::reconstruction::Reconstruction;
-use crate::sysid::per_flight::PerFlight;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::regression::columns::SENSORS;
+use crate::diagnose::regression::sensors;
+pub use crate::diagnose::regression::sensors::BLURRED;
+use crate::diagnose::regression::shared::{self, PathError};
+use crate::diagnose::search::round::{Problem, Round};
+use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::PerFlight;
+use crate::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
 
 /// Times that everything is fitted again around the last values.
 const PASSES: usize = 4;

@@ -3,9 +3,9 @@
 //! An interval knows of noise. Between two samples of 20 or 40 ms a surface and a roll rate move on, and what a sum over
 //! samples makes of that is no noise: it is the same in every flight and does not average out.
 
-use crate::logs::Sampling;
-use crate::sysid::diagnose::search::round::{Problem, Round};
-use crate::sysid::diagnose::search::settling::SETTLING;
+use crate::diagnose::search::round::{Problem, Round};
+use crate::diagnose::search::settling::SETTLING;
+use greylag_logs::Sampling;
 
 /// Part of the change from half the samples to all of them that is left with all, taken as a standard deviation. Sums whose error grows
 /// with the square of the time between samples leave a third.
@@ -47,12 +47,12 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::model::{GreyBox, Integrator, Memory};
-    use crate::physics::{Controls, State};
-    use crate::sysid::diagnose::regression::{sensors, shared};
-    use crate::sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
-    use crate::sysid::per_flight::PerFlight;
-    use crate::sysid::weak_form::prepared::Prepared;
+    use crate::diagnose::regression::{sensors, shared};
+    use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
+    use crate::per_flight::PerFlight;
+    use crate::weak_form::prepared::Prepared;
+    use greylag_model::{GreyBox, Integrator, Memory};
+    use greylag_physics::{Controls, State};
 
     const STEP_S: f64 = 0.01;
 
@@ -98,7 +98,7 @@ mod tests {
 
     /// Error of the fitted roll damping, what the noise and what the sums leave in it.
     fn roll_damping(every: usize, sampling: Sampling) -> [f64; 3] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         let mut model = GreyBox::load(&path).unwrap();
         model.integrator = Integrator::Rk4;
         let flight = flown(&model, every, sampling);

@@ -1,9 +1,9 @@
 //! Whether the flights move what a diagnosis needs moved.
 
-use crate::logs::rudder::MOVES_RAD;
-use crate::sysid::diagnose::error::DiagnoseError;
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::error::DiagnoseError;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Prepared;
+use greylag_logs::rudder::MOVES_RAD;
 
 /// Least flight time, s.
 const LEAST_S: f64 = 10.0;

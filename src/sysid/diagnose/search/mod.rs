@@ -1,7 +1,7 @@
 //! The stepwise search: rounds, checks of a candidate, thresholds by a bootstrap under the null.
 
 pub(super) mod checks;
-pub(in crate::sysid) mod clocks;
+pub(crate) mod clocks;
 pub(super) mod coarser;
 pub(super) mod excitation;
 pub(super) mod nulls;

@@ -5,9 +5,9 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::num::stream::stream;
-use crate::sysid::diagnose::regression::projected::Projected;
-use crate::sysid::diagnose::regression::rank::{Draw, Trial};
+use crate::diagnose::regression::projected::Projected;
+use crate::diagnose::regression::rank::{Draw, Trial};
+use greylag_num::stream::stream;
 
 /// Random streams of nulls.
 const NULLS: u64 = 80;

@@ -4,10 +4,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::RngExt;
 use rayon::prelude::*;
 
-use crate::num::stream::stream;
-use crate::sysid::diagnose::regression::projected::scaled_inverse;
-use crate::sysid::diagnose::search::nulls::threshold;
-use crate::sysid::diagnose::search::round::Round;
+use crate::diagnose::regression::projected::scaled_inverse;
+use crate::diagnose::search::nulls::threshold;
+use crate::diagnose::search::round::Round;
+use greylag_num::stream::stream;
 
 /// Ridges that are tried, as shares of a feature's mean square.
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];

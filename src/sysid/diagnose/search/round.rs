@@ -6,16 +6,16 @@ mod tuned;
 
 use rayon::prelude::*;
 
-use crate::model::GreyBox;
-use crate::sysid::diagnose::regression::catalogue::{self, Columns, Entry};
-use crate::sysid::diagnose::regression::cells::{Cells, Placed};
-use crate::sysid::diagnose::regression::columns::{Ready, SENSORS};
-use crate::sysid::diagnose::regression::noise::Noise;
-use crate::sysid::diagnose::regression::projected::{Known, Projected, scaled_inverse};
-use crate::sysid::diagnose::regression::rank::{Draw, Score, Trial};
-use crate::sysid::diagnose::regression::{features, shared};
-use crate::sysid::per_flight::PerFlight;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::regression::catalogue::{self, Columns, Entry};
+use crate::diagnose::regression::cells::{Cells, Placed};
+use crate::diagnose::regression::columns::{Ready, SENSORS};
+use crate::diagnose::regression::noise::Noise;
+use crate::diagnose::regression::projected::{Known, Projected, scaled_inverse};
+use crate::diagnose::regression::rank::{Draw, Score, Trial};
+use crate::diagnose::regression::{features, shared};
+use crate::per_flight::PerFlight;
+use crate::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
 use known::{curved, known};
 use shared_noise::{Setting, shared, sum};
 
@@ -258,7 +258,7 @@ impl Round {
     /// constants are not amounts.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");
-        let operator = crate::physics::inputs::Kind::from_id(id).is_some();
+        let operator = greylag_physics::inputs::Kind::from_id(id).is_some();
         let linear = self.model.linear();
         let named = self.model.coefficients();
         let own: Vec<usize> = (0..self.coefficients.len())

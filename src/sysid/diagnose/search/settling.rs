@@ -1,10 +1,10 @@
 //! Candidates ranked, and a model settled after one of them has joined.
 
-use crate::model::GreyBox;
-use crate::sysid::diagnose::options::Options;
-use crate::sysid::diagnose::regression::rank::Score;
-use crate::sysid::diagnose::search::nulls;
-use crate::sysid::diagnose::search::round::{Beside, Problem, Round};
+use crate::diagnose::options::Options;
+use crate::diagnose::regression::rank::Score;
+use crate::diagnose::search::nulls;
+use crate::diagnose::search::round::{Beside, Problem, Round};
+use greylag_model::GreyBox;
 
 /// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
 pub const SETTLING: usize = 3;

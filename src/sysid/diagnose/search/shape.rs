@@ -7,17 +7,17 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{GreyBox, Integrator};
-use crate::num::statistics::mean;
-use crate::sysid::diagnose::regression::cells::Placed;
-use crate::sysid::diagnose::regression::columns::{Ready, bends};
-use crate::sysid::diagnose::regression::features::{spread, standard};
-use crate::sysid::diagnose::regression::gather::{Column, gather};
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::diagnose::regression::projected::{Projected, scaled_inverse};
-use crate::sysid::diagnose::search::nulls;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::weak_form::prepared::Prepared;
+use crate::diagnose::regression::cells::Placed;
+use crate::diagnose::regression::columns::{Ready, bends};
+use crate::diagnose::regression::features::{spread, standard};
+use crate::diagnose::regression::gather::{Column, gather};
+use crate::diagnose::regression::local::CHANNELS;
+use crate::diagnose::regression::projected::{Projected, scaled_inverse};
+use crate::diagnose::search::nulls;
+use crate::diagnose::search::round::Round;
+use crate::weak_form::prepared::Prepared;
+use greylag_model::{GreyBox, Integrator};
+use greylag_num::statistics::mean;
 
 /// States and deflections whose products are the terms.
 const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];

@@ -10,20 +10,20 @@ pub use examine::SELECTED;
 pub use found::Found;
 pub use found::Selected;
 
-use crate::model::{GreyBox, RUDDER};
-use crate::sysid::diagnose::error::DiagnoseError;
-use crate::sysid::diagnose::options::Options;
-use crate::sysid::diagnose::regression::catalogue::{self, Entry};
-use crate::sysid::diagnose::regression::rank::Score;
-use crate::sysid::diagnose::search::coarser::left_by_sums;
-use crate::sysid::diagnose::search::remainder::remainder;
-use crate::sysid::diagnose::search::round::{Problem, Round};
-use crate::sysid::diagnose::search::settling::{Ranked, SETTLING, ranked};
-use crate::sysid::diagnose::search::shape::shape;
-use crate::sysid::diagnose::search::unexplained::unexplained;
-use crate::sysid::diagnose::search::{checks, excitation};
-use crate::sysid::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::options::Options;
+use crate::diagnose::regression::catalogue::{self, Entry};
+use crate::diagnose::regression::rank::Score;
+use crate::diagnose::search::coarser::left_by_sums;
+use crate::diagnose::search::remainder::remainder;
+use crate::diagnose::search::round::{Problem, Round};
+use crate::diagnose::search::settling::{Ranked, SETTLING, ranked};
+use crate::diagnose::search::shape::shape;
+use crate::diagnose::search::unexplained::unexplained;
+use crate::diagnose::search::{checks, excitation};
+use crate::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
 use examine::examine;
+use greylag_model::{GreyBox, RUDDER};
 use run_off::run_off;
 
 /// Share of the search that is done once all candidates have been ranked.

@@ -1,11 +1,11 @@
 //! How much of each channel is left unexplained.
 
-use crate::num::statistics::mean;
-use crate::sysid::compare::ChannelId;
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::local::CHANNELS;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::weak_form::windows::{self, Series};
+use crate::compare::ChannelId;
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::local::CHANNELS;
+use crate::diagnose::search::round::Round;
+use crate::weak_form::windows::{self, Series};
+use greylag_num::statistics::mean;
 
 /// Variance of a channel beyond its noise, and the variance of that noise, both in squared units of the channel.
 struct Measured {

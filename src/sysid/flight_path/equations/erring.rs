@@ -4,15 +4,15 @@ use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{BETWEEN, Found, Problem, WIDTH, start, step_deviations, weigh};
-use crate::logs::Sampling;
-use crate::num::stream::Stream;
-use crate::sysid::flight_path::band::{self, Node};
-use crate::sysid::flight_path::intake::Track;
-use crate::sysid::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
-use crate::sysid::flight_path::levels::CALM;
-use crate::sysid::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
-use crate::sysid::flight_path::nuisance::{self, COUNT, Values};
-use crate::sysid::flight_path::path::{CHANNELS, Path};
+use crate::flight_path::band::{self, Node};
+use crate::flight_path::intake::Track;
+use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
+use crate::flight_path::levels::CALM;
+use crate::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
+use crate::flight_path::nuisance::{self, COUNT, Values};
+use crate::flight_path::path::{CHANNELS, Path};
+use greylag_logs::Sampling;
+use greylag_num::stream::Stream;
 
 /// A path with an error like that of the one found.
 #[derive(Clone, Debug)]

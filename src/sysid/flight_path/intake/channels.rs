@@ -1,9 +1,9 @@
 //! The channels of a log, each with the way it is interpolated.
 
 use super::{Periods, Present};
-use crate::logs::{Flight, FlowAngles, Sample};
-use crate::sysid::flight_path::ReconstructError;
-use crate::sysid::flight_path::channel::{Channel, Interpolation};
+use crate::flight_path::ReconstructError;
+use crate::flight_path::channel::{Channel, Interpolation};
+use greylag_logs::{Flight, FlowAngles, Sample};
 
 /// The channels of a log.
 pub(super) struct Channels {

@@ -1,9 +1,9 @@
 //! The stretches of a log that were flown without a gap, and the time between their samples.
 
 use super::Present;
-use crate::logs::{Flight, Sample};
-use crate::num::statistics::quantile;
-use crate::sysid::flight_path::{Options, ReconstructError};
+use crate::flight_path::{Options, ReconstructError};
+use greylag_logs::{Flight, Sample};
+use greylag_num::statistics::quantile;
 
 /// A pause is a gap if it exceeds this many median periods of the rows, and `Options::gap_s`.
 const GAP_PERIODS: f64 = 2.5;

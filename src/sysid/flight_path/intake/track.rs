@@ -2,11 +2,11 @@
 
 use super::channels::Channels;
 use super::{Present, Track};
-use crate::physics::actuators::Actuators;
-use crate::physics::atmosphere::{Atmosphere, Density};
-use crate::physics::{Command, Controls};
-use crate::sysid::flight_path::Options;
-use crate::sysid::flight_path::channel::{Channel, wrap};
+use crate::flight_path::Options;
+use crate::flight_path::channel::{Channel, wrap};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::atmosphere::{Atmosphere, Density};
+use greylag_physics::{Command, Controls};
 
 /// Time over which a climb is taken from the altitude, s.
 const CLIMB_WINDOW: f64 = 1.0;

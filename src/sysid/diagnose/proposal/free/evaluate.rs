@@ -1,7 +1,7 @@
 //! Expressions over all samples at once.
 
-use crate::physics::formula::Variable;
-use crate::physics::formula::expression::{Expression, Function, Node};
+use greylag_physics::formula::Variable;
+use greylag_physics::formula::expression::{Expression, Function, Node};
 
 /// The values of `of` at `count` places, where `variable` has those of a variable; not a number where it has a part
 /// that depends on more than the place.
@@ -67,7 +67,7 @@ fn binary(function: Function, x: f64, y: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::formula::parser::parse;
+    use greylag_physics::formula::parser::parse;
 
     #[test]
     fn values_are_those_of_mathematics() {

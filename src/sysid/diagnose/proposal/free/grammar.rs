@@ -1,9 +1,9 @@
 //! Expressions of at most nine nodes, from what a variable may do by itself to products of three.
 
-use crate::physics::formula::Variable;
-use crate::physics::formula::dimension::Dimension;
-use crate::physics::formula::expression::{Expression, Function, Node};
-use crate::physics::formula::units;
+use greylag_physics::formula::Variable;
+use greylag_physics::formula::dimension::Dimension;
+use greylag_physics::formula::expression::{Expression, Function, Node};
+use greylag_physics::formula::units;
 
 /// Most nodes of an expression: variables, numbers, functions and operators.
 pub const MOST_NODES: usize = 9;
@@ -289,7 +289,7 @@ impl Free {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::formula::parser;
+    use greylag_physics::formula::parser;
 
     fn grammar(variables: &[Variable]) -> Grammar {
         let reach = |v: &Variable| Reach { variable: *v, levels: [0.03, 0.05, 0.1] };

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::grammar::Free;
 use super::samples::Samples;
 use super::screen::Screen;
-use crate::sysid::diagnose::regression::projected::scaled_inverse;
+use crate::diagnose::regression::projected::scaled_inverse;
 
 /// Gauss–Newton steps.
 const STEPS: usize = 6;

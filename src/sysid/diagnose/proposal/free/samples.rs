@@ -1,14 +1,14 @@
 //! What the variables are at every sample of the flights, and how a window averages them.
 
-use crate::logs::Sampling;
-use crate::model::{GreyBox, Integrator};
-use crate::physics::formula::Variable;
-use crate::physics::formula::expression::Expression;
-use crate::physics::{Channel, Controls};
-use crate::sysid::diagnose::proposal::free::evaluate::evaluate;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::flight_path::reconstruction::Instant;
-use crate::sysid::weak_form::prepared::Window;
+use crate::diagnose::proposal::free::evaluate::evaluate;
+use crate::diagnose::search::round::Round;
+use crate::flight_path::reconstruction::Instant;
+use crate::weak_form::prepared::Window;
+use greylag_logs::Sampling;
+use greylag_model::{GreyBox, Integrator};
+use greylag_physics::formula::Variable;
+use greylag_physics::formula::expression::Expression;
+use greylag_physics::{Channel, Controls};
 
 /// Variables that free forms may hold.
 pub const VARIABLES: [Variable; 13] = [

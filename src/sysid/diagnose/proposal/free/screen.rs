@@ -1,6 +1,6 @@
 //! All forms on the whitened residual of one channel, and on that of flights that lack nothing.
 //!
-//! The statistics are those of the library's round ([`Score`](crate::sysid::diagnose::regression::rank::Score)) with
+//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)) with
 //! what the model's own coefficients take projected out, but for the noise that columns share with the residual,
 //! which the round corrects when the best forms come to it.
 
@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::num::stream::stream;
-use crate::physics::Channel;
-use crate::sysid::diagnose::proposal::forward::ORDER;
-use crate::sysid::diagnose::regression::cells::Placed;
-use crate::sysid::diagnose::regression::projected::Known;
-use crate::sysid::diagnose::search::round::Round;
+use crate::diagnose::proposal::forward::ORDER;
+use crate::diagnose::regression::cells::Placed;
+use crate::diagnose::regression::projected::Known;
+use crate::diagnose::search::round::Round;
+use greylag_num::stream::stream;
+use greylag_physics::Channel;
 
 use super::samples::{Average, Samples};
 

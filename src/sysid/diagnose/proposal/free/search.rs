@@ -7,15 +7,15 @@ use super::grammar::{Candidate, Free, Grammar, MOST_NODES, Reach};
 use super::refine::Place;
 use super::samples::Samples;
 use super::screen::{Kept, Screen};
-use crate::num::statistics::quantile;
-use crate::physics::Channel;
-use crate::physics::formula::{Variable, file};
-use crate::sysid::diagnose::Options;
-use crate::sysid::diagnose::proposal::draft::{self, Term};
-use crate::sysid::diagnose::proposal::library::{BESIDE_AIR, Form, OF_AIR, Shape};
-use crate::sysid::diagnose::search::nulls::threshold;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::progress::{Cancelled, Progress, say};
+use crate::diagnose::Options;
+use crate::diagnose::proposal::draft::{self, Term};
+use crate::diagnose::proposal::library::{BESIDE_AIR, Form, OF_AIR, Shape};
+use crate::diagnose::search::nulls::threshold;
+use crate::diagnose::search::round::Round;
+use crate::progress::{Cancelled, Progress, say};
+use greylag_num::statistics::quantile;
+use greylag_physics::Channel;
+use greylag_physics::formula::{Variable, file};
 
 /// Forms that are tried at once.
 const BATCH: usize = 64;

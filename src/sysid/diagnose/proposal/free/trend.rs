@@ -2,9 +2,9 @@
 
 use super::evaluate::evaluate;
 use super::grammar::positive;
-use crate::physics::formula::Variable;
-use crate::physics::formula::expression::Expression;
-use crate::physics::formula::parser;
+use greylag_physics::formula::Variable;
+use greylag_physics::formula::expression::Expression;
+use greylag_physics::formula::parser;
 
 /// Places along a variable at which a shape is tried, as shares of what the variable reaches.
 const ALONG: [f64; 8] = [0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0];

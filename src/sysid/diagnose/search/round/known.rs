@@ -1,13 +1,13 @@
 //! What is unknown in every round: the free coefficients and the errors of the sensors, with their columns.
 
 use super::Problem;
-use crate::model::GreyBox;
-use crate::sysid::diagnose::regression::catalogue::{self, Entry};
-use crate::sysid::diagnose::regression::cells::Placed;
-use crate::sysid::diagnose::regression::columns::{Ready, SENSORS, combine};
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::projected::{Known, Projected};
-use crate::sysid::diagnose::regression::{per_flight, sensors};
+use crate::diagnose::regression::catalogue::{self, Entry};
+use crate::diagnose::regression::cells::Placed;
+use crate::diagnose::regression::columns::{Ready, SENSORS, combine};
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::projected::{Known, Projected};
+use crate::diagnose::regression::{per_flight, sensors};
+use greylag_model::GreyBox;
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 

@@ -1,15 +1,15 @@
 //! What noise that columns and residual share feigns, by drawing it again.
 
-use crate::sysid::diagnose::regression::shared;
+use crate::diagnose::regression::shared;
 use rayon::prelude::*;
 
 use super::known::known;
 use super::{Problem, place};
-use crate::model::GreyBox;
-use crate::sysid::diagnose::regression::catalogue::{self, Columns, Entry};
-use crate::sysid::diagnose::regression::cells::{Cells, Placed};
-use crate::sysid::diagnose::regression::columns::Ready;
-use crate::sysid::diagnose::regression::noise::Noise;
+use crate::diagnose::regression::catalogue::{self, Columns, Entry};
+use crate::diagnose::regression::cells::{Cells, Placed};
+use crate::diagnose::regression::columns::Ready;
+use crate::diagnose::regression::noise::Noise;
+use greylag_model::GreyBox;
 
 /// Draws of the noise that columns and residual share, over which its product is averaged. With one, an
 /// inertia that is not there had an evidence of 3, 11 or 19 by the seed.

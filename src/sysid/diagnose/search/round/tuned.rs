@@ -1,12 +1,12 @@
 //! The models and the columns that a round fits.
 
 use super::Round;
-use crate::model::GreyBox;
-use crate::sysid::diagnose::regression::catalogue::{self};
-use crate::sysid::diagnose::regression::cells::Placed;
-use crate::sysid::diagnose::regression::columns::{combine, of_body};
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::rank::Score;
+use crate::diagnose::regression::catalogue::{self};
+use crate::diagnose::regression::cells::Placed;
+use crate::diagnose::regression::columns::{combine, of_body};
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::rank::Score;
+use greylag_model::GreyBox;
 
 impl Round {
     /// The model with its coefficients where they go once `score`'s effect has joined.

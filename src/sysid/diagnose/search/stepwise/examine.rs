@@ -1,11 +1,11 @@
 //! The checks of the best candidate.
 
 use super::found::{Found, Selected};
-use crate::sysid::diagnose::options::Options;
-use crate::sysid::diagnose::regression::rank::Score;
-use crate::sysid::diagnose::search::checks;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::search::unexplained::explained;
+use crate::diagnose::options::Options;
+use crate::diagnose::regression::rank::Score;
+use crate::diagnose::search::checks;
+use crate::diagnose::search::round::Round;
+use crate::diagnose::search::unexplained::explained;
 
 /// Least fall of the error on held-out segments.
 pub const HELD_OUT: f64 = 0.1;

@@ -1,12 +1,12 @@
 //! How a search ended: what it selected, what each of it took, what is left.
 
-use crate::sysid::diagnose::regression::gather::Column;
-use crate::sysid::diagnose::regression::rank::Score;
-use crate::sysid::diagnose::search::checks;
-use crate::sysid::diagnose::search::remainder::Remainder;
-use crate::sysid::diagnose::search::round::Round;
-use crate::sysid::diagnose::search::shape::Shape;
-use crate::sysid::diagnose::search::unexplained::unexplained;
+use crate::diagnose::regression::gather::Column;
+use crate::diagnose::regression::rank::Score;
+use crate::diagnose::search::checks;
+use crate::diagnose::search::remainder::Remainder;
+use crate::diagnose::search::round::Round;
+use crate::diagnose::search::shape::Shape;
+use crate::diagnose::search::unexplained::unexplained;
 
 /// A channel that is explained but for this share of its variance is adequate: reconstruction and sampling
 /// leave as much of exact models.

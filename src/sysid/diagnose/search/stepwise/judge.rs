@@ -1,8 +1,8 @@
 //! Refusals of selected effects by what is left beside them.
 
 use super::found::{Found, Selected};
-use crate::physics::inputs::{Acts, Kind};
-use crate::sysid::compare::ChannelId;
+use crate::compare::ChannelId;
+use greylag_physics::inputs::{Acts, Kind};
 
 /// Part of what is to be removed from its channels that an effect may leave there.
 const LEFT: f64 = 0.3;

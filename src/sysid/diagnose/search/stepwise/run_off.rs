@@ -1,9 +1,9 @@
 //! The run-off of close contenders, each joined to the model and settled.
 
 use super::found::Found;
-use crate::sysid::diagnose::search::checks;
-use crate::sysid::diagnose::search::round::Problem;
-use crate::sysid::diagnose::search::settling::{SETTLING, settled};
+use crate::diagnose::search::checks;
+use crate::diagnose::search::round::Problem;
+use crate::diagnose::search::settling::{SETTLING, settled};
 
 /// Share of the best candidate's order (see `Score::order`) above which another contends with it.
 const CONTENDING: f64 = 0.2;

@@ -14,8 +14,8 @@ pub use excitation::{Axis, Excitation, Shape};
 pub use file::ScheduleError;
 pub use scheduled::{Overlay, Scheduled};
 
-use crate::control::Target;
-use crate::physics::Command;
+use greylag_control::Target;
+use greylag_physics::Command;
 
 /// Largest bank (degrees) that a schedule may ask for.
 pub const ROLL_MAX_DEG: f64 = 70.0;

@@ -16,7 +16,7 @@ pub use registry::{ControllerKind, Needs, Pace, SetupError, Source, build};
 
 use insight::Insight;
 
-use crate::physics::{ActuatorState, Command, State, Time};
+use greylag_physics::{ActuatorState, Command, State, Time};
 
 /// What a controller sees: eq. (27) of \[GSFM26\] with the altitude, which sets the air density.
 #[derive(Clone, Copy, Debug, PartialEq)]
