@@ -1,6 +1,6 @@
 //! The hand-offs between control and planner, control and recorder, in some thousands of orders of their threads' steps.
 //!
-//! The sources are those of the companion; only `flight::threads` is another one here, made of shuttle's parts.
+//! The sources are those of the companion; only `crate::threads` is another one here, made of shuttle's parts.
 
 use std::time::{Duration, Instant};
 
@@ -19,24 +19,12 @@ mod threaded;
 #[allow(dead_code, unused_imports)]
 mod threads;
 
-mod control {
-    pub use greylag::control::Controller;
+mod pilot {
+    pub use greylag::flight::pilot::{Plan, Request};
 }
 
-mod physics {
-    pub use greylag::physics::Command;
-}
-
-mod flight {
-    pub(crate) use crate::threads;
-
-    pub mod pilot {
-        pub use greylag::flight::pilot::{Plan, Request};
-    }
-
-    pub mod runtime {
-        pub use greylag::flight::runtime::Pace;
-    }
+mod runtime {
+    pub use greylag::flight::runtime::Pace;
 }
 
 use queue::Queue;

@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use greylag_sitl::plant::PlantOptions;
@@ -55,7 +55,7 @@ pub struct Arguments {
     )]
     model: PathBuf,
     /// What is at the other end of the vehicle's link.
-    #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_enum)]
+    #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_parser = counterparts())]
     counterpart: Vec<Counterpart>,
     /// Show the faults and the messages of each flight with a finding.
     #[arg(long)]
@@ -80,20 +80,23 @@ struct Document<'a> {
     flights: &'a [Entry],
 }
 
-impl ValueEnum for Counterpart {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Counterpart::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()).help(match self {
+/// Reads the name of a counterpart.
+fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
+    let names = Counterpart::ALL.map(|counterpart| {
+        PossibleValue::new(counterpart.name()).help(match counterpart {
             Counterpart::Sitl => "The simulator's shim",
             Counterpart::Px4 => "PX4 by surfaces",
             Counterpart::Px4Attitude => "PX4 by attitude",
             Counterpart::Ardupilot => "ArduPilot by channels",
             Counterpart::ArdupilotAttitude => "ArduPilot by attitude",
-        }))
-    }
+        })
+    });
+    PossibleValuesParser::new(names).try_map(|name| {
+        Counterpart::ALL
+            .into_iter()
+            .find(|counterpart| counterpart.name() == name)
+            .ok_or("no such counterpart")
+    })
 }
 
 /// Flies the campaign; the exit status tells whether the companion itself never failed, with every

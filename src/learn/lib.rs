@@ -7,7 +7,7 @@ pub mod dynamics;
 pub mod policy;
 
 pub use adam::Adam;
-pub(crate) use checkpoint::write_whole;
+pub use checkpoint::write_whole;
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use dynamics::basis::{JXZ, TrainableError, trainable};
 pub use dynamics::engine::{Arithmetic, Engine};

@@ -20,10 +20,10 @@ mod trim;
 pub mod weights;
 
 #[cfg(feature = "learn")]
-pub(crate) use forces::{Starting, Weights, parted};
+pub use forces::{Starting, Weights, parted};
 pub use grey_box::{GreyBox, Named, RUDDER};
 #[cfg(feature = "learn")]
-pub(crate) use integrator::advance_jsbsim;
+pub use integrator::advance_jsbsim;
 pub use integrator::{Integrator, Memory, STEP, Twin};
 pub use join::JoinError;
 pub use linear::{Linear, linearise, linearise_step};

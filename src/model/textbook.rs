@@ -44,7 +44,7 @@ pub struct Measures {
 }
 
 /// An estimated number: its name, value, standard deviation as a share of the value, source.
-pub(crate) type Estimate = (&'static str, f64, f64, &'static str);
+pub type Estimate = (&'static str, f64, f64, &'static str);
 
 /// An effect of the model file with its estimates.
 pub(crate) type Section = (&'static str, Vec<Estimate>);
@@ -65,7 +65,7 @@ struct Figures {
 }
 
 /// The table `[incidence]` of an airframe file from the incidences (rad) of cruise and stall.
-pub(crate) fn incidence_limits(cruise: f64, stall: f64) -> String {
+pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     let up_to = |share: f64| (cruise + share * (stall - cruise)).max(0.01);
     format!(
         "# Cruise is flown at {cruise:.3} rad; the wing stalls at {stall:.3} rad.\n[incidence]\ncomfortable_rad = \
@@ -209,7 +209,7 @@ impl Measures {
 }
 
 /// Lines of a model file; a width of nothing is left out.
-pub(crate) fn numbers(out: &mut String, estimates: &[Estimate]) {
+pub fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
         let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
         let sd = width * value.abs();

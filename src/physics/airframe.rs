@@ -394,13 +394,13 @@ impl Envelope {
 }
 
 /// A name that tables and file names can bear.
-pub(crate) fn named(name: String) -> Result<String, String> {
+pub fn named(name: String) -> Result<String, String> {
     let fits = !name.trim().is_empty() && name.len() <= 64 && !name.chars().any(char::is_control);
     if fits { Ok(name) } else { Err("name must be one line of 1 to 64 bytes; give it one".into()) }
 }
 
 /// Refuses a file of another layout than this program's: 1 to `newest`.
-pub(crate) fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
+pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     if (1..=newest).contains(&schema) {
         return Ok(());
     }
@@ -411,16 +411,12 @@ pub(crate) fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
 }
 
 /// A number that must lie above zero and at most at `most`, the largest that an aircraft has.
-pub(crate) fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
+pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
     within(field, number, [most * 1e-9, most])
 }
 
 /// A number that must lie between the smallest and the largest that an aircraft has, both above zero.
-pub(crate) fn within(
-    field: &str,
-    number: &Sourced,
-    [least, most]: [f64; 2],
-) -> Result<f64, String> {
+pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));
     }
@@ -434,7 +430,7 @@ pub(crate) fn within(
 }
 
 /// A TOML error on one line: where, then what.
-pub(crate) fn toml_error(text: &str, error: &toml::de::Error) -> String {
+pub fn toml_error(text: &str, error: &toml::de::Error) -> String {
     let line =
         error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
     let message = error.message().lines().collect::<Vec<_>>().join("; ");

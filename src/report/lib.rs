@@ -47,7 +47,7 @@ pub use kit::grid::{Grid, GridCell, GridRow};
 pub use kit::heat_map::{HeatCell, HeatMap};
 pub use kit::histogram::Histogram;
 #[cfg(feature = "sitl")]
-pub(crate) use kit::html::escape;
+pub use kit::html::escape;
 pub use kit::intervals::{IntervalBins, IntervalPanel, Intervals};
 pub use kit::loop_timing::{Cycle, LoopTiming};
 pub use kit::page::{Page, Section};

@@ -45,12 +45,12 @@ pub fn unheard(_: Stage<'_>) -> ControlFlow<()> {
 pub struct Cancelled;
 
 /// Says a stage; an error if the task shall end.
-pub(crate) fn say(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
+pub fn say(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
     said(progress(Stage::new(doing, fraction)))
 }
 
 /// An error for a `Break`.
-pub(crate) fn said(answer: ControlFlow<()>) -> Result<(), Cancelled> {
+pub fn said(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     match answer {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(Cancelled),
@@ -58,7 +58,7 @@ pub(crate) fn said(answer: ControlFlow<()>) -> Result<(), Cancelled> {
 }
 
 /// Hears the stages of a part of a task as stages of the whole, from one share of it to another.
-pub(crate) fn part<'a>(
+pub fn part<'a>(
     progress: &'a Progress<'a>,
     [from, to]: [f64; 2],
 ) -> impl Fn(Stage<'_>) -> ControlFlow<()> + Sync + 'a {

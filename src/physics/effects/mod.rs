@@ -27,7 +27,7 @@ pub struct Coefficient {
 }
 
 /// Shorthand for the coefficient lists.
-pub(crate) const fn coefficient(
+pub const fn coefficient(
     name: &'static str,
     meaning: &'static str,
     unit: &'static str,

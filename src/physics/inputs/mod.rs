@@ -85,7 +85,7 @@ pub struct InputMemory<R = f64> {
     /// What its input effects remember of aileron, elevator and throttle; on a rudder they do not act.
     inputs: [[Past<R>; 3]; MOST],
     /// What its formulas remember of what they lag or delay.
-    pub(crate) formulas: [Past<R>; LAGS],
+    pub formulas: [Past<R>; LAGS],
 }
 
 impl<R: Real> InputMemory<R> {

@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 /// `text` with the five characters that mean something to HTML replaced; safe as element text
 /// and inside a quoted attribute.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
