@@ -95,12 +95,10 @@ pub struct Arguments {
     force: bool,
 }
 
-/// What lies between a controller and the surfaces.
+/// What lies between a controller and the surfaces: the filter of the envelope, or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EnvelopeName {
-    /// The filter that keeps load factor, incidence, sideslip and attitude.
     Kept,
-    /// Nothing.
     Free,
 }
 
