@@ -17,7 +17,6 @@ use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::commands::watchdog;
 use crate::control::cem::Change;
-use crate::control::envelope::EnvelopeFilter;
 use crate::control::{self, Controller, ControllerKind, build};
 use crate::flight::monitor::Monitor;
 use crate::flight::pilot::{Config, Pilot};
@@ -282,8 +281,7 @@ pub fn companion_with_planner(
     } else {
         fallback(model)?
     };
-    let mut pilot = Pilot::new(Config::for_model(model)?, fallback)?;
-    pilot.protect_with(EnvelopeFilter::new(model));
+    let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
     let placement =
         if kind.pace() == control::Pace::Planned { Placement::Thread } else { Placement::Loop };
     Ok(Companion { pilot, controller, placement })

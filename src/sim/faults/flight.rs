@@ -20,7 +20,6 @@ use super::policies::Sample;
 use super::scenario::{Asking, Scenario, Setting};
 use super::wire::Wire;
 use disk::Disk;
-use greylag_control::envelope::EnvelopeFilter;
 use greylag_control::{Controller, ControllerKind, SetupError, build};
 use greylag_flight::desk::Desk;
 use greylag_flight::pilot::{ConfigError, Pilot};
@@ -139,8 +138,7 @@ impl CompanionFactory {
 
     fn desk(&self, counterpart: Counterpart) -> Result<Desk, FaultsError> {
         let config = self.companion.pilot.config().clone();
-        let mut pilot = Pilot::new(config, self.fallback.boxed_clone())?;
-        pilot.protect_with(EnvelopeFilter::new(&self.model));
+        let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
         let controller = self.companion.controller.boxed_clone();
         let companion = Companion { pilot, controller, placement: self.companion.placement };
         Ok(Desk::new(companion, vehicle(counterpart, &self.model)))
