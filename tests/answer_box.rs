@@ -179,7 +179,7 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
     let numbers = &answer["numbers"];
     let steps = numbers["steps"].as_array().unwrap();
     assert_eq!(steps.len(), 3);
-    let mut before = None;
+    let mut before: Option<f64> = None;
     let mut of_states = Vec::new();
     for (step, model) in steps.iter().zip([&given, &tuned, &fitted]) {
         let (error, states) = recomputed(model, &logs[2], &given, 5.0);
@@ -187,7 +187,7 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
         // the same runs, added up in another order
         assert!((told / error - 1.0).abs() < 1e-6, "{step}: {error}");
         if let Some(before) = before {
-            let change = 100.0 * (error / before - 1.0);
+            let change: f64 = 100.0 * (error / before - 1.0);
             assert!(
                 (step["change_percent"].as_f64().unwrap() - change).abs() < 1e-3,
                 "{step}: {change}"

@@ -173,9 +173,7 @@ fn files(folder: &Path) {
     csv::save(&fly(4, 15.0, REALISTIC), &at("other.csv")).unwrap();
     let mut degrees = flight.clone();
     for s in &mut degrees.samples {
-        for angle in
-            [&mut s.roll_rad, &mut s.pitch_rad, &mut s.p_radps, &mut s.q_radps, &mut s.r_radps]
-        {
+        for angle in s.attitude_rad.iter_mut().chain(&mut s.rates_radps) {
             *angle = angle.to_degrees();
         }
     }

@@ -3,6 +3,7 @@
 pub mod aircraft_check;
 pub mod cem;
 mod disturbance;
+pub mod envelope;
 pub mod ilqr;
 pub mod insight;
 pub mod lqi;

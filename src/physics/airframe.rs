@@ -40,9 +40,11 @@ pub struct Envelope {
     pub pitch_min_deg: f64,
     /// Largest load factor.
     pub load_factor_max: f64,
-    /// Least load factor, where the file states one.
+    /// Least load factor, where the file states one: see [`load_factor_least`](Envelope::load_factor_least).
+    #[serde(default)]
     pub load_factor_min: Option<f64>,
-    /// Largest sideslip, degrees, where the file states one.
+    /// Largest sideslip, degrees, where the file states one: see [`sideslip_most_deg`](Envelope::sideslip_most_deg).
+    #[serde(default)]
     pub sideslip_max_deg: Option<f64>,
     /// Smallest airspeed, m/s.
     pub airspeed_min_mps: f64,
@@ -54,7 +56,26 @@ pub struct Envelope {
     pub surface_slew_per_s: f64,
 }
 
+/// Least load factor over the largest, where a file states none: FAR 23.337 (b) (1), normal and utility category.
+const LEAST_LOAD: f64 = -0.4;
+/// Largest sideslip where a file states none, degrees: beyond it linear lateral derivatives say little.
+const SIDESLIP_DEG: f64 = 25.0;
+/// Stall angle over the angle from which the nose is pushed down, where a file states none.
+const STALL: f64 = 4.0 / 3.0;
+/// Part of the stall angle that flight keeps to.
+const BEFORE_STALL: f64 = 0.95;
+
 impl Envelope {
+    /// The least load factor: the file's, else −0.4 of the largest (FAR 23.337).
+    pub fn load_factor_least(&self) -> f64 {
+        self.load_factor_min.unwrap_or(LEAST_LOAD * self.load_factor_max)
+    }
+
+    /// The largest sideslip, degrees: the file's, else 25.
+    pub fn sideslip_most_deg(&self) -> f64 {
+        self.sideslip_max_deg.unwrap_or(SIDESLIP_DEG)
+    }
+
     /// Airspeed from which a log's rows count as flight, m/s: half the least one, so that a stall is flight and
     /// taxiing is not.
     pub fn flying_from_mps(&self) -> f64 {
@@ -89,11 +110,11 @@ pub struct Incidence {
     /// Angle of attack beyond which the nose is pushed down, rad.
     #[serde(rename = "push_from_rad")]
     pub push_from: f64,
+    /// Angle of attack at which the wing stalls, rad, where the file states one: see [`before_stall`](Incidence::before_stall).
+    #[serde(default, rename = "stall_rad")]
+    pub stall: Option<f64>,
     /// Elevator deflection, nose down, added per rad of angle of attack beyond `push_from`, rad/rad.
     pub push_gain: f64,
-    /// Angle of attack at which the wing stalls, rad, where the file states it.
-    #[serde(rename = "stall_rad")]
-    pub stall: Option<f64>,
 }
 
 impl Incidence {
@@ -105,6 +126,11 @@ impl Incidence {
         push_gain: 3.0,
         stall: None,
     };
+
+    /// The largest angle of attack of a transient, rad: 95 % of the stall's, which is 4/3 of `push_from` where the file states none.
+    pub fn before_stall(&self) -> f64 {
+        BEFORE_STALL * self.stall.unwrap_or(STALL * self.push_from)
+    }
 
     fn checked(self) -> Result<Self, String> {
         let Incidence { comfortable, tolerable, push_from, push_gain, stall } = self;
@@ -346,12 +372,12 @@ impl Envelope {
                 "load_factor_max must lie between 1 and 20",
             ),
             (
-                self.load_factor_min.is_none_or(|least| (-20.0..1.0).contains(&least)),
-                "load_factor_min must lie between -20 and 1",
+                self.load_factor_min.is_none_or(|n| (-20.0..0.9).contains(&n)),
+                "load_factor_min must lie between -20 and 0.9",
             ),
             (
-                self.sideslip_max_deg.is_none_or(|most| most > 0.0 && most < 90.0),
-                "sideslip_max_deg must lie in 0..90",
+                self.sideslip_max_deg.is_none_or(|deg| deg > 1.0 && deg <= 90.0),
+                "sideslip_max_deg must lie between 1 and 90",
             ),
             (
                 0.0 < self.airspeed_min_mps && self.airspeed_min_mps < self.airspeed_cruise_mps,

@@ -5,16 +5,24 @@
 //! which is the real-time iteration of Diehl et al. (2002). Throttle and the attitude that the airspeed
 //! allows are the LQI's, and what the model leaves unexplained is taken into it: no steady error.
 
+mod cost;
 mod problem;
+mod settings;
 mod solve;
 
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
+use crate::envelope::Bounds;
 use crate::insight::{Insight, Path};
 use crate::lqi::{Ahead, Lqi};
+use crate::policy::{Actor, Agent};
 use crate::{Controller, Observation, Target};
 use greylag_model::GreyBox;
+use greylag_num::dense::Units;
 use greylag_physics::Command;
+use std::sync::Arc;
+
 use problem::{Problem, Trajectory};
+pub use settings::{Barrier, Settings, Start};
 use solve::Solver;
 
 /// Steps planned ahead.
@@ -26,6 +34,11 @@ type Surfaces = [f64; 2];
 /// The planner. It takes no memory after it is built.
 #[derive(Clone, Debug)]
 pub struct Ilqr {
+    name: &'static str,
+    settings: Settings,
+    bounds: Option<Bounds>,
+    actor: Option<Arc<Actor>>,
+    units: Units<f32>,
     model: GreyBox,
     lqi: Lqi,
     ahead: Ahead,
@@ -36,7 +49,24 @@ pub struct Ilqr {
 impl Ilqr {
     /// A planner through `model`, beside the LQI that it is given.
     pub fn new(model: &GreyBox, lqi: Lqi) -> Ilqr {
+        Ilqr::with("ilqr", model, lqi, None, Settings::PLAIN)
+    }
+
+    /// The same with other settings under a name of its own, and with a policy where there is one.
+    pub fn with(
+        name: &'static str,
+        model: &GreyBox,
+        lqi: Lqi,
+        agent: Option<&Agent>,
+        settings: Settings,
+    ) -> Ilqr {
+        let bounds = Bounds::of(&model.airframe);
         Ilqr {
+            name,
+            settings,
+            bounds: settings.envelope.map(|barrier| bounds.within(barrier.part)),
+            actor: agent.filter(|_| settings.start == Start::Policy).map(|a| a.actor.clone()),
+            units: Units::new(0.0),
             model: model.clone(),
             lqi,
             ahead: Ahead::new(STEPS, &model.airframe),
@@ -44,9 +74,7 @@ impl Ilqr {
             desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
         }
     }
-}
 
-impl Ilqr {
     /// The first `N` steps (50 at most) of this tick's plan, aileron and elevator; `None` if none stays finite.
     pub(crate) fn plan<const N: usize>(
         &mut self,
@@ -67,10 +95,18 @@ struct Desk {
     flown: Trajectory,
 }
 
+/// What a tick may start from beside the last plan.
+struct Starts<'a> {
+    lqi: &'a Ahead,
+    actor: Option<&'a Actor>,
+    units: &'a mut Units<f32>,
+    target: &'a Target,
+}
+
 impl Desk {
     /// The plan of this tick; `None` if no plan stays finite.
-    fn improve(&mut self, problem: &Problem, lqi: &Ahead) -> Option<[Surfaces; STEPS]> {
-        let (mut start, mut cost) = problem.follow(lqi, &mut self.flown);
+    fn improve(&mut self, problem: &Problem, starts: Starts) -> Option<[Surfaces; STEPS]> {
+        let (mut start, mut cost) = problem.follow(starts.lqi, &mut self.flown);
         if let Some(last) = &self.plan {
             let mut shifted = *last;
             shifted.rotate_left(1);
@@ -82,13 +118,27 @@ impl Desk {
                 self.solver.swap(&mut self.flown);
             }
         }
-        cost.is_finite().then(|| self.solver.iterate(problem, start, cost, &mut self.flown))
+        if let Some(actor) = starts.actor {
+            let Starts { units, target, .. } = starts;
+            let (plan, found) = problem.follow_policy(actor, units, target, self.solver.spare());
+            if found < cost || !cost.is_finite() {
+                (start, cost) = (plan, found);
+                self.solver.swap(&mut self.flown);
+            }
+        }
+        if !cost.is_finite() {
+            return None;
+        }
+        for _ in 0..problem.settings.iterations {
+            (start, cost) = self.solver.iterate(problem, start, cost, &mut self.flown);
+        }
+        Some(start)
     }
 }
 
 impl Controller for Ilqr {
     fn name(&self) -> &'static str {
-        "ilqr"
+        self.name
     }
 
     fn boxed_clone(&self) -> Box<dyn Controller> {
@@ -129,8 +179,16 @@ impl Controller for Ilqr {
             rudder: alone.rudder,
             memory: self.disturbance.memory(),
             disturbance: self.disturbance.rate(),
+            settings: &self.settings,
+            bounds: self.bounds,
         };
-        self.desk.plan = self.desk.improve(&problem, &self.ahead);
+        let starts = Starts {
+            lqi: &self.ahead,
+            actor: self.actor.as_deref(),
+            units: &mut self.units,
+            target,
+        };
+        self.desk.plan = self.desk.improve(&problem, starts);
         match self.desk.plan {
             Some(plan) => {
                 self.lqi.hand_over(&before, seen);

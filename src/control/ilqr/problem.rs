@@ -2,10 +2,15 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::cost::{Cost, attitude, beyond, square};
+use super::settings::Settings;
 use super::{STEPS, Surfaces};
-use crate::Observation;
+use crate::envelope::{Bounds, load_factor, load_factor_slopes};
 use crate::lqi::{Ahead, Goal};
+use crate::policy::{Actor, observe};
+use crate::{Observation, Target};
 use greylag_model::{GreyBox, Memory, STEP, linearise_step};
+use greylag_num::dense::Units;
 use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Command, Controls, State};
@@ -24,20 +29,8 @@ pub(super) type Vector = SVector<f64, STATES>;
 /// How commands act.
 pub(super) type Input = SMatrix<f64, STATES, 2>;
 
-// What is as bad as the others' (Bryson). Of a few tried on every seventh target these settle as soon as any
-// and are the steadiest in moderate turbulence.
-/// Attitude error, rad.
-const ATTITUDE: f64 = 0.05;
-/// Body rates beside those of the steady turn, rad/s.
-const RATE: f64 = 2.0;
-/// Sideslip beside the steady one, rad.
-const SIDESLIP: f64 = 0.3;
-/// A step of the command, in units of the largest deflection.
-const MOVE: f64 = 0.3;
-/// Incidence (rad) above which it costs, and its excess that is as bad.
+/// Incidence (rad) above which it costs where the envelope does not, and its excess that is as bad as other errors.
 const STALL: [f64; 2] = [0.16, 0.02];
-/// What the last state costs, in stages.
-const LAST: f64 = 20.0;
 
 /// One tick's problem.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +45,9 @@ pub(super) struct Problem<'a> {
     pub memory: Memory,
     /// What the state's rate has beside the model's.
     pub disturbance: State,
+    pub settings: &'a Settings,
+    /// Where load factor, incidence and sideslip begin to cost.
+    pub bounds: Option<Bounds>,
 }
 
 /// States and surfaces along a plan.
@@ -169,6 +165,22 @@ impl Problem<'_> {
         })
     }
 
+    /// Flies the policy's way on; its plan and what that costs.
+    pub fn follow_policy(
+        &self,
+        actor: &Actor,
+        units: &mut Units<f32>,
+        target: &Target,
+        out: &mut Trajectory,
+    ) -> ([Surfaces; STEPS], f64) {
+        let figures = &self.model.airframe.actuators;
+        self.fly_choosing(out, |_, flight, _| {
+            let observed = observe(&flight.state, &flight.actuators.observed(figures), target);
+            let [aileron, elevator, _] = actor.act_one(units, &observed.map(|x| x as f32));
+            [f64::from(aileron), f64::from(elevator)]
+        })
+    }
+
     fn fly_choosing(
         &self,
         out: &mut Trajectory,
@@ -179,46 +191,89 @@ impl Problem<'_> {
         let mut cost = 0.0;
         self.note(&flight, 0, out);
         for (step, place) in plan.iter_mut().enumerate() {
-            let before = flight.previous[0];
+            let (before, from) = (flight.previous[0], flight.state);
             let chosen = choose(step, &flight, out).map(|x| x.clamp(-1.0, 1.0));
             *place = chosen;
             self.advance(&mut flight, chosen);
             self.note(&flight, step + 1, out);
             let moved = [chosen[0] - before.aileron, chosen[1] - before.elevator];
-            cost += 0.5 * (moved[0] * moved[0] + moved[1] * moved[1]) / (MOVE * MOVE);
-            cost += self.stage(&flight.state) * if step + 1 == STEPS { LAST } else { 1.0 };
+            let size = self.settings.moves;
+            cost += 0.5 * (moved[0] * moved[0] + moved[1] * moved[1]) / (size * size);
+            let last = step + 1 == STEPS;
+            cost += self.stage(&flight.state) * if last { self.settings.last } else { 1.0 };
+            cost += self.load(&from, &flight.state).value;
         }
         (plan, cost)
     }
 
-    /// Each weighed residual of a state, with its place in the state; stall only where there is any.
-    fn residuals(&self, s: &State) -> [(usize, f64, f64); 7] {
+    /// What each component of a state costs, with its place in the state.
+    fn costs(&self, s: &State) -> [(usize, Cost); 7] {
         let [p, q, r, _, beta] = self.goal.steady;
         let tau = std::f64::consts::TAU;
         let turn = (s.roll - self.goal.attitude[0] + tau / 2.0).rem_euclid(tau) - tau / 2.0;
-        let stall = (s.alpha - STALL[0]).max(0.0);
+        let of = self.settings;
+        let incidence = match (&self.bounds, &of.envelope) {
+            (Some(bounds), Some(barrier)) => beyond(s.alpha, bounds.alpha, barrier.alpha),
+            _ => beyond(s.alpha, [f64::NEG_INFINITY, STALL[0]], STALL[1]),
+        };
+        let mut sideslip = square(s.beta - beta, of.sideslip);
+        if let (Some(bounds), Some(barrier)) = (&self.bounds, &of.envelope) {
+            sideslip += beyond(s.beta, [-bounds.sideslip, bounds.sideslip], barrier.sideslip);
+        }
         [
-            (0, turn, 1.0 / ATTITUDE),
-            (1, s.pitch - self.goal.attitude[1], 1.0 / ATTITUDE),
-            (3, s.p - p, 1.0 / RATE),
-            (4, s.q - q, 1.0 / RATE),
-            (5, s.r - r, 1.0 / RATE),
-            (6, stall, if stall > 0.0 { 1.0 / STALL[1] } else { 0.0 }),
-            (7, s.beta - beta, 1.0 / SIDESLIP),
+            (0, attitude(turn, of.attitude, of.far)),
+            (1, attitude(s.pitch - self.goal.attitude[1], of.attitude, of.far)),
+            (3, square(s.p - p, of.rate)),
+            (4, square(s.q - q, of.rate)),
+            (5, square(s.r - r, of.rate)),
+            (6, incidence),
+            (7, sideslip),
         ]
     }
 
     fn stage(&self, state: &State) -> f64 {
-        self.residuals(state).iter().map(|(_, x, w)| 0.5 * (x * w) * (x * w)).sum()
+        self.costs(state).iter().map(|(_, cost)| cost.value).sum()
+    }
+
+    /// What the load factor between two states costs.
+    fn load(&self, from: &State, to: &State) -> Cost {
+        match (&self.bounds, &self.settings.envelope) {
+            (Some(bounds), Some(barrier)) => {
+                beyond(load_factor(from, to), bounds.load, barrier.load)
+            }
+            _ => Cost::NONE,
+        }
+    }
+
+    /// Slope and curvature of what the load factor of a step costs, with its own slope over the state before, given how that
+    /// moves on; `None` where it costs nothing.
+    pub fn load_terms(
+        &self,
+        trajectory: &Trajectory,
+        step: usize,
+        a: &Square,
+    ) -> Option<(Cost, Vector)> {
+        let (from, to) = (&trajectory.states[step], &trajectory.states[step + 1]);
+        let cost = self.load(from, to);
+        if cost.value == 0.0 {
+            return None;
+        }
+        let [own, next] = load_factor_slopes(from, to);
+        let mut slope = Vector::zeros();
+        slope.as_mut_slice()[..8].copy_from_slice(&own);
+        for (row, by) in next.into_iter().enumerate().filter(|(_, by)| *by != 0.0) {
+            slope += a.row(row).transpose() * by;
+        }
+        Some((cost, slope))
     }
 
     /// Slope and curvature of what the state costs after `step` steps.
     pub fn stage_terms(&self, trajectory: &Trajectory, step: usize) -> (Vector, Vector) {
         let (mut slope, mut curvature) = (Vector::zeros(), Vector::zeros());
-        let weight = if step == STEPS { LAST } else { 1.0 };
-        for (at, x, w) in self.residuals(&trajectory.states[step]) {
-            slope[at] += weight * w * w * x;
-            curvature[at] += weight * w * w;
+        let weight = if step == STEPS { self.settings.last } else { 1.0 };
+        for (at, cost) in self.costs(&trajectory.states[step]) {
+            slope[at] += weight * cost.slope;
+            curvature[at] += weight * cost.curvature;
         }
         (slope, curvature)
     }
@@ -233,7 +288,7 @@ impl Problem<'_> {
 
     /// Weight of a squared step of the command.
     pub fn move_weight(&self) -> f64 {
-        1.0 / (MOVE * MOVE)
+        1.0 / (self.settings.moves * self.settings.moves)
     }
 
     /// One step, linear about the trajectory: δx₊ = a δx + b δu.

@@ -38,7 +38,7 @@ impl Solver {
         std::mem::swap(&mut self.spare, trajectory);
     }
 
-    /// The best of the tried steps from `plan`, which costs `cost` along `trajectory`; `plan` if none is
+    /// The best of the tried steps from `plan`, which costs `cost` along `trajectory`, and its cost; `plan` if none is
     /// better. `trajectory` is that of the answer.
     pub fn iterate(
         &mut self,
@@ -46,9 +46,9 @@ impl Solver {
         plan: [Surfaces; STEPS],
         cost: f64,
         trajectory: &mut Trajectory,
-    ) -> [Surfaces; STEPS] {
+    ) -> ([Surfaces; STEPS], f64) {
         if self.back(problem, &plan, trajectory).is_none() {
-            return plan;
+            return (plan, cost);
         }
         for part in PARTS {
             let (gains, changes) = (&self.gains, &self.changes);
@@ -58,10 +58,10 @@ impl Solver {
             });
             if found < cost {
                 self.swap(trajectory);
-                return better;
+                return (better, found);
             }
         }
-        plan
+        (plan, cost)
     }
 
     /// Fills gains and changes; `None` if a number is lost.
@@ -83,6 +83,10 @@ impl Solver {
             let mut q_xx: Square = a.tr_mul(&va);
             let mut q_ux: Gain = b.tr_mul(&va);
             let mut q_uu: Matrix2<f64> = b.tr_mul(&vb);
+            if let Some((cost, n)) = problem.load_terms(trajectory, step, &a) {
+                q_x += n * cost.slope;
+                q_xx.ger(cost.curvature, &n, &n, 1.0);
+            }
             // the cost of moving a command from the last one, which is among the states
             let x = trajectory.at(step);
             for (c, (at, unit)) in problem.last_commands(&x).into_iter().enumerate() {

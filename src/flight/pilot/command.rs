@@ -103,6 +103,7 @@ impl Pilot {
             command = programme.excite(command);
         }
         command = self.as_eased(command, seen.time);
+        command = self.inside_envelope(command, seen);
         command = self.upright(command, seen.state.roll);
         command.throttle =
             self.limits.protect(throttle.unwrap_or(command.throttle), seen.state.airspeed);

@@ -13,6 +13,7 @@ mod command;
 mod complaints;
 mod config;
 mod decision;
+mod envelope;
 mod estimate;
 mod failsafe;
 mod limits;
@@ -36,6 +37,7 @@ pub use polarity::Answers;
 use crate::monitor::Monitor;
 use complaints::{Complaints, due};
 use estimate::{Estimate, Frame, RESTART, within};
+use greylag_control::envelope::EnvelopeFilter;
 use greylag_control::{Controller, Observation, Target};
 use greylag_link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
 use greylag_link::vehicle::{Fault, Telemetry, Vehicle};
@@ -107,6 +109,8 @@ pub struct Pilot {
     refused: Option<Fault>,
     /// The model that says what it has not predicted, where there is one.
     monitor: Option<Monitor>,
+    /// What keeps the commands inside the envelope, where there is a model to predict with.
+    envelope: Option<EnvelopeFilter>,
 }
 
 /// What `observe` found, for `decide`.
@@ -171,6 +175,7 @@ impl Pilot {
             upset: false,
             refused: None,
             monitor: None,
+            envelope: None,
         })
     }
 
@@ -306,6 +311,7 @@ impl Pilot {
 
     fn configure(&mut self, config: Config) {
         self.limits = Limits::from(&config);
+        self.envelope.iter_mut().for_each(|filter| filter.keep_to(&config.envelope));
         self.parameters = parameters::table(&config);
         self.config = config;
     }

@@ -1,0 +1,446 @@
+//! Measures how controllers fly on the way to a target: error, overshoot, surface travel, load factor, incidence.
+//!
+//! ```text
+//! cargo run --release --ignore-rust-version --no-default-features --features sitl --example flight_quality -- \
+//!     lqi hybrid-lqi ilqr hybrid-ilqr every=7 steps=200
+//! ```
+//!
+//! JSBSim flies; load factor, angle of attack and sideslip are its own, not the model's. Every controller flies `every`-th target
+//! of `params/targets.csv` from level at the reference airspeed for 10 s, then `steps` steps between seeded random attitudes at the
+//! cruise airspeed, 5 s each, ten in a row. `hybrid-ilqr:KEY=VALUE,…` changes its settings, `NAME+free` flies without the filter.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | `model=FILE` `policy=DIR` | what the controllers are built from |
+//! | `aircraft=NAME` | JSBSim's aircraft |
+//! | `every=N` `steps=N` | how much is flown; 0 leaves it out |
+//! | `turbulence=N` | MIL-spec severity: 3 light, 4 moderate |
+//! | `delay=N` | commands arrive N ticks of 10 ms late |
+//! | `seed=N` | seed of the steps and of the air |
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use greylag::control::envelope::Guarded;
+use greylag::control::ilqr::{Ilqr, Settings, Start};
+use greylag::control::lqi::Lqi;
+use greylag::control::policy::Agent;
+use greylag::control::{Controller, ControllerKind, Observation, Source, Target, build};
+use greylag::model::GreyBox;
+use greylag::num::stream::stream;
+use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
+use greylag_sitl::air::Turbulence;
+use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start as Begin, Truth};
+use rand::RngExt;
+
+const STEP: f64 = 0.01;
+const G: f64 = 9.806;
+/// Ticks of a flight from level, and of a step.
+const FLIGHT: usize = 1000;
+const SHORT: usize = 500;
+/// Steps flown in a row.
+const ROW: usize = 10;
+
+struct Options {
+    model: PathBuf,
+    policy: PathBuf,
+    aircraft: String,
+    every: usize,
+    steps: usize,
+    turbulence: u8,
+    delay: usize,
+    seed: u32,
+    names: Vec<String>,
+}
+
+fn options() -> Result<Options> {
+    let mut o = Options {
+        model: "params/x8/learned/model.toml".into(),
+        policy: "params/x8/learned/policy".into(),
+        aircraft: "x8".into(),
+        every: 7,
+        steps: 0,
+        turbulence: 0,
+        delay: 0,
+        seed: 1,
+        names: Vec::new(),
+    };
+    for word in std::env::args().skip(1) {
+        match word.split_once('=') {
+            Some(("model", x)) => o.model = x.into(),
+            Some(("policy", x)) => o.policy = x.into(),
+            Some(("aircraft", x)) => o.aircraft = x.into(),
+            Some(("every", x)) => o.every = x.parse()?,
+            Some(("steps", x)) => o.steps = x.parse()?,
+            Some(("turbulence", x)) => o.turbulence = x.parse()?,
+            Some(("delay", x)) => o.delay = x.parse()?,
+            Some(("seed", x)) => o.seed = x.parse()?,
+            Some((key, _)) if !key.contains(':') => bail!("there is no {key}"),
+            _ => o.names.push(word),
+        }
+    }
+    Ok(o)
+}
+
+/// What is measured of one flight to one target.
+#[derive(Clone, Copy, Debug, Default)]
+struct Measures {
+    settled: f64,
+    to_one: f64,
+    overshoot: [f64; 2],
+    step: [f64; 2],
+    iae: f64,
+    travel: [f64; 3],
+    load: [f64; 2],
+    alpha: [f64; 2],
+    beta: f64,
+    slowest: f64,
+    lost: bool,
+    rms: f64,
+}
+
+/// An aircraft in JSBSim with commands on their way to it.
+struct World {
+    plant: Plant,
+    start: Begin,
+    late: VecDeque<Command>,
+    delay: usize,
+    previous: [Command; 2],
+    truth: Truth,
+}
+
+impl World {
+    fn new(o: &Options, airframe: &Airframe, airspeed: f64) -> Result<World> {
+        let mut options =
+            PlantOptions { seed: o.seed, aircraft: o.aircraft.clone(), ..Default::default() };
+        let start = Begin { airspeed_mps: airspeed, altitude_m: 600.0, ..Begin::NEUTRAL };
+        options.start = start;
+        for (name, value) in &airframe.conditions {
+            options.held.push((name.clone(), *value));
+        }
+        if o.turbulence > 0 {
+            options.air.turbulence =
+                Some(Turbulence { wind_20ft_mps: 15.0, severity: o.turbulence });
+        }
+        let mut plant = Plant::new(&options)?;
+        let truth = plant.reset(&start)?;
+        Ok(World {
+            plant,
+            start,
+            late: VecDeque::new(),
+            delay: o.delay,
+            previous: [Command::IDLE; 2],
+            truth,
+        })
+    }
+
+    fn reset(&mut self, seed: u32) -> Result<()> {
+        self.plant.reseed(seed);
+        self.truth = self.plant.reset(&self.start)?;
+        self.previous = [Command::IDLE; 2];
+        self.late = std::iter::repeat_n(Command::IDLE, self.delay).collect();
+        Ok(())
+    }
+
+    fn see(&self) -> Observation {
+        let t = &self.truth;
+        Observation {
+            time: Time::from_micros((t.time_s * 1e6).round() as u64),
+            state: State {
+                roll: t.roll_rad,
+                pitch: t.pitch_rad,
+                airspeed: t.airspeed_mps,
+                p: t.p_radps,
+                q: t.q_radps,
+                r: t.r_radps,
+                alpha: t.alpha_rad,
+                beta: t.beta_rad,
+            },
+            actuators: ActuatorState {
+                aileron: t.aileron_rad,
+                aileron_rate: t.aileron_rate_radps,
+                elevator: t.elevator_rad,
+                elevator_rate: t.elevator_rate_radps,
+                throttle: t.throttle,
+                rudder: t.rudder_rad,
+                rudder_rate: t.rudder_rate_radps,
+            },
+            altitude: t.altitude_m,
+            previous: self.previous,
+        }
+    }
+
+    fn step(&mut self, command: Command) -> Result<()> {
+        let command = command.clamped();
+        self.previous = [command, self.previous[0]];
+        self.late.push_back(command);
+        let Some(Command { aileron, elevator, throttle, rudder }) = self.late.pop_front() else {
+            bail!("no command");
+        };
+        self.truth = self.plant.step(Inputs { aileron, elevator, throttle, rudder })?;
+        Ok(())
+    }
+}
+
+/// One controller over what has to be flown.
+struct Flown {
+    group: &'static str,
+    measures: Vec<Measures>,
+}
+
+fn leg(
+    world: &mut World,
+    controller: &mut dyn Controller,
+    target: &Target,
+    ticks: usize,
+    times: &mut Vec<f64>,
+) -> Measures {
+    let mut m =
+        Measures { load: [9.0, -9.0], alpha: [9.0, -9.0], slowest: 1e3, ..Default::default() };
+    let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
+    let error = |t: &Truth| {
+        [
+            wrap((t.roll_rad - target.roll).to_degrees()),
+            wrap((t.pitch_rad - target.pitch).to_degrees()),
+        ]
+    };
+    let first = error(&world.truth);
+    m.step = first.map(f64::abs);
+    let (mut settled, mut away) = ([0.0; 2], 0);
+    let last = ticks / 5;
+    for tick in 0..ticks {
+        let seen = world.see();
+        let begun = Instant::now();
+        let command = controller.command(&seen, target);
+        times.push(begun.elapsed().as_secs_f64() * 1e3);
+        let before = world.previous[0];
+        for (sum, d) in m.travel.iter_mut().zip([
+            command.aileron - before.aileron,
+            command.elevator - before.elevator,
+            command.throttle - before.throttle,
+        ]) {
+            *sum += d.abs();
+        }
+        if world.step(command).is_err() || !world.truth.roll_rad.is_finite() {
+            m.lost = true;
+            break;
+        }
+        let t = &world.truth;
+        let e = error(t);
+        m.iae += (e[0].abs() + e[1].abs()) * STEP;
+        for axis in 0..2 {
+            m.overshoot[axis] = m.overshoot[axis].max(-e[axis] * first[axis].signum());
+        }
+        if e.iter().any(|e| e.abs() > 1.0) {
+            away = tick + 1;
+        }
+        if tick >= ticks - last {
+            settled = [settled[0] + e[0] * e[0], settled[1] + e[1] * e[1]];
+        }
+        let load = -t.specific_force_mps2[2] / G;
+        m.load = [m.load[0].min(load), m.load[1].max(load)];
+        let alpha = t.alpha_rad.to_degrees();
+        m.alpha = [m.alpha[0].min(alpha), m.alpha[1].max(alpha)];
+        m.beta = m.beta.max(t.beta_rad.abs().to_degrees());
+        m.slowest = m.slowest.min(t.airspeed_mps);
+    }
+    m.to_one = away as f64 * STEP;
+    m.settled = 0.5 * ((settled[0] / last as f64).sqrt() + (settled[1] / last as f64).sqrt());
+    m.rms = m.settled;
+    m.lost |= m.settled > 10.0;
+    m
+}
+
+fn fly(
+    o: &Options,
+    airframe: &Airframe,
+    controller: &mut dyn Controller,
+) -> Result<(Vec<Flown>, Vec<f64>)> {
+    let mut times = Vec::new();
+    let mut all: Vec<Flown> = Vec::new();
+    if o.every > 0 {
+        let start = airframe.reference.airspeed;
+        let mut world = World::new(o, airframe, start)?;
+        let mut reader = csv::Reader::from_path("params/targets.csv")?;
+        for (number, row) in reader.records().enumerate() {
+            let row = row?;
+            let group = match &row[0] {
+                "easy" => "easy",
+                "hard_corners" => "corners",
+                _ => "outside",
+            };
+            if number % o.every != 0 {
+                continue;
+            }
+            let e = &airframe.envelope;
+            let [roll, pitch]: [f64; 2] = [row[1].parse()?, row[2].parse()?];
+            if roll.abs() > e.bank_max_deg || !(e.pitch_min_deg..=e.pitch_max_deg).contains(&pitch)
+            {
+                continue;
+            }
+            let target =
+                Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: start };
+            world.reset(o.seed + number as u32)?;
+            controller.reset(number as u64);
+            let m = leg(&mut world, controller, &target, FLIGHT, &mut times);
+            match all.iter_mut().find(|f| f.group == group) {
+                Some(f) => f.measures.push(m),
+                None => all.push(Flown { group, measures: vec![m] }),
+            }
+        }
+    }
+    if o.steps > 0 {
+        let e = airframe.envelope;
+        let cruise = e.airspeed_cruise_mps;
+        let mut world = World::new(o, airframe, cruise)?;
+        let mut flown = Flown { group: "steps", measures: Vec::new() };
+        let mut rng = stream(o.seed.into(), &[1951]);
+        for number in 0..o.steps {
+            if number % ROW == 0 {
+                world.reset(o.seed + number as u32)?;
+                controller.reset(number as u64);
+            }
+            let roll = rng.random_range(-e.bank_max_deg..e.bank_max_deg);
+            let pitch = rng.random_range(e.pitch_min_deg..e.pitch_max_deg);
+            let target =
+                Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: cruise };
+            flown.measures.push(leg(&mut world, controller, &target, SHORT, &mut times));
+        }
+        all.push(flown);
+    }
+    Ok((all, times))
+}
+
+fn quantile(mut xs: Vec<f64>, q: f64) -> f64 {
+    if xs.is_empty() {
+        return f64::NAN;
+    }
+    xs.sort_by(f64::total_cmp);
+    xs[((xs.len() - 1) as f64 * q).round() as usize]
+}
+
+fn print(name: &str, airframe: &Airframe, all: &[Flown], times: &[f64]) {
+    let most = airframe.envelope.load_factor_max;
+    let ms = [0.5, 0.99, 0.999].map(|q| quantile(times.to_vec(), q));
+    for Flown { group, measures } in all {
+        let of =
+            |f: &dyn Fn(&Measures) -> f64, q: f64| quantile(measures.iter().map(f).collect(), q);
+        let over = |axis: usize| of(&|m| m.overshoot[axis], 0.95);
+        let fits = |m: &Measures| (0..2).all(|a| m.overshoot[a] <= (0.03 * m.step[a]).max(1.0));
+        let fit = measures.iter().filter(|m| fits(m)).count() as f64 / measures.len() as f64;
+        let beyond = measures
+            .iter()
+            .filter(|m| m.load[1] > 1.05 * most || m.load[0] < -0.4 * 1.05 * most)
+            .count();
+        println!(
+            "{name:<34} {group:<8} {:>4} {:>7.3} {:>7.3} {:>5.2} {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>4.0}% {:>6.2} {:>6.2} {:>5.2} {:>6.2} {:>6.2} {:>6} {:>6.1} {:>6.1} {:>5.1} {:>5.1} {:>5} {:>6.3} {:>6.3}",
+            measures.len(),
+            of(&|m| m.settled, 0.5),
+            of(&|m| m.settled, 1.0),
+            of(&|m| m.to_one, 0.5),
+            of(&|m| m.iae, 0.5),
+            measures.iter().map(|m| m.iae).sum::<f64>() / measures.len() as f64,
+            over(0),
+            over(1),
+            100.0 * fit,
+            of(&|m| m.travel[0], 0.5),
+            of(&|m| m.travel[1], 0.5),
+            of(&|m| m.travel[2], 0.5),
+            of(&|m| m.load[0], 0.0),
+            of(&|m| m.load[1], 1.0),
+            beyond,
+            of(&|m| m.alpha[0], 0.0),
+            of(&|m| m.alpha[1], 1.0),
+            of(&|m| m.beta, 1.0),
+            of(&|m| m.slowest, 0.0),
+            measures.iter().filter(|m| m.lost).count(),
+            ms[0],
+            ms[2],
+        );
+    }
+}
+
+fn main() -> Result<()> {
+    let o = options()?;
+    let model = GreyBox::load(&o.model)?;
+    let agent = Agent::load(&o.policy, &model.airframe).ok();
+    println!(
+        "{:<34} {:<8} {:>4} {:>7} {:>7} {:>5} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6}",
+        "controller",
+        "group",
+        "n",
+        "settled",
+        "worst",
+        "to1",
+        "IAE",
+        "mean",
+        "ovR95",
+        "ovP95",
+        "fit",
+        "ail",
+        "elev",
+        "thr",
+        "nmin",
+        "nmax",
+        "beyond",
+        "amin",
+        "amax",
+        "bmax",
+        "Vmin",
+        "lost",
+        "ms50",
+        "ms99.9"
+    );
+    for name in &o.names {
+        let mut controller = entrant(name, &model, agent.as_ref())?;
+        let (all, times) = fly(&o, &model.airframe, controller.as_mut())?;
+        print(name, &model.airframe, &all, &times);
+    }
+    Ok(())
+}
+
+/// The controller of a word: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings; `+free` leaves the envelope filter out.
+fn entrant(word: &str, model: &GreyBox, agent: Option<&Agent>) -> Result<Box<dyn Controller>> {
+    let (word, free) = word.strip_suffix("+free").map_or((word, false), |word| (word, true));
+    let bare = match word.split_once(':') {
+        Some((_, changes)) => {
+            let settings = settings(changes)?;
+            let lqi = Lqi::new(model)?;
+            Box::new(Ilqr::with("hybrid-ilqr", model, lqi, agent, settings)) as Box<dyn Controller>
+        }
+        None => {
+            let kind: ControllerKind =
+                word.parse().with_context(|| format!("controller {word}"))?;
+            build(kind, Source { model, agent, changes: &[] })?
+        }
+    };
+    Ok(if free { bare } else { Box::new(Guarded::new(bare, model)) })
+}
+
+/// The settings of `hybrid-ilqr` with `changes`, KEY=VALUE with commas between.
+fn settings(changes: &str) -> Result<Settings> {
+    let mut s = Settings::HYBRID;
+    for change in changes.split(',') {
+        let (key, value) = change.split_once('=').context("a change is KEY=VALUE")?;
+        let number = || value.parse::<f64>().with_context(|| format!("{value} is no number"));
+        match (key, s.envelope.as_mut()) {
+            ("far", _) => s.far = if value == "none" { None } else { Some(number()?) },
+            ("attitude", _) => s.attitude = number()?,
+            ("rate", _) => s.rate = number()?,
+            ("sideslip", _) => s.sideslip = number()?,
+            ("moves", _) => s.moves = number()?,
+            ("last", _) => s.last = number()?,
+            ("iterations", _) => s.iterations = value.parse()?,
+            ("start", _) => s.start = if value == "policy" { Start::Policy } else { Start::Own },
+            ("envelope", _) => s.envelope = None,
+            ("part", Some(e)) => e.part = number()?,
+            ("load", Some(e)) => e.load = number()?,
+            ("alpha", Some(e)) => e.alpha = number()?,
+            ("slip", Some(e)) => e.sideslip = number()?,
+            _ => bail!("there is no setting {key}"),
+        }
+    }
+    Ok(s)
+}

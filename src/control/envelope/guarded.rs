@@ -1,0 +1,49 @@
+//! A controller behind the envelope filter, as it flies in the pilot.
+
+use crate::envelope::EnvelopeFilter;
+use crate::insight::Insight;
+use crate::{Controller, Observation, Target};
+use greylag_model::GreyBox;
+use greylag_physics::Command;
+
+/// A controller whose commands pass the filter.
+pub struct Guarded {
+    controller: Box<dyn Controller>,
+    filter: EnvelopeFilter,
+}
+
+impl Guarded {
+    /// `controller` behind the envelope of the aircraft that `model` describes.
+    pub fn new(controller: Box<dyn Controller>, model: &GreyBox) -> Guarded {
+        Guarded { controller, filter: EnvelopeFilter::new(model) }
+    }
+}
+
+impl Controller for Guarded {
+    fn name(&self) -> &'static str {
+        self.controller.name()
+    }
+
+    fn reset(&mut self, seed: u64) {
+        self.controller.reset(seed);
+        self.filter.reset();
+    }
+
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        let wanted = self.controller.command(seen, target);
+        self.filter.filter(seen, wanted).command
+    }
+
+    fn prepare(&mut self) {
+        self.controller.prepare();
+    }
+
+    fn insight(&self, seen: &Observation) -> Option<Insight> {
+        self.controller.insight(seen)
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        let controller = self.controller.boxed_clone();
+        Box::new(Guarded { controller, filter: self.filter.clone() })
+    }
+}
