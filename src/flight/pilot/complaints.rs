@@ -19,6 +19,7 @@ pub(super) struct Complaints {
     pub(super) plan: Option<Time>,
     pub(super) fallback: Option<Time>,
     pub(super) limits: Option<Time>,
+    pub(super) envelope: Option<Time>,
 }
 
 impl Pilot {
