@@ -31,6 +31,8 @@ const WRAP_MS_S: f64 = 4_294_967.296;
 
 /// How far back the time of a vehicle goes that has started again, s.
 const BACK_S: f64 = 5.0;
+/// Attitudes from which a system beside the one that sends most is a vehicle of its own.
+const VEHICLE: usize = 50;
 /// Messages in a row that show it; one alone may be late or wrong.
 const BACK_FOR: usize = 5;
 
@@ -176,10 +178,16 @@ impl Reader {
 
     /// The lives of the systems that send an attitude: the system with its records.
     fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
-        let attitudes = self.entries.keys().filter(|(name, _)| name.starts_with("ATTITUDE"));
-        let mut systems: Vec<u8> = attitudes.map(|(_, source)| source.to_be_bytes()[0]).collect();
-        systems.sort_unstable();
-        systems.dedup();
+        let mut attitudes: BTreeMap<u8, usize> = BTreeMap::new();
+        for ((_, source), (entries, _)) in
+            self.entries.iter().filter(|((name, _), _)| name.starts_with("ATTITUDE"))
+        {
+            *attitudes.entry(source.to_be_bytes()[0]).or_default() += entries.len();
+        }
+        let most = attitudes.iter().max_by_key(|(_, count)| **count).map(|(system, _)| *system);
+        let is_one = |system: u8, count: usize| count >= VEHICLE || Some(system) == most;
+        let vehicles = attitudes.into_iter().filter(|(system, count)| is_one(*system, *count));
+        let systems: Vec<u8> = vehicles.map(|(system, _)| system).collect();
         let of = |system: u8| {
             let mut bounds = vec![0];
             bounds.extend(clocks.get(&system).map(|c| starts(c)).unwrap_or_default());
@@ -198,7 +206,16 @@ impl Reader {
         clocks: &BTreeMap<u8, Vec<Tick>>,
     ) -> Topics {
         let whole = at == (0..usize::MAX);
-        let mut out = Topics { system, ..self.out.clone() };
+        let own = |source: u16| system.is_none_or(|s| source.to_be_bytes()[0] == s);
+        let counts = self.out.counts.iter().filter(|((_, source), _)| *source == 0 || own(*source));
+        let mut out = Topics {
+            system,
+            counts: counts.map(|(key, count)| (key.clone(), *count)).collect(),
+            parameters: self.out.parameters.clone(),
+            findings: self.out.findings.clone(),
+            naming: self.out.naming,
+            ..Topics::default()
+        };
         out.life = system.filter(|_| self.lives(clocks).len() > 1).map(|system| match whole {
             true => format!("system {system}"),
             false => format!("system {system} from record {}", at.start.max(1)),
