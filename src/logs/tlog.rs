@@ -168,12 +168,22 @@ impl Reader {
         }
         let lives = self.lives(&clocks);
         match &lives[..] {
-            [] => vec![self.life(None, 0..usize::MAX, &clocks)],
-            [(system, _)] => vec![self.life(Some(*system), 0..usize::MAX, &clocks)],
-            several => {
-                several.iter().map(|(s, at)| self.life(Some(*s), at.clone(), &clocks)).collect()
-            }
+            [] => vec![self.only_life(None, clocks)],
+            [(system, _)] => vec![self.only_life(Some(*system), clocks)],
+            several => several.iter().map(|(s, at)| self.life(*s, at.clone(), &clocks)).collect(),
         }
+    }
+
+    /// All records as the life of the only vehicle; nothing is copied.
+    fn only_life(mut self, system: Option<u8>, mut clocks: BTreeMap<u8, Vec<Tick>>) -> Topics {
+        let mut out = Topics { system, ..std::mem::take(&mut self.out) };
+        clocks.values_mut().for_each(|clock| clock.sort_by(|a, b| a.host_s.total_cmp(&b.host_s)));
+        for ((name, source), (entries, mut topic)) in self.entries {
+            let clock = clocks.get(&source.to_be_bytes()[0]).map_or(&[][..], Vec::as_slice);
+            topic.time_s = entries.iter().map(|entry| time(entry, clock)).collect();
+            out.topics.insert((name.to_owned(), source), topic);
+        }
+        out
     }
 
     /// The lives of the systems that send an attitude: the system with its records.
@@ -198,25 +208,20 @@ impl Reader {
         systems.into_iter().flat_map(of).collect()
     }
 
-    /// What the records `at` say of `system`; its vehicle and its life are named where the file holds several.
-    fn life(
-        &self,
-        system: Option<u8>,
-        at: Range<usize>,
-        clocks: &BTreeMap<u8, Vec<Tick>>,
-    ) -> Topics {
+    /// What the records `at` say of `system`, one of several lives in the file.
+    fn life(&self, system: u8, at: Range<usize>, clocks: &BTreeMap<u8, Vec<Tick>>) -> Topics {
         let whole = at == (0..usize::MAX);
-        let own = |source: u16| system.is_none_or(|s| source.to_be_bytes()[0] == s);
+        let own = |source: u16| source.to_be_bytes()[0] == system;
         let counts = self.out.counts.iter().filter(|((_, source), _)| *source == 0 || own(*source));
         let mut out = Topics {
-            system,
+            system: Some(system),
             counts: counts.map(|(key, count)| (key.clone(), *count)).collect(),
             parameters: self.out.parameters.clone(),
             findings: self.out.findings.clone(),
             naming: self.out.naming,
             ..Topics::default()
         };
-        out.life = system.filter(|_| self.lives(clocks).len() > 1).map(|system| match whole {
+        out.life = Some(match whole {
             true => format!("system {system}"),
             false => format!("system {system} from record {}", at.start.max(1)),
         });
