@@ -31,6 +31,8 @@ const WRAP_MS_S: f64 = 4_294_967.296;
 
 /// How far back the time of a vehicle goes that has started again, s.
 const BACK_S: f64 = 5.0;
+/// Attitudes from which a system beside the one that sends most is a vehicle of its own.
+const VEHICLE: usize = 50;
 /// Messages in a row that show it; one alone may be late or wrong.
 const BACK_FOR: usize = 5;
 
@@ -166,20 +168,36 @@ impl Reader {
         }
         let lives = self.lives(&clocks);
         match &lives[..] {
-            [] => vec![self.life(None, 0..usize::MAX, &clocks)],
-            [(system, _)] => vec![self.life(Some(*system), 0..usize::MAX, &clocks)],
-            several => {
-                several.iter().map(|(s, at)| self.life(Some(*s), at.clone(), &clocks)).collect()
-            }
+            [] => vec![self.only_life(None, clocks)],
+            [(system, _)] => vec![self.only_life(Some(*system), clocks)],
+            several => several.iter().map(|(s, at)| self.life(*s, at.clone(), &clocks)).collect(),
         }
+    }
+
+    /// All records as the life of the only vehicle; nothing is copied.
+    fn only_life(mut self, system: Option<u8>, mut clocks: BTreeMap<u8, Vec<Tick>>) -> Topics {
+        let mut out = Topics { system, ..std::mem::take(&mut self.out) };
+        clocks.values_mut().for_each(|clock| clock.sort_by(|a, b| a.host_s.total_cmp(&b.host_s)));
+        for ((name, source), (entries, mut topic)) in self.entries {
+            let clock = clocks.get(&source.to_be_bytes()[0]).map_or(&[][..], Vec::as_slice);
+            topic.time_s = entries.iter().map(|entry| time(entry, clock)).collect();
+            out.topics.insert((name.to_owned(), source), topic);
+        }
+        out
     }
 
     /// The lives of the systems that send an attitude: the system with its records.
     fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
-        let attitudes = self.entries.keys().filter(|(name, _)| name.starts_with("ATTITUDE"));
-        let mut systems: Vec<u8> = attitudes.map(|(_, source)| source.to_be_bytes()[0]).collect();
-        systems.sort_unstable();
-        systems.dedup();
+        let mut attitudes: BTreeMap<u8, usize> = BTreeMap::new();
+        for ((_, source), (entries, _)) in
+            self.entries.iter().filter(|((name, _), _)| name.starts_with("ATTITUDE"))
+        {
+            *attitudes.entry(source.to_be_bytes()[0]).or_default() += entries.len();
+        }
+        let most = attitudes.iter().max_by_key(|(_, count)| **count).map(|(system, _)| *system);
+        let is_one = |system: u8, count: usize| count >= VEHICLE || Some(system) == most;
+        let vehicles = attitudes.into_iter().filter(|(system, count)| is_one(*system, *count));
+        let systems: Vec<u8> = vehicles.map(|(system, _)| system).collect();
         let of = |system: u8| {
             let mut bounds = vec![0];
             bounds.extend(clocks.get(&system).map(|c| starts(c)).unwrap_or_default());
@@ -190,16 +208,20 @@ impl Reader {
         systems.into_iter().flat_map(of).collect()
     }
 
-    /// What the records `at` say of `system`; its vehicle and its life are named where the file holds several.
-    fn life(
-        &self,
-        system: Option<u8>,
-        at: Range<usize>,
-        clocks: &BTreeMap<u8, Vec<Tick>>,
-    ) -> Topics {
+    /// What the records `at` say of `system`, one of several lives in the file.
+    fn life(&self, system: u8, at: Range<usize>, clocks: &BTreeMap<u8, Vec<Tick>>) -> Topics {
         let whole = at == (0..usize::MAX);
-        let mut out = Topics { system, ..self.out.clone() };
-        out.life = system.filter(|_| self.lives(clocks).len() > 1).map(|system| match whole {
+        let own = |source: u16| source.to_be_bytes()[0] == system;
+        let counts = self.out.counts.iter().filter(|((_, source), _)| *source == 0 || own(*source));
+        let mut out = Topics {
+            system: Some(system),
+            counts: counts.map(|(key, count)| (key.clone(), *count)).collect(),
+            parameters: self.out.parameters.clone(),
+            findings: self.out.findings.clone(),
+            naming: self.out.naming,
+            ..Topics::default()
+        };
+        out.life = Some(match whole {
             true => format!("system {system}"),
             false => format!("system {system} from record {}", at.start.max(1)),
         });

@@ -86,7 +86,7 @@ pub(super) fn read<'a>(
     wanted: &dyn Fn(&str, &str) -> bool,
 ) -> (Topics, Window<'a>) {
     let mut window = Window::new(source);
-    let mut reader = Reader::default();
+    let mut reader = Reader { in_step: true, ..Reader::default() };
     let header = window.view(HEADER);
     if !header.starts_with(&ULOG_MAGIC) || header.len() < HEADER {
         reader.out.findings.push(Finding::warning("the file ends within its header"));
@@ -130,8 +130,8 @@ fn header(view: &[u8]) -> Option<(usize, u8)> {
 impl Reader {
     /// What stands at the beginning of `view`.
     ///
-    /// A record that is followed by another one, or that has the size of its topic, is believed. Where the file is
-    /// damaged, several in a row must fit.
+    /// A record that several others follow is believed. Where the file is damaged, it must have the size of its topic
+    /// as well.
     fn place(&self, view: &[u8]) -> Place {
         let Some((len, kind)) = header(view) else { return Place::Damage };
         let exact = kind == b'D' && self.fits(view, len);
@@ -140,7 +140,8 @@ impl Reader {
             return if believed { Place::Cut } else { Place::Damage };
         }
         let fits = match self.in_step {
-            true => exact || self.is_in_step(&view[len..], Undeclared::Allowed),
+            // Its own size is not enough: the damage may have begun within it.
+            true => self.is_in_step(&view[len..], Undeclared::Allowed),
             false => self.is_in_step(view, Undeclared::Refused),
         };
         if fits { Place::Record(len) } else { Place::Damage }
@@ -155,6 +156,10 @@ impl Reader {
                 known.is_some_and(|n| self.subscriptions.contains_key(&u16::from_le_bytes(*n)));
             let excused = undeclared == Undeclared::Allowed && !known;
             if kind == b'D' && !excused && !self.fits(view, len) {
+                return false;
+            }
+            // Numbers hold the letters of the other kinds, so that those show no place to go on at.
+            if kind != b'D' && undeclared == Undeclared::Refused {
                 return false;
             }
             // What the window or the file cuts off is judged by its beginning.
