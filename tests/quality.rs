@@ -108,10 +108,9 @@ fn steps_are_scored_from_one_attitude_to_the_other() {
     for (course, flight) in courses.iter().zip(&evaluation.flights) {
         let (first, last) = (course.first.unwrap().target, course.leg.target);
         let wanted = [last.roll - first.roll, last.pitch - first.pitch].map(f64::to_degrees);
-        for axis in 0..2 {
+        for (step, wanted) in flight.quality.step_deg.iter().zip(wanted) {
             // the LQI has settled within a degree when the step comes
-            let step = flight.quality.step_deg[axis];
-            assert!((step - wanted[axis]).abs() < 1.0, "{step} {}", wanted[axis]);
+            assert!((step - wanted).abs() < 1.0, "{step} {wanted}");
         }
         assert!(flight.quality.airspeed_mps[0] > 13.0 && flight.settled_deg < 0.5, "{flight:?}");
     }

@@ -57,12 +57,12 @@ fn the_leading_sentence_is_first_and_leads_to_its_channel() {
     };
     assert_eq!(answer.answer.error, comparison.answer.error);
     assert!(answer.answer.error.contains("falls from"), "{}", answer.answer.error);
-    let all = page.sections.iter().flat_map(|s| &s.figures);
-    let found = all.filter_map(|f| match f {
+    let mut all = page.sections.iter().flat_map(|s| &s.figures).rev();
+    let found = all.find_map(|f| match f {
         Figure::Findings(found) => Some(found),
         _ => None,
     });
-    let found = found.last().unwrap();
+    let found = found.unwrap();
     assert_eq!(found.lead[0].sentence, comparison.sentences[0]);
     let link = found.lead[1].link.as_ref().expect("the sentence on lift has a figure");
     assert_eq!(link.option, "L lift");

@@ -116,7 +116,7 @@ impl Scene {
             self.client.catch_up();
             let fresh = &self.client.log[seen..];
             let attitudes = fresh.iter().filter(|m| matches!(m, MavMessage::ATTITUDE(_))).count();
-            if attitudes > 3 && fresh.iter().filter(|m| turned(*m)).count() == attitudes {
+            if attitudes > 3 && fresh.iter().filter(|m| turned(m)).count() == attitudes {
                 break;
             }
             assert!(

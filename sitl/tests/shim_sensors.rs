@@ -72,6 +72,7 @@ fn a_bias_moves_its_channel_and_no_other() {
         alpha_rad: 0.02,
         beta_rad: -0.03,
         airspeed_scale: 1.1,
+        ..Bias::default()
     };
     let (with, without) = (held(|o| o.bias = bias, 3)[2], held(|_| (), 3)[2]);
     let moved = |shown: f32, was: f32, by: f64| {

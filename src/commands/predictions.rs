@@ -103,10 +103,10 @@ fn write_row(text: &mut String, row: &Row, all: &[Row], horizons_s: &[f64]) {
     let horizon = horizons_s[row.horizon];
     // to a String nothing can fail
     let _ = write!(text, "{},{},{},{horizon}", row.model, row.flight, row.start_s);
-    for k in 0..8 {
-        let (x, half) = (row.predicted[k], NORMAL_95 * (squares[k] / count).sqrt());
-        let bound = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
-        let _ = write!(text, ",{x},{},{},{}", row.measured[k], bound(x - half), bound(x + half));
+    let bound = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
+    for ((x, measured), square) in row.predicted.iter().zip(&row.measured).zip(squares) {
+        let half = NORMAL_95 * (square / count).sqrt();
+        let _ = write!(text, ",{x},{measured},{},{}", bound(x - half), bound(x + half));
     }
     text.push('\n');
 }

@@ -250,7 +250,7 @@ impl Twin {
     pub fn specific_force(&self, model: &GreyBox) -> Vector<f64> {
         let air = model.air(&self.state, self.altitude);
         let measured = self.actuators.controls();
-        let mut inputs = self.inputs.clone().unwrap_or_else(|| model.at_rest(&measured));
+        let mut inputs = self.inputs.unwrap_or_else(|| model.at_rest(&measured));
         let controls = model.act(&measured, &mut inputs);
         let wrench = model.wrench(&self.state, &controls, &air);
         let mut force = rigid_body::body_force(&wrench, &air, model.axes)
