@@ -278,7 +278,7 @@ impl Moment<'_> {
             let load = self.load(alpha, elevator);
             slope = (self.load(alpha + SLOPE_STEP, elevator) - load) / SLOPE_STEP;
             // beyond the stall more incidence is no more lift
-            if !(slope > 0.0) {
+            if slope <= 0.0 || slope.is_nan() {
                 return stall;
             }
             let next = alpha + (bounds.load[side] - load) / slope;
