@@ -7,7 +7,7 @@
 //!
 //! JSBSim flies; load factor, angle of attack and sideslip are its own, not the model's. Every controller flies `every`-th target
 //! of `params/targets.csv` from level at the reference airspeed for 10 s, then `steps` steps between seeded random attitudes at the
-//! cruise airspeed, 5 s each, ten in a row. `hybrid-ilqr:KEY=VALUE,…` changes its settings, `NAME+free` flies without the filter.
+//! cruise airspeed, 5 s each, ten in a row. `hybrid-ilqr:KEY=VALUE,…` changes its settings, `NAME+free` flies without the limiter.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -401,7 +401,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The controller of a word: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings; `+free` leaves the envelope filter out.
+/// The controller of a word: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings; `+free` leaves the envelope limiter out.
 fn entrant(word: &str, model: &GreyBox, agent: Option<&Agent>) -> Result<Box<dyn Controller>> {
     let (word, free) = word.strip_suffix("+free").map_or((word, false), |word| (word, true));
     let bare = match word.split_once(':') {

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
+use clap::ValueEnum;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::plant_arguments::PlantArgs;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,6 +19,7 @@ use crate::commands::files::{self, shipped};
 use crate::commands::start::{self, StartArguments};
 use crate::commands::{bar, choices, controllers, fly};
 use crate::control::cem::Change;
+use crate::control::envelope::Guarded;
 use crate::control::quality::Limits;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
 use crate::model::GreyBox;
@@ -81,6 +83,9 @@ pub struct Arguments {
     /// what is not known of the aircraft. The controllers keep the --model that they are built from.
     #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: Option<u32>,
+    /// Whether the controllers fly behind the envelope limiter, as in `fly` and `demo`, or bare, as in the paper.
+    #[arg(long, value_name = "WHAT", default_value = "free", value_enum)]
+    envelope: EnvelopeName,
     /// Seed of the controllers' own randomness, with the air's and the draws'.
     #[arg(long, default_value_t = 1)]
     seed: u32,
@@ -98,6 +103,13 @@ pub struct Arguments {
     /// Replace the JSON file and the page if they exist.
     #[arg(long)]
     force: bool,
+}
+
+/// What lies between a controller and the surfaces: the envelope limiter, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum EnvelopeName {
+    Kept,
+    Free,
 }
 
 /// The JSON document.
@@ -244,7 +256,10 @@ fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
         for (model, mut name, folder) in sources {
             let agent = controllers::policy(*kind, model, folder)?;
             let changes = &arguments.changes;
-            let controller = build(*kind, Source { model, agent: agent.as_ref(), changes })?;
+            let mut controller = build(*kind, Source { model, agent: agent.as_ref(), changes })?;
+            if arguments.envelope == EnvelopeName::Kept {
+                controller = Box::new(Guarded::new(controller, model));
+            }
             if agent.is_some() {
                 let separator = if name.is_empty() { "" } else { ", " };
                 name += &format!("{separator}{}", folder.display());

@@ -1,9 +1,9 @@
-//! The limits of the envelope as predictions are held against them.
+//! The limits of the envelope that plans and commands are held to.
 
 use greylag_physics::Airframe;
 use greylag_physics::airframe::{Envelope, Incidence};
 
-/// Attitude beyond its largest command that a transient may have, rad: 3 % of a step from −60° to 60°.
+/// Bank beyond its largest command that a transient may have, rad: 3 % of a step from −60° to 60°.
 const OVERSHOOT: f64 = 0.0628;
 
 /// Limits in SI units: least and most.
@@ -17,10 +17,6 @@ pub struct Bounds {
     pub sideslip: f64,
     /// Bank to either side, rad.
     pub bank: f64,
-    /// Pitch, rad.
-    pub pitch: [f64; 2],
-    /// Largest change of a surface command in a second, in units of the command.
-    pub slew: f64,
 }
 
 impl Bounds {
@@ -37,11 +33,6 @@ impl Bounds {
             alpha: [-most, most],
             sideslip: envelope.sideslip_most_deg().to_radians(),
             bank: envelope.bank_max_deg.to_radians() + OVERSHOOT,
-            pitch: [
-                envelope.pitch_min_deg.to_radians() - OVERSHOOT,
-                envelope.pitch_max_deg.to_radians() + OVERSHOOT,
-            ],
-            slew: envelope.surface_slew_per_s,
         }
     }
 

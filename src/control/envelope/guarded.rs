@@ -1,21 +1,21 @@
-//! A controller behind the envelope filter, as it flies in the pilot.
+//! A controller behind the envelope limiter, as it flies in the pilot.
 
-use crate::envelope::EnvelopeFilter;
+use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;
 use crate::{Controller, Observation, Target};
 use greylag_model::GreyBox;
 use greylag_physics::Command;
 
-/// A controller whose commands pass the filter.
+/// A controller whose commands pass the limiter.
 pub struct Guarded {
     controller: Box<dyn Controller>,
-    filter: EnvelopeFilter,
+    limiter: EnvelopeLimiter,
 }
 
 impl Guarded {
     /// `controller` behind the envelope of the aircraft that `model` describes.
     pub fn new(controller: Box<dyn Controller>, model: &GreyBox) -> Guarded {
-        Guarded { controller, filter: EnvelopeFilter::new(model) }
+        Guarded { controller, limiter: EnvelopeLimiter::new(model) }
     }
 }
 
@@ -26,12 +26,12 @@ impl Controller for Guarded {
 
     fn reset(&mut self, seed: u64) {
         self.controller.reset(seed);
-        self.filter.reset();
+        self.limiter.reset();
     }
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
         let wanted = self.controller.command(seen, target);
-        self.filter.filter(seen, wanted).command
+        self.limiter.limit(seen, wanted).command
     }
 
     fn prepare(&mut self) {
@@ -44,6 +44,6 @@ impl Controller for Guarded {
 
     fn boxed_clone(&self) -> Box<dyn Controller> {
         let controller = self.controller.boxed_clone();
-        Box::new(Guarded { controller, filter: self.filter.clone() })
+        Box::new(Guarded { controller, limiter: self.limiter.clone() })
     }
 }

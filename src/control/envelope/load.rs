@@ -19,6 +19,16 @@ pub fn load_factor(s: &State, next: &State) -> f64 {
     (gravity + u * s.q - v * s.p - (down(next) - down(s)) / STEP) / G0
 }
 
+/// The load factor along the body's z axis, positive upward, at `s` with the state's `rate`, per second.
+pub fn load_factor_under(s: &State, rate: &State) -> f64 {
+    let ((sin_a, cos_a), (sin_b, cos_b)) = (s.alpha.sin_cos(), s.beta.sin_cos());
+    let v = s.airspeed;
+    let down = rate.airspeed * sin_a * cos_b + v * rate.alpha * cos_a * cos_b
+        - v * rate.beta * sin_a * sin_b;
+    let gravity = G0 * s.pitch.cos() * s.roll.cos();
+    (gravity + v * cos_a * cos_b * s.q - v * sin_b * s.p - down) / G0
+}
+
 /// Derivatives of [`load_factor`]: by `s` at a fixed `next`, and by `next`.
 pub fn load_factor_slopes(s: &State, next: &State) -> [[f64; 8]; 2] {
     let ((sin_a, cos_a), (sin_b, cos_b)) = (s.alpha.sin_cos(), s.beta.sin_cos());

@@ -1,11 +1,11 @@
-//! The envelope, kept behind every controller: predicted load factor, incidence, sideslip and attitude.
+//! The envelope, kept behind every controller: load factor, incidence and bank.
 
 mod bounds;
-mod filter;
 mod guarded;
+mod limiter;
 mod load;
 
 pub use bounds::Bounds;
-pub use filter::{EnvelopeFilter, Filtered, Limit};
 pub use guarded::Guarded;
-pub use load::{G0, load_factor, load_factor_slopes};
+pub use limiter::{EnvelopeLimiter, Limit, Limited};
+pub use load::{G0, load_factor, load_factor_slopes, load_factor_under};

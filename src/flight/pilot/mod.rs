@@ -37,7 +37,7 @@ pub use polarity::Answers;
 use crate::monitor::Monitor;
 use complaints::{Complaints, due};
 use estimate::{Estimate, Frame, RESTART, within};
-use greylag_control::envelope::EnvelopeFilter;
+use greylag_control::envelope::EnvelopeLimiter;
 use greylag_control::{Controller, Observation, Target};
 use greylag_link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
 use greylag_link::vehicle::{Fault, Telemetry, Vehicle};
@@ -110,7 +110,7 @@ pub struct Pilot {
     /// The model that says what it has not predicted, where there is one.
     monitor: Option<Monitor>,
     /// What keeps the commands inside the envelope, where there is a model to predict with.
-    envelope: Option<EnvelopeFilter>,
+    envelope: Option<EnvelopeLimiter>,
 }
 
 /// What `observe` found, for `decide`.
@@ -311,7 +311,7 @@ impl Pilot {
 
     fn configure(&mut self, config: Config) {
         self.limits = Limits::from(&config);
-        self.envelope.iter_mut().for_each(|filter| filter.keep_to(&config.envelope));
+        self.envelope.iter_mut().for_each(|limiter| limiter.keep_to(&config.envelope));
         self.parameters = parameters::table(&config);
         self.config = config;
     }

@@ -1,0 +1,304 @@
+//! The limiter between a controller and the surfaces: the elevator keeps load factor and incidence, the aileron keeps bank.
+//!
+//! Each limit becomes a law for the surface, and the command is clamped between the laws of both sides (min/max selection, as in
+//! fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6). The law is that of an
+//! exponential control barrier function (Nguyen and Sreenath, ACC 2016): where x is limited to x_lim and ẍ follows the surface,
+//!
+//! ```text
+//! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
+//! ```
+//!
+//! brings x to its limit without overshoot. A controller that stays below is not touched. Accelerations and surface effects are
+//! the model's at the state predicted for the moment at which a command acts, so rolling, speed and gravity are in them.
+
+use crate::Observation;
+use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
+use crate::envelope::{Bounds, load_factor_under};
+use greylag_model::{GreyBox, STEP};
+use greylag_physics::actuators::Actuators;
+use greylag_physics::airframe::Envelope;
+use greylag_physics::servos::Travel;
+use greylag_physics::{Command, Controls, State};
+
+/// Part of the load factor and of the incidence that is aimed at: the rest is for what the model does not know.
+const PART: f64 = 0.96;
+/// ω of load factor and incidence, rad/s.
+const PITCH_POLE: f64 = 10.0;
+/// ω of bank, rad/s.
+const BANK_POLE: f64 = 10.0;
+/// Steps after which a command acts: until the next tick, then the lag of a surface's actuator.
+const AHEAD: usize = 3;
+/// Deflection that shows what a surface does, in parts of its travel.
+const PROBE: f64 = 0.1;
+/// Time along which the model's rates are differentiated, s.
+const SPAN_S: f64 = 1e-3;
+/// Change of the angle of attack that shows the slope of the load factor, rad.
+const SLOPE_STEP: f64 = 0.01;
+/// Newton steps from the present angle of attack to that of a load factor.
+const NEWTON: usize = 2;
+
+/// What limited a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Load factor.
+    Load,
+    /// Angle of attack.
+    Incidence,
+    /// Bank.
+    Bank,
+    /// Nothing: the model has not predicted what happened, so nothing is limited by it.
+    Distrust,
+}
+
+/// What the limiter made of a command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limited {
+    /// The command to be flown.
+    pub command: Command,
+    /// What has limited it.
+    pub by: Option<Limit>,
+}
+
+/// The limiter of one aircraft. It takes no memory after it is built.
+#[derive(Clone, Debug)]
+pub struct EnvelopeLimiter {
+    model: GreyBox,
+    bounds: Bounds,
+    disturbance: Disturbance,
+}
+
+/// A surface that acts on a limit.
+#[derive(Clone, Copy)]
+enum Surface {
+    Elevator,
+    Aileron,
+}
+
+/// Where a limit lies, and how fast it moves, per second.
+#[derive(Clone, Copy, Debug)]
+struct At {
+    limit: Limit,
+    value: f64,
+    rate: f64,
+}
+
+/// The aircraft at the moment at which a command acts.
+struct Moment<'a> {
+    model: &'a GreyBox,
+    unexplained: State,
+    altitude: f64,
+    state: State,
+    controls: Controls,
+}
+
+/// The acceleration of a limited quantity and what a surface does to it.
+#[derive(Clone, Copy)]
+struct Motion {
+    value: f64,
+    rate: f64,
+    acceleration: f64,
+    /// Change of the acceleration by rad of deflection.
+    effect: f64,
+    deflection: f64,
+}
+
+impl EnvelopeLimiter {
+    /// The limiter of the aircraft that `model` describes.
+    pub fn new(model: &GreyBox) -> EnvelopeLimiter {
+        EnvelopeLimiter {
+            model: model.clone(),
+            bounds: Bounds::of(&model.airframe),
+            disturbance: Disturbance::new(TIME_CONSTANT_S),
+        }
+    }
+
+    /// Keeps to another envelope from now on.
+    pub fn keep_to(&mut self, envelope: &Envelope) {
+        self.bounds = Bounds::new(envelope, &self.model.airframe.incidence);
+    }
+
+    /// Forgets what the model has left unexplained.
+    pub fn reset(&mut self) {
+        self.disturbance = Disturbance::new(TIME_CONSTANT_S);
+    }
+
+    /// The command nearest to `wanted` that keeps to the envelope. To be called once a tick with what flies; a command that is
+    /// not finite is left as it is.
+    pub fn limit(&mut self, seen: &Observation, wanted: Command) -> Limited {
+        self.disturbance.update(&self.model, seen);
+        if !wanted.is_finite() {
+            return Limited { command: wanted, by: None };
+        }
+        if self.disturbance.is_wrong(TRUST) {
+            return Limited { command: wanted, by: Some(Limit::Distrust) };
+        }
+        let mut out = Limited { command: wanted.clamped(), by: None };
+        let at = self.when_it_acts(seen);
+        self.keep_bank(&at, &mut out);
+        self.keep_load(&at, &mut out);
+        out
+    }
+
+    /// The moment at which a command of now acts, those before it being held.
+    fn when_it_acts(&self, seen: &Observation) -> Moment<'_> {
+        let figures = &self.model.airframe.actuators;
+        let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
+        let mut inputs = self.model.at_rest(&actuators.controls());
+        let mut memory = self.disturbance.memory();
+        let unexplained = self.disturbance.rate();
+        let mut state = seen.state;
+        let mut controls = self.model.act(&actuators.controls(), &mut inputs);
+        for _ in 0..AHEAD {
+            let next = self.model.step(&state, &controls, seen.altitude, &mut memory);
+            state = next.advance(&unexplained, STEP);
+            actuators.step(&seen.previous[0], figures);
+            controls = self.model.act(&actuators.controls(), &mut inputs);
+        }
+        Moment { model: &self.model, unexplained, altitude: seen.altitude, state, controls }
+    }
+
+    fn keep_bank(&self, at: &Moment, out: &mut Limited) {
+        let motion = at.motion(Surface::Aileron, |s| s.roll);
+        let most = self.bounds.bank;
+        let law = |value| motion.law(At { limit: Limit::Bank, value, rate: 0.0 }, BANK_POLE);
+        let travel = self.model.airframe.actuators.aileron.travel;
+        // a positive aileron rolls right
+        if motion.effect > 0.0 {
+            clamp(&mut out.command.aileron, &mut out.by, travel, [law(-most), law(most)]);
+        }
+    }
+
+    /// Load factor and incidence: both are limits of the angle of attack.
+    fn keep_load(&self, at: &Moment, out: &mut Limited) {
+        let motion = at.motion(Surface::Elevator, |s| s.alpha);
+        // a positive elevator pitches down
+        if motion.effect >= 0.0 {
+            return;
+        }
+        let bounds = self.bounds.within(PART);
+        let travel = self.model.airframe.actuators.elevator.travel;
+        // the load factor is that with the elevator which holds the angle of attack: a surface in motion adds its own lift
+        let held = (motion.deflection - motion.acceleration / motion.effect)
+            .clamp(travel.least, travel.most);
+        let law = |side: usize| motion.law(at.incidence_limit(&bounds, side, held), PITCH_POLE);
+        let [least, most] = [law(0), law(1)];
+        // the elevator's own lift, which is there before the angle of attack follows
+        let [push, pull] = at.lift_limits(&self.bounds, motion.deflection);
+        let low = if pull > most.0 { (pull.min(least.0), Limit::Load) } else { most };
+        let high = if push < least.0 { (push.max(most.0), Limit::Load) } else { least };
+        // the lower bound is the most nose-up and has the last word: the stall before the negative load factor
+        clamp(&mut out.command.elevator, &mut out.by, travel, [low, high]);
+    }
+}
+
+/// Clamps a command between deflections with the limits that ask for them; the first has the last word.
+fn clamp(
+    command: &mut f64,
+    by: &mut Option<Limit>,
+    travel: Travel,
+    [low, high]: [(f64, Limit); 2],
+) {
+    let [least, most] =
+        [low, high].map(|(x, _)| travel.command(x.clamp(travel.least, travel.most)));
+    if *command > most {
+        (*command, *by) = (most, Some(high.1));
+    }
+    if *command < least {
+        (*command, *by) = (least, Some(low.1));
+    }
+}
+
+impl Surface {
+    fn of(self, controls: &mut Controls) -> &mut f64 {
+        match self {
+            Surface::Elevator => &mut controls.elevator,
+            Surface::Aileron => &mut controls.aileron,
+        }
+    }
+
+    fn travel(self, model: &GreyBox) -> Travel {
+        match self {
+            Surface::Elevator => model.airframe.actuators.elevator.travel,
+            Surface::Aileron => model.airframe.actuators.aileron.travel,
+        }
+    }
+}
+
+impl Moment<'_> {
+    fn rate(&self, state: &State, controls: &Controls) -> State {
+        self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
+    }
+
+    /// How the quantity `of` moves, and what `surface` does to it.
+    fn motion(&self, surface: Surface, of: impl Fn(&State) -> f64) -> Motion {
+        let mut controls = self.controls;
+        // rate and acceleration of the quantity: the acceleration is the change of the rate along the flow
+        let follow = |controls: &Controls| {
+            let rate = self.rate(&self.state, controls);
+            let later = self.rate(&self.state.advance(&rate, SPAN_S), controls);
+            (of(&rate), (of(&later) - of(&rate)) / SPAN_S)
+        };
+        let (rate, acceleration) = follow(&controls);
+        let deflection = *surface.of(&mut controls);
+        let travel = surface.travel(self.model);
+        let probe = if deflection > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
+        *surface.of(&mut controls) += probe;
+        let (_, probed) = follow(&controls);
+        let effect = (probed - acceleration) / probe;
+        Motion { value: of(&self.state), rate, acceleration, effect, deflection }
+    }
+
+    /// The load factor at an angle of attack, at an elevator.
+    fn load(&self, alpha: f64, elevator: f64) -> f64 {
+        let state = State { alpha, ..self.state };
+        let controls = Controls { elevator, ..self.controls };
+        load_factor_under(&state, &self.rate(&state, &controls))
+    }
+
+    /// The elevators at which its own lift alone takes the load factor to its largest and to its least.
+    fn lift_limits(&self, bounds: &Bounds, elevator: f64) -> [f64; 2] {
+        let load = self.load(self.state.alpha, elevator);
+        let travel = Surface::Elevator.travel(self.model);
+        let probe = if elevator > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
+        let slope = (self.load(self.state.alpha, elevator + probe) - load) / probe;
+        // that of a canard goes the other way, with its moment
+        if slope <= 0.0 {
+            return [f64::INFINITY, f64::NEG_INFINITY];
+        }
+        let [least, most] = bounds.load.map(|bound| elevator + (bound - load) / slope);
+        [most, least]
+    }
+
+    /// The angle of attack of the bounds' `side` (0 the least, 1 the most), which the load factor or the stall sets.
+    fn incidence_limit(&self, bounds: &Bounds, side: usize, elevator: f64) -> At {
+        let stall = At { limit: Limit::Incidence, value: bounds.alpha[side], rate: 0.0 };
+        let mut alpha = self.state.alpha;
+        let mut slope = 0.0;
+        for _ in 0..NEWTON {
+            let load = self.load(alpha, elevator);
+            slope = (self.load(alpha + SLOPE_STEP, elevator) - load) / SLOPE_STEP;
+            // beyond the stall more incidence is no more lift
+            if slope <= 0.0 || slope.is_nan() {
+                return stall;
+            }
+            let next = alpha + (bounds.load[side] - load) / slope;
+            alpha = next.clamp(bounds.alpha[0], bounds.alpha[1]);
+        }
+        let inside = bounds.alpha[0] < alpha && alpha < bounds.alpha[1];
+        if !inside {
+            return stall;
+        }
+        // the incidence of a load factor goes with 1/V²
+        let rate = self.rate(&self.state, &self.controls).airspeed;
+        let rate = -2.0 * rate / self.state.airspeed * bounds.load[side] / slope;
+        At { limit: Limit::Load, value: alpha, rate }
+    }
+}
+
+impl Motion {
+    /// The deflection that brings the quantity to a limit.
+    fn law(&self, at: At, pole: f64) -> (f64, Limit) {
+        let wanted = -2.0 * pole * (self.rate - at.rate) - pole * pole * (self.value - at.value);
+        (self.deflection + (wanted - self.acceleration) / self.effect, at.limit)
+    }
+}
