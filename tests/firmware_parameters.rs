@@ -82,5 +82,9 @@ fn pages_and_checks_name_the_files() {
 }
 
 /// Values that a page speaks of beside those that are shipped.
-const EXPLAINED: [(&str, f64); 3] =
-    [("MAV_GCS_SYSID_HI", 255.0), ("FS_GCS_ENABL", 0.0), ("FS_LONG_TIMEOUT", 1.5)];
+const EXPLAINED: [(&str, f64); 4] = [
+    ("MAV_GCS_SYSID_HI", 255.0),
+    ("FS_GCS_ENABL", 0.0),
+    ("FS_LONG_ACTN", 0.0),
+    ("FS_LONG_TIMEOUT", 1.5),
+];

@@ -625,7 +625,9 @@ fn a_loop_that_swings_gets_a_third_of_the_deflections_for_a_while() {
         let eased = swing(&mut flight, seconds(3.0), step);
         // 1.1 beside level trim is asked: a third about the mean, which moves by 0.19 itself, and 0.13 of trim
         assert!(eased < 0.6, "{eased}");
-        assert!(flight.texts().contains("oscillates in pitch: a third of the deflections for 5 s"));
+        let texts = flight.texts();
+        assert!(texts.contains("oscillates in pitch since "), "{texts}");
+        assert!(texts.contains("a third of the deflections for the next 5 s"), "{texts}");
         assert_eq!(flight.last.unwrap().refused, None);
         // calm again, all of them are flown
         flight.plan = Plan::Ready(RIGHT);

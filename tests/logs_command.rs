@@ -82,7 +82,7 @@ fn info_says_of_a_table_without_a_column_what_it_still_serves_for() {
         "1000 rows",
         "comparison in free run: no, for want of airspeed_mps",
         "forces D, Y, L: no, for want of airspeed_mps",
-        "alpha, beta: yes",
+        "alpha, beta: no, for want of a flight",
         "has no column `airspeed_mps`",
         "ias_kt",
     ] {

@@ -61,9 +61,9 @@ fn the_story_stands_in_order_and_loads_nothing() {
     // Three curves of at most 1500 points and a comparison's growth: far from a megabyte.
     assert!(html.len() < 600_000, "the page has {} bytes", html.len());
     let order = [
+        "The effect",
         "Where it fails",
         "Suspects",
-        "The effect",
         "Do the flights agree?",
         "What chance reaches",
         "Before and after",

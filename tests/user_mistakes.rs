@@ -37,7 +37,6 @@ const FILES: [Mistake; 21] = [
     ("compare --model @/model.toml --log @/picture.csv", 1, &["no flight log"]),
     ("compare --model @/model.toml --log @/empty.csv", 1, &["is empty"]),
     ("compare --model @/model.toml --log @/no-airspeed.csv", 1, &["airspeed"]),
-    ("compare --model @/model.toml --log @/semicolons.csv", 1, &["semicolons.csv", "commas"]),
     ("compare --model @/model.toml --log @", 1, &["it is a folder"]),
     ("compare --model @/good.csv --log @/model.toml", 1, &["good.csv is a flight log", "swapped"]),
     (
@@ -113,12 +112,12 @@ const NUMBERS: [Mistake; 12] = [
     (
         "aircraft new @/new --mass-kg 2.1 --span-m 160 --area-m2 0.3",
         1,
-        &["did you mean --span-m 1.6"],
+        &["--span-m = 160 is not physical"],
     ),
     (
         "aircraft new @/new --mass-kg 2.1 --span-m 1600 --area-m2 0.3",
         1,
-        &["did you mean --span-m 1.6"],
+        &["--span-m = 1600 is not physical"],
     ),
     (
         "aircraft new @/new --mass-kg -2 --span-m 1.6 --area-m2 0.3",
@@ -156,8 +155,7 @@ const WORDS: [Mistake; 8] = [
         1,
         &["flubber", "effects list"],
     ),
-    ("effects show flubber", 1, &["flubber"]),
-    ("mystery --seed 3 --out @/new --effect flubber", 1, &["flubber", "drag_beta2"]),
+    ("mystery --seed 3 --out @/another --effect flubber", 1, &["flubber", "drag_beta2"]),
     ("mystery --seed 3 --out /proc/x", 1, &["/proc", "--out"]),
     ("mystery --open @", 1, &["greylag mystery"]),
     ("mystery --open @/mystery", 1, &["--give-up", "greylag diagnose --model"]),
@@ -232,7 +230,7 @@ fn answer(output: &Output) -> String {
 }
 
 fn check(mistakes: &[Mistake]) {
-    let scratch = tempfile::tempdir().unwrap();
+    let scratch = tempfile::Builder::new().prefix("mistakes").tempdir().unwrap();
     let folder = scratch.path();
     files(folder);
     let before = content(folder);
@@ -297,7 +295,7 @@ fn wrong_words_are_answered() {
 
 #[test]
 fn the_mapping_that_is_offered_cures_a_log_in_degrees() {
-    let scratch = tempfile::tempdir().unwrap();
+    let scratch = tempfile::Builder::new().prefix("mistakes").tempdir().unwrap();
     let folder = scratch.path();
     files(folder);
     let wrote = run("logs info @/degrees.csv --write-mapping @/mapping.toml", folder);

@@ -155,7 +155,8 @@ impl Reading {
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
             eprintln!("log {} of {}: reading and reconstructing {name}", k + 1, paths.len());
-            let read = given::log(path).and_then(|()| Ok(logs::flights(path, &reading)?));
+            let read = given::log(path)
+                .and_then(|()| logs::flights(path, &reading).map_err(|e| units_first(path, e)));
             let logs = match read {
                 Ok(logs) => logs,
                 Err(error) if paths.len() == 1 => {
@@ -202,6 +203,20 @@ impl Reading {
         let flight = reconstruct(&log.flight, &options)
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))
+    }
+}
+
+/// The error of a log that cannot be read; where units explain it, with the command that puts them right.
+fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
+    match error {
+        logs::LogError::Unusable { dropped, rows, ref hint, .. } if hint.contains("--mapping") => {
+            let log = quoted(path);
+            anyhow::anyhow!(
+                "flight log {log}: {dropped} of {rows} rows are unusable, for units are wrong (degrees, say)\n  to put it right: \
+                 greylag logs info {log} --write-mapping mapping.toml\n  then add: --mapping mapping.toml"
+            )
+        }
+        error => error.into(),
     }
 }
 

@@ -11,7 +11,10 @@ use crate::logs::{Channel, Format};
 pub fn mapping(logs: &[Info]) -> Option<String> {
     let mut columns = BTreeMap::new();
     for log in logs {
-        for cure in log.findings.iter().filter_map(|f| f.cure.as_ref()) {
+        let cures = || log.findings.iter().filter_map(|f| f.cure.as_ref());
+        // with a wrong unit beside it a sign cannot be judged
+        let units = cures().any(|cure| cure.scale > 0.0);
+        for cure in cures().filter(|cure| !units || cure.scale > 0.0) {
             columns.insert(cure.column.clone(), (origin(log, &cure.column), cure.scale));
         }
     }
