@@ -237,7 +237,7 @@ fn real_ardupilot_logs_are_read_where_they_lie() {
         let log = inspect(&path, &Options::default()).unwrap();
         // pymavlink 2.4.50 counts 888 ATTITUDE, two of which repeat a time; 337 are of flight on the wings, or of the ground.
         assert_eq!(log.flight.samples.len(), 337);
-        let roll = log.channels.iter().find(|c| c.column == "roll_rad").unwrap();
+        let roll = log.channels.iter().find(|c| c.columns.iter().any(|n| n == "roll_rad")).unwrap();
         assert_eq!(roll.samples, 886);
     }
     if let Some(path) = shared("arduplane_3.8.2_pymavlink_test.BIN") {

@@ -31,7 +31,7 @@ const LINE: [Mistake; 12] = [
     ("aircraft new @/new --mass-kg two --span-m 1.6 --area-m2 0.3", 2, &["two", "--mass-kg"]),
 ];
 
-const FILES: [Mistake; 21] = [
+const FILES: [Mistake; 20] = [
     ("compare --model @/none.toml --log @/good.csv", 1, &["none.toml"]),
     ("compare --model @/model.toml --log @/gone.csv", 1, &["gone.csv", "check the path"]),
     ("compare --model @/model.toml --log @/picture.csv", 1, &["no flight log"]),
@@ -149,7 +149,7 @@ const NUMBERS: [Mistake; 12] = [
     ),
 ];
 
-const WORDS: [Mistake; 8] = [
+const WORDS: [Mistake; 7] = [
     (
         "amend --model @/model.toml --log @/good.csv --effect flubber --out @/new",
         1,
