@@ -208,16 +208,19 @@ impl Reading {
 
 /// The error of a log that cannot be read; where units explain it, with the command that puts them right.
 fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
-    match error {
-        logs::LogError::Unusable { dropped, rows, ref hint, .. } if hint.contains("--mapping") => {
-            let log = quoted(path);
-            anyhow::anyhow!(
-                "flight log {log}: {dropped} of {rows} rows are unusable, for units are wrong (degrees, say)\n  to put it right: \
-                 greylag logs info {log} --write-mapping mapping.toml\n  then add: --mapping mapping.toml"
-            )
-        }
-        error => error.into(),
+    let hint = match &error {
+        logs::LogError::Csv { hint, .. } | logs::LogError::Unusable { hint, .. } => hint,
+        _ => "",
+    };
+    if !hint.contains("--mapping") {
+        return error.into();
     }
+    let (text, log) = (error.to_string(), quoted(path));
+    let what = text.split("; first").next().unwrap_or_default();
+    anyhow::anyhow!(
+        "{what}): units look wrong (degrees, say)\n  to put it right: greylag logs info {log} --write-mapping mapping.toml\n  \
+         then add: --mapping mapping.toml"
+    )
 }
 
 /// Refuses a log whose figures would be wrong, with the command that writes the mapping that puts it right.

@@ -18,7 +18,7 @@ pub fn told(error: &anyhow::Error) -> String {
     let system = error.chain().find_map(|cause| cause.downcast_ref::<io::Error>());
     match system.and_then(|system| cure(system.kind())) {
         Some(cure) => format!("{}; {cure}", plain(&text)),
-        None => text,
+        None => without_numbers(text),
     }
 }
 
@@ -38,13 +38,19 @@ fn cure(kind: ErrorKind) -> Option<&'static str> {
     }
 }
 
-/// The text without cures that may not be, numbers of the system, and names of temporary files.
-fn plain(text: &str) -> String {
-    let mut text = ANY_CURE.iter().fold(text.to_owned(), |text, any| text.replace(any, ""));
+/// The text without the numbers that the system gives its errors.
+fn without_numbers(mut text: String) -> String {
     while let Some(from) = text.find(" (os error ") {
         let Some(length) = text[from..].find(')') else { break };
         text.replace_range(from..=from + length, "");
     }
+    text
+}
+
+/// The text without cures that may not be, numbers of the system, and names of temporary files.
+fn plain(text: &str) -> String {
+    let mut text = ANY_CURE.iter().fold(text.to_owned(), |text, any| text.replace(any, ""));
+    text = without_numbers(text);
     if let Some(from) = text.find(" at path \"") {
         let end = text[from + 10..].find('"').map_or(text.len(), |end| from + 11 + end);
         text.replace_range(from..end, "");

@@ -159,6 +159,7 @@ struct Port {
     id: LinkId,
     inbox: Inbox<Arrival>,
     counters: Arc<Counters>,
+    takes_all: bool,
 }
 
 impl Port {
@@ -191,6 +192,8 @@ pub struct Network {
     rounds: Arc<AtomicU64>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
+    /// Whether one sender of datagrams is listened to without limit.
+    takes_all: bool,
 }
 
 impl Network {
@@ -209,7 +212,12 @@ impl Network {
                 let _ = runtime.block_on(stopped);
             })
             .map_err(TransportError::Thread)?;
-        Ok(Network { handle, rounds, stop: Some(stop), thread: Some(thread) })
+        Ok(Network { handle, rounds, stop: Some(stop), thread: Some(thread), takes_all: false })
+    }
+
+    /// Links that are opened from now on take every datagram: a simulation in lockstep sends as fast as it is answered.
+    pub fn take_all(&mut self) {
+        self.takes_all = true;
     }
 
     /// How many rounds the thread has gone, one in 10 ms while it runs: between two of them every socket was looked at.
@@ -228,7 +236,7 @@ impl Network {
         inbox: Inbox<Arrival>,
     ) -> Result<Link, TransportError> {
         let counters = Arc::new(Counters::default());
-        let port = Port { id, inbox, counters: counters.clone() };
+        let port = Port { id, inbox, counters: counters.clone(), takes_all: self.takes_all };
         let (outbox, outgoing) = mpsc::channel(OUTBOX);
         let failed = |source: std::io::Error| match source.kind() {
             std::io::ErrorKind::AddrInUse => {

@@ -243,7 +243,8 @@ impl Vehicle {
     /// Lets 10 ms pass until `end`, whether or not the companion answers: flies on the newest answer there is.
     pub fn step_on(&mut self, end: Instant) {
         self.time_us += 10_000;
-        self.socket.send(&self.frames(Trouble::None).concat()).unwrap();
+        // refused until the companion has opened its port
+        let _ = self.socket.send(&self.frames(Trouble::None).concat());
         let mut buffer = [0; 2048];
         while let Some(left) =
             end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())

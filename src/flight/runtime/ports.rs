@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use crossbeam_channel::{Receiver, bounded};
 
 use super::guard::Guard;
-use super::{FlightError, FlightOptions};
+use super::{FlightError, FlightOptions, Pace};
 use greylag_link::peer::{LinkId, PeerId};
 use greylag_link::signing::SigningCounts;
 use greylag_link::transport::{Arrival, Link, Network, Packet};
@@ -30,7 +30,10 @@ impl Ports {
     /// Opens all links, or none.
     pub(super) fn open(options: &FlightOptions) -> Result<Self, FlightError> {
         let guard = options.signing.as_ref().map(|s| Guard::open(s, options)).transpose()?;
-        let network = Network::start()?;
+        let mut network = Network::start()?;
+        if options.pace == Pace::Lockstep {
+            network.take_all();
+        }
         let (to_vehicle, from_vehicle) = bounded(VEHICLE_QUEUE);
         let (to_clients, from_clients) = bounded(CLIENT_QUEUE);
         let vehicle = network.open(LinkId(0), &options.vehicle, "--vehicle", to_vehicle)?;

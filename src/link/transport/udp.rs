@@ -65,7 +65,9 @@ async fn receive(port: Port, socket: Arc<UdpSocket>) {
     let mut senders = Senders::default();
     loop {
         match socket.recv_from(&mut buffer).await {
-            Ok((_, from)) if !senders.may(from, Instant::now()) => count(&port.counters.flooded),
+            Ok((_, from)) if !port.takes_all && !senders.may(from, Instant::now()) => {
+                count(&port.counters.flooded)
+            }
             Ok((len, _)) if len > MAX_DATAGRAM => count(&port.counters.oversize),
             Ok((len, from)) => port.deliver(from, buffer[..len].to_vec()),
             Err(_) => tokio::time::sleep(PAUSE).await,
