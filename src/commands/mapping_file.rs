@@ -7,6 +7,10 @@ use crate::logs::info::Info;
 use crate::logs::mapping::TEXT;
 use crate::logs::{Channel, Format};
 
+/// Columns whose unit a finding judges by the first of them.
+const ALIKE: [(&str, [&str; 2]); 2] =
+    [("roll_rad", ["pitch_rad", "yaw_rad"]), ("p_radps", ["q_radps", "r_radps"])];
+
 /// The text of the mapping; `None` if no factor puts anything right.
 pub fn mapping(logs: &[Info]) -> Option<String> {
     let mut columns = BTreeMap::new();
@@ -15,7 +19,14 @@ pub fn mapping(logs: &[Info]) -> Option<String> {
         // with a wrong unit beside it a sign cannot be judged
         let units = cures().any(|cure| cure.scale > 0.0);
         for cure in cures().filter(|cure| !units || cure.scale > 0.0) {
-            columns.insert(cure.column.clone(), (origin(log, &cure.column), cure.scale));
+            let column = cure.column.as_str();
+            let alike = ALIKE.iter().find(|(first, _)| *first == column && cure.scale > 0.0);
+            let there =
+                |c: &&&str| log.channels.iter().any(|own| own.columns.iter().any(|o| o == **c));
+            let others = alike.into_iter().flat_map(|(_, others)| others.iter().filter(there));
+            for column in std::iter::once(&column).chain(others) {
+                columns.insert((*column).to_owned(), (origin(log, column), cure.scale));
+            }
         }
     }
     let mut text = "schema = 1\n\n[columns]\n".to_owned();
