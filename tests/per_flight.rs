@@ -75,11 +75,13 @@ fn a_board_that_stands_askew_in_one_flight_is_found_there_and_not_in_the_other()
     let without = asked(&flights, PerFlight::default());
     let found = asked(&flights, PerFlight { askew_deg: Some(3.0), trims: None });
     let angles: Vec<_> = found.measurement.iter().filter(|m| m.id == "axes_askew").collect();
-    assert!(without.measurement.iter().all(|m| m.id != "axes_askew"));
-    // the aerodynamics in turned axes are other ones: three quarters of what is unexplained, and more, was that
-    let left =
-        |of: &Diagnosis| -> f64 { of.channels.iter().map(|c| c.tuned_unexplained_fraction).sum() };
-    println!("{} {}", left(&without), left(&found));
+    // a tilt that explains more than the effects do is proposed unasked, with the same angles
+    let unasked: Vec<_> = without.measurement.iter().filter(|m| m.id == "axes_askew").collect();
+    assert_eq!(unasked.len(), angles.len());
+    for (m, asked) in unasked.iter().zip(&angles) {
+        assert!((m.value - asked.value).abs() < asked.sd, "{} {}", m.flight, m.name);
+    }
+    assert!(without.sentences[0].contains("axes stand askew, roll"), "{:?}", without.sentences);
     for (k, m) in angles.iter().enumerate() {
         println!("{} {} {:.3} ± {:.3}", m.flight, m.name, m.value.to_degrees(), m.sd.to_degrees());
         let truth = if k < 3 { turned[k].to_radians() } else { 0.0 };
@@ -88,7 +90,6 @@ fn a_board_that_stands_askew_in_one_flight_is_found_there_and_not_in_the_other()
     let clear: Vec<bool> = angles.iter().map(|m| m.asserted).collect();
     assert_eq!(clear, [true, false, true, false, false, false]);
     assert!(found.sentences.iter().any(|s| s.contains("axes stand askew, roll")));
-    assert!(left(&found) < 0.25 * left(&without));
 }
 
 #[test]
@@ -109,7 +110,8 @@ fn trims_of_flights_are_found_beside_the_model() {
         let [by, sd] = t.beside_mean.unwrap();
         println!("{} {} {:.5} ± {:.5}, {by:.5} ± {sd:.5}", t.flight, t.name, t.value, t.sd);
         // all flights' common part is the model's as well, whose coefficients are 15 % off
-        assert!((by - truth).abs() < 3.0 * sd, "{} {}", t.flight, t.name);
+        // 21 numbers, one in a hundred seeds with one beyond
+        assert!((by - truth).abs() < 3.5 * sd, "{} {}", t.flight, t.name);
         assert_eq!(t.asserted, clear, "{} {}", t.flight, t.name);
         if clear {
             assert!((t.value - truth).abs() < 3.0 * t.sd && t.sd < 0.5 * truth.abs());
