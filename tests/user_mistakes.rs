@@ -149,12 +149,13 @@ const NUMBERS: [Mistake; 12] = [
     ),
 ];
 
-const WORDS: [Mistake; 7] = [
+const WORDS: [Mistake; 8] = [
     (
         "amend --model @/model.toml --log @/good.csv --effect flubber --out @/new",
         1,
         &["flubber", "effects list"],
     ),
+    ("effects show flubber", 1, &["flubber"]),
     ("mystery --seed 3 --out @/another --effect flubber", 1, &["flubber", "drag_beta2"]),
     ("mystery --seed 3 --out /proc/x", 1, &["/proc", "--out"]),
     ("mystery --open @", 1, &["greylag mystery"]),
