@@ -155,7 +155,7 @@ const WORDS: [Mistake; 8] = [
         1,
         &["flubber", "effects list"],
     ),
-    ("effects show flubber", 1, &["flubber"]),
+    ("effects show drag_beta", 1, &["drag_beta2", "effects list"]),
     ("mystery --seed 3 --out @/another --effect flubber", 1, &["flubber", "drag_beta2"]),
     ("mystery --seed 3 --out /proc/x", 1, &["/proc", "--out"]),
     ("mystery --open @", 1, &["greylag mystery"]),

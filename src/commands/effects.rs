@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
 use serde::Serialize;
 
@@ -41,7 +40,7 @@ enum What {
 #[derive(clap::Args)]
 struct Show {
     /// The effect's id, as `greylag effects list` names it, or an effect file.
-    #[arg(value_name = "ID|FILE", value_parser = id())]
+    #[arg(value_name = "ID|FILE")]
     id: String,
     /// Write the effect's page, one HTML file with its signature.
     #[arg(long)]
@@ -136,31 +135,6 @@ fn catalogue() -> Vec<(Place, Description)> {
         .collect()
 }
 
-/// An id of the catalogue or a file; for any other, the parser names those that are like it.
-fn id() -> impl TypedValueParser<Value = String> {
-    NamedParser(PossibleValuesParser::new(catalogue().iter().map(|(_, about)| about.id)))
-}
-
-/// Takes files as they are, and leaves ids to the parser of those that are known.
-#[derive(Clone)]
-struct NamedParser(PossibleValuesParser);
-
-impl TypedValueParser for NamedParser {
-    type Value = String;
-
-    fn parse_ref(
-        &self,
-        command: &clap::Command,
-        argument: Option<&clap::Arg>,
-        value: &std::ffi::OsStr,
-    ) -> Result<String, clap::Error> {
-        match value.to_str().filter(|named| is_file(named)) {
-            Some(file) => Ok(file.to_owned()),
-            None => self.0.parse_ref(command, argument, value),
-        }
-    }
-}
-
 /// Prints the list or one entry; writes its page.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
@@ -238,8 +212,19 @@ fn named(name: &str) -> Result<(Place, Description)> {
         let [effect] = read[..] else { bail!("{name} is not one effect file; name one") };
         return Ok((Place::Forces, effect.about));
     }
-    let found = catalogue().into_iter().find(|(_, about)| about.id == name);
-    found.with_context(|| format!("there is no effect {name}"))
+    let mut catalogue = catalogue();
+    let Some(found) = catalogue.iter().position(|(_, about)| about.id == name) else {
+        let like = |about: &Description| strsim::jaro_winkler(about.id, name);
+        let (_, nearest) = catalogue
+            .iter()
+            .max_by(|a, b| like(&a.1).total_cmp(&like(&b.1)))
+            .context("the catalogue has no effect")?;
+        bail!(
+            "there is no effect {name}; the nearest id is {}, `greylag effects list` has all",
+            nearest.id
+        );
+    };
+    Ok(catalogue.swap_remove(found))
 }
 
 /// Prints what only effects of files have.

@@ -33,7 +33,7 @@ impl Size {
     }
 
     /// With the lift that an aircraft of `body` and `geometry` needs at the least `airspeed` (m/s) it flies at: a wing
-    /// must be able to carry the weight there, and [`PULL`] times that when it pulls up.
+    /// must be able to carry the weight there, and `PULL` times that when it pulls up.
     pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
         let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
         let level = body.mass * GRAVITY / (pressure * geometry.area);

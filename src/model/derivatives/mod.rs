@@ -1,7 +1,7 @@
 //! Stability derivatives that aerodynamic tools compute, as airframe and model.
 //!
 //! Each tool has its axes, units and names; they end here in body axes, by a radian, by pb/2V, qc/2V, rb/2V. Each
-//! derivative has the width of its tool ([`widths`]), and what a tool cannot compute is named and not taken ([`checks`]).
+//! derivative has the width of its tool ([`widths`]), and what a tool cannot compute is named and not taken (`checks`).
 
 mod avl;
 mod checks;

@@ -79,7 +79,7 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// What a model remembers of its controls' past; [`GreyBox::at_rest`](greylag_model::GreyBox::at_rest) makes it.
+/// What a model remembers of its controls' past; `GreyBox::at_rest` of the crate `greylag-model` makes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMemory<R = f64> {
     /// What its input effects remember of aileron, elevator and throttle; on a rudder they do not act.
