@@ -1,4 +1,4 @@
-//! The measures on signals whose answers have closed forms.
+//! Quality measures on signals with closed-form results.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -174,7 +174,7 @@ fn every_limit_is_judged_by_its_own_quantity() {
     assert_eq!(outside(&|m| m.alpha = f64::NAN), []);
 }
 
-/// A twentieth of the limit is a transient's room, more is not.
+/// An excess of a twentieth of the limit counts as a transient, a larger one does not.
 #[test]
 fn a_transient_may_pass_load_factor_and_stall_by_a_twentieth() {
     assert!(LIMITS.kept([-1.04, 2.09], [-5.0, 12.5]));
