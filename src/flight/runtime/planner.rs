@@ -1,4 +1,4 @@
-//! Who computes the plan of a tick: a controller in the loop, or one on a thread of its own.
+//! The planner of a tick: a controller in the loop, or one on its own thread.
 
 mod threaded;
 
@@ -9,7 +9,7 @@ use greylag_control::Controller;
 pub(super) use threaded::Threaded;
 use threaded::run;
 
-/// The controller of the flight, where it runs.
+/// The controller of the flight and where it runs.
 pub(super) enum Planner {
     /// Fast enough to be called in the loop.
     Inline(Box<dyn Controller>),

@@ -15,7 +15,7 @@ use crate::peer::{self, PeerId};
 /// Largest number of bytes per read.
 const CHUNK: usize = 1024;
 /// An incomplete frame is dropped after this silence.
-const PAUSE: Duration = Duration::from_millis(50);
+const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(50);
 /// Interval between attempts to reopen a port.
 const RETRY: Duration = Duration::from_millis(200);
 /// A frame that cannot be written within this time is dropped: the wire is stuck.
@@ -149,24 +149,24 @@ async fn wait_for(
 }
 
 /// Detects a stream of bytes without valid frames.
-struct Ear {
+struct NoiseDetector {
     since: Instant,
     bytes: u64,
     frames: u64,
     reported: bool,
 }
 
-impl Ear {
+impl NoiseDetector {
     fn new() -> Self {
-        Ear { since: Instant::now(), bytes: 0, frames: 0, reported: false }
+        NoiseDetector { since: Instant::now(), bytes: 0, frames: 0, reported: false }
     }
 
     /// Whether the noise is to be reported now; at most once.
-    fn hears_noise(&mut self, bytes: usize, frames: usize) -> bool {
+    fn is_noise(&mut self, bytes: usize, frames: usize) -> bool {
         self.bytes += bytes as u64;
         self.frames += frames as u64;
         if self.frames > 0 {
-            *self = Ear { reported: self.reported, ..Ear::new() };
+            *self = NoiseDetector { reported: self.reported, ..NoiseDetector::new() };
             return false;
         }
         let noise = self.bytes >= NOISE.0 && self.since.elapsed() >= NOISE.1 && !self.reported;
@@ -179,16 +179,18 @@ impl Ear {
 async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wire: &Wire) {
     let mut cutter = StreamCutter::default();
     let mut chunk = [0; CHUNK];
-    let mut ear = Ear::new();
+    let mut noise = NoiseDetector::new();
     loop {
         let mut whole = Vec::new();
         let mut keep = |frame: &[u8]| whole.extend_from_slice(frame);
         let good = cutter.counts.good;
         let len = match cutter.is_waiting() {
-            true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
-                cutter.flush_pieces(&mut keep);
-                Err(std::io::ErrorKind::TimedOut.into())
-            }),
+            true => {
+                timeout(PARTIAL_FRAME_TIMEOUT, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
+                    cutter.flush_pieces(&mut keep);
+                    Err(std::io::ErrorKind::TimedOut.into())
+                })
+            }
             false => stream.read(&mut chunk).await,
         };
         let len = match len {
@@ -201,7 +203,7 @@ async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wir
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => 0,
             Err(_) => return,
         };
-        if ear.hears_noise(len, (cutter.counts.good - good) as usize) {
+        if noise.is_noise(len, (cutter.counts.good - good) as usize) {
             let remark = Remark::Noise { port: wire.port.clone(), baud: wire.baud };
             port.announce(Arrival::Remark(remark)).await;
         }

@@ -22,7 +22,9 @@ const QUEUE: usize = 256;
 /// Largest number of bytes per read: their frames form one packet.
 const CHUNK: usize = 1024;
 /// An incomplete frame is dropped after this silence.
-const PAUSE: Duration = Duration::from_millis(100);
+const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(100);
+/// Delay after a failed `accept`, as when no file descriptors are left.
+const ACCEPT_RETRY: Duration = Duration::from_millis(100);
 /// A peer that accepts no byte for this long is disconnected.
 const STALLED: Duration = Duration::from_secs(5);
 /// Interval between connection attempts, doubling from the first value to the second.
@@ -67,13 +69,12 @@ pub(super) fn connect(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr
 async fn accept(port: Port, connections: Connections, listener: TcpListener) {
     loop {
         match listener.accept().await {
-            // One too many is closed at once, which tells it.
+            // a connection beyond the limit is closed, which its peer notices
             Ok(_) if count_of(&connections) >= MAX_CONNECTIONS => {}
             Ok((stream, from)) => {
                 tokio::spawn(serve(port.clone(), connections.clone(), stream, from));
             }
-            // Out of file descriptors, say: wait for some to be freed.
-            Err(_) => sleep(PAUSE).await,
+            Err(_) => sleep(ACCEPT_RETRY).await,
         }
     }
 }
@@ -105,10 +106,12 @@ async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     loop {
         let mut whole = Vec::new();
         let len = match cutter.is_waiting() {
-            true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
-                cutter.flush_pieces(|frame| whole.extend_from_slice(frame));
-                Err(io::ErrorKind::TimedOut.into())
-            }),
+            true => {
+                timeout(PARTIAL_FRAME_TIMEOUT, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
+                    cutter.flush_pieces(|frame| whole.extend_from_slice(frame));
+                    Err(io::ErrorKind::TimedOut.into())
+                })
+            }
             false => stream.read(&mut chunk).await,
         };
         match len {

@@ -17,7 +17,7 @@ use super::{Port, count};
 /// Largest datagram in bytes: MAVLink senders stay within an Ethernet frame; this allows jumbo frames.
 const MAX_DATAGRAM: usize = 9000;
 /// Delay after a socket error, so that a persistent one does not busy-loop.
-const PAUSE: Duration = Duration::from_millis(5);
+const ERROR_DELAY: Duration = Duration::from_millis(5);
 
 /// Listens at an address and sends from it; returns the bound address.
 pub(super) fn listen(
@@ -70,7 +70,7 @@ async fn receive(port: Port, socket: Arc<UdpSocket>) {
             }
             Ok((len, _)) if len > MAX_DATAGRAM => count(&port.counters.oversize),
             Ok((len, from)) => port.deliver(from, buffer[..len].to_vec()),
-            Err(_) => tokio::time::sleep(PAUSE).await,
+            Err(_) => tokio::time::sleep(ERROR_DELAY).await,
         }
     }
 }

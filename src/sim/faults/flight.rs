@@ -328,7 +328,7 @@ impl Flight {
         let mut up = Vec::new();
         for batch in std::mem::take(&mut self.unread) {
             let (judge, follower) = (&mut self.judge, &mut self.follower);
-            self.desk.hear(host, &batch, &mut up, |_, decision| {
+            self.desk.receive(host, &batch, &mut up, |_, decision| {
                 judge.decision(now_s, decision);
                 follower.decided(decision);
             });

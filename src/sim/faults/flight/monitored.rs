@@ -156,7 +156,7 @@ impl Bench {
         let (at_s, host) = (step as f64 * 0.01, Duration::from_millis(1000 + 10 * step));
         let (mut down, mut up) = (Vec::new(), Vec::new());
         self.controller.show(&mut down);
-        self.desk.hear(host, &down, &mut up, |_, _| {});
+        self.desk.receive(host, &down, &mut up, |_, _| {});
         self.client(step, at_s, host);
         self.desk.poll(host, &mut up);
         for text in self.desk.texts.drain(..) {
