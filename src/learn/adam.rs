@@ -1,4 +1,4 @@
-//! Adam, the optimiser.
+//! The Adam optimiser (Kingma and Ba, 2015).
 
 /// Memory of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
 ///
@@ -7,11 +7,11 @@
 /// of the algorithm are less than what carries them over. A test holds it against a written-out case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
-    /// Running means of the gradient.
+    /// Running means of the gradients.
     pub mean: Vec<f64>,
-    /// Running means of its square.
+    /// Running means of the squared gradients.
     pub square: Vec<f64>,
-    /// Steps made.
+    /// Number of steps made.
     pub steps: u64,
 }
 
@@ -19,18 +19,18 @@ const BETA: [f64; 2] = [0.9, 0.999];
 const EPSILON: f64 = 1e-8;
 
 impl Adam {
-    /// Adam for `count` parameters that has not moved yet.
+    /// State for `count` parameters before the first step.
     pub fn new(count: usize) -> Adam {
         Adam { mean: vec![0.0; count], square: vec![0.0; count], steps: 0 }
     }
 
-    /// Begins a step.
+    /// Starts a step.
     pub fn begin(&mut self) {
         self.steps += 1;
     }
 
-    /// What parameter `place` moves by at learning rate `rate`, its gradient being `gradient`; to be
-    /// called once for each between two calls of [`begin`](Adam::begin).
+    /// The change of parameter `place` at learning rate `rate` for its `gradient`; to be called once for each
+    /// parameter between two calls of [`begin`](Adam::begin).
     pub fn move_of(&mut self, place: usize, gradient: f64, rate: f64) -> f64 {
         let (m, v) = (&mut self.mean[place], &mut self.square[place]);
         *m = BETA[0] * *m + (1.0 - BETA[0]) * gradient;

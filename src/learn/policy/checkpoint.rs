@@ -1,4 +1,4 @@
-//! The checkpoint of a policy's training, in a file that is there whole or not at all.
+//! The checkpoint of a policy training, in a file that is replaced atomically.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -29,10 +29,11 @@ struct Said {
 }
 
 impl PolicyStanding {
-    /// Writes it in place of any file at `path`; a reader sees the old one or the new one.
+    /// Writes the file `path` atomically; a reader sees the old version or the new one.
     ///
     /// # Errors
-    /// If the disk refuses.
+    ///
+    /// If it cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
         let bytes =
             to_bytes(self).map_err(|why| CheckpointError::Content { path: path.into(), why })?;
@@ -43,10 +44,11 @@ impl PolicyStanding {
         })
     }
 
-    /// Reads one.
+    /// Reads a checkpoint.
     ///
     /// # Errors
-    /// If the file cannot be read or is none.
+    ///
+    /// If the file cannot be read or is not a checkpoint.
     pub fn load(path: &Path) -> Result<PolicyStanding, CheckpointError> {
         let bytes = std::fs::read(path).map_err(|why| CheckpointError::File {
             doing: "read",
@@ -57,7 +59,7 @@ impl PolicyStanding {
     }
 }
 
-/// The lists of a standing, each with its name.
+/// Arrays of a state, each with its name.
 fn lists(standing: &PolicyStanding) -> Vec<(String, &[f32])> {
     let mut lists = vec![("replay".to_owned(), &standing.replay[..])];
     for (name, (own, target, moments)) in NAMES.iter().zip(&standing.td3.networks) {

@@ -1,4 +1,4 @@
-//! Rollouts by the scheme of JSBSim, which asks the model once a step and remembers the last time.
+//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the last one.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
@@ -70,8 +70,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
     }
 
-    /// Slopes through the scheme of JSBSim: of the state after the step and of what is remembered
-    /// then, with respect to what they are made of.
+    /// Slopes through JSBSim's scheme: of the state after the step and of the memory, over their inputs.
     #[inline(always)]
     fn advance_back(
         &self,
@@ -105,7 +104,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     }
 }
 
-/// Slopes with respect to what a step is made of.
+/// Slopes over the inputs of a step.
 struct Back<R> {
     state: State<R>,
     learned: State<R>,
@@ -114,7 +113,7 @@ struct Back<R> {
     memory: Vector<R>,
 }
 
-/// Acceleration and spin of the prior with those learned.
+/// Acceleration and spin of prior plus residual.
 #[inline(always)]
 fn pushed<R: Real>(
     said: &Said<R>,
@@ -132,8 +131,7 @@ fn pushed<R: Real>(
     (acceleration, spin)
 }
 
-/// [`advance_jsbsim`] as a function of state, acceleration and memory, with the slopes with respect to
-/// what it makes.
+/// [`advance_jsbsim`] as a function of state, acceleration and memory, with the slopes over its outputs.
 struct Scheme<'a, R> {
     geometry: &'a Geometry,
     density: R,
@@ -160,7 +158,7 @@ impl<R: Real> Sloped<R, 14> for Scheme<'_, R> {
     }
 }
 
-/// Slopes through [`pushed`], with respect to the state and to what was learned.
+/// Slopes through [`pushed`], over the state and the residual.
 #[inline(always)]
 fn push_back<R: Real>(
     state: &State<R>,
