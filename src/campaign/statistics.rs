@@ -2,7 +2,7 @@
 //!
 //! As in rliable (Agarwal et al. 2021): the interquartile mean leaves a quarter of all runs out at each end; intervals
 //! are percentiles of a bootstrap that draws seeds with replacement within each stratum (task). Departs from it: the median
-//! is that of all runs, not the median over tasks of their means; \[GSFM26\] does not say which its tables hold.
+//! is that of all runs, not the median over tasks of their means; \[GSFM26\] does not specify which its tables hold.
 
 use greylag_num::bootstrap;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};

@@ -1,10 +1,10 @@
 //! The Adam optimiser (Kingma and Ba, 2015).
 
-/// Memory of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
+/// State of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
 ///
-/// The crate burn has one. It is not used here: its parameters live in its tensors, and these are
-/// changed by a kernel of ours 500 times a second, to the bit the same after a resume; the two lines
-/// of the algorithm are less than what carries them over. A test holds it against a written-out case.
+/// burn's Adam requires the parameters in its tensors; these are updated by a kernel of this crate 500
+/// times a second, equal to the bit after a resume, so that copying them would cost more code than the
+/// algorithm. A test compares it with a case calculated by hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
     /// Running means of the gradients.

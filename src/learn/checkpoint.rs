@@ -56,7 +56,7 @@ pub enum CheckpointError {
 
 /// The scalars of a checkpoint, as the one entry of the metadata.
 #[derive(Serialize, Deserialize)]
-struct Said {
+struct Header {
     schema: String,
     identity: String,
     /// Bits of λ, stored without rounding.
@@ -134,26 +134,26 @@ impl Checkpoint {
             })
             .collect::<Result<Vec<_>, _>>()
             .map_err(|e| e.to_string())?;
-        let said = Said {
+        let header = Header {
             schema: SCHEMA.into(),
             identity: self.identity.clone(),
             lambda_bits: self.lambda.to_bits(),
             update: self.update,
             adam_steps: self.adam.steps,
         };
-        let said = serde_json::to_string(&said).map_err(|e| e.to_string())?;
-        let metadata = HashMap::from([(METADATA.to_owned(), said)]);
+        let header = serde_json::to_string(&header).map_err(|e| e.to_string())?;
+        let metadata = HashMap::from([(METADATA.to_owned(), header)]);
         safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
     }
 }
 
 fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let said: Said = serde_json::from_str(said.ok_or("it has no metadata of ours")?)
+    let header = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let header: Header = serde_json::from_str(header.ok_or("it has no metadata of ours")?)
         .map_err(|e| e.to_string())?;
-    if said.schema != SCHEMA {
-        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", said.schema));
+    if header.schema != SCHEMA {
+        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", header.schema));
     }
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let part = |name: &str, kind: Dtype| match tensors.tensor(name) {
@@ -169,7 +169,7 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
     };
     let network = part("network", Dtype::F32)?;
     Ok(Checkpoint {
-        identity: said.identity,
+        identity: header.identity,
         network: network
             .chunks_exact(4)
             .filter_map(|b| Some(f32::from_le_bytes(b.try_into().ok()?)))
@@ -178,10 +178,10 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
         adam: Adam {
             mean: double("adam.mean")?,
             square: double("adam.square")?,
-            steps: said.adam_steps,
+            steps: header.adam_steps,
         },
-        lambda: f64::from_bits(said.lambda_bits),
-        update: said.update,
+        lambda: f64::from_bits(header.lambda_bits),
+        update: header.update,
     })
 }
 

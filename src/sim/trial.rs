@@ -1,4 +1,4 @@
-//! One trial of finding what is missing: flights of an aircraft that has more than its model.
+//! One trial of diagnosis: flights of an aircraft with an effect that its model lacks.
 
 use std::f64::consts::TAU;
 
@@ -28,7 +28,7 @@ const LIGHT_20FT_MPS: f64 = 7.6;
 /// The aircraft of a trial.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The simulator's aircraft at its start, with what is held; its air and hidden effects are the trial's.
+    /// The simulator's aircraft at its start, with its held properties; its air and hidden effects are the trial's.
     pub plant: PlantOptions,
     /// Airspeed at which it cruises, m/s.
     pub cruise: f64,

@@ -1,5 +1,5 @@
-//! CEM-MPC, section III-D of \[GSFM26\], with the policy's proposals and the critics' values that make
-//! it the hybrid controller of section IV-C.
+//! CEM-MPC, section III-D of \[GSFM26\]; with a policy's proposals and critics' values it is the hybrid
+//! controller of section IV-C.
 
 mod candidates;
 mod changes;

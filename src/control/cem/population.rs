@@ -102,8 +102,8 @@ impl Cem {
         Valued { plan, worth: returns[lane], doubt: doubt[lane] }
     }
 
-    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, weighted as [`Update`]
-    /// says, and the best candidate; `None` if too few returns are finite.
+    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, weighted by
+    /// [`Update`], and the best candidate; `None` if too few returns are finite.
     pub(super) fn refit(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
         let begun = Instant::now();
         let refitted = self.refitted(end);

@@ -1,6 +1,6 @@
-//! The limiter between a controller and the surfaces: the elevator keeps load factor and incidence, the aileron keeps bank.
+//! The envelope limiter between a controller and the surfaces: elevator for load factor and incidence, aileron for bank.
 //!
-//! Each limit becomes a law for the surface, and the command is clamped between the laws of both sides (min/max selection, as in
+//! Each limit gives a control law for the surface, and the command is clamped between the laws of both sides (min/max selection, as in
 //! fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6). The law is that of an
 //! exponential control barrier function (Nguyen and Sreenath, ACC 2016): where x is limited to x_lim and ẍ follows the surface,
 //!
@@ -8,8 +8,9 @@
 //! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
 //! ```
 //!
-//! brings x to its limit without overshoot. A controller that stays below is not touched. Accelerations and surface effects are
-//! the model's at the state predicted for the moment at which a command acts, so rolling, speed and gravity are in them.
+//! brings x to its limit without overshoot. Commands inside the limits are unchanged. Accelerations and surface effects are
+//! evaluated with the model at the state predicted for the time at which a command acts, so that they include rolling,
+//! speed and gravity.
 
 use crate::Observation;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};

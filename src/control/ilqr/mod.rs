@@ -1,9 +1,9 @@
-//! iLQR: the plan over half a second that the model's exact derivatives lead to.
+//! iLQR: a plan over half a second from exact derivatives of the model.
 //!
 //! Differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
-//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration a tick from the last plan,
-//! which is the real-time iteration of Diehl et al. (2002). Throttle and the attitude that the airspeed
-//! allows are the LQI's, and what the model leaves unexplained is taken into it: no steady error.
+//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration per tick from the last plan,
+//! which is the real-time iteration of Diehl et al. (2002). Throttle and attitude limits come from the
+//! LQI. The disturbance estimate is part of the prediction, so that there is no steady-state error.
 
 mod cost;
 mod problem;

@@ -98,7 +98,7 @@ mod tests {
         }
         // Half a second beyond the patience the pilot finds the link lost.
         assert_eq!(clock.at(later(1700)), time(5500));
-        // A companion that stood still for five seconds has not heard five seconds of silence.
+        // A companion that stalled for five seconds did not observe five seconds of silence.
         assert_eq!(clock.at(later(6700)), time(5600));
         clock.set(later(6700), time(5010));
         assert_eq!(clock.at(later(9000)), time(5010));

@@ -79,7 +79,7 @@ mod tests {
         }
     }
 
-    /// A planner, what tells that a plan is begun, and what lets one that waits go.
+    /// A planner with channels that signal the start of a plan and release a waiting one.
     struct Bench {
         planner: Threaded,
         begun: Receiver<()>,
@@ -87,7 +87,7 @@ mod tests {
     }
 
     impl Bench {
-        /// `waits`: which plans wait, the first first.
+        /// `waits`: whether each plan waits, in order.
         fn new(pace: Pace, waits: &[bool]) -> Bench {
             let ((begun, started), (go, gate)) = (bounded(9), bounded(9));
             let waits = waits.iter().rev().copied().collect();
@@ -96,7 +96,7 @@ mod tests {
             Bench { planner, begun: started, go }
         }
 
-        /// A plan that nothing holds up, however slow the machine.
+        /// A plan that is ready in time on any machine.
         fn in_time(&mut self, engage: bool) -> Plan {
             self.planner.deadline = Duration::from_secs(60);
             self.planner.plan(&any_request(engage), Instant::now())

@@ -103,7 +103,7 @@ mod tests {
         for us in 0..1000 {
             histogram.note(Duration::from_micros(us));
         }
-        // Of 0, 1 … 999 µs a half do not exceed 499 µs: told as the bucket's end.
+        // Of 0, 1 … 999 µs a half do not exceed 499 µs: reported as the bucket's end.
         assert_eq!(histogram.quantile_us(0.5), 500.0);
         assert_eq!(histogram.quantile_us(0.99), 990.0);
         assert_eq!(histogram.quantile_us(1.0), 999.0);

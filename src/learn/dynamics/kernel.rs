@@ -4,7 +4,7 @@
 //! instructions, and two integration schemes share one copy of its value, its slopes and its coefficients' slopes.
 
 use crate::dynamics::packet::Packet;
-use crate::dynamics::prior::{At, Said, Slopes};
+use crate::dynamics::prior::{At, PriorOutputs, Slopes};
 use crate::dynamics::rollout::{Gradient, Pass, SumSlopes, Sums, Trace};
 use greylag_model::GreyBox;
 #[cfg(target_arch = "aarch64")]
@@ -17,7 +17,11 @@ pub trait InstructionSet: Copy + Send + Sync {
     /// The number type of a pass.
     type Number: Packet;
     /// Calls [`At::ask`] for the prior.
-    fn ask<const WHOLE: bool>(self, model: &GreyBox, at: &At<Self::Number>) -> Said<Self::Number>;
+    fn ask<const WHOLE: bool>(
+        self,
+        model: &GreyBox,
+        at: &At<Self::Number>,
+    ) -> PriorOutputs<Self::Number>;
     /// Calls [`At::slope`] for the state's slopes.
     fn slope<const WHOLE: bool>(
         self,
@@ -92,13 +96,13 @@ macro_rules! compiled {
                 self,
                 model: &GreyBox,
                 at: &At<$number>,
-            ) -> Said<$number> {
+            ) -> PriorOutputs<$number> {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
                 fn compiled<const WHOLE: bool>(
                     model: &GreyBox,
                     at: &At<$number>,
-                ) -> Said<$number> {
+                ) -> PriorOutputs<$number> {
                     at.ask::<WHOLE>(model)
                 }
                 compiled!(call compiled::<WHOLE>(model, at) $($features)?)

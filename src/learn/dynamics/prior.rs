@@ -12,7 +12,7 @@ pub const ALOFT: f64 = f64::INFINITY;
 
 /// Outputs of the prior at a point.
 #[derive(Clone, Copy, Debug)]
-pub struct Said<R> {
+pub struct PriorOutputs<R> {
     /// Specific force plus gravity, body axes, m/s².
     pub acceleration: Vector<R>,
     /// Angular acceleration in rad/s².
@@ -21,7 +21,7 @@ pub struct Said<R> {
     pub rate: State<R>,
 }
 
-/// Slopes of the loss over the outputs [`Said`].
+/// Slopes of the loss over the outputs [`PriorOutputs`].
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes<R> {
     /// Slope over the specific force plus gravity.
@@ -53,7 +53,7 @@ impl<R: Real> At<R> {
     /// Outputs of `model`'s prior: with `WHOLE` all of its effects, else those that depend on the point alone, in
     /// code without the others.
     #[inline(always)]
-    pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> Said<R> {
+    pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> PriorOutputs<R> {
         let air = self.air(model);
         let (acceleration, spin) = if WHOLE {
             model.accelerations_inlined(&self.state, &self.controls, &air)
@@ -61,7 +61,7 @@ impl<R: Real> At<R> {
             model.independent_accelerations(&self.state, &self.controls, &air)
         };
         let rate = rigid_body::state_rate(&self.state, &air, acceleration, spin);
-        Said { acceleration, spin, rate }
+        PriorOutputs { acceleration, spin, rate }
     }
 
     /// The slope over the state.
@@ -83,14 +83,14 @@ impl<R: Real, const WHOLE: bool> Sloped<R, 8> for Asked<'_, R, WHOLE> {
     fn part(&self, x: [Dual<2, R>; 8]) -> [R; 2] {
         let controls = self.at.controls.map(fixed);
         let at = At { state: State::from_array(x), controls, density: fixed(self.at.density) };
-        let said = at.ask::<WHOLE>(self.model);
+        let outputs = at.ask::<WHOLE>(self.model);
         let slopes = self.slopes;
         let mut sum = [R::zero(); 2];
         for i in 0..3 {
-            add(&mut sum, &said.acceleration[i], slopes.acceleration[i]);
-            add(&mut sum, &said.spin[i], slopes.spin[i]);
+            add(&mut sum, &outputs.acceleration[i], slopes.acceleration[i]);
+            add(&mut sum, &outputs.spin[i], slopes.spin[i]);
         }
-        for (out, slope) in said.rate.to_array().iter().zip(slopes.rate.to_array()) {
+        for (out, slope) in outputs.rate.to_array().iter().zip(slopes.rate.to_array()) {
             add(&mut sum, out, slope);
         }
         sum
@@ -113,8 +113,8 @@ pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
 
 /// Σ of slopes times derivatives with respect to each of `inputs`, two at a time.
 ///
-/// Two at a time and not all at once, because the compiler has to see the prior whole in each
-/// direction, and because what the network costs is far more.
+/// Two at a time and not all at once, because the compiler inlines the whole prior for each
+/// direction, and because the network costs far more.
 #[inline(always)]
 pub fn transposed<R: Real, const N: usize>(
     inputs: &[R; N],
@@ -191,11 +191,11 @@ impl<R: Packet> At<R> {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes with respect to the coefficients of all effects, `wrench` being those with respect to the forces
-    /// and moments; the moments.
+    /// Adds the slopes over the coefficients of all effects, given those over forces and moments, `wrench`; returns the
+    /// moments.
     ///
-    /// The sums over the effects that need only the point, as they are, with centred surfaces and at rest, are what the
-    /// other effects are made of: the slopes with respect to these sums go on to the coefficients of the former.
+    /// The other effects depend on three sums over the effects of the point alone (as they are, with centred surfaces,
+    /// and at rest): the slopes over these sums propagate to the coefficients of the latter.
     #[inline(always)]
     fn whole(
         &self,

@@ -1,10 +1,10 @@
-//! The analytic policy gradient: the slope of the reward through the model, over short windows.
+//! The analytic policy gradient: the gradient of the reward through the model, over short windows.
 //!
 //! The short-horizon actor-critic of Xu et al. (2022) without its critic: the windows are longer than
-//! the aircraft takes to answer, so that what lies behind them adds little. The model's slopes are
-//! differences between the lanes of one block: the point itself in the first, one number moved a little in
-//! each of the others. The actuators are those that the five observed numbers and the last commands
-//! explain, which is exact but for the first step off a stop.
+//! the aircraft's response, so that rewards after them matter little. The model's derivatives are finite
+//! differences between the lanes of one block: the point itself in the first, one variable perturbed in
+//! each of the others. The actuator states are reconstructed from the five observed values and the last
+//! commands, which is exact except for the first step off a stop.
 
 mod slopes;
 

@@ -106,8 +106,8 @@ pub struct Spread {
     pub high: Vec<f64>,
 }
 
-/// The spread over `curves` of what `get` says of a point, at each of the places `at` of the quantity
-/// `over`, linear between two points; NaN where a curve has not begun or has ended.
+/// The spread over `curves` of the quantity `get`, at each of the values `at` of the quantity `over`,
+/// interpolated linearly; NaN where a curve has not begun or has ended.
 pub fn spread(
     curves: &[&[CurvePoint]],
     over: impl Fn(&CurvePoint) -> f64,

@@ -14,9 +14,9 @@ pub struct Mlp {
 
 /// Adam for one network, in one pass over each of its tensors.
 ///
-/// burn's own makes a dozen passes, each into memory that it takes anew, which at the sizes of Table VII is
-/// a tenth of an update of TD3. The operations here are burn's in burn's order, so that the numbers are
-/// the same to the bit; a test holds them to that.
+/// burn's own makes a dozen passes, each with a new allocation, which at the sizes of Table VII takes a tenth
+/// of an update of TD3. The operations are burn's in burn's order, so that the results are equal to the bit,
+/// which a test checks.
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     rate: f64,

@@ -1,12 +1,12 @@
 //! TD3 (Fujimoto et al. 2018), Table VII of \[GSFM26\], in the order of the algorithm.
 //!
-//! What departs from the paper:
-//! - Observations are scaled, and targets observed as what is left to them
-//!   ([`greylag_control::policy::observe`]): the same information.
-//! - An aircraft that leaves the model's envelope earns the worst reward for ever,
-//!   −(κ_φ + κ_θ + κ_v)/(1 − γ), and nothing follows. The end of an episode's time is no end: what
-//!   follows is valued as ever. The paper says nothing of either.
-//! - The actor's last layer starts small, so that it starts at neutral surfaces and half throttle.
+//! Departures from the paper:
+//! - Observations are scaled, and contain the errors instead of the targets
+//!   ([`greylag_control::policy::observe`]): the information is the same.
+//! - Leaving the model's validity limits is terminal, with the smallest reward for ever,
+//!   −(κ_φ + κ_θ + κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next
+//!   state is bootstrapped. The paper specifies neither.
+//! - The actor's last layer is initialised near zero: neutral surfaces and half throttle.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;

@@ -14,7 +14,7 @@ fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
 }
 
 /// The value converted to the table's type. An integer sent as REAL32 is accepted for an INT32, because pymavlink's
-/// `param_set_send` sends REAL32 unless told otherwise.
+/// `param_set_send` sends REAL32 by default.
 fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<ParameterValue> {
     match (table, sent?) {
         (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),

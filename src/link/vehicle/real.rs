@@ -260,7 +260,7 @@ impl Real {
     }
 
     fn write(&mut self, message: &Message) -> Vec<u8> {
-        // Before a controller is heard the system is the one that nearly all have.
+        // until a controller is received its system id is assumed to be the usual one
         let source = Source { system: self.system().unwrap_or(1), component: ONBOARD };
         self.sequence = self.sequence.wrapping_add(1);
         message.encode(Version::V2, self.sequence, source).unwrap_or_default()

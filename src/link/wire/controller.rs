@@ -17,8 +17,8 @@ pub const SET_MODE: u16 = 176;
 /// Command number of MAV_CMD_SET_MESSAGE_INTERVAL.
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
-/// What the wind of WIND_COV and of WIND is worth. PX4's was right to 0.1 m/s in calm air; ArduPlane's, which it sends at
-/// 2 Hz and which wanders by 0.9 m/s, made a sideslip of 1.3° (sd) with 0.5 and one of 0.3° with 4
+/// Standard deviations of the wind in WIND_COV and in WIND, m/s. PX4's wind was accurate to 0.1 m/s in calm air;
+/// ArduPlane's, sent at 2 Hz and drifting by 0.9 m/s, caused a sideslip error of 1.3° (sd) with 0.5 and of 0.3° with 4
 /// (`tests/firmware/angles.py`).
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;

@@ -2,7 +2,7 @@
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
-use crate::dynamics::prior::{ALOFT, At, Said, Sloped, Slopes, add, fixed, transposed};
+use crate::dynamics::prior::{ALOFT, At, PriorOutputs, Sloped, Slopes, add, fixed, transposed};
 use crate::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
 use greylag_model::{STEP, advance_jsbsim};
 use greylag_num::{Dual, Real};
@@ -21,10 +21,10 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
             // this scheme knows accelerations only
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
-            let said = self.ask(&at);
+            let outputs = self.ask(&at);
             let air = at.air(&self.subject.prior);
-            let (acceleration, spin) = pushed(&said, &learned, &at.state, &air);
-            trace.rates[step] = [said.rate, learned];
+            let (acceleration, spin) = pushed(&outputs, &learned, &at.state, &air);
+            trace.rates[step] = [outputs.rate, learned];
             trace.memory[step] = [acceleration, last.unwrap_or([zero; 3])];
             let (next, remembered) = advance_jsbsim(&state, &air, acceleration, spin, last);
             last = Some(remembered);
@@ -116,14 +116,14 @@ struct Back<R> {
 /// Acceleration and spin of prior plus residual.
 #[inline(always)]
 fn pushed<R: Real>(
-    said: &Said<R>,
+    outputs: &PriorOutputs<R>,
     learned: &State<R>,
     state: &State<R>,
     air: &AirData<R>,
 ) -> (Vector<R>, Vector<R>) {
     let push = rigid_body::acceleration_of(state, air, learned);
     let turn = [learned.p, learned.q, learned.r];
-    let (mut acceleration, mut spin) = (said.acceleration, said.spin);
+    let (mut acceleration, mut spin) = (outputs.acceleration, outputs.spin);
     for i in 0..3 {
         acceleration[i] += push[i];
         spin[i] += turn[i];

@@ -6,7 +6,7 @@ mod rk4;
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::network::Passes;
 use crate::dynamics::packet::Packet;
-use crate::dynamics::prior::{At, Said, Slopes};
+use crate::dynamics::prior::{At, PriorOutputs, Slopes};
 use greylag_model::residual::Scales;
 use greylag_model::{GreyBox, Integrator};
 use greylag_num::Real;
@@ -189,7 +189,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
 
     /// The prior's outputs at a point.
     #[inline(always)]
-    fn ask(&self, at: &At<R>) -> Said<R> {
+    fn ask(&self, at: &At<R>) -> PriorOutputs<R> {
         let model = &self.subject.prior;
         match model.needs() {
             Needs::Point => self.set.ask::<false>(model, at),

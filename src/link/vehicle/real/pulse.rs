@@ -72,7 +72,7 @@ impl Pulse {
 mod tests {
     use super::*;
 
-    /// What a second of cycles every `cycle_ms` says, every `state`-th of them with a state.
+    /// The shortage reported in a second of cycles every `cycle_ms`, every `state`-th of them with a state.
     fn second(cycle_ms: u64, state: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         (0..1000 / cycle_ms).find_map(|i| {
@@ -83,7 +83,7 @@ mod tests {
         })
     }
 
-    /// What two seconds say in which `lost` of ten frames are lost from `from_ms` to `to_ms`.
+    /// The shortage reported in two seconds with `lost` of ten frames lost from `from_ms` to `to_ms`.
     fn lossy(lost: u64, from_ms: u64, to_ms: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         let mut frames = [0, 0];
