@@ -95,7 +95,7 @@ pub struct TableFile {
     pub stage: String,
     /// The axes that form its rows; cells of a row that differ in others are its strata.
     pub rows: Vec<String>,
-    /// The quantities by their names in a result, such as `easy.mean_deg`.
+    /// Names of the quantities in a result, such as `easy.mean_deg`.
     pub metrics: Vec<String>,
     /// Unit of the quantities.
     #[serde(default)]

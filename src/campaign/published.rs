@@ -1,4 +1,4 @@
-//! The paper's tables of statistics over seeds, to stand beside a campaign's.
+//! The paper's tables of statistics over seeds, for comparison with a campaign's.
 //!
 //! `published.csv` holds Tables IV, VIII, IX, X (with III in it) and XI of \[GSFM26\] as printed. Rows have the names of
 //! levels here: `severe/trainable`, `parallel`, `hybrid`; targets those of `greylag evaluate`.

@@ -22,8 +22,8 @@ const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
 /// The longest frame: MAVLink 2, full payload, signed.
 pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
-/// False starts that one datagram or chunk may cost before the rest of it is dropped: each costs
-/// a CRC over up to 267 bytes, so noise cannot buy more than a few microseconds.
+/// False starts in one datagram or chunk after which the rest is dropped: each costs a CRC over up
+/// to 267 bytes, so that noise takes a few microseconds at most.
 const MAX_FALSE_STARTS: u32 = 32;
 /// Frames taken from one datagram or chunk; senders pack to an MTU, which holds fewer.
 const MAX_FRAMES: u32 = 128;

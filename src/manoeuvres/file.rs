@@ -32,7 +32,7 @@ pub enum ScheduleError {
     Content {
         /// Path of the file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The fault and its remedy.
         why: String,
     },
 }
@@ -243,7 +243,7 @@ impl ExcitationFile {
     }
 }
 
-/// What is wrong with `steps`, by the number of the step.
+/// The first fault of `steps`, by the number of the step.
 pub(super) fn check(steps: &[Step]) -> Result<(), String> {
     if steps.is_empty() {
         return Err(

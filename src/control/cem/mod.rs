@@ -118,7 +118,7 @@ struct Base {
 }
 
 impl Cem {
-    /// A planner through `model` under the name `name`.
+    /// A planner with `model`, registered under `name`.
     ///
     /// # Panics
     /// If the settings ask for a policy or its critics and `aids` has none.

@@ -36,7 +36,7 @@ struct RudderLaw {
     deflection: f64,
 }
 
-/// Conversion of commands to deflections, with the sign of the elevator.
+/// Figures that convert deflections to commands, with the sign of the elevator.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfaces {
     pub figures: ActuatorFigures,

@@ -1,4 +1,4 @@
-//! What a policy observes: the fifteen numbers of eq. (28) of \[GSFM26\] with the airspeed error, of order one.
+//! Observation of a policy: the fifteen numbers of eq. (28) of \[GSFM26\] with the airspeed error, of order one.
 
 use crate::Target;
 use greylag_num::Real;

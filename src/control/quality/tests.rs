@@ -118,7 +118,7 @@ fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
 }
 
-/// The jump with which a new target is answered counts where the flight went on before it.
+/// The command's jump at a new target counts if the flight had started before it.
 #[test]
 fn the_first_change_counts_from_the_command_before() {
     let command = Command { aileron: 0.5, ..Command::IDLE };

@@ -55,7 +55,7 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 /// Kinds of methods:
 ///
 /// - set-up before flight: [`Pilot::take_on`], [`Pilot::follow`], [`Pilot::protect_with`], [`Pilot::monitor_with`];
-/// - time: [`Pilot::advance`], at least every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of
+/// - time: [`Pilot::advance`], about every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of
 /// this computer;
 /// - tick: [`Pilot::observe`] with a state frame, then [`Pilot::decide`] with the plan for the request that `observe`
 /// returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
@@ -114,7 +114,7 @@ pub struct Pilot {
     by_attitude: bool,
     /// Time of the last oscillation: the gain is reduced for a while after it.
     oscillated: Option<Time>,
-    /// What the controller's deflections are on the average of the last half second, and until when.
+    /// Low-pass of the controller's commands, and the time of its last update.
     mean: Option<(Time, Command)>,
     /// Whether recovery from an upset is active.
     upset: bool,

@@ -36,7 +36,7 @@ mod tests {
     use greylag_physics::{ActuatorState, Command, State, Time};
     use std::time::Duration;
 
-    /// Something to plan for, of no interest beside its being there.
+    /// An arbitrary planning request.
     fn any_request(engage: bool) -> Request {
         let observation = Observation {
             time: Time::default(),
@@ -108,7 +108,7 @@ mod tests {
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        /// Waits for plans that came too late.
+        /// Waits for late plans.
         fn done(&self, plans: usize) {
             while self.planner.plans.len() < plans {
                 std::thread::sleep(Duration::from_millis(1));

@@ -23,11 +23,11 @@ const SAMPLES: usize = 4096;
 /// Squared relative strength below which a direction counts as unidentifiable.
 const UNSEEN: f64 = 1e-9;
 
-/// θ_p = θ_p0 + T η: η has as many entries as the data sees directions.
+/// θ_p = θ_p0 + T η: η has as many entries as there are identifiable directions.
 ///
-/// Adam moves every parameter at its own pace, but along the axes it is given: coefficients differ a
-/// thousandfold in size and move in company (aileron power with roll damping), so the axes are those
-/// of the rates that they make over the flights: ∂(F_p/x_c)/∂η has unit covariance.
+/// Adam scales every parameter separately, along the given axes. Coefficients differ a thousandfold in
+/// size and are correlated (aileron power with roll damping), so that the axes are chosen by their
+/// effect on the rates over the flights: ∂(F_p/x_c)/∂η has unit covariance.
 #[derive(Clone, Debug)]
 pub struct Basis {
     /// Places in the model's list, the list's length standing for Jxz.
@@ -167,7 +167,7 @@ impl Basis {
         self.turn.ncols()
     }
 
-    /// Whether nothing is trained.
+    /// Whether there are no coordinates.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -113,7 +113,7 @@ pub fn save(
     write(MODEL, text.as_bytes())
 }
 
-/// Puts the coefficient `name` of `model` into the model file's `table`; `None` if that has no such entry.
+/// Writes the coefficient `name` of `model` into the model file's `table`; `None` if that has no such entry.
 fn write_trained(
     table: &mut toml::Table,
     model: &GreyBox,

@@ -161,7 +161,7 @@ impl NoiseDetector {
         NoiseDetector { since: Instant::now(), bytes: 0, frames: 0, reported: false }
     }
 
-    /// Whether the noise is to be reported now; at most once.
+    /// Counts received bytes and frames; whether a wrong baud rate is to be reported now, at most once.
     fn is_noise(&mut self, bytes: usize, frames: usize) -> bool {
         self.bytes += bytes as u64;
         self.frames += frames as u64;

@@ -86,8 +86,8 @@ pub fn parameter_error(
 
 /// STATUSTEXT messages that together carry `words`, in chunks that share `id`.
 ///
-/// MAVLink 1 has no field for chunks, so `chunks` there are texts of their own. Letters outside
-/// ASCII become `?`: receivers disagree about them.
+/// MAVLink 1 has no field for chunks, so that `chunks` are separate texts there. Characters
+/// outside ASCII become `?`: receivers differ in their encoding.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
     let bytes: Vec<u8> =
         words.chars().map(|c| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' }).collect();

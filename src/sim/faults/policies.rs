@@ -147,7 +147,7 @@ fn steady_for_less(seconds: f64) -> Rule {
     Formula::atom(move |s: &Sample| (seconds - s.steady_s) / UNIT_S)
 }
 
-/// Whatever begins is reported within a second, or was recently.
+/// The start of `event` is reported within a second, or was reported recently.
 fn reported(event: Rule) -> Rule {
     let spoke = || is(|s| s.spoke);
     event.rises().implies(spoke().eventually(1.0).or(spoke().once(COMPLAINED_S)))

@@ -113,7 +113,7 @@ mod tests {
         }
     }
 
-    /// A controller that reaches 95 % of what it is commanded, in turns to both sides.
+    /// A controller that reaches 95 % of its command, in turns to both sides.
     #[test]
     fn a_turn_that_is_reversed_is_trimmed_anew() {
         for ramp_s in [0.01, 9.0] {

@@ -8,7 +8,8 @@ use super::profile::{Authority, Stack};
 
 /// Delay of a second-order Butterworth low-pass at low frequencies, in cycles of its cut-off: √2 / 2π.
 const LOW_PASS: f64 = 0.225;
-/// ArduPilot looks at its channels every 20 ms; PX4 at MANUAL_CONTROL as it comes, 10 ms apart.
+/// Sampling period of the sticks, s: ArduPilot samples its channels every 20 ms; PX4 takes each
+/// MANUAL_CONTROL, 10 ms apart.
 const CHANNELS_S: [f64; 2] = [0.02, 0.01];
 /// Remaining delay margin below which a warning is given, s; it covers the link and other delays known roughly.
 const SCARCE_S: f64 = 0.015;

@@ -28,7 +28,7 @@ pub enum Authority {
 pub struct Profile {
     /// The flight stack it runs.
     pub stack: Stack,
-    /// What it is commanded.
+    /// The quantities it is commanded.
     pub authority: Authority,
     /// Actuator dynamics of the aircraft, whose state the controller does not report.
     pub actuators: ActuatorFigures,
@@ -240,7 +240,7 @@ const STATION: &str =
     "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
 const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// 100 Hz of state are 0.8 of 125 Hz; below 200 Hz nothing was flown.
+/// Loop rate of the controller, Hz: state at 100 Hz needs 125 Hz; below 200 Hz there is no flight experience.
 const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [

@@ -63,7 +63,7 @@ impl Sticks {
 
     /// Pulse widths of channels 1 to 3, µs, by RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
     ///
-    /// ArduPilot's pitch stick is positive nose up, against our elevator.
+    /// ArduPilot's pitch stick is positive nose up, opposite to our elevator.
     pub(super) fn pulses(&mut self, command: &Command, parameters: &Parameters) -> [u16; 3] {
         let [one, two, three] = [1, 2, 3].map(|n| channel(n, parameters));
         let wanted = [

@@ -32,7 +32,7 @@ pub(super) struct Follower {
     surfaces: [Fast; 2],
 }
 
-/// High-pass of a surface's deflection.
+/// High-pass of a surface's deflection with its mean square.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fast {
     slow: f64,
