@@ -58,7 +58,7 @@ pub struct Now {
 /// Kinds of methods:
 ///
 /// - input: [`Clients::handle`] takes received bytes, [`Clients::welcome`] and [`Clients::forget`] take connections
-/// that open and close;
+///   that open and close;
 /// - time: [`Clients::poll`] queues what is due;
 /// - output: [`Clients::drain`] returns the queued frames;
 /// - queries: [`Clients::peers`], [`Clients::counts`], [`Clients::session_count`], [`Clients::identity`].

@@ -56,9 +56,9 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 ///
 /// - set-up before flight: [`Pilot::take_on`], [`Pilot::follow`], [`Pilot::protect_with`], [`Pilot::monitor_with`];
 /// - time: [`Pilot::advance`], about every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of
-/// this computer;
+///   this computer;
 /// - tick: [`Pilot::observe`] with a state frame, then [`Pilot::decide`] with the plan for the request that `observe`
-/// returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
+///   returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
 /// - requests of clients: the trait [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
 /// - vehicle: [`Pilot::engaged`] when a real controller has given control authority.
 ///
