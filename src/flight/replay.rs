@@ -53,9 +53,9 @@ pub enum ReplayError {
 pub struct Difference {
     /// Time of the state, vehicle clock.
     pub time: Time,
-    /// The recorded command.
+    /// The command in the recording.
     pub recorded: Command,
-    /// The replayed command.
+    /// The command in the replay.
     pub replayed: Command,
 }
 

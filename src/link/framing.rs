@@ -40,9 +40,9 @@ pub enum Version {
 /// Sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Source {
-    /// System id, 1..255.
+    /// System id of the MAVLink node.
     pub system: u8,
-    /// Component id, 1..255.
+    /// Component id of the MAVLink node.
     pub component: u8,
 }
 

@@ -41,9 +41,9 @@ impl Group {
 /// Sensor errors of one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instruments {
-    /// Gyro biases, rad/s.
+    /// Biases of the gyros, rad/s.
     pub gyro_bias: [f64; 3],
-    /// Accelerometer biases, m/s².
+    /// Biases of the accelerometers, m/s².
     pub force_bias: [f64; 3],
     /// Factor of the measured on the true airspeed.
     pub airspeed_scale: f64,

@@ -85,9 +85,9 @@ pub struct Trial {
 /// Logs of a trial.
 #[derive(Clone, Debug)]
 pub struct Logs {
-    /// Flights for estimation.
+    /// Flights for parameter estimation.
     pub training: Vec<Flight>,
-    /// Flights for validation.
+    /// Flights for model validation.
     pub testing: Vec<Flight>,
 }
 

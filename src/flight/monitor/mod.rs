@@ -32,7 +32,7 @@ const SLOWEST: f64 = 0.8;
 pub struct Compared {
     /// Measured value: forces at the sample, angular accelerations as means over the preceding step.
     pub measured: f64,
-    /// Predicted value.
+    /// Value predicted by the model.
     pub predicted: f64,
     /// Half width of the band about the prediction: two standard deviations.
     pub band: f64,

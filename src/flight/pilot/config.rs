@@ -121,9 +121,9 @@ pub enum ConfigError {
         name: &'static str,
         /// Value of the setting.
         value: f64,
-        /// Smallest allowed value.
+        /// Smallest value that is allowed.
         low: f64,
-        /// Largest allowed value.
+        /// Largest value that is allowed.
         high: f64,
     },
     /// Two settings contradict each other.

@@ -20,7 +20,7 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Adds a duration.
+    /// Adds a duration to the histogram.
     pub fn note(&mut self, duration: Duration) {
         let us = usize::try_from(duration.as_micros()).unwrap_or(RESOLVED_US);
         self.buckets[us.min(RESOLVED_US)] += 1;
@@ -28,12 +28,12 @@ impl Histogram {
         self.max_us = self.max_us.max(duration.as_nanos() as f64 / 1000.0);
     }
 
-    /// Number of durations.
+    /// Number of durations added.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Largest duration, µs.
+    /// Largest of the durations, µs.
     pub fn max_us(&self) -> f64 {
         self.max_us
     }
@@ -68,7 +68,7 @@ pub struct Timing {
     pub overtaken: u64,
     /// Number of stalls of more than 0.1 s.
     pub stalls: u64,
-    /// The longest stall.
+    /// Length of the longest stall.
     pub longest_stall: Duration,
 }
 

@@ -38,7 +38,7 @@ impl Counterpart {
         Counterpart::ArdupilotAttitude,
     ];
 
-    /// Name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Counterpart::Sitl => "sitl",

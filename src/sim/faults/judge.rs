@@ -85,7 +85,7 @@ impl Cause {
     /// The causes that faults produce.
     pub const OF_FAULTS: [Cause; 3] = [Cause::Unsteered, Cause::Blind, Cause::Misled];
 
-    /// Name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Cause::Unsteered => "unsteered",
@@ -142,7 +142,7 @@ impl Finding {
         matches!(self, Panic | Command | Slew | SlowHandBack | Unreported)
     }
 
-    /// Name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Finding::Panic => "panic",

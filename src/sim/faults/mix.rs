@@ -74,7 +74,7 @@ impl FaultKind {
         FaultKind::Disk,
     ];
 
-    /// Name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             FaultKind::Loss => "loss",

@@ -33,11 +33,11 @@ pub struct Leg {
 pub struct Asked {
     /// Time of the request, s.
     pub at_s: f64,
-    /// Kind of request.
+    /// The kind of request.
     pub what: Asking,
 }
 
-/// Kinds of request.
+/// Requests of clients and ground stations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Asking {

@@ -56,7 +56,7 @@ impl Failure {
         Failure::ShiftedLoad,
     ];
 
-    /// Name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Failure::None => "healthy",
