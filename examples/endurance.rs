@@ -148,7 +148,7 @@ fn in_process(model: &GreyBox, hours: f64, opposite: &str) -> Result<()> {
         down.clear();
         let truth = aircraft.show(&mut down);
         let mut ticked = 0;
-        desk.hear(host, &down, &mut up, |_, _| ticked += 1);
+        desk.receive(host, &down, &mut up, |_, _| ticked += 1);
         ticks += ticked;
         // Every state must have its command within its own step, once the stream has begun.
         late += u64::from(ticks > 0 && ticked != 1);

@@ -1,54 +1,54 @@
-//! What can be wrong with a campaign.
+//! Errors of campaigns.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a campaign cannot be planned, read or written.
+/// A campaign cannot be planned, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The campaign file cannot be read.
     #[error("cannot read campaign file {path}: {source}; name a file such as params/campaigns/small.toml", path = path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// The campaign file says something that cannot be done.
+    /// The campaign file is invalid.
     #[error("campaign file {path}: {why}", path = path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// The fault and its remedy.
         why: String,
     },
     /// A file of the campaign's folder or an input cannot be used.
     #[error("{doing} {path}: {source}", path = path.display())]
     Io {
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// To which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// A file does not hold what its name says.
+    /// A file has the wrong contents.
     #[error("{path} {why}", path = path.display())]
     Content {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// The fault and its remedy.
         why: String,
     },
 }
 
 impl CampaignError {
-    /// An error of the system while `doing` something to `path`.
+    /// An operating system's error while `doing` something to `path`.
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> CampaignError {
         move |source| CampaignError::Io { doing, path: path.into(), source }
     }
 
-    /// A file that does not hold what it should.
+    /// A file with the wrong contents.
     pub(super) fn content(path: &Path, why: impl ToString) -> CampaignError {
         CampaignError::Content { path: path.into(), why: why.to_string() }
     }

@@ -1,4 +1,4 @@
-//! The campaign file: axes, seeds, stages, and what is summed up of them.
+//! The campaign file: axes, seeds, stages, tables and claims.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,33 +8,33 @@ use serde::Deserialize;
 use super::error::CampaignError;
 use greylag_model::residual::hash;
 
-/// The layout that this program reads.
+/// The schema that this program reads.
 const SCHEMA: u32 = 1;
 /// The axis that every campaign has.
 pub const SEED: &str = "seed";
 
-/// A campaign as its file says it.
+/// Contents of a campaign file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignFile {
     schema: u32,
-    /// Its name: that of its folder.
+    /// Name of the campaign and of its folder.
     pub name: String,
-    /// What it is for, in a sentence.
+    /// Purpose in one sentence.
     #[serde(default)]
     pub about: String,
-    /// The seeds.
+    /// Random seeds of the runs.
     pub seeds: Vec<u64>,
-    /// What is varied beside the seed.
+    /// Axes in addition to the seed.
     #[serde(default)]
     pub axes: BTreeMap<String, Vec<Level>>,
-    /// The stages in order: a stage uses those before it.
+    /// The stages in order: a stage may use those before it.
     #[serde(rename = "stage")]
     pub stages: Vec<StageFile>,
-    /// What is summed up.
+    /// Tables of summary statistics.
     #[serde(default, rename = "table")]
     pub tables: Vec<TableFile>,
-    /// What is asked of the results.
+    /// Claims that the results are tested against.
     #[serde(default, rename = "claim")]
     pub claims: Vec<ClaimFile>,
     /// SHA-256 of the file.
@@ -42,13 +42,13 @@ pub struct CampaignFile {
     pub sha256: String,
 }
 
-/// A level of an axis: its name, and the words that it puts into a command.
+/// A level of an axis: its name, and the words that it inserts into a command.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(from = "LevelFile")]
 pub struct Level {
-    /// The name in tables.
+    /// Name in tables.
     pub name: String,
-    /// The words, which may be none.
+    /// The words; may be empty.
     pub words: String,
 }
 
@@ -72,49 +72,49 @@ impl From<LevelFile> for Level {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageFile {
-    /// Its name; `{name}` in a later command is the folder that it wrote.
+    /// Its name; `{name}` in a later command is its output folder.
     pub name: String,
     /// The axes that it varies.
     pub over: Vec<String>,
-    /// The command line, without `greylag`; `{out}`, `{seed}`, `{axis}` and `{stage}` are filled in.
+    /// The command line without `greylag`; `{out}`, `{seed}`, `{axis}` and `{stage}` are substituted.
     pub command: String,
     /// Files that the command reads without naming them.
     #[serde(default)]
     pub inputs: Vec<String>,
-    /// Time of a core that a cell takes, s, until cells have been measured.
+    /// Estimated core time of a cell, s, until cells have been measured.
     pub core_seconds: Option<f64>,
 }
 
-/// A table: a quantity of a stage, summed up over seeds.
+/// A table: a quantity of a stage, summarised over seeds.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableFile {
-    /// Its title.
+    /// Title of the table.
     pub title: String,
-    /// The stage whose cells it sums up, and levels that they are to have: `stage axis=level …`.
+    /// The stage whose cells it summarises, and their required levels: `stage axis=level …`.
     pub stage: String,
-    /// The axes that make its rows; cells of a row that differ in others are its strata.
+    /// The axes that form its rows; cells of a row that differ in others are its strata.
     pub rows: Vec<String>,
-    /// The quantities by their names in a result, such as `easy.mean_deg`.
+    /// Names of the quantities in a result, such as `easy.mean_deg`.
     pub metrics: Vec<String>,
-    /// Their unit.
+    /// Unit of the quantities.
     #[serde(default)]
     pub unit: String,
-    /// The published table that stands beside: one of those in [`super::published`].
+    /// The published table for comparison: one of those in [`super::published`].
     pub paper: Option<String>,
 }
 
-/// A claim: one row of a stage is less than another in a quantity.
+/// A claim: one row of a stage is smaller than another in a quantity.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClaimFile {
-    /// The claim in words.
+    /// The claim as text.
     pub says: String,
-    /// The quantity.
+    /// Name of the quantity.
     pub metric: String,
-    /// Stage and levels of the cells that are said to have less of it: `stage axis=level …`.
+    /// Stage and levels of the cells claimed to be smaller: `stage axis=level …`.
     pub less: String,
-    /// Those that they are compared with.
+    /// Stage and levels of the cells they are compared with.
     pub than: String,
 }
 
@@ -122,17 +122,19 @@ impl CampaignFile {
     /// Reads and checks a campaign file.
     ///
     /// # Errors
-    /// If it cannot be read, is no campaign, or names what there is not.
+    ///
+    /// If it cannot be read, is invalid, or names something that does not exist.
     pub fn load(path: &Path) -> Result<CampaignFile, CampaignError> {
         let text = greylag_physics::text_file::read(path)
             .map_err(|source| CampaignError::Read { path: path.into(), source })?;
         CampaignFile::parse(&text).map_err(|why| CampaignError::File { path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
+    /// [`load`](Self::load) from the file's text; the error describes the fault.
     ///
     /// # Errors
-    /// If it is no campaign or names what there is not.
+    ///
+    /// If it is invalid or names something that does not exist.
     pub fn parse(text: &str) -> Result<CampaignFile, String> {
         let mut file: CampaignFile =
             toml::from_str(text).map_err(|e| greylag_physics::airframe::toml_error(text, &e))?;
@@ -209,9 +211,10 @@ impl CampaignFile {
         Err(format!("there is no axis {axis}; there are {}", known.join(", ")))
     }
 
-    /// The stage of that name.
+    /// The stage with that name.
     ///
     /// # Errors
+    ///
     /// If there is none.
     pub fn stage(&self, name: &str) -> Result<&StageFile, String> {
         self.stages.iter().find(|stage| stage.name == name).ok_or_else(|| {
@@ -233,7 +236,7 @@ impl CampaignFile {
         Ok((stage.name.clone(), levels))
     }
 
-    /// Fails if the axis has no such level.
+    /// Fails if the axis lacks the level.
     pub(super) fn known_level(&self, axis: &str, level: &str) -> Result<(), String> {
         self.known_axis(axis)?;
         let known = self.levels(axis);
@@ -246,7 +249,7 @@ impl CampaignFile {
         }
     }
 
-    /// The levels of an axis, the seeds too.
+    /// The levels of an axis, including the seeds.
     pub fn levels(&self, axis: &str) -> Vec<Level> {
         if axis != SEED {
             return self.axes.get(axis).cloned().unwrap_or_default();
@@ -268,7 +271,7 @@ pub(super) fn levels<'a>(
         .collect()
 }
 
-/// Fails for a name that could not be that of a folder everywhere.
+/// Fails for a name that is not portable as a folder name.
 fn plain(what: &str, name: &str) -> Result<(), String> {
     let good = |c: char| c.is_ascii_alphanumeric() || "_-.+".contains(c);
     match !name.is_empty() && name.chars().all(good) {

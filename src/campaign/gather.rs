@@ -1,4 +1,4 @@
-//! Joins what the cells of a campaign gave, and says which are missing.
+//! Collects the results of a campaign's cells and lists missing ones.
 
 use std::path::Path;
 
@@ -7,40 +7,40 @@ use super::error::CampaignError;
 use super::plan::Plan;
 use super::store::{Failure, Standing, Store, Times, whole};
 
-/// How a campaign stands.
+/// State of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Gathered {
     /// The results, in the order of the cells.
     pub records: Vec<Record>,
-    /// What they took, in the order of the cells, without those whose times are not known: [`Times::cell`] says which
-    /// record each belongs to.
+    /// Computing times in the order of the cells, where known: [`Times::cell`] names the record's cell.
     pub times: Vec<Times>,
-    /// Cells that failed, and why.
+    /// Failed cells, with the reasons.
     pub failed: Vec<(String, Failure)>,
-    /// Cells that began and are not done.
+    /// Cells that have started and not finished.
     pub begun: Vec<String>,
-    /// Cells whose results are of another command or of other inputs.
+    /// Cells whose results belong to another command or to other inputs.
     pub stale: Vec<String>,
-    /// Cells of which there is nothing.
+    /// Cells without any result.
     pub missing: Vec<String>,
 }
 
-/// What became of results from elsewhere.
+/// Outcome of an import of results.
 #[derive(Clone, Debug, Default)]
 pub struct Joined {
-    /// Results that were taken.
+    /// Results that were imported.
     pub taken: usize,
-    /// Results of cells that are done here too, with the same measurements.
+    /// Results of cells that are finished here too, with the same measurements.
     pub twice: usize,
-    /// Cells that are done here too, with other measurements.
+    /// Results of cells that are finished here too, with other measurements.
     pub differing: Vec<String>,
     /// Results of no cell of the plan, or of another command or input.
     pub foreign: usize,
 }
 
-/// Looks at every cell.
+/// Reads the state of every cell.
 ///
 /// # Errors
+///
 /// If a file of the campaign's folder cannot be read.
 pub fn gather(plan: &Plan, store: &Store) -> Result<Gathered, CampaignError> {
     let mut all = Gathered::default();
@@ -66,9 +66,11 @@ impl Gathered {
         Ok(())
     }
 
-    /// Takes the results of `others`, say of another machine, for the cells of `plan` that are not done here, and says what became of them.
+    /// Imports the results of `others`, for instance from another machine, for the cells of `plan` that are not
+    /// finished here.
     ///
-    /// A result of another command or input than the plan's is left out. Where a cell was run in both places, the result from here stays.
+    /// A result of another command or input than the plan's is left out. Where a cell was run in both places, the
+    /// result from here is kept.
     pub fn join(&mut self, plan: &Plan, others: Vec<Record>) -> Joined {
         let mut joined = Joined::default();
         for other in others {
@@ -95,7 +97,7 @@ impl Gathered {
         joined
     }
 
-    /// Whether every cell is done.
+    /// Whether every cell is finished.
     pub fn is_whole(&self) -> bool {
         let rest = [&self.begun, &self.stale, &self.missing];
         self.failed.is_empty() && rest.iter().all(|cells| cells.is_empty())
@@ -115,10 +117,11 @@ pub fn write_lines<T: serde::Serialize>(path: &Path, lines: &[T]) -> Result<(), 
     whole(path, text)
 }
 
-/// The results in a file that [`write_lines`] wrote.
+/// The results in a file written by [`write_lines`].
 ///
 /// # Errors
-/// If it cannot be read, or a line of it is no result.
+///
+/// If it cannot be read, or a line is not a result.
 pub fn read_lines(path: &Path) -> Result<Vec<Record>, CampaignError> {
     let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
     let line = |(number, line): (usize, &str)| {
@@ -151,7 +154,7 @@ mod tests {
         plan(file, Path::new("a.toml"), &|path: &Path| PathBuf::from(path)).unwrap()
     }
 
-    /// Gives a cell the result `value`.
+    /// Sets a cell's result to `value`.
     fn finish(store: &Store, cell: &Cell, value: f64) {
         let claimed = store.claim(cell).unwrap().unwrap();
         assert!(store.claim(cell).unwrap().is_none(), "a cell is run by one process");

@@ -1,4 +1,4 @@
-//! What a finished command left in its folder: the quantities and files that count.
+//! Extracts quantities and output files from the folder of a finished command.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,34 +8,35 @@ use serde_json::Value;
 use super::error::CampaignError;
 use greylag_model::residual::hash;
 
-/// Where `greylag evaluate` writes its scores in a cell's folder.
+/// File of `greylag evaluate` with its scores, in a cell's folder.
 pub const SCORES: &str = "evaluation.json";
-/// Where `greylag train dynamics` does.
+/// File of `greylag train dynamics` with its report.
 const TRAINING: &str = "training.json";
-/// Where `greylag train policy` writes its learning curve.
+/// File of `greylag train policy` with its learning curve.
 const CURVE: &str = "curve.csv";
-/// Columns of a curve that do not depend on the machine.
+/// Columns of a curve that are independent of the machine.
 const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
-/// The files that later cells read, by their ends.
+/// Suffixes of the files that later cells read.
 const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
-/// What is none of them: it holds times, or what only this cell goes on from.
+/// Excluded file: it holds times, or the state that only this cell resumes from.
 const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 
-/// What a cell gave.
+/// Output of a cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Harvest {
     /// SHA-256 of the files that later cells read, by their names in the folder.
     pub files: BTreeMap<String, String>,
-    /// What was measured.
+    /// Measured quantities by name.
     pub metrics: BTreeMap<String, f64>,
     /// Points of a learning curve.
     pub curve: BTreeMap<String, Vec<f64>>,
 }
 
-/// What the commands of a cell left in `folder`.
+/// The output of a cell's commands in `folder`.
 ///
 /// # Errors
-/// If a file cannot be read or is not what it should be.
+///
+/// If a file cannot be read or is invalid.
 pub fn harvest(folder: &Path) -> Result<Harvest, CampaignError> {
     let mut harvest = Harvest { files: files(folder)?, ..Harvest::default() };
     if let Some(scores) = document(&folder.join(SCORES))? {
@@ -51,7 +52,7 @@ pub fn harvest(folder: &Path) -> Result<Harvest, CampaignError> {
     Ok(harvest)
 }
 
-/// The scores of each controller: `easy.mean_deg`, with the controller before it if there are several.
+/// The scores of each controller: `easy.mean_deg`, prefixed with the controller if there are several.
 fn evaluated(document: &Value) -> Vec<(String, f64)> {
     let controllers = list(document, "controllers");
     let mut all = Vec::new();
@@ -79,8 +80,8 @@ fn evaluated(document: &Value) -> Vec<(String, f64)> {
     all
 }
 
-/// What happened on the way: `easy.surface_travel` for the median over the targets, `easy.load_factor_max.worst` for
-/// the worst.
+/// Quality measures: `easy.surface_travel` for the median over the targets, `easy.load_factor_max.worst` for the
+/// worst.
 fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (id, spread) in measures.as_object().into_iter().flatten() {
@@ -91,7 +92,7 @@ fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     all
 }
 
-/// The errors of a learned model on flights that it has not seen, after some steps, with those of its prior.
+/// The free-run errors of a learned model on test flights after some steps, with those of its prior.
 fn trained(document: &Value) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (who, before) in [("learned", ""), ("prior", "prior.")] {
@@ -111,7 +112,7 @@ fn trained(document: &Value) -> Vec<(String, f64)> {
     all
 }
 
-/// How far a learned coefficient is off the true one, in parts of it.
+/// Relative error of a learned coefficient.
 fn relative(coefficient: &Value) -> Option<f64> {
     let (value, truth) = (coefficient["value"].as_f64()?, coefficient["truth"].as_f64()?);
     (truth != 0.0).then(|| (value / truth - 1.0).abs())
@@ -149,7 +150,7 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
     Ok(columns)
 }
 
-/// SHA-256 of what later cells read; a folder of flights counts as one.
+/// SHA-256 of the files that later cells read; a folder of flights counts as one.
 fn files(folder: &Path) -> Result<BTreeMap<String, String>, CampaignError> {
     let mut all = BTreeMap::new();
     for path in sorted(folder)? {

@@ -1,29 +1,30 @@
-//! Scripts that hand a campaign to a scheduler: an array of jobs a stage, each `greylag campaign run FILE --cell N`.
+//! Scripts that submit a campaign to a scheduler: a job array per stage, each job `greylag campaign run FILE --cell
+//! N`.
 
 use super::file::StageFile;
 use super::plan::Plan;
 
-/// What runs the jobs.
+/// Scheduler of the jobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Launcher {
-    /// Slurm's arrays.
+    /// Job arrays of Slurm.
     Slurm,
-    /// HyperQueue's arrays.
+    /// Task arrays of HyperQueue.
     Hyperqueue,
-    /// GNU parallel on this machine, or on those of its own options.
+    /// GNU parallel on this machine, or on those in its options.
     Parallel,
 }
 
-/// What a script is filled with.
+/// Values of a script.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// The program.
+    /// Path of the program.
     pub program: String,
-    /// The campaign file.
+    /// Path of the campaign file.
     pub file: String,
-    /// The campaign's folder.
+    /// Path of the campaign's folder.
     pub out: String,
-    /// Attempts at a cell that fails for a time (exit status 75).
+    /// Attempts at a cell that fails temporarily (exit status 75).
     pub attempts: usize,
     /// Further options of the scheduler, such as a partition and a time limit.
     pub options: String,
@@ -58,7 +59,7 @@ fn line(plan: &Plan, stage: &StageFile) -> String {
     format!("stage {} {first} {last}\n", stage.name)
 }
 
-/// A word for a shell.
+/// Quotes a word for a shell.
 fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', "'\\''"))
 }

@@ -1,10 +1,11 @@
-//! A campaign: many runs of this program over priors, controllers and seeds, and what they say together.
+//! Campaigns: many runs of this program over priors, controllers and seeds, with statistics over them.
 //!
-//! A campaign file names axes, seeds and stages. [`plan`](plan()) makes of it *cells*: command lines of this program, each
-//! with an identity that its command, its input files and the cells before it decide. [`store`] keeps what a cell
-//! gave: one JSON line, written whole. [`gather`] joins the lines; [`tables`] sums them up over seeds.
+//! A campaign file names axes, seeds and stages. [`plan`](plan()) expands it into *cells*: command lines of this
+//! program, each with an identity derived from its command, its input files and the cells before it. [`store`] keeps
+//! the result of a cell: one JSON line, written atomically. [`gather`] collects the lines; [`tables`] summarises them
+//! over seeds.
 //!
-//! Nothing here runs a cell: `greylag campaign run` does, and a cluster's scheduler calls that ([`launch`]).
+//! This crate runs no cell: `greylag campaign run` does, and a cluster's scheduler calls it ([`launch`]).
 
 pub mod cell;
 pub mod error;

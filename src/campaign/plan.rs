@@ -1,4 +1,4 @@
-//! From a campaign file to its cells.
+//! Expands a campaign file into its cells.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,16 +15,17 @@ const OWN: &str = "{out}";
 /// A campaign with its cells.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The file.
+    /// The campaign file.
     pub file: CampaignFile,
-    /// The cells; a cell stands after those that it reads.
+    /// The cells in order: a cell follows those that it reads.
     pub cells: Vec<Cell>,
 }
 
-/// The cells of `file`, read from `path`; `find` says where a file that a command names lies.
+/// The cells of `file`, read from `path`; `find` locates a file that a command names.
 ///
 /// # Errors
-/// If a command has a placeholder that stands for nothing, or names a file that there is not.
+///
+/// If a command has an unknown placeholder, or names a file that does not exist.
 pub fn plan(
     file: CampaignFile,
     path: &Path,
@@ -54,9 +55,10 @@ pub fn plan(
 }
 
 impl Plan {
-    /// The cell of that number or that id.
+    /// The cell with that number or id.
     ///
     /// # Errors
+    ///
     /// If there is none.
     pub fn cell(&self, name: &str) -> Result<&Cell, String> {
         let number: Option<usize> = name.parse().ok();
@@ -87,7 +89,7 @@ fn combinations(file: &CampaignFile, stage: &StageFile) -> Vec<Vec<(String, Leve
     })
 }
 
-/// A cell whose command is being put together.
+/// A cell under construction.
 struct Draft<'a> {
     file: &'a CampaignFile,
     stage: &'a StageFile,
@@ -120,7 +122,7 @@ impl Draft<'_> {
         self.levels.iter().find(|(name, _)| name == axis).map(|(_, level)| level)
     }
 
-    /// A word with its placeholders filled in.
+    /// A word with its placeholders substituted.
     fn word(&self, word: &str, after: &mut Vec<usize>) -> Result<String, String> {
         let (mut text, mut rest) = (String::new(), word);
         while let Some(start) = rest.find('{') {
@@ -138,7 +140,7 @@ impl Draft<'_> {
         Ok(text + rest)
     }
 
-    /// The folder of the cell of an earlier stage: `stage`, or `stage:axis=level,…` for other levels than its own.
+    /// The folder of the cell of an earlier stage: `stage`, or `stage:axis=level,…` for levels other than its own.
     fn upstream(&self, name: &str, after: &mut Vec<usize>) -> Result<String, String> {
         let (stage, chosen) = name.split_once(':').unwrap_or((name, ""));
         let given = levels(chosen.split(',').filter(|part| !part.is_empty()))?;
@@ -187,7 +189,8 @@ fn cell(
     cell
 }
 
-/// The files that a command names: words with a slash that are no folder of the campaign, and what its stage adds.
+/// The files that a command names: words with a slash that are no folder of the campaign, and the additional ones of
+/// its stage.
 fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
     // `--env model:FOLDER`

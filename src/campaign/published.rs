@@ -1,4 +1,4 @@
-//! The paper's tables of statistics over seeds, to stand beside a campaign's.
+//! The paper's tables of statistics over seeds, for comparison with a campaign's.
 //!
 //! `published.csv` holds Tables IV, VIII, IX, X (with III in it) and XI of \[GSFM26\] as printed. Rows have the names of
 //! levels here: `severe/trainable`, `parallel`, `hybrid`; targets those of `greylag evaluate`.
@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use super::statistics::Estimate;
 
-/// A line of the file.
+/// A row of the file.
 struct Line {
     table: &'static str,
     row: &'static str,
@@ -27,15 +27,15 @@ fn line(text: &'static str) -> Option<Line> {
     Some(Line { table, row, targets, statistic, estimate })
 }
 
-/// The tables by their numbers.
+/// Published tables by number.
 pub fn tables() -> Vec<&'static str> {
     let mut tables: Vec<&str> = LINES.iter().map(|line| line.table).collect();
     tables.dedup();
     tables
 }
 
-/// Median, interquartile mean and mean of a row of a table in a quantity by its name in a result, such as
-/// `easy.mean_deg`; of `easy.divergence_rate` the mean, as a part of one.
+/// Median, interquartile mean and mean of a table's row for a quantity by its name in a result, such as
+/// `easy.mean_deg`; of `easy.divergence_rate` the mean, as a fraction.
 pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] {
     let (targets, quantity) = metric.rsplit_once('.').unwrap_or(("", metric));
     let find = |statistic: &str| {
@@ -49,7 +49,7 @@ pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] 
     }
 }
 
-/// Percent as a part of one.
+/// Percent as a fraction.
 fn part(percent: Estimate) -> Estimate {
     Estimate { value: percent.value / 100.0, ci95: percent.ci95.map(|end| end / 100.0) }
 }

@@ -2,41 +2,41 @@
 //!
 //! As in rliable (Agarwal et al. 2021): the interquartile mean leaves a quarter of all runs out at each end; intervals
 //! are percentiles of a bootstrap that draws seeds with replacement within each stratum (task). Departs from it: the median
-//! is that of all runs, not the median over tasks of their means; \[GSFM26\] does not say which its tables hold.
+//! is that of all runs, not the median over tasks of their means; \[GSFM26\] does not specify which its tables hold.
 
 use greylag_num::bootstrap;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};
 
-/// Seed of the resamples: the same runs have the same intervals.
+/// Seed of the bootstrap: the same runs give the same intervals.
 const SEED: u64 = 95;
 
 /// A statistic with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The value.
+    /// Value of the statistic.
     pub value: f64,
-    /// The ends of its 95 % interval.
+    /// Bounds of its 95 % interval.
     pub ci95: [f64; 2],
 }
 
-/// What several runs reached.
+/// Summary of several runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aggregate {
-    /// Runs.
+    /// Number of runs.
     pub count: usize,
-    /// Their median.
+    /// Median over the runs.
     pub median: Estimate,
-    /// Their interquartile mean.
+    /// Interquartile mean over the runs.
     pub iqm: Estimate,
-    /// Their mean.
+    /// Mean over the runs.
     pub mean: Estimate,
-    /// The least.
+    /// Smallest of the runs.
     pub min: f64,
-    /// The most.
+    /// Largest of the runs.
     pub max: f64,
 }
 
-/// Sums runs up; `strata` are the scores of the seeds, task by task. `None` without a run.
+/// Summarises runs; `strata` are the scores of the seeds, task by task. `None` without runs.
 pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     let runs: Vec<f64> = strata.concat();
     let estimate = |statistic: &dyn Fn(&[f64]) -> f64| Estimate {
@@ -53,7 +53,7 @@ pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     })
 }
 
-/// How much more the mean of `b` is than that of `a`, each resampled by itself; `None` without runs.
+/// Mean of `b` minus mean of `a`, each resampled independently; `None` without runs.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     if a.is_empty() || b.is_empty() {
         return None;
@@ -64,7 +64,7 @@ pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     Some(Estimate { value: gap(&strata.concat()), ci95 })
 }
 
-/// The mean of the gaps of paired runs, resampled within each stratum; `None` without pairs.
+/// Mean of the differences of paired runs, resampled within each stratum; `None` without pairs.
 pub fn paired_difference(strata: &[Vec<f64>]) -> Option<Estimate> {
     let gaps = strata.concat();
     if gaps.is_empty() {

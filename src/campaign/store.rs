@@ -1,4 +1,4 @@
-//! What a campaign has on disk: a folder a cell, in it one result, written whole.
+//! A campaign on disk: a folder per cell with one result, written atomically.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -8,15 +8,15 @@ use serde::{Deserialize, Serialize};
 use super::cell::{Cell, Record};
 use super::error::CampaignError;
 
-/// The line of a cell that is done.
+/// File of a finished cell's result.
 const RESULT: &str = "result.json";
-/// Why a cell will never be done.
+/// File with the reason of a permanent failure.
 const FAILURE: &str = "failure.json";
-/// What a cell took.
+/// File with a cell's computing time.
 const TIMES: &str = "times.json";
-/// Held while a cell runs.
+/// Lock file while a cell runs.
 const LOCK: &str = "lock";
-/// There since a cell began.
+/// File that marks a started cell.
 const BEGUN: &str = "begun";
 
 /// The folder of a campaign.
@@ -25,79 +25,80 @@ pub struct Store {
     folder: PathBuf,
 }
 
-/// How a cell stands.
+/// State of a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// It has its result.
+    /// It has a result.
     Done(Box<Record>),
     /// It failed, and would fail again.
     Failed(Failure),
-    /// It began and has no result: it runs, or was stopped.
+    /// It has started and has no result: it runs, or was stopped.
     Begun,
-    /// It has a result of another command or of other inputs, which does not count.
+    /// It has a result of another command or of other inputs, which is not valid.
     Stale,
-    /// Nothing is there.
+    /// It has not started.
     Missing,
 }
 
-/// Why a cell will never be done.
+/// Reason of a permanent failure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// The error.
+    /// Text of the error.
     pub error: String,
-    /// The program that said so.
+    /// The program and its build.
     pub program: String,
 }
 
-/// What a cell took, and where: kept apart from its result, which is the same everywhere.
+/// Computing time and machine of a cell: separate from its result, which is the same everywhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Times {
-    /// The cell.
+    /// Id of the cell.
     pub cell: String,
-    /// Time of the session that ended it, s.
+    /// Wall time of the session that finished it, s.
     pub seconds: f64,
-    /// Time of all cores together in that session, s.
+    /// Processor time in that session, s.
     pub core_seconds: f64,
-    /// Whether an earlier session had begun it: its time is then not the whole.
+    /// Whether an earlier session had started it, so that the times are incomplete.
     pub resumed: bool,
-    /// When it ended, seconds since 1970 UTC.
+    /// End, seconds since 1970 UTC.
     pub ended_unix_s: u64,
-    /// The processor.
+    /// Model of the processor.
     pub processor: String,
     /// The program and its build.
     pub program: String,
 }
 
-/// The right to run a cell: no other process of any machine with the same disk has it.
+/// The lock on a cell: no other process of any machine with the same disk holds it.
 #[derive(Debug)]
 pub struct Claimed {
-    /// The cell's folder.
+    /// Folder of the cell.
     pub folder: PathBuf,
-    /// Whether an earlier session had begun it.
+    /// Whether an earlier session had started it.
     pub resumed: bool,
     _lock: File,
 }
 
 impl Store {
-    /// The campaign's folder.
+    /// A store in the campaign's folder.
     pub fn new(folder: &Path) -> Store {
         Store { folder: folder.into() }
     }
 
-    /// The campaign's folder.
+    /// Path of the campaign's folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The folder of a cell.
+    /// Path of a cell's folder.
     pub fn folder_of(&self, cell: &Cell) -> PathBuf {
         self.folder.join(cell.folder())
     }
 
-    /// How a cell stands.
+    /// State of a cell.
     ///
     /// # Errors
-    /// If a result is there and cannot be read.
+    ///
+    /// If a result exists and cannot be read.
     pub fn standing(&self, cell: &Cell) -> Result<Standing, CampaignError> {
         let folder = self.folder_of(cell);
         if let Some(record) = read::<Record>(&folder.join(RESULT))? {
@@ -130,10 +131,11 @@ impl Store {
         })
     }
 
-    /// The right to run a cell; `None` while another process has it.
+    /// Locks a cell; `None` while another process holds the lock.
     ///
     /// # Errors
-    /// If the folder cannot be made or locked.
+    ///
+    /// If the folder cannot be created or locked.
     pub fn claim(&self, cell: &Cell) -> Result<Option<Claimed>, CampaignError> {
         let folder = self.folder_of(cell);
         std::fs::create_dir_all(&folder).map_err(CampaignError::io("cannot make", &folder))?;
@@ -151,28 +153,31 @@ impl Store {
         Ok(Some(Claimed { folder, resumed, _lock: lock }))
     }
 
-    /// What a cell took, if it is known.
+    /// Computing time of a cell, if known.
     ///
     /// # Errors
-    /// If it is there and cannot be read.
+    ///
+    /// If the file exists and cannot be read.
     pub fn times(&self, cell: &Cell) -> Result<Option<Times>, CampaignError> {
         read(&self.folder_of(cell).join(TIMES))
     }
 }
 
 impl Claimed {
-    /// Writes the result; the cell is done from then on.
+    /// Writes the result, which finishes the cell.
     ///
     /// # Errors
+    ///
     /// If it cannot be written.
     pub fn finish(&self, record: &Record, times: &Times) -> Result<(), CampaignError> {
         write(&self.folder.join(TIMES), times)?;
         write(&self.folder.join(RESULT), record)
     }
 
-    /// Notes that the cell will never be done.
+    /// Records a permanent failure of the cell.
     ///
     /// # Errors
+    ///
     /// If it cannot be written.
     pub fn fail(&self, failure: &Failure) -> Result<(), CampaignError> {
         write(&self.folder.join(FAILURE), failure)
@@ -190,13 +195,13 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Campai
     serde_json::from_str(&text).map(Some).map_err(wrong)
 }
 
-/// Writes a document in one line: a reader sees all of it or nothing.
+/// Writes a document in one line, atomically.
 fn write<T: Serialize>(path: &Path, document: &T) -> Result<(), CampaignError> {
     let line = serde_json::to_string(document).map_err(|e| CampaignError::content(path, e))?;
     whole(path, line + "\n")
 }
 
-/// Writes a file beside its place and renames it there.
+/// Writes a file beside its place and renames it.
 pub(super) fn whole(path: &Path, text: String) -> Result<(), CampaignError> {
     let part = path.with_extension(format!("part-{}", std::process::id()));
     let cannot = || CampaignError::io("cannot write", path);

@@ -1,4 +1,4 @@
-//! The tables of a campaign: each quantity summed up over seeds, the paper's beside it; and what becomes of its claims.
+//! Tables of a campaign: each quantity summarised over seeds beside the paper's value, and tests of its claims.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,71 +7,71 @@ use super::file::{CampaignFile, ClaimFile, SEED, TableFile};
 use super::published::published;
 use super::statistics::{Aggregate, Estimate, aggregate, difference, paired_difference};
 
-/// A table.
+/// A table of summary statistics.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// Its title.
+    /// Title of the table.
     pub title: String,
-    /// The unit of its quantities.
+    /// Unit of its quantities.
     pub unit: String,
-    /// The paper's table that stands beside.
+    /// The paper's table for comparison.
     pub paper: Option<String>,
-    /// Its rows.
+    /// Rows of the table.
     pub rows: Vec<SummaryRow>,
 }
 
-/// A quantity of the cells that share some levels.
+/// A quantity of the cells with the same levels.
 #[derive(Clone, Debug)]
 pub struct SummaryRow {
     /// The levels, joined by `/`.
     pub name: String,
-    /// The quantity.
+    /// Name of the quantity.
     pub metric: String,
-    /// What the seeds reached.
+    /// Summary over the seeds.
     pub ours: Aggregate,
-    /// Where it comes from.
+    /// The single values.
     pub runs: Vec<Run>,
     /// The paper's median, interquartile mean and mean.
     pub paper: [Option<Estimate>; 3],
 }
 
-/// One number of one cell.
+/// One value of one cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// The cell.
+    /// Id of the cell.
     pub cell: String,
-    /// Its seed.
+    /// Its random seed.
     pub seed: Option<u64>,
-    /// The number.
+    /// Value of the quantity.
     pub value: f64,
 }
 
-/// What the results say to a claim.
+/// Test of a claim.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The claim.
+    /// The claim under test.
     pub says: String,
-    /// How it came out.
+    /// Result of the test.
     pub outcome: Outcome,
-    /// The numbers.
+    /// Values of both sides.
     pub because: String,
 }
 
-/// How a claim came out.
+/// Result of a claim's test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The interval of the difference is above zero.
+    /// Confirmed: the interval of the difference is above zero.
     Holds,
-    /// It is below zero.
+    /// Refuted: the interval is below zero.
     Contradicted,
-    /// It holds zero.
+    /// Undecided: the interval contains zero.
     Undecided,
-    /// There are no cells to decide by.
+    /// No cells for the test.
     NoData,
 }
 
 impl Outcome {
-    /// In words.
+    /// The result as text.
     pub fn words(self) -> &'static str {
         match self {
             Outcome::Holds => "holds",
@@ -82,7 +82,7 @@ impl Outcome {
     }
 }
 
-/// The tables that a campaign file asks for.
+/// The tables of a campaign file.
 pub fn summaries(file: &CampaignFile, records: &[Record]) -> Vec<Summary> {
     file.tables.iter().map(|table| summary(file, table, records)).collect()
 }
@@ -106,7 +106,7 @@ fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summar
     }
 }
 
-/// Every combination of levels that makes a row, in the order of the file.
+/// Every combination of levels that forms a row, in the order of the file.
 fn row_levels(file: &CampaignFile, table: &TableFile) -> Vec<Vec<(String, String)>> {
     table.rows.iter().fold(vec![Vec::new()], |all, axis| {
         let levels = file.levels(axis);
@@ -143,11 +143,11 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
-/// Runs below which an interval over seeds says nothing: that of one run has no width.
+/// Number of runs below which an interval over seeds is meaningless: one run has no spread.
 const FEWEST: usize = 3;
 
 impl Summary {
-    /// Where the intervals of ours and of the paper have nothing in common, a sentence each.
+    /// Rows where our interval and the paper's are disjoint, a sentence each.
     pub fn departures(&self) -> Vec<String> {
         self.rows.iter().filter_map(SummaryRow::departure).collect()
     }
@@ -174,21 +174,22 @@ impl SummaryRow {
     }
 }
 
-/// A value with its interval.
+/// A value with its interval as text.
 pub fn said(estimate: &Estimate) -> String {
     let Estimate { value, ci95: [low, high] } = estimate;
     format!("{value:.3} [{low:.3}, {high:.3}]")
 }
 
-/// What the results say to the claims of a campaign file.
+/// Tests of the claims of a campaign file.
 ///
 /// # Errors
-/// If a claim names a stage or a level that there is not.
+///
+/// If a claim names a stage or a level that does not exist.
 pub fn findings(file: &CampaignFile, records: &[Record]) -> Result<Vec<Finding>, String> {
     file.claims.iter().map(|claim| finding(file, claim, records)).collect()
 }
 
-/// The levels of a cell that a claim leaves open, its seed among them.
+/// The levels of a cell that a claim leaves open, including its seed.
 type Levels = BTreeMap<String, String>;
 
 fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result<Finding, String> {

@@ -213,7 +213,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     companion.pilot.monitor_with(Monitor::new(model.clone()));
     if let Some(words) = exposed {
-        companion.pilot.tell(Severity::Warning, &words);
+        companion.pilot.send_text(Severity::Warning, &words);
     }
     let mut options = options(arguments, &model);
     if options.controller.is_some_and(|profile| profile.authority == Authority::Surfaces) {

@@ -1,4 +1,5 @@
-//! What a model says of its aircraft before anybody flies it: trim, modes, authority, loops.
+//! Pre-flight check of a model: trim over the envelope, modes, control authority and stability margins of the LQI
+//! loops.
 
 use serde::Serialize;
 
@@ -7,78 +8,80 @@ use crate::{ControllerKind, build};
 use greylag_model::modes::{Mode, modes, rates};
 use greylag_model::{GreyBox, Trim, TrimError};
 
-/// Airspeeds of the trim table.
+/// Number of airspeeds in the trim table.
 const SPEEDS: usize = 7;
-/// Part of a surface's travel above which level flight leaves too little of it: a fifth for everything else.
+/// Fraction of a surface's travel used by trim above which a finding is reported: a fifth is left for manoeuvres and
+/// gusts.
 const MUCH_TRAVEL: f64 = 0.8;
-/// Delay that sensing, link and servo of a small aircraft have together, s.
+/// Total delay of sensing, link and servo that is typical of a small aircraft, s.
 const USUAL_DELAY: f64 = 0.04;
-/// How closely the fastest level flight is found, m/s.
+/// Resolution of the search for the fastest level flight, m/s.
 const LEVEL_WITHIN_MPS: f64 = 0.01;
-/// Roll rate at full aileron below which an aircraft is slow to roll, rad/s (20°/s).
+/// Roll rate at full aileron below which the roll authority is reported as low, rad/s (20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
-/// Straight flight at one airspeed: level, or the descent, at full or idle throttle, of an aircraft that cannot.
+/// Steady straight flight at one airspeed: level, or the descent at full or idle throttle where level flight is not
+/// possible.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
-    /// True airspeed, m/s.
+    /// True airspeed V_a, m/s.
     pub airspeed: f64,
     /// Angle of attack, rad.
     pub alpha: f64,
-    /// Elevator in parts of its travel, −1..1.
+    /// Elevator command as a fraction of its travel, −1..1.
     pub elevator: f64,
-    /// Throttle, 0..1.
+    /// Throttle command as a fraction, 0..1.
     pub throttle: f64,
-    /// Angle of the flight path above the horizon, rad: zero, or below in a descent.
+    /// Flight-path angle above the horizon, rad: zero in level flight, negative in a descent.
     pub path: f64,
 }
 
-/// What the surfaces do at full travel in level flight at the cruise airspeed.
+/// Control authority at full travel, in level flight at the cruise airspeed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Authority {
     /// Steady roll rate, rad/s.
     pub roll_rate: f64,
-    /// Pitching acceleration, rad/s².
+    /// Initial pitching acceleration, rad/s².
     pub pitch_acceleration: f64,
-    /// Yawing acceleration by the rudder, rad/s².
+    /// Yawing acceleration by the rudder, rad/s²; `None` without a rudder.
     pub yaw_acceleration: Option<f64>,
 }
 
-/// A controller of the registry with the least delay that a loop of it bears.
+/// The recommended controller, with the smallest delay margin of its loops.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Advised {
-    /// Its name.
+    /// Name of the controller in the registry.
     pub name: &'static str,
-    /// Delay beyond which its loop that bears least is unstable, s.
+    /// Smallest delay margin of its loops, s.
     pub delay_s: f64,
 }
 
-/// What was found.
+/// Results of [`check`], all at the model's reference altitude.
 #[derive(Clone, Debug, Serialize)]
 pub struct AircraftCheck {
-    /// Straight flight over the envelope's airspeeds, where there is any.
+    /// Trimmed straight flight over the envelope's airspeeds, where a trim exists.
     pub levels: Vec<Level>,
     /// The modes at the cruise airspeed.
     pub modes: Vec<Mode>,
-    /// The fastest level flight (m/s), where that is slower than the envelope's end.
+    /// Fastest level flight, m/s; `None` if the whole envelope can be flown level.
     pub level_up_to: Option<f64>,
-    /// The controller to begin with: its loops bear the delay that links and servos have.
+    /// The recommended controller: its delay margin covers the usual delay of link and servo.
     pub controller: Advised,
-    /// What the surfaces do there.
+    /// Control authority at the cruise airspeed.
     pub authority: Authority,
-    /// What each loop of the LQI bears there.
+    /// Stability margins of each LQI loop at the cruise airspeed.
     pub loops: Vec<LoopMargins>,
-    /// What should be mended before a flight, worst first.
+    /// What should be corrected before a flight, most severe first.
     pub findings: Vec<String>,
 }
 
-/// Why an aircraft cannot be checked: it does not fly at its cruise airspeed.
+/// The model cannot be trimmed or stabilised at its cruise airspeed.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
-    /// It cannot be trimmed there.
+    /// No trim exists at the cruise airspeed.
     #[error(transparent)]
     Trim(#[from] TrimError),
-    /// It cannot be stabilised there.
+    /// No LQI gain stabilises it there.
     #[error(transparent)]
     Margins(#[from] MarginsError),
 }
@@ -108,7 +111,7 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     Ok(check)
 }
 
-/// The LQI, or the damped one where the LQI's loops bear too little delay and those of the damped one more.
+/// The LQI, or the damped LQI where the LQI's delay margin is too small and the damped one's is larger.
 fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
     let least = |weights: &Weights| -> Result<f64, MarginsError> {
@@ -164,7 +167,7 @@ fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
     }
 }
 
-/// What is wrong with straight flight at one airspeed.
+/// Findings on straight flight at one airspeed.
 fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
     let mut out = Vec::new();
     let Level { airspeed, elevator, throttle, path, .. } = *level;
@@ -187,7 +190,7 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
     out
 }
 
-/// What is wrong with the aircraft, in sentences; empty if nothing is.
+/// All findings as sentences, most severe first; empty if there are none.
 fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String> {
     let mut out = Vec::new();
     let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = check.authority;
@@ -264,7 +267,7 @@ mod tests {
                 found.loops
             );
             assert!(found.authority.roll_rate > SLOW_ROLL);
-            // what may be said of them is the delay that the LQI bears
+            // the delay margin of the LQI decides what is reported of them
             assert!(found.findings.iter().all(|f| f.contains("of delay")), "{:?}", found.findings);
             assert_eq!(found.modes.iter().filter(|m| m.name == "short period").count(), 1);
         }

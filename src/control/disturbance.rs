@@ -1,34 +1,34 @@
-//! What the model leaves unexplained of the aircraft's motion, taken as constant over a plan.
+//! Estimate of the acceleration that the model does not explain, taken as constant over a plan.
 //!
-//! Offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the
-//! disturbance on the states: where the aircraft stands still the planner's model does so too, whatever is
-//! wrong with it.
+//! Offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the disturbance on the
+//! states: at steady state the planner's model is also steady, whatever its error.
 
 use crate::Observation;
 use greylag_model::{GreyBox, Memory, STEP};
 use greylag_physics::State;
 use greylag_physics::actuators::Actuators;
 
-/// No disturbance.
+/// The zero disturbance.
 pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
-/// Time constant of the estimate where nothing else is asked for, s: faster follows the noise, slower the manoeuvre.
+/// Default time constant of the estimate, s: a shorter one follows the noise, a longer one lags behind manoeuvres.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
-/// Part of the motion that predictions may miss for the model to be planned with, where nothing else is asked for. In still air,
-/// on `params/x8/learned` they never miss so much, on `prior-as-printed` almost always (`docs/validation/learned-models.md`).
+/// Default limit of the relative prediction error for the model to be planned with. In still air `params/x8/learned`
+/// stays below it and `prior-as-printed` almost always exceeds it (`docs/validation/learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
-/// Time over which predictions are compared with what happened, s: a few responses of the short period.
+/// Averaging time of the comparison of predictions with measurements, s: a few periods of the short-period mode.
 const MEMORY_S: f64 = 0.5;
-/// Time over which what was missed is compared with what was predicted, s: gusts average out.
+/// Averaging time of the regression of prediction errors on predictions, s: gusts average out.
 const SLOPE_MEMORY_S: f64 = 2.0;
-/// Slope of what was missed over what was predicted from which the model is wrong: near 0 in gusts, −1 where nothing came true of
-/// what was predicted. What it gives, right and wrong models: `docs/validation/controllers.md`, in turbulence.
+/// Regression slope of the error on the prediction beyond which the model is rejected: near 0 in gusts, −1 where the
+/// predicted change did not happen at all. Values for right and wrong models: `docs/validation/controllers.md`, in
+/// turbulence.
 const SLOPE: f64 = 0.7;
-/// Accelerations below which nothing is compared, in x_c a second: calm flight shows no model to be wrong.
+/// Accelerations below which nothing is compared, in x_c per second: calm flight cannot show a model error.
 const CALM: f64 = 0.02;
 
-/// Its estimate.
+/// Recursive estimate of the disturbance and of the model's prediction error.
 #[derive(Clone, Debug)]
 pub(crate) struct Disturbance {
     /// Time constant of the estimate, s.
@@ -36,23 +36,23 @@ pub(crate) struct Disturbance {
     last: Option<Observation>,
     memory: Memory,
     rate: State,
-    /// Mean squares over [`MEMORY_S`] of what the predictions missed and of what happened, x_c a second.
+    /// Mean squares over [`MEMORY_S`] of the prediction error and of the measured change, x_c per second.
     missed: f64,
     happened: f64,
-    /// Means over [`SLOPE_MEMORY_S`] of missed times predicted, and of predicted squared, of the rates p, q, r.
+    /// Means over [`SLOPE_MEMORY_S`] of error times prediction and of the squared prediction, for the rates p, q, r.
     slope: [f64; 2],
 }
 
 impl Disturbance {
-    /// None yet; the estimate follows with `time_constant` (s).
+    /// A zero estimate with time constant `time_constant` (s).
     pub fn new(time_constant: f64) -> Disturbance {
         let (missed, happened, slope) = (0.0, 0.0, [0.0; 2]);
         let memory = Memory::default();
         Disturbance { time_constant, last: None, memory, rate: NONE, missed, happened, slope }
     }
 
-    /// Compares what is seen with what the model expected a tick ago. A gap between ticks is no
-    /// evidence, neither is a number that is lost.
+    /// Compares `seen` with the model's prediction from the last tick. A gap between ticks and values that are not
+    /// finite are skipped.
     pub fn update(&mut self, model: &GreyBox, seen: &Observation) {
         let follows = |last: &Observation| {
             let gap = seen.time.since(last.time).as_secs_f64();
@@ -72,7 +72,7 @@ impl Disturbance {
             - std::f64::consts::PI;
         let step = seen.state.advance(&last.state, -1.0);
         self.compare(model, &error.advance(&self.rate, -STEP), &step);
-        // e is what one step added beside the model: its rate is e / STEP
+        // e is what one step added to the model's prediction: its rate is e / STEP
         let part = STEP / self.time_constant;
         let moved = self.rate.advance(&self.rate, -part).advance(&error, part / STEP);
         if moved.is_finite() {
@@ -82,9 +82,9 @@ impl Disturbance {
         }
     }
 
-    /// Notes what a prediction missed, and what happened, in a step.
+    /// Updates the error statistics with one step's prediction error and measured change.
     fn compare(&mut self, model: &GreyBox, missed: &State, happened: &State) {
-        // rates and flow angles, in x_c a second: attitude and airspeed only follow
+        // rates and flow angles, in x_c a second: attitude and airspeed are their integrals
         let scale = model.scale();
         let scaled = |change: &State| -> [f64; 5] {
             let change = change.to_array();
@@ -92,7 +92,8 @@ impl Disturbance {
         };
         let (missed, happened) = (scaled(missed), scaled(happened));
         let square = |x: &[f64]| -> f64 { x.iter().map(|x| x * x).sum() };
-        // flow angles are left out of the slope: a gust moves them at once, the rates only through what they make of it
+        // flow angles are left out of the slope: a gust changes them immediately, the rates only through the moments
+        // that follow
         let predicted: [f64; 3] = std::array::from_fn(|i| happened[i] - missed[i]);
         let product: f64 = missed.iter().zip(predicted).map(|(m, p)| m * p).sum();
         let means = [square(&missed), square(&happened), product, square(&predicted)];
@@ -107,20 +108,21 @@ impl Disturbance {
         follow(&mut self.slope[1], predicted, SLOPE_MEMORY_S);
     }
 
-    /// Whether the model is no model to plan with: its predictions have missed more than `most` of the motion of the last half
-    /// second (root mean squares), and what they missed goes with what they predicted. A gust is missed too, but by any model.
+    /// Whether the model must not be planned with: the root-mean-square prediction error of the last half second
+    /// exceeds `most` of the motion, and the error is correlated with the prediction. The correlation excludes gusts,
+    /// which no model predicts.
     pub fn is_wrong(&self, most: f64) -> bool {
         let part = (self.missed / (self.happened + CALM * CALM)).sqrt();
         let [product, predicted] = self.slope;
         part > most && (product / (predicted + CALM * CALM)).abs() > SLOPE
     }
 
-    /// What the state's rate has beside the model's, per second.
+    /// Estimated disturbance, added to the model's state rate, per second.
     pub fn rate(&self) -> State {
         self.rate
     }
 
-    /// What the integrator remembers of the step that led here.
+    /// Past commands of the integrator at the last step.
     pub fn memory(&self) -> Memory {
         self.memory
     }

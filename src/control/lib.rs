@@ -1,4 +1,4 @@
-//! Controllers: from what is observed and what is wanted to a command, once every 10 ms.
+//! Controllers: from observation and target to a command, once every 10 ms.
 
 pub mod aircraft_check;
 pub mod cem;
@@ -20,23 +20,23 @@ use insight::Insight;
 
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// What a controller sees: eq. (27) of \[GSFM26\] with the altitude, which sets the air density.
+/// Input of a controller: eq. (27) of \[GSFM26\] plus the altitude, which sets the air density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Moment of the measurement, vehicle clock.
+    /// Time of the measurement, vehicle clock.
     pub time: Time,
-    /// Physical state s^p.
+    /// Physical state s^p, eq. (4) of \[GSFM26\].
     pub state: State,
     /// Observed actuator state z: positions and rates.
     pub actuators: ActuatorState,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
-    /// The commands in force at the last two ticks, newest first: with `actuators` they fix the
-    /// actuator filters.
+    /// The commands of the last two ticks, newest first: with `actuators` they determine the state of the actuator
+    /// filters.
     pub previous: [Command; 2],
 }
 
-/// What is wanted: the commanded attitude (φ*, θ*) and the airspeed V_a* to hold meanwhile.
+/// Commanded attitude (φ*, θ*) and the airspeed V_a* to hold meanwhile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target<R = f64> {
     /// Commanded roll φ*, rad.
@@ -48,35 +48,39 @@ pub struct Target<R = f64> {
 }
 
 impl<R: Copy> Target<R> {
-    /// The target with every component read as another kind of number.
+    /// The target with its components converted to another number type.
     #[inline(always)]
     pub fn map<S: Copy>(&self, mut f: impl FnMut(R) -> S) -> Target<S> {
         Target { roll: f(self.roll), pitch: f(self.pitch), airspeed: f(self.airspeed) }
     }
 }
 
-/// A control law, called every 10 ms of vehicle time. A controller that cannot be built says so in [`build`]; one that
-/// is built returns no errors: a command that is not finite says that it has none, see [`Controller::command`].
+/// A control law, called every 10 ms of vehicle time.
+///
+/// Order of calls: [`Controller::reset`] before the first tick of an engagement, then [`Controller::command`] once
+/// per tick, [`Controller::prepare`] optionally between two ticks. [`Controller::insight`] describes the last
+/// command. Errors occur only on construction ([`build`]); a tick without a command returns NaN.
 pub trait Controller: Send + Sync {
     /// The name that selects it on the command line.
     fn name(&self) -> &'static str;
-    /// Forgets the past (integrators, warm starts), as before take-off or on re-engagement.
+    /// Clears the internal state (integrators, warm starts) before take-off or on re-engagement.
     ///
-    /// The first command afterwards may differ from the one in force: whoever hands over limits
-    /// how fast the surfaces move.
+    /// The first command afterwards may differ from the one in force: the caller limits the slew rate of the
+    /// surfaces.
     fn reset(&mut self, seed: u64);
-    /// The command for this tick; it need not be in range. A call neither allocates nor waits for the outside.
+    /// The command for this tick; it need not be in range. A call neither allocates nor blocks.
     ///
-    /// A controller that has no command, as a planner without a plan, returns NaN: the caller must check
-    /// [`Command::is_finite`] and fly something else, as the pilot does with its fallback.
+    /// A controller without a command, such as a planner without a plan, returns NaN: the caller must check
+    /// [`Command::is_finite`] and fly another controller, as the pilot does with its fallback.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
-    /// Computes what it can before the next tick is seen: whoever has time between two commands calls this. The
-    /// commands are the same if nobody does.
+    /// Computes in advance what the next tick needs, when there is time between two commands. It never changes the
+    /// commands.
     fn prepare(&mut self) {}
-    /// What the last command, for `seen`, was chosen from; `None` of a controller that does not plan.
+    /// The candidates from which the last command, for `seen`, was chosen; `None` for a controller that does not
+    /// plan.
     fn insight(&self, _seen: &Observation) -> Option<Insight> {
         None
     }
-    /// Another controller like this one, for another core; the design is not made again.
+    /// A copy of this controller for another thread; the design is not repeated.
     fn boxed_clone(&self) -> Box<dyn Controller>;
 }

@@ -8,18 +8,18 @@ use greylag_physics::Command;
 /// surface, or throttle) per unit of the error (rad, or m/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
-    /// On the error.
+    /// Proportional gain on the error.
     pub kp: f64,
-    /// On its integral, per second.
+    /// Integral gain on the error, per second.
     pub ki: f64,
-    /// On the measured body rate, output per rad/s; it is subtracted. The airspeed loop has none.
+    /// Derivative gain on the measured body rate, output per rad/s; it is subtracted. The airspeed loop has none.
     pub kd: f64,
 }
 
-/// A set of gains with what belongs to it.
+/// A named set of PID gains with its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
-    /// The name that selects it.
+    /// Name in the controller registry.
     pub name: &'static str,
     /// Roll error (rad) to aileron (rad).
     pub roll: Gains,
@@ -27,27 +27,27 @@ pub struct Tuning {
     pub pitch: Gains,
     /// Airspeed error (m/s) to throttle.
     pub airspeed: Gains,
-    /// Throttle when the airspeed is right.
+    /// Throttle at zero airspeed error, 0..1.
     pub throttle_trim: f64,
     /// Deflection at full command, rad.
     pub deflection: f64,
     /// Airspeed to hold instead of the target's, m/s.
     pub airspeed_override: Option<f64>,
-    /// Whether an integrator stops while its output is at the stop.
+    /// What an integrator does while its output saturates.
     pub windup: Windup,
 }
 
-/// What an integrator does while its loop's output is at a stop.
+/// Integrator behaviour under saturation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Windup {
-    /// It goes on integrating, as the public controller does.
+    /// The integrator keeps integrating, as in the public controller.
     Free,
-    /// It stops where it would push further into the stop.
+    /// Conditional integration: the integrator stops where it would drive the output further into saturation.
     Clamped,
 }
 
-/// The gains published with the simulator FW-JSBGym (its latest `pid_eval`, read 2026; an earlier
-/// version had 1.0, 0, 0.5 for roll and −4, −0.75, −0.1 for pitch): the yardstick.
+/// Gains published with the simulator FW-JSBGym (its latest `pid_eval`, read 2026; an earlier version had 1.0, 0, 0.5
+/// for roll and −4, −0.75, −0.1 for pitch). They are the baseline of comparisons.
 pub const PUBLIC: Tuning = Tuning {
     name: "pid",
     roll: Gains { kp: 1.5, ki: 0.1, kd: 0.1 },
@@ -73,7 +73,7 @@ pub const RETUNED: Tuning = Tuning {
     windup: Windup::Clamped,
 };
 
-/// The PID controller.
+/// The PID attitude controller.
 #[derive(Clone, Debug)]
 pub struct Pid {
     tuning: Tuning,
@@ -81,12 +81,12 @@ pub struct Pid {
 }
 
 impl Pid {
-    /// A controller with these gains.
+    /// A controller with these gains and empty integrators.
     pub fn new(tuning: Tuning) -> Pid {
         Pid { tuning, integrals: [0.0; 3] }
     }
 
-    /// One loop; `stops` are the limits of its output.
+    /// One loop; `stops` are the saturation limits of its output.
     fn step(
         &mut self,
         axis: usize,

@@ -1,4 +1,4 @@
-//! The controllers there are, by name.
+//! The registry of controllers by name.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,61 +7,61 @@ use crate::policy::{Agent, Policy};
 use crate::{Controller, cem, ilqr, lqi, pid};
 use greylag_model::GreyBox;
 
-/// Why a controller cannot be built.
+/// A controller cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// No such controller.
+    /// The name is not in the registry.
     #[error("there is no controller {name:?}; there are {}", ControllerKind::names())]
     Unknown {
-        /// What was asked for.
+        /// The name that was requested.
         name: String,
     },
-    /// The model cannot be controlled.
+    /// No controller can be designed from the model.
     #[error(
         "cannot design an LQI from model {model}: it has no steady flight that can be stabilised at \
          roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at any airspeed; use a better model (--model)"
     )]
     Design {
-        /// The model's name.
+        /// Name of the model.
         model: String,
-        /// Where it fails.
+        /// Roll of the failing design, degrees.
         roll_deg: f64,
-        /// Where it fails.
+        /// Pitch of the failing design, degrees.
         pitch_deg: f64,
     },
-    /// The model has an effect that nobody has accepted.
+    /// The model has an effect that has not been accepted.
     #[error(
         "cannot fly model {model}: its effect {effect} was proposed by a search; look at it, then write status = \
          \"accepted\" into the effect's file"
     )]
     Proposed {
-        /// The model's name.
+        /// Name of the model.
         model: String,
-        /// The effect.
+        /// Name of the effect.
         effect: &'static str,
     },
-    /// The controller is a trained one, and none was given.
+    /// The controller needs a trained policy, and none was given.
     #[error("a controller that was trained needs its files; give their folder with --policy")]
     Untrained,
-    /// The planner values the end of its plans, and the policy has no critics.
+    /// The planner needs critics, and the policy has none.
     #[error(
         "controller {name} values the end of its plans with critics, and this policy has none; fly it as \
          `policy` or `cem-policy`, or export it with its critics"
     )]
     Criticless {
-        /// The controller.
+        /// Name of the controller.
         name: &'static str,
     },
 }
 
-/// What a controller may be built from.
+/// Inputs for building a controller.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// The model that it is designed from or plans with.
+    /// The model that a design or planner uses.
     pub model: &'a GreyBox,
     /// The networks of a trained policy.
     pub agent: Option<&'a Agent>,
-    /// What a planner searches with in other than the usual size.
+    /// Overrides of the planner's default settings.
     pub changes: &'a [cem::Change],
 }
 
@@ -76,12 +76,13 @@ impl<'a> Source<'a> {
         self.agent.ok_or(SetupError::Untrained)
     }
 
-    /// A planner of those settings with the changes asked for.
+    /// A planner with `settings` and the overrides.
     fn planner(&self, name: &'static str, settings: cem::Settings) -> Result<cem::Cem, SetupError> {
         self.planner_over(None, name, settings)
     }
 
-    /// The same over the model's LQI. Without a policy the search starts from the LQI's plan alone.
+    /// A planner with the model's LQI as base controller. Without a policy the search starts from the LQI's plan
+    /// alone.
     fn planner_over_lqi(
         &self,
         name: &'static str,
@@ -110,19 +111,19 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Where a controller has to run.
+/// Where a controller has to be executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// In the control loop: it needs microseconds.
     Immediate,
-    /// On a thread of its own: it plans, and so may miss the deadline.
+    /// On its own thread: it plans, and so may miss the deadline.
     Planned,
 }
 
-/// What a controller is built from.
+/// Inputs that a controller is built from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
-    /// Its own gains.
+    /// Fixed gains of its own.
     Gains,
     /// A model of the aircraft.
     Model,
@@ -130,12 +131,12 @@ pub enum Needs {
     Policy,
     /// A model and a policy.
     Both,
-    /// A model; a policy's plans are tried beside the controller's own where there is one.
+    /// A model; a policy is optional, and its plans are tried beside the controller's own.
     ModelAndAnyPolicy,
 }
 
 impl Needs {
-    /// Whether nothing flies without a policy.
+    /// Whether a policy is required.
     pub fn policy(self) -> bool {
         matches!(self, Needs::Policy | Needs::Both)
     }
@@ -143,35 +144,35 @@ impl Needs {
 
 macro_rules! controllers {
     ($($kind:ident $name:literal $seat:ident $needs:ident $about:literal => |$from:ident| $build:expr),* $(,)?) => {
-        /// A controller by name.
+        /// A controller of the registry.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ControllerKind { $(#[doc = $about] $kind,)* }
 
         impl ControllerKind {
-            /// Every controller there is.
+            /// All controllers of the registry.
             pub const ALL: &'static [ControllerKind] = &[$(ControllerKind::$kind),*];
 
-            /// The name that selects it.
+            /// The name on the command line.
             pub const fn name(self) -> &'static str {
                 match self { $(ControllerKind::$kind => $name,)* }
             }
 
-            /// Where it has to run.
+            /// Where it has to be executed.
             pub const fn pace(self) -> Pace {
                 match self { $(ControllerKind::$kind => Pace::$seat,)* }
             }
 
-            /// What it is built from.
+            /// The inputs it is built from.
             pub const fn needs(self) -> Needs {
                 match self { $(ControllerKind::$kind => Needs::$needs,)* }
             }
         }
 
-        /// Builds a controller from what [`ControllerKind::needs`] says; a model alone will do where no policy
-        /// is needed.
+        /// Builds a controller from the inputs that [`ControllerKind::needs`] names.
         ///
         /// # Errors
-        /// If the model does not allow the design, or a policy is needed and there is none.
+        ///
+        /// If the model does not allow the design, or a required policy is missing.
         pub fn build<'a>(
             kind: ControllerKind,
             source: impl Into<Source<'a>>,
@@ -203,7 +204,7 @@ controllers! {
 }
 
 impl ControllerKind {
-    /// Whether it searches with [`cem::Settings`], so that a [`cem::Change`] tells.
+    /// Whether it searches with [`cem::Settings`], so that a [`cem::Change`] has an effect.
     pub fn searches(self) -> bool {
         self.pace() == Pace::Planned
             && !matches!(self, ControllerKind::Ilqr | ControllerKind::HybridIlqr)

@@ -1,29 +1,30 @@
-//! How a model's aircraft answers its stick: steps of aileron and elevator from steady straight flight.
+//! Step responses of a model to aileron and elevator from steady straight flight.
 
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::{Controls, State};
 
-/// Part of the travel that is stepped.
+/// Step size as a fraction of the travel.
 pub const STEPPED: f64 = 0.25;
-/// Time flown behind the step, s.
+/// Simulated time after the step, s.
 const FLOWN_S: f64 = 3.0;
-/// Step of the integration, s.
+/// Integration step, s.
 const STEP_S: f64 = 0.005;
 
-/// An answer over time.
+/// A step response over time.
 #[derive(Clone, Debug, Default)]
 pub struct StickResponse {
-    /// Time behind the step, s.
+    /// Times since the step, s.
     pub time_s: Vec<f64>,
-    /// The states.
+    /// States at these times.
     pub states: Vec<State>,
 }
 
-/// Answers to a quarter of the aileron (roll right), then of the elevator (nose up), from straight flight at the cruise
-/// airspeed with servos that settle at once.
+/// Responses to a quarter of full aileron (roll right), then of full elevator (nose up), from straight flight at the
+/// cruise airspeed with ideal servos.
 ///
 /// # Errors
-/// The model cannot fly straight there.
+///
+/// The model has no straight-flight trim there.
 pub fn stick_responses(model: &GreyBox) -> Result<[StickResponse; 2], TrimError> {
     let altitude = model.airframe.reference.altitude;
     let trim = Trim::straight(model, model.airframe.envelope.airspeed_cruise_mps, altitude)?;
@@ -37,7 +38,7 @@ pub fn stick_responses(model: &GreyBox) -> Result<[StickResponse; 2], TrimError>
     ])
 }
 
-/// The states behind a step to `controls`, by the classical Runge–Kutta method.
+/// States after a step to `controls`, by the classical Runge–Kutta method.
 fn flown(model: &GreyBox, from: State, controls: Controls, altitude: f64) -> StickResponse {
     let rate = |x: [f64; 8]| model.rate(&State::from_array(x), &controls, altitude).to_array();
     let along = |x: [f64; 8], k: [f64; 8], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
@@ -71,8 +72,7 @@ mod tests {
         let at = |r: &StickResponse, t: f64| r.states[(t / STEP_S) as usize];
         assert!(at(&roll, 0.5).p > 0.1 && at(&roll, 0.5).roll > 0.02);
         assert!(at(&pitch, 0.2).q > 0.01 && at(&pitch, 0.5).alpha > at(&pitch, 0.0).alpha);
-        // roll rate settles at what the authority of the check says, a quarter of it, within a tenth (the spiral and
-        // Dutch roll act meanwhile)
+        // the roll rate settles at a quarter of the check's authority, within a tenth (the spiral and
         let full = crate::aircraft_check::check(&model).unwrap().authority.roll_rate;
         assert!(
             (at(&roll, 0.4).p / (STEPPED * full) - 1.0).abs() < 0.25,

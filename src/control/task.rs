@@ -1,4 +1,4 @@
-//! The task: what an attitude reached is worth, eq. (30) of \[GSFM26\].
+//! The reinforcement-learning task: the reward for tracking an attitude, eq. (30) of \[GSFM26\].
 
 use crate::Target;
 use greylag_num::Real;
@@ -35,18 +35,18 @@ impl Task {
         discount: 0.99,
     };
 
-    /// The lowest reward of a step: every term at its cap.
+    /// The smallest reward of a step: every term at its cap.
     pub fn worst(&self) -> f64 {
         -(self.roll_cap + self.pitch_cap + self.airspeed_cap)
     }
 
-    /// The reward of the step that loses the aircraft (no loss function): the worst for ever, discounted. Without it,
-    /// whoever ends an episode early would escape what the rest of it costs.
+    /// The reward of the step that loses the aircraft: the smallest reward for ever, discounted. Without it, ending
+    /// an episode early would avoid the cost of the remaining steps.
     pub fn of_loss(&self) -> f64 {
         self.worst() / (1.0 - self.discount)
     }
 
-    /// The reward of being in `state` when `target` is wanted: 0 at best.
+    /// The reward of `state` for `target`: at most 0.
     #[inline(always)]
     pub fn reward<R: Real>(&self, state: &State<R>, target: &Target<R>) -> R {
         #[inline(always)]

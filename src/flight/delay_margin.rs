@@ -1,4 +1,4 @@
-//! How much delay a loop bears: the least at which it swings by itself, on the model.
+//! Delay margin of a controller's surface loops: the smallest delay with a limit cycle, found by simulation.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -9,22 +9,22 @@ use greylag_model::{GreyBox, Trim, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
-/// Delays that are tried, ms: a loop that bears the last bears enough.
+/// Delays that are tried, ms; a loop stable at the last one counts as sufficient.
 const STEP_MS: usize = 4;
 const LONGEST_MS: usize = 120;
-/// A flight of so many ticks, with a pulse of full deflection in these; its end shows whether the loop swings on.
+/// Length of a simulation in ticks, with a full-deflection pulse in this range; the oscillation at the end is judged.
 const TICKS: usize = 700;
 const PULSE: std::ops::Range<usize> = 100..110;
 const END: usize = 500;
-/// Swing of a rate, from peak to peak at the end of a flight, that counts as swinging, rad/s (10 °/s).
+/// Peak-to-peak rate at the end of a simulation that counts as an oscillation, rad/s (10 °/s).
 const SWING: f64 = 0.17;
-/// A cycle, ms.
+/// Control period in ms.
 const TICK_MS: usize = 10;
 
-/// The least delay at which `controller` makes the pitch or the roll loop of `model` swing by itself after a pulse of full
-/// deflection, in level flight at the cruise airspeed; `None` if it bears 0.12 s.
+/// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate after a pulse of
+/// full deflection, in level flight at the cruise airspeed; `None` if it is stable up to 0.12 s.
 ///
-/// The surfaces are thought of as undelayed, as beside a real flight controller, which does not report them. It
+/// The observed surface positions are undelayed, as with a real flight controller, which does not report them. It
 /// takes a second for a controller that needs microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
     let mut delays = (0..=LONGEST_MS).step_by(STEP_MS);
@@ -34,14 +34,14 @@ pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Dura
     delays.find(|delay| swings(*delay)).map(|ms| Duration::from_millis(ms as u64))
 }
 
-/// The axis whose surface is late.
+/// The axis whose surface is delayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Axis {
     Pitch,
     Roll,
 }
 
-/// Whether the loop swings on after the pulse.
+/// Whether the oscillation persists after the pulse.
 fn swings(controller: &dyn Controller, model: &GreyBox, axis: Axis, delay_ms: usize) -> bool {
     let envelope = &model.airframe.envelope;
     let airspeed = envelope.airspeed_cruise_mps;
@@ -96,7 +96,7 @@ fn swings(controller: &dyn Controller, model: &GreyBox, axis: Axis, delay_ms: us
     range[1] - range[0] > SWING
 }
 
-/// Altitude of the flights, m.
+/// Altitude of the simulations, m.
 const ALTITUDE_M: f64 = 600.0;
 
 fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
@@ -106,7 +106,7 @@ fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
     }
 }
 
-/// What the actuators get: one surface late, by whole cycles and the share of one, in which the older command acts.
+/// The command that acts: one surface delayed by whole cycles and a fraction, interpolated between two commands.
 fn delayed(late: &VecDeque<Command>, now: Command, axis: Axis, delay_ms: usize) -> Command {
     let (whole, share) = (delay_ms / TICK_MS, (delay_ms % TICK_MS) as f64 / TICK_MS as f64);
     let newest = late.len() - 1;
@@ -135,8 +135,8 @@ mod tests {
 
     #[test]
     fn the_model_says_of_delay_what_the_official_simulator_does() {
-        // Swinging by itself in JSBSim's steps of 1 ms, after a pulse of full deflection: `lqi` from 46 ms in pitch on, `lqi-damped`
-        // from 104 ms (`examples/delay_margin.rs`).
+        // Oscillates in JSBSim's steps of 1 ms, after a pulse of full deflection: `lqi` from 46 ms in pitch on,
+        // `lqi-damped`
         let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
         let margin = |kind| {
             delay_margin(build(kind, &model).unwrap().as_ref(), &model)

@@ -1,7 +1,7 @@
 //! The companion without threads, sockets or a wall clock: bytes in, bytes out, time as an argument.
 //!
-//! The same pilot, vehicle session and controller as in [`runtime`](super::runtime), for campaigns
-//! that fly thousands of flights in one process, and for replays.
+//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime), for campaigns of thousands of
+//! flights in one process, and for replays.
 
 use std::time::Duration;
 
@@ -14,12 +14,15 @@ use greylag_link::peer::{LinkId, PeerId, SERIAL};
 use greylag_link::vehicle::{Notice, Order, Outputs, Telemetry, Vehicle};
 use greylag_physics::Time;
 
-/// The peer that everything comes from.
+/// The only peer of the vehicle link.
 const WIRE: PeerId = PeerId { link: LinkId(0), address: SERIAL };
 /// Seed of the controller's random numbers, as in real flight.
 const SEED: u64 = 0;
 
-/// A companion on a desk.
+/// A companion whose input and time are arguments.
+///
+/// Call [`Desk::receive`] with received bytes and [`Desk::poll`] every 10 ms; both append the bytes to send. `host`
+/// must not decrease.
 pub struct Desk {
     pilot: Pilot,
     controller: Box<dyn Controller>,
@@ -28,13 +31,13 @@ pub struct Desk {
     /// Host and vehicle time of the newest state.
     anchor: Option<(Duration, Time)>,
     recorder: Option<Recorder>,
-    /// Every line that was said to the ground stations.
+    /// All texts sent to the ground stations.
     pub texts: Vec<Text>,
 }
 
 impl Desk {
-    /// A companion at a vehicle that is not heard yet. The companion's controller flies in the loop,
-    /// wherever it would sit otherwise.
+    /// A companion at a vehicle from which nothing was received yet. The controller is called synchronously, wherever
+    /// it would run in flight.
     pub fn new(companion: Companion, vehicle: Vehicle) -> Self {
         let mut pilot = companion.pilot;
         pilot.take_on(&vehicle);
@@ -49,14 +52,14 @@ impl Desk {
         }
     }
 
-    /// Records from now on.
+    /// Starts recording.
     pub fn record(&mut self, recorder: Recorder) {
         self.recorder = Some(recorder);
     }
 
-    /// Takes bytes that arrive at `host`, appends what is sent in answer to `out`, and shows each
-    /// state with what was decided on it.
-    pub fn hear(
+    /// Takes bytes that arrive at `host`, appends the replies to `out`, and calls `show` with each state and its
+    /// decision.
+    pub fn receive(
         &mut self,
         host: Duration,
         bytes: &[u8],
@@ -96,12 +99,12 @@ impl Desk {
         self.heed(host);
     }
 
-    /// Does what is due at `host`, as every 10 ms in flight.
+    /// Performs the periodic duties at `host`, as every 10 ms in flight.
     pub fn poll(&mut self, host: Duration, out: &mut Vec<u8>) {
         let now = self.now(host);
         self.pilot.advance(now);
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
-            self.pilot.tell(Severity::Warning, &trouble);
+            self.pilot.send_text(Severity::Warning, &trouble);
         }
         out.extend(self.vehicle.due(host, self.outputs).unwrap_or_default());
         self.heed(host);
@@ -111,24 +114,24 @@ impl Desk {
     fn heed(&mut self, host: Duration) {
         while let Some(notice) = self.vehicle.take_notice() {
             if let Some(words) = notice.ending() {
-                // Its verdict cannot be a refusal: it is forced.
+                // forced arming is never refused
                 let _ = self.pilot.disarm(self.now(host), true);
-                self.pilot.tell(Severity::Critical, &words);
+                self.pilot.send_text(Severity::Critical, &words);
             }
             match notice {
-                Notice::Text(severity, words) => self.pilot.tell(severity, &words),
+                Notice::Text(severity, words) => self.pilot.send_text(severity, &words),
                 Notice::System(_) | Notice::Released(_) | Notice::HandedBack(_) => {}
                 Notice::Engaged => self.pilot.engaged(self.now(host)),
             }
         }
     }
 
-    /// Vehicle time at `host`: between states it goes on with the host's.
+    /// Vehicle time at `host`: between states it advances with host time.
     pub fn now(&self, host: Duration) -> Time {
         self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
     }
 
-    /// Arms, and so engages, as a client would.
+    /// Arms, and thereby engages, as a client would.
     pub fn arm(&mut self, host: Duration) -> Verdict {
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(obstacle),
@@ -136,12 +139,12 @@ impl Desk {
         }
     }
 
-    /// The pilot, for a client's requests.
+    /// The pilot, for requests of a client.
     pub fn pilot(&mut self) -> &mut Pilot {
         &mut self.pilot
     }
 
-    /// The vehicle's session.
+    /// Link to the vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }

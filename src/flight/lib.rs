@@ -1,5 +1,4 @@
-//! The flight: the pilot that decides, the runtime that keeps time, the recorder that remembers, the
-//! desk on which it is tested.
+//! Flight: the pilot, which decides; the runtime with threads and clocks; the recorder; and the desk for tests.
 
 mod delay_margin;
 pub mod desk;

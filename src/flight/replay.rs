@@ -1,4 +1,4 @@
-//! The pilot on a recorded flight: the same calls, the same frames, so the same commands.
+//! Replay of a recorded flight: the same calls and frames give the same commands.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -16,67 +16,67 @@ use greylag_physics::{Command, Time};
 
 /// Seed of the controller's random numbers, as in flight.
 const SEED: u64 = 0;
-/// Differences that are kept to be shown.
+/// Number of differences kept for display.
 const SHOWN: usize = 10;
 
-/// Why a flight cannot be replayed.
+/// A flight cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// A file of the recording cannot be read.
     #[error("reading {}: {source}; name a folder that `greylag fly` has recorded", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// The calls are of another kind.
+    /// The calls have another format version.
     #[error("{} does not begin with `{HEADER}`: it was recorded by another version", path.display())]
     Header {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A line in the middle cannot be read.
+    /// A line before the last is invalid.
     #[error("{}, line {line}: {source}", path.display())]
     Line {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its number, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Why it is invalid.
         source: CallError,
     },
 }
 
-/// A tick that did not come out as it was recorded.
+/// A tick whose replayed command differs from the recorded one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Time of the state.
+    /// Time of the state, vehicle clock.
     pub time: Time,
-    /// What was recorded.
+    /// The command in the recording.
     pub recorded: Command,
-    /// What came out.
+    /// The command in the replay.
     pub replayed: Command,
 }
 
-/// What a replay came to.
+/// Result of a replay.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outcome {
-    /// Ticks replayed.
+    /// Number of ticks replayed.
     pub ticks: u64,
     /// Commands that differ in any bit.
     pub different: u64,
     /// Plans of the controller that differ in any bit from the recorded ones.
     pub plans_different: u64,
-    /// Ticks whose state is not in the telemetry: what follows one proves nothing.
+    /// Ticks whose state is missing in the telemetry; later ticks are no evidence.
     pub without_state: u64,
-    /// The first differences.
+    /// The first differences, in order.
     pub differences: Vec<Difference>,
-    /// Whether the recording ends in the middle of something, as after a crash.
+    /// Whether the recording ends inside an entry, as after a crash.
     pub cut_short: bool,
 }
 
-/// The states of a recording, in their order.
+/// The recorded states in order.
 struct States {
     vehicle: Vehicle,
     bytes: Vec<u8>,
@@ -85,7 +85,7 @@ struct States {
 }
 
 impl States {
-    /// The state of `time`; those before it that nobody asks for are late ones.
+    /// The state of `time`; earlier ones without a call arrived late.
     fn next(&mut self, time: Time) -> Option<(Duration, Telemetry)> {
         loop {
             while let Some((host, state)) = self.ready.pop_front() {
@@ -101,13 +101,13 @@ impl States {
         }
     }
 
-    /// The stamp of the next record.
+    /// Timestamp of the next record.
     fn stamp(&self) -> Option<u64> {
         Some(u64::from_be_bytes(*self.bytes.get(self.at..)?.first_chunk()?))
     }
 
-    /// Reads the frames of one packet, which share its stamp: all of them are handed over before any state
-    /// is answered, as in flight.
+    /// Reads the frames of one packet, which share a timestamp: all are handled before any state is answered, as in
+    /// flight.
     fn read_packet(&mut self) -> Option<()> {
         let (stamp, mut read) = (self.stamp()?, None);
         while self.stamp() == Some(stamp) && self.read_one(stamp).is_some() {
@@ -135,10 +135,11 @@ impl States {
     }
 }
 
-/// Replays the recording in `folder` with `companion` at `vehicle`, both as fresh as in flight.
+/// Replays the recording in `folder` with a new `companion` and `vehicle`.
 ///
 /// # Errors
-/// If a file cannot be read, or is none of a recording.
+///
+/// If a file cannot be read, or is not part of a recording.
 pub fn replay(
     folder: &Path,
     companion: Companion,
@@ -147,14 +148,14 @@ pub fn replay(
     replay_watched(folder, companion, vehicle, &mut |_, _, _| ())
 }
 
-/// What sees every planned tick of a replay: its time, what the controller was asked, and the controller
-/// after its answer.
+/// Callback for each planned tick of a replay: time, request, and the controller after its command.
 pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
 
-/// The same under the eyes of `watch`.
+/// Replays with the callback `watch`.
 ///
 /// # Errors
-/// As [`replay`].
+///
+/// The same as [`replay`].
 pub fn replay_watched(
     folder: &Path,
     companion: Companion,
@@ -199,12 +200,12 @@ struct Replayed<'w, 'f> {
     companion: Companion,
     states: States,
     outcome: Outcome,
-    /// An engagement that the planner had not heard of, because it was busy.
+    /// A reset that the planner has not received, because it was busy.
     owed: bool,
 }
 
 impl Replayed<'_, '_> {
-    /// Makes one call; `false` when the telemetry has ended. Verdicts were given in flight.
+    /// Makes one call; `false` when the telemetry has ended. Verdicts are not repeated.
     fn make(&mut self, call: &Call) -> bool {
         let pilot = &mut self.companion.pilot;
         match *call {
@@ -225,7 +226,7 @@ impl Replayed<'_, '_> {
     fn tick(&mut self, time: Time, planned: Planned, recorded: Command) -> bool {
         let Some((host, state)) = self.states.next(time) else {
             self.outcome.without_state += 1;
-            // At the end of a recording that was cut the telemetry may end first.
+            // at the end of a truncated recording the telemetry may end first
             let ended = self.states.at + 8 >= self.states.bytes.len();
             self.outcome.cut_short |= ended;
             return !ended;

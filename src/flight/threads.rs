@@ -1,7 +1,7 @@
-//! Threads, queues and counters of the hand-offs between control, planner and recorder.
+//! Threads, queues and counters shared by control, planner and recorder.
 //!
-//! Nothing else is imported there, so that `tests/interleavings.rs` can compile the same sources with those of shuttle, which
-//! tries other orders of their steps in each run.
+//! Other modules import them from here only, so that `tests/interleavings.rs` can compile the same sources with those
+//! of shuttle, which explores other interleavings in each run.
 
 pub use std::sync::atomic::{AtomicU64, Ordering};
 pub use std::thread::{Builder, JoinHandle};

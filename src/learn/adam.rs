@@ -1,17 +1,17 @@
-//! Adam, the optimiser.
+//! The Adam optimiser (Kingma and Ba, 2015).
 
-/// Memory of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
+/// State of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
 ///
-/// The crate burn has one. It is not used here: its parameters live in its tensors, and these are
-/// changed by a kernel of ours 500 times a second, to the bit the same after a resume; the two lines
-/// of the algorithm are less than what carries them over. A test holds it against a written-out case.
+/// burn's Adam requires the parameters in its tensors; these are updated by a kernel of this crate 500
+/// times a second, equal to the bit after a resume, so that copying them would cost more code than the
+/// algorithm. A test compares it with a case calculated by hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
-    /// Running means of the gradient.
+    /// Running means of the gradients.
     pub mean: Vec<f64>,
-    /// Running means of its square.
+    /// Running means of the squared gradients.
     pub square: Vec<f64>,
-    /// Steps made.
+    /// Number of steps made.
     pub steps: u64,
 }
 
@@ -19,18 +19,18 @@ const BETA: [f64; 2] = [0.9, 0.999];
 const EPSILON: f64 = 1e-8;
 
 impl Adam {
-    /// Adam for `count` parameters that has not moved yet.
+    /// State for `count` parameters before the first step.
     pub fn new(count: usize) -> Adam {
         Adam { mean: vec![0.0; count], square: vec![0.0; count], steps: 0 }
     }
 
-    /// Begins a step.
+    /// Starts a step.
     pub fn begin(&mut self) {
         self.steps += 1;
     }
 
-    /// What parameter `place` moves by at learning rate `rate`, its gradient being `gradient`; to be
-    /// called once for each between two calls of [`begin`](Adam::begin).
+    /// The change of parameter `place` at learning rate `rate` for its `gradient`; to be called once for each
+    /// parameter between two calls of [`begin`](Adam::begin).
     pub fn move_of(&mut self, place: usize, gradient: f64, rate: f64) -> f64 {
         let (m, v) = (&mut self.mean[place], &mut self.square[place]);
         *m = BETA[0] * *m + (1.0 - BETA[0]) * gradient;

@@ -1,4 +1,4 @@
-//! Checkpoints: where a training stands, in a file that is there whole or not at all.
+//! Checkpoints of a model training, in a file that is replaced atomically.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -9,57 +9,57 @@ use serde::{Deserialize, Serialize};
 
 use crate::adam::Adam;
 
-/// Where a training stands.
+/// State of a model training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     /// Hash of recipe, prior and data.
     pub identity: String,
-    /// The network's parameters.
+    /// Parameters of the network.
     pub network: Vec<f32>,
-    /// The prior's coordinates.
+    /// Coordinates of the prior.
     pub coordinates: Vec<f64>,
-    /// The optimiser.
+    /// State of the optimiser.
     pub adam: Adam,
     /// λ of eq. (24).
     pub lambda: f64,
-    /// Updates made.
+    /// Number of updates made.
     pub update: u64,
 }
 
-/// Why a checkpoint cannot be used or written.
+/// A checkpoint cannot be used or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// The file cannot be read or written.
     #[error("cannot {doing} {path}: {why}; check that its folder exists, can be written to and has room", path = path.display())]
     File {
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// It is no checkpoint.
+    /// The file is not a checkpoint.
     #[error("{path} is no checkpoint of this program: {why}; remove it to begin anew", path = path.display())]
     Content {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is invalid in it.
         why: String,
     },
-    /// It is one of another training.
+    /// The checkpoint belongs to another training.
     #[error(
         "the checkpoint is of a training with other options, another prior or other flights; give the same ones, or another --out"
     )]
     Other,
 }
 
-/// The numbers of a checkpoint that are no tensors, as the one entry of the metadata.
+/// The scalars of a checkpoint, as the one entry of the metadata.
 #[derive(Serialize, Deserialize)]
-struct Said {
+struct Header {
     schema: String,
     identity: String,
-    /// Bits of λ, so that nothing is lost in print.
+    /// Bits of λ, stored without rounding.
     lambda_bits: u64,
     update: u64,
     adam_steps: u64,
@@ -69,11 +69,12 @@ const SCHEMA: &str = "greylag.checkpoint/1";
 const METADATA: &str = "greylag";
 
 impl Checkpoint {
-    /// Whether it is of the training `identity` with so many parameters, `coordinates` of the prior's
+    /// Checks that it belongs to the training `identity` with this number of parameters, `coordinates` of the prior's
     /// among them.
     ///
     /// # Errors
-    /// If it is not.
+    ///
+    /// If it does not.
     pub fn fits(
         &self,
         identity: &str,
@@ -88,10 +89,11 @@ impl Checkpoint {
         if fits { Ok(()) } else { Err(CheckpointError::Other) }
     }
 
-    /// Writes it in place of any file at `path`; a reader sees the old one or the new one.
+    /// Writes the file `path` atomically; a reader sees the old version or the new one.
     ///
     /// # Errors
-    /// If the disk refuses.
+    ///
+    /// If it cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
         let bytes =
             self.to_bytes().map_err(|why| CheckpointError::Content { path: path.into(), why })?;
@@ -102,10 +104,11 @@ impl Checkpoint {
         })
     }
 
-    /// Reads one.
+    /// Reads a checkpoint.
     ///
     /// # Errors
-    /// If the file cannot be read or is none.
+    ///
+    /// If the file cannot be read or is not a checkpoint.
     pub fn load(path: &Path) -> Result<Checkpoint, CheckpointError> {
         let bytes = std::fs::read(path).map_err(|why| CheckpointError::File {
             doing: "read",
@@ -131,26 +134,26 @@ impl Checkpoint {
             })
             .collect::<Result<Vec<_>, _>>()
             .map_err(|e| e.to_string())?;
-        let said = Said {
+        let header = Header {
             schema: SCHEMA.into(),
             identity: self.identity.clone(),
             lambda_bits: self.lambda.to_bits(),
             update: self.update,
             adam_steps: self.adam.steps,
         };
-        let said = serde_json::to_string(&said).map_err(|e| e.to_string())?;
-        let metadata = HashMap::from([(METADATA.to_owned(), said)]);
+        let header = serde_json::to_string(&header).map_err(|e| e.to_string())?;
+        let metadata = HashMap::from([(METADATA.to_owned(), header)]);
         safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
     }
 }
 
 fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let said: Said = serde_json::from_str(said.ok_or("it has no metadata of ours")?)
+    let header = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let header: Header = serde_json::from_str(header.ok_or("it has no metadata of ours")?)
         .map_err(|e| e.to_string())?;
-    if said.schema != SCHEMA {
-        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", said.schema));
+    if header.schema != SCHEMA {
+        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", header.schema));
     }
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let part = |name: &str, kind: Dtype| match tensors.tensor(name) {
@@ -166,7 +169,7 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
     };
     let network = part("network", Dtype::F32)?;
     Ok(Checkpoint {
-        identity: said.identity,
+        identity: header.identity,
         network: network
             .chunks_exact(4)
             .filter_map(|b| Some(f32::from_le_bytes(b.try_into().ok()?)))
@@ -175,14 +178,14 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
         adam: Adam {
             mean: double("adam.mean")?,
             square: double("adam.square")?,
-            steps: said.adam_steps,
+            steps: header.adam_steps,
         },
-        lambda: f64::from_bits(said.lambda_bits),
-        update: said.update,
+        lambda: f64::from_bits(header.lambda_bits),
+        update: header.update,
     })
 }
 
-/// Writes a whole file beside `path`, then puts it in its place.
+/// Writes a complete file beside `path`, then renames it.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

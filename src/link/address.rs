@@ -1,4 +1,4 @@
-//! Where a link goes: the addresses of the command line, such as `udpin:0.0.0.0:14550`.
+//! Link addresses of the command line, such as `udpin:0.0.0.0:14550`.
 
 use std::fmt;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -15,16 +15,16 @@ pub struct HostPort {
     pub port: u16,
 }
 
-/// An end of a MAVLink link.
+/// The address of a MAVLink link.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Address {
-    /// Listen for datagrams here; answer whoever sends.
+    /// Listens for datagrams here; replies to each sender.
     UdpIn(HostPort),
-    /// Send datagrams there first; answer whoever sends back.
+    /// Sends datagrams there first; replies to whoever answers.
     UdpOut(HostPort),
-    /// Listen for connections here.
+    /// Listens for connections here.
     TcpIn(HostPort),
-    /// Connect there, again and again.
+    /// Connects there, and reconnects when the connection is lost.
     TcpOut(HostPort),
     /// A serial port at a baud rate.
     Serial {
@@ -55,12 +55,12 @@ pub enum AddressError {
         "address `{0}`: `{1}` is not a baud rate; write for example serial:/dev/ttyACM0:921600"
     )]
     Baud(String, String),
-    /// The host name stands for no address.
+    /// The host name cannot be resolved.
     #[error("looking up host `{host}`: {reason}; give a number such as 127.0.0.1")]
     Lookup {
-        /// The name.
+        /// Host name as written.
         host: String,
-        /// What the system said.
+        /// The operating system's error text.
         reason: String,
     },
 }
@@ -77,7 +77,7 @@ impl HostPort {
         Ok(HostPort { host: host.into(), port })
     }
 
-    /// The first address that the host name stands for.
+    /// The first address that the host name resolves to.
     pub fn resolve(&self) -> Result<SocketAddr, AddressError> {
         let failed = |reason: String| AddressError::Lookup { host: self.host.clone(), reason };
         (self.host.as_str(), self.port)
@@ -89,8 +89,8 @@ impl HostPort {
 }
 
 impl Address {
-    /// Whether only this machine reaches the link: at or towards an address of loopback, or by a wire. A name that
-    /// cannot be looked up does not stay here.
+    /// Whether the link is reachable from this machine only: a loopback address or a serial wire. A name that cannot
+    /// be resolved counts as reachable from elsewhere.
     pub fn stays_here(&self) -> bool {
         match self {
             Address::UdpIn(at) | Address::UdpOut(at) | Address::TcpIn(at) | Address::TcpOut(at) => {
@@ -172,7 +172,7 @@ mod tests {
         assert!(complaint("14550").contains("unknown kind"));
         assert!(complaint("udpin:14550").contains("HOST:PORT"));
         assert!(complaint("udpin::14550").contains("HOST:PORT"));
-        // One more than the largest port number.
+        // one more than the largest port number
         assert!(complaint("udpin:127.0.0.1:65536").contains("`65536` is not a port"));
         assert!(complaint("serial:/dev/ttyACM0").contains("baud"));
         assert!(complaint("serial:/dev/ttyACM0:fast").contains("`fast`"));

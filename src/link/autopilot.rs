@@ -1,34 +1,34 @@
-//! What the client side asks of an autopilot: the boundary between MAVLink and the pilot.
+//! The interface of an autopilot to its MAVLink clients: the boundary between the protocol and the pilot.
 
 use greylag_physics::{ActuatorState, Command, Time};
 
 /// Flight modes, with the `custom_mode` numbers PX4 uses (main mode, sub mode).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// Stick deflections are surface commands. PX4 main mode 1.
+    /// Sticks command the surfaces directly. PX4 main mode 1.
     Manual,
     /// Wings level at the cruise airspeed. PX4 AUTO/LOITER, main 4 sub 3.
     Hold,
-    /// Return to launch: known so that it can be refused by name. PX4 AUTO/RTL, main 4 sub 5.
+    /// Return to launch: recognised only to be refused by name. PX4 AUTO/RTL, main 4 sub 5.
     Return,
     /// Attitude setpoints from a client. PX4 main mode 6.
     Offboard,
-    /// Stick deflections are roll and pitch commands. PX4 main mode 7.
+    /// Sticks command roll and pitch. PX4 main mode 7.
     Stabilized,
 }
 
-/// The answer to a request.
+/// Result of a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Done.
+    /// The request was carried out (MAV_RESULT_ACCEPTED).
     Accepted,
-    /// Understood, not now: MAV_RESULT_TEMPORARILY_REJECTED, with the reason for a STATUSTEXT.
+    /// Refused in the present state (MAV_RESULT_TEMPORARILY_REJECTED), with the reason for a STATUSTEXT.
     Rejected(String),
-    /// Understood, never like this: MAV_RESULT_DENIED, with the reason for a STATUSTEXT.
+    /// Refused in any state (MAV_RESULT_DENIED), with the reason for a STATUSTEXT.
     Denied(String),
 }
 
-/// An attitude setpoint, already decoded from SET_ATTITUDE_TARGET and known to be finite.
+/// An attitude setpoint decoded from SET_ATTITUDE_TARGET; all values are finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeSetpoint {
     /// Commanded roll, rad, not yet limited to the envelope.
@@ -46,56 +46,56 @@ pub struct Sticks {
     pub roll: f64,
     /// Pitch stick, positive forward (nose down).
     pub pitch: f64,
-    /// Throttle stick, 0..1.
+    /// Throttle stick position, 0..1.
     pub throttle: f64,
 }
 
-/// How urgent a text is (MAV_SEVERITY).
+/// Severity of a text (MAV_SEVERITY).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// The aircraft is in danger.
+    /// The aircraft is in danger (MAV_SEVERITY_CRITICAL).
     Critical = 2,
-    /// Something failed.
+    /// An action failed (MAV_SEVERITY_ERROR).
     Error = 3,
-    /// Something may fail.
+    /// A failure is possible (MAV_SEVERITY_WARNING).
     Warning = 4,
-    /// Worth knowing.
+    /// An unusual event (MAV_SEVERITY_NOTICE).
     Notice = 5,
-    /// For the record.
+    /// Normal operation (MAV_SEVERITY_INFO).
     Info = 6,
 }
 
-/// A line for the ground station.
+/// A STATUSTEXT line for the ground stations.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
-    /// How urgent it is.
+    /// Severity of the line.
     pub severity: Severity,
-    /// The words, of any length (they are sent in chunks of 50).
+    /// The text, of any length (it is sent in chunks of 50 characters).
     pub words: String,
 }
 
 /// A parameter's value in its MAVLink type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterValue {
-    /// MAV_PARAM_TYPE_REAL32.
+    /// A float (MAV_PARAM_TYPE_REAL32).
     Real(f32),
-    /// MAV_PARAM_TYPE_INT32, sent bytewise in the float field.
+    /// An integer (MAV_PARAM_TYPE_INT32), sent bytewise in the float field.
     Int(i32),
 }
 
-/// One entry of the parameter table; its place in the table is its index.
+/// One entry of the parameter table; its position is its index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// At most 16 ASCII characters.
     pub name: &'static str,
-    /// The value in force.
+    /// Present value of the parameter.
     pub value: ParameterValue,
 }
 
-/// Everything that the streams to a client are made of. A value that is not known is NaN.
+/// The autopilot's state from which telemetry streams are built. Unknown values are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
-    /// The mode in force.
+    /// The active flight mode.
     pub mode: Mode,
     /// Whether actuator outputs are live.
     pub armed: bool,
@@ -107,7 +107,7 @@ pub struct Status {
     pub attitude: [f64; 3],
     /// Body rates p, q, r, rad/s.
     pub rates: [f64; 3],
-    /// True airspeed, m/s.
+    /// True airspeed V_a, m/s.
     pub airspeed: f64,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
@@ -115,41 +115,40 @@ pub struct Status {
     pub position: [f64; 2],
     /// Velocity over ground, NED, m/s.
     pub velocity: [f64; 3],
-    /// The attitude commanded now (roll, pitch), rad, after the envelope.
+    /// Commanded roll and pitch after envelope limits, rad.
     pub target: [f64; 2],
-    /// The command in force.
+    /// The actuator command in force.
     pub command: Command,
     /// The observed actuator state.
     pub actuators: ActuatorState,
-    /// Share of the 10 ms cycle the control task needed lately, 0..1.
+    /// Recent processing time of the control task as a fraction of its 10 ms cycle, 0..1.
     pub load: f64,
-    /// What is measured less what the model predicts, divided by the half width of its band (two standard deviations,
-    /// see `flight::monitor`), in the order of [`RESIDUALS`]; no unit, beyond −1..1 is outside.
+    /// Model residuals: measured minus predicted, divided by the half width of the band (two standard deviations, see
+    /// `flight::monitor`), in the order of [`RESIDUALS`]; dimensionless, outside −1..1 is outside the band.
     pub residuals: [f64; 6],
 }
 
 /// Names of the residuals: specific forces along body x, y, z, then angular accelerations.
 pub const RESIDUALS: [&str; 6] = ["res_fx", "res_fy", "res_fz", "res_roll", "res_pitch", "res_yaw"];
 
-/// An autopilot as the client side sees it. Implemented by `flight::pilot::Pilot`, and by a double
-/// in the tests of the protocol.
+/// An autopilot as its clients see it, implemented by `flight::pilot::Pilot` and by a double in the protocol tests.
 pub trait Autopilot {
-    /// Makes actuator outputs live; `force` skips the checks.
+    /// Enables actuator outputs; `force` skips the pre-arm checks.
     fn arm(&mut self, now: Time, force: bool) -> Verdict;
-    /// Makes actuator outputs dead; `force` does so in the air.
+    /// Disables actuator outputs; `force` allows it in flight.
     fn disarm(&mut self, now: Time, force: bool) -> Verdict;
-    /// Changes the mode.
+    /// Requests a flight mode.
     fn set_mode(&mut self, now: Time, mode: Mode) -> Verdict;
-    /// A valid attitude setpoint has arrived (it also proves the sender alive).
+    /// Takes a valid attitude setpoint, which also restarts the offboard timeout.
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint);
-    /// Stick positions have arrived.
+    /// Takes stick positions, which also restart their timeout.
     fn sticks(&mut self, now: Time, sticks: Sticks);
-    /// The parameter table: stable in length and order.
+    /// The parameter table; its length and order never change.
     fn parameters(&self) -> &[Parameter];
-    /// Sets a parameter; the verdict says why not. The type given has been matched to the table's.
+    /// Sets a parameter. `value` already has the table's type; a refusal carries its reason.
     fn set_parameter(&mut self, index: usize, value: ParameterValue) -> Verdict;
-    /// What the streams are made of.
+    /// The present state, for telemetry streams.
     fn status(&self) -> Status;
-    /// Takes the oldest line waiting for the ground stations.
+    /// Removes and returns the oldest text waiting for the ground stations.
     fn take_text(&mut self) -> Option<Text>;
 }

@@ -1,8 +1,6 @@
-//! The side that serves ground stations and offboard programs, as an autopilot of its own.
+//! MAVLink server for ground stations and offboard programs, which see an autopilot.
 //!
-//! Free of sockets and clocks: [`Clients::handle`] takes what arrived, [`Clients::poll`] does what
-//! is due, [`Clients::drain`] hands over what is to be sent. Work and memory are bounded per call,
-//! whatever arrives.
+//! It has no sockets and no clock. See [`Clients`] for the order of calls.
 
 mod commands;
 mod counts;
@@ -32,30 +30,46 @@ use session::{Session, Stay};
 use setpoint_authority::SetpointAuthority;
 use setpoints::OTHER_SETPOINT;
 
-/// Sessions at most.
+/// Largest number of sessions.
 pub const MAX_SESSIONS: usize = 32;
-/// A session that was silent for this long may be displaced by a new one when all are taken.
+/// Silence after which a session may be replaced by a new one when all are taken.
 const DISPLACEABLE: Duration = Duration::from_secs(3);
-/// A datagram peer that was silent for this long is forgotten.
+/// Silence after which the session of a datagram peer ends.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Lines for the ground stations taken from the autopilot in one call.
+/// Texts taken from the autopilot in one call.
 const TEXTS_PER_POLL: usize = 8;
-/// Letters of a line that are sent: eight chunks.
+/// Longest text that is sent, in characters: eight chunks.
 const TEXT_LENGTH: usize = 400;
 
-/// The two clocks that a client's request meets.
+/// Host time and vehicle time of a call.
 ///
-/// The host's clock paces heartbeats and streams, which go on when the vehicle stands still; the
-/// vehicle's clock drives the autopilot and stamps what is sent.
+/// Host time paces heartbeats and streams, which continue when the vehicle stops; vehicle time drives the autopilot
+/// and stamps what is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Now {
-    /// Time since the program's start.
+    /// Time since the program's start, monotonic.
     pub host: Duration,
-    /// Vehicle time.
+    /// Time of the vehicle's clock.
     pub vehicle: Time,
 }
 
-/// All clients, with what each has asked for.
+/// Sessions with all MAVLink clients of an autopilot.
+///
+/// Kinds of methods:
+///
+/// - input: [`Clients::handle`] takes received bytes, [`Clients::welcome`] and [`Clients::forget`] take connections
+///   that open and close;
+/// - time: [`Clients::poll`] queues what is due;
+/// - output: [`Clients::drain`] returns the queued frames;
+/// - queries: [`Clients::peers`], [`Clients::counts`], [`Clients::session_count`], [`Clients::identity`].
+///
+/// Order of calls: after any input, and after `poll` about every 10 ms, call `drain` and send its frames; frames that
+/// nobody drains are dropped beyond a bound and counted. `handle` and `poll` call the [`Autopilot`] synchronously.
+///
+/// Rule of time: [`Now::host`] must not decrease between calls. [`Now::vehicle`] is passed on to the autopilot and
+/// into the messages; it may stop, and may restart with the vehicle.
+///
+/// Work and memory per call are bounded, whatever arrives.
 #[derive(Debug)]
 pub struct Clients {
     identity: Source,
@@ -75,7 +89,7 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// No clients yet; `identity` is who we are to them (system 1, component 1 with the shim).
+    /// A server without sessions; `identity` is the sender of its messages (system 1, component 1 with the shim).
     pub fn new(identity: Source) -> Self {
         Clients {
             identity,
@@ -95,30 +109,30 @@ impl Clients {
         }
     }
 
-    /// No clients yet; we are the onboard computer of a controller that is not heard yet: only what
-    /// is addressed to our component is ours, and nothing is streamed that nobody asked for.
+    /// A server as the onboard computer of a controller that has not been received yet: only requests to this
+    /// component are served, and streams are sent only on request.
     pub fn onboard() -> Self {
         let identity = Source { system: 1, component: ONBOARD };
         Clients { role: Role::Onboard, ..Clients::new(identity) }
     }
 
-    /// Takes the controller's system id as ours.
+    /// Adopts the controller's system id.
     pub fn adopt(&mut self, system: u8) {
         self.identity.system = system;
     }
 
-    /// Who we are.
+    /// System and component id of the messages sent.
     pub fn identity(&self) -> Source {
         self.identity
     }
 
-    /// All that are served.
+    /// Peers with a session.
     pub fn peers(&self) -> impl Iterator<Item = PeerId> + '_ {
         self.sessions.iter().map(|session| session.peer)
     }
 
-    /// Serves a peer from now on without waiting for it to speak: the target of a `udpout:` link,
-    /// or a TCP connection. It stays until [`Clients::forget`].
+    /// Opens a session before the peer has sent anything: the target of a `udpout:` link, or a TCP connection. It
+    /// lasts until [`Clients::forget`].
     pub fn welcome(&mut self, now: Now, peer: PeerId) {
         match self.sessions.iter().position(|s| s.peer == peer) {
             Some(at) => self.sessions[at].stay = Stay::UntilForgotten,
@@ -128,14 +142,14 @@ impl Clients {
         }
     }
 
-    /// Forgets a peer, as when its connection has closed.
+    /// Ends a session, as when its connection is closed.
     pub fn forget(&mut self, peer: PeerId) {
         self.sessions.retain(|s| s.peer != peer);
         self.setpoint_authority.release(peer);
         self.stick_authority.release(peer);
     }
 
-    /// Takes one datagram, or some bytes of whole frames, from a peer.
+    /// Handles one datagram, or whole frames of a stream, from a peer.
     pub fn handle(&mut self, now: Now, peer: PeerId, bytes: &[u8], autopilot: &mut dyn Autopilot) {
         let mut counts = FrameCounts::default();
         for frame in Frames::new(bytes, &mut counts) {
@@ -144,8 +158,8 @@ impl Clients {
         self.counts.frames.add(counts);
     }
 
-    /// Sends what is due: heartbeats, streams, parameters and lines of text. To be called from
-    /// the control task itself, about every 10 ms.
+    /// Queues what is due: heartbeats, streams, parameters and texts. Call it from the control task, about every 10
+    /// ms.
     pub fn poll(&mut self, now: Now, autopilot: &mut dyn Autopilot) {
         self.sessions.retain(|s| {
             s.stay == Stay::UntilForgotten || now.host.saturating_sub(s.heard) < FORGOTTEN
@@ -161,17 +175,17 @@ impl Clients {
         self.summarise(now);
     }
 
-    /// Hands over what is to be sent, oldest first: each item is one frame for one peer.
+    /// Removes the queued frames, oldest first, each with its peer.
     pub fn drain(&mut self) -> impl Iterator<Item = (PeerId, Vec<u8>)> + '_ {
         self.outbox.drain()
     }
 
-    /// What was received so far.
+    /// Counters of received traffic.
     pub fn counts(&self) -> ClientCounts {
         ClientCounts { dropped: self.outbox.dropped(), ..self.counts }
     }
 
-    /// How many peers are served.
+    /// Number of sessions.
     pub fn session_count(&self) -> usize {
         self.sessions.len()
     }
@@ -194,7 +208,7 @@ impl Clients {
         }
     }
 
-    /// Opens a session, in the place of the longest silent one when all are taken.
+    /// Opens a session, replacing the one with the longest silence when all are taken.
     fn admit(&mut self, now: Now, peer: PeerId, stay: Stay) -> Option<usize> {
         if self.sessions.len() >= MAX_SESSIONS {
             let silent = |s: &Session| now.host.saturating_sub(s.heard);
@@ -244,7 +258,7 @@ impl Clients {
                 self.set_parameter(now, at, from, name, value, autopilot)
             }
             Request::Mission { step, kind } => self.reply(at, &mission(step, kind, from)),
-            // An answer of the other side is not to be answered: 128 is ACK, 129 NAK.
+            // a reply must not be replied to: 128 is ACK, 129 NAK
             Request::File { opcode: 128 | 129, .. } => {}
             Request::File { sequence, session, opcode } => {
                 self.reply(at, &answer::file_nak(sequence, session, opcode, from));
@@ -261,7 +275,7 @@ impl Clients {
         }
     }
 
-    /// SET_MODE has no acknowledgement: the heartbeat tells, and a refusal is said in words.
+    /// Handles SET_MODE, which has no acknowledgement: the heartbeat shows the mode, and a refusal is sent as text.
     fn set_mode(
         &mut self,
         now: Now,
@@ -285,14 +299,14 @@ impl Clients {
         self.sessions[at].send(message, self.identity, &mut self.outbox);
     }
 
-    /// A line for one client.
+    /// Queues a text for one client.
     fn say(&mut self, at: usize, severity: Severity, words: &str) {
         self.text_id = self.text_id.checked_add(1).unwrap_or(1);
         let words = words.char_indices().nth(TEXT_LENGTH).map_or(words, |(end, _)| &words[..end]);
         self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 
-    /// A warning for one client, unless it has had too many lately.
+    /// Queues a warning for one client, within its rate limit.
     fn complain(&mut self, now: Now, at: usize, words: &str) {
         if self.sessions[at].may_complain(now.host) {
             self.say(at, Severity::Warning, words);
@@ -300,7 +314,7 @@ impl Clients {
     }
 }
 
-/// There are no missions here: nothing to list, nothing to clear, no room for any.
+/// Reply to a mission message. Missions are not supported: the list is empty, and uploads are refused.
 fn mission(step: MissionStep, kind: u8, from: Source) -> Message {
     match step {
         MissionStep::List => answer::empty_mission(kind, from),

@@ -1,10 +1,10 @@
-//! MAVLink frames cut out of bytes.
+//! Parser and encoder of MAVLink frames.
 //!
-//! A datagram is cut by [`Frames`], a byte stream by [`StreamCutter`]. Both take MAVLink 1 and 2,
-//! check the CRC, and look for the next start marker after anything that is not a frame. Signed
-//! frames (incompatibility flag 0x01) count as frames, their signature unchecked: whether to
-//! believe them is decided by `signing::Signer::believed`. Any other incompatibility flag is
-//! refused, as the MAVLink guide asks.
+//! [`Frames`] parses a datagram, [`StreamCutter`] a byte stream. Both accept MAVLink 1 and 2, check
+//! the CRC, and resynchronise on the next start marker after bytes that are not a frame. Signed
+//! frames (incompatibility flag 0x01) are accepted without a check of the signature, which
+//! `signing::Signer::believed` does. Frames with any other incompatibility flag are refused, as the
+//! MAVLink guide requires.
 
 use mavlink::calculate_crc;
 
@@ -22,13 +22,13 @@ const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
 /// The longest frame: MAVLink 2, full payload, signed.
 pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
-/// False starts that one datagram or chunk may cost before the rest of it is dropped: each costs
-/// a CRC over up to 267 bytes, so noise cannot buy more than a few microseconds.
+/// False starts in one datagram or chunk after which the rest is dropped: each costs a CRC over up
+/// to 267 bytes, so that noise takes a few microseconds at most.
 const MAX_FALSE_STARTS: u32 = 32;
 /// Frames taken from one datagram or chunk; senders pack to an MTU, which holds fewer.
 const MAX_FRAMES: u32 = 128;
 
-/// The version of MAVLink that a frame is written in.
+/// MAVLink protocol version of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
     /// Start marker 0xFE, message numbers to 255.
@@ -37,27 +37,27 @@ pub enum Version {
     V2,
 }
 
-/// Who wrote a frame.
+/// Sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Source {
-    /// System id.
+    /// System id of the MAVLink node.
     pub system: u8,
-    /// Component id.
+    /// Component id of the MAVLink node.
     pub component: u8,
 }
 
-/// A whole frame whose CRC is right.
+/// A complete frame with a valid CRC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// The version it is written in.
+    /// Protocol version of the frame.
     pub version: Version,
-    /// The sender's running number.
+    /// Sequence number of the sender.
     pub sequence: u8,
-    /// The sender.
+    /// Sender of the frame.
     pub source: Source,
-    /// The message's number.
+    /// Message id.
     pub id: u32,
-    /// The payload as sent: MAVLink 2 has cut its trailing zeros.
+    /// Payload as sent: MAVLink 2 truncates trailing zeros.
     pub payload: &'a [u8],
     /// Whether it carries a signature; it is not checked here.
     pub signed: bool,
@@ -65,19 +65,18 @@ pub struct Frame<'a> {
     pub bytes: &'a [u8],
 }
 
-/// What became of the bytes.
+/// Counters of parsed frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameCounts {
-    /// Whole frames with the right CRC.
+    /// Complete frames with a valid CRC.
     pub good: u64,
-    /// Candidates with a wrong CRC.
+    /// Candidates with an invalid CRC.
     pub bad_crc: u64,
-    /// Plausible frames of a message that the dialect does not know, so that its CRC cannot be
-    /// checked.
+    /// Plausible frames of a message outside the dialect, whose CRC cannot be checked.
     pub unknown: u64,
-    /// Candidates that end beyond the datagram.
+    /// Candidates that end after the datagram.
     pub truncated: u64,
-    /// Candidates with an incompatibility flag that we do not understand.
+    /// Candidates with an unsupported incompatibility flag.
     pub refused: u64,
     /// Bytes dropped because a datagram held too many frames or false starts.
     pub dropped_bytes: u64,
@@ -94,13 +93,13 @@ impl FrameCounts {
         self.dropped_bytes += other.dropped_bytes;
     }
 
-    /// Everything that was not a good frame of a known message.
+    /// Number of candidates that were not valid frames of the dialect.
     pub fn bad(&self) -> u64 {
         self.bad_crc + self.unknown + self.truncated + self.refused
     }
 }
 
-/// What stands at a start marker.
+/// Classification of the bytes at a start marker.
 enum Candidate<'a> {
     Frame(Frame<'a>),
     BadCrc,
@@ -109,8 +108,7 @@ enum Candidate<'a> {
     Incomplete,
 }
 
-/// The length that the frame at the start of `bytes` claims; `None` without a start marker or
-/// with too few bytes to tell.
+/// Length of the frame at the start of `bytes`; `None` without a start marker or with too few bytes to determine it.
 pub fn frame_len(bytes: &[u8]) -> Option<usize> {
     let payload = usize::from(*bytes.get(1)?);
     match bytes[0] {
@@ -123,7 +121,7 @@ pub fn frame_len(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// Examines the bytes from a start marker on.
+/// Classifies the bytes from a start marker on.
 fn examine(bytes: &[u8]) -> Candidate<'_> {
     let v1 = bytes[0] == STX_V1;
     let header = if v1 { HEADER_V1 } else { HEADER_V2 };
@@ -162,26 +160,26 @@ fn examine(bytes: &[u8]) -> Candidate<'_> {
     })
 }
 
-/// What [`Frames`] finds.
+/// One item found by [`Frames`].
 enum Piece<'a> {
-    /// A frame of a message that the dialect knows, its CRC right.
+    /// A frame of the dialect with a valid CRC.
     Known(Frame<'a>),
-    /// A plausible frame of a message that it does not know: to be forwarded, not read.
+    /// A plausible frame of a message outside the dialect: it can be forwarded, not decoded.
     Unknown(&'a [u8]),
 }
 
-/// The frames of one datagram, in order.
+/// Iterator over the frames of one datagram.
 pub struct Frames<'a, 'c> {
     rest: &'a [u8],
     counts: &'c mut FrameCounts,
     frames_left: u32,
     starts_left: u32,
-    /// Whether more bytes may follow, so that an unfinished candidate is to be waited for.
+    /// Whether more bytes may follow, so that an incomplete candidate is kept.
     waits: bool,
 }
 
 impl<'a, 'c> Frames<'a, 'c> {
-    /// Cuts a whole datagram, counting what is found.
+    /// Parses a complete datagram and updates `counts`.
     pub fn new(datagram: &'a [u8], counts: &'c mut FrameCounts) -> Self {
         Frames {
             rest: datagram,
@@ -192,8 +190,7 @@ impl<'a, 'c> Frames<'a, 'c> {
         }
     }
 
-    /// Spends one false start: on to the byte after the marker, or to the end when there have
-    /// been too many.
+    /// Skips a false start: to the byte after the marker, or to the end when there were too many.
     fn false_start(&mut self) {
         match self.starts_left.checked_sub(1) {
             Some(left) => {
@@ -210,9 +207,8 @@ impl<'a, 'c> Frames<'a, 'c> {
     }
 }
 
-/// Whether an unknown message's frame of `len` bytes ends where a frame may end: at the end of
-/// the bytes, or in front of another start marker. Anything else is noise in a frame's clothes,
-/// and skipping its length would swallow good frames.
+/// Whether a frame of `len` bytes with an unknown message ends at the end of the bytes or before another start
+/// marker. Otherwise it is taken for noise: skipping its length could drop valid frames.
 fn ends_well(bytes: &[u8], len: usize) -> bool {
     bytes.get(len).is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
 }
@@ -273,8 +269,7 @@ impl<'a> Iterator for Frames<'a, '_> {
     }
 }
 
-/// Delivers every frame of some bytes as it came, those of unknown messages among them, each with
-/// what is known of it: what a router passes on unmodified.
+/// Delivers every frame unmodified, unknown messages included, with its decoded header where known: for a router.
 pub fn pieces<'a>(bytes: &'a [u8], mut deliver: impl FnMut(&'a [u8], Option<Frame<'a>>)) {
     let mut counts = FrameCounts::default();
     let mut frames = Frames::new(bytes, &mut counts);
@@ -286,33 +281,33 @@ pub fn pieces<'a>(bytes: &'a [u8], mut deliver: impl FnMut(&'a [u8], Option<Fram
     }
 }
 
-/// Cuts frames out of a byte stream, holding less than one frame between chunks.
+/// Parses frames from a byte stream, holding less than one frame between chunks.
 #[derive(Clone, Debug, Default)]
 pub struct StreamCutter {
     pending: Vec<u8>,
-    /// What was found so far.
+    /// Counters since the start.
     pub counts: FrameCounts,
 }
 
 impl StreamCutter {
-    /// Takes the next chunk and delivers the frames that are whole by now.
+    /// Takes the next chunk and delivers each completed frame.
     pub fn push(&mut self, chunk: &[u8], deliver: impl FnMut(Frame<'_>)) {
         self.pending.extend_from_slice(chunk);
         self.cut(true, deliver);
     }
 
-    /// Gives up on an unfinished candidate, as after a pause in the stream: a marker that was
-    /// noise must not hold back the frames behind it.
+    /// Discards an incomplete candidate, as after a silence of the stream: a false start marker must not hold back
+    /// the frames behind it.
     pub fn flush(&mut self, deliver: impl FnMut(Frame<'_>)) {
         self.cut(false, deliver);
     }
 
-    /// Whether bytes wait for the rest of their frame.
+    /// Whether an incomplete frame is buffered.
     pub fn is_waiting(&self) -> bool {
         !self.pending.is_empty()
     }
 
-    /// [`StreamCutter::push`] for a router: delivers each frame's bytes, of unknown messages too.
+    /// [`StreamCutter::push`] for a router: delivers each frame's bytes, unknown messages included.
     pub fn push_pieces(&mut self, chunk: &[u8], deliver: impl FnMut(&[u8])) {
         self.pending.extend_from_slice(chunk);
         self.cut_pieces(true, deliver);
@@ -343,8 +338,8 @@ impl StreamCutter {
     }
 }
 
-/// Writes one frame. MAVLink 2 cuts the payload's trailing zeros; MAVLink 1 has no room for
-/// messages above 255, which give `None`, as does a message that the dialect does not know.
+/// Encodes one frame. MAVLink 2 truncates the payload's trailing zeros. `None` for a message outside the dialect, and
+/// for ids above 255 in MAVLink 1.
 pub fn write(
     version: Version,
     sequence: u8,

@@ -1,9 +1,9 @@
 //! MAVLink: addresses, transports, frames, and the two sides of the companion.
 //!
-//! Everything but the transport is free of sockets and clocks: bytes and the time come in as
-//! arguments, bytes go out as return values. [`transport`] runs on tokio and hands datagrams and
-//! streams over channels. [`vehicle`] speaks to the flight controller, [`client`] to ground
-//! stations and offboard programs; `wire` is the one place that names MAVLink messages.
+//! Only the transport has sockets and a clock: elsewhere bytes and time are arguments, and bytes
+//! are return values. [`transport`] runs on tokio and passes datagrams and streams through
+//! channels. [`vehicle`] connects to the flight controller, [`client`] to ground stations and
+//! offboard programs; only `wire` uses MAVLink message types.
 //!
 //! How the control thread puts them together (`pilot` is any [`autopilot::Autopilot`]):
 //!

@@ -1,4 +1,4 @@
-//! An offboard client: the other end of [`client`](super::client), for the demonstration.
+//! An offboard client for the demonstration: the peer of [`client`](super::client).
 
 use super::autopilot::Mode;
 use super::framing::{FrameCounts, Frames, Source, Version};
@@ -6,14 +6,14 @@ use super::wire::{Message, offboard};
 
 pub use super::wire::offboard::Heard;
 
-/// The autopilot that is spoken to: system 1, component 1.
+/// Address of the autopilot: system 1, component 1.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
-/// Ourselves: an onboard computer of the same system.
+/// This client's ids: an onboard computer of the same system.
 const OURSELVES: Source = Source { system: 1, component: 191 };
 
-/// MAV_CMD_COMPONENT_ARM_DISARM.
+/// Command number of MAV_CMD_COMPONENT_ARM_DISARM.
 pub const ARM: u32 = 400;
-/// MAV_CMD_DO_SET_MODE.
+/// Command number of MAV_CMD_DO_SET_MODE.
 pub const SET_MODE: u32 = 176;
 
 /// A session with one autopilot, free of sockets and clocks.
@@ -24,27 +24,27 @@ pub struct OffboardClient {
 }
 
 impl OffboardClient {
-    /// A heartbeat, to be sent once a second.
+    /// Encodes a heartbeat, to be sent once a second.
     pub fn heartbeat(&mut self) -> Vec<u8> {
         self.frame(&offboard::heartbeat())
     }
 
-    /// A setpoint: roll and pitch in rad, `time_ms` on the client's own clock.
+    /// Encodes an attitude setpoint: roll and pitch in rad, `time_ms` on the client's own clock.
     pub fn setpoint(&mut self, time_ms: u32, roll: f64, pitch: f64) -> Vec<u8> {
         self.frame(&offboard::attitude_target(AUTOPILOT, time_ms, roll, pitch))
     }
 
-    /// The command to arm.
+    /// Encodes the arming command.
     pub fn arm(&mut self) -> Vec<u8> {
         self.frame(&offboard::arm(AUTOPILOT))
     }
 
-    /// The command to change the mode.
+    /// Encodes the command that changes the mode.
     pub fn set_mode(&mut self, mode: Mode) -> Vec<u8> {
         self.frame(&offboard::set_mode(AUTOPILOT, mode))
     }
 
-    /// Reads a datagram; frames of others than the autopilot are passed over.
+    /// Decodes a datagram; frames from others than the autopilot are skipped.
     pub fn read(&mut self, datagram: &[u8], mut hear: impl FnMut(Heard)) {
         for frame in Frames::new(datagram, &mut self.counts) {
             if frame.source == AUTOPILOT

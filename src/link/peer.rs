@@ -1,4 +1,4 @@
-//! Who is at the other end of a link.
+//! Peers of a link.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -7,15 +7,15 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LinkId(pub u16);
 
-/// The address of whoever is at the other end of a serial wire, which has none of its own.
+/// Placeholder address of the peer on a serial wire, which has none.
 pub const SERIAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED), 0);
 
-/// One correspondent on one link: a datagram's sender, one TCP connection, the end of a wire.
+/// One peer on one link: a datagram's sender, one TCP connection, or the end of a serial wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PeerId {
-    /// The link it was heard on.
+    /// The link on which it was received.
     pub link: LinkId,
-    /// Its own address and port.
+    /// Its address and port.
     pub address: SocketAddr,
 }
 

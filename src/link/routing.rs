@@ -1,4 +1,5 @@
-//! Routing: what is not for us goes on unmodified, only where its target was heard.
+//! Routing between clients and a flight controller: frames for others are forwarded unmodified, to where their target
+//! was seen.
 
 use std::time::Duration;
 
@@ -6,32 +7,32 @@ use super::framing::{Frame, Source, pieces};
 use super::peer::PeerId;
 use super::wire::controller as wire;
 
-/// Correspondents remembered at most.
+/// Largest number of routes.
 const MAX_ROUTES: usize = 64;
-/// One that was silent for this long is forgotten.
+/// Silence after which a route is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
-/// What becomes of a frame of a client.
+/// Destination of a client's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// It goes on to the controller.
+    /// Forwarded to the controller.
     Controller,
-    /// It is for us alone.
+    /// Handled here only.
     Ours,
-    /// It goes nowhere: it would take control authority from whoever has it, or give a key away.
+    /// Dropped: it would override whoever has control authority, or disclose a signing key.
     Nowhere,
 }
 
-/// Who was heard where.
+/// The routing table: which system and component was seen from which peer.
 #[derive(Clone, Debug, Default)]
 pub struct Router {
     routes: Vec<(Source, PeerId, Duration)>,
-    /// Frames that were kept from the controller.
+    /// Number of frames withheld from the controller.
     pub held: u64,
 }
 
 impl Router {
-    /// Learns from a client's bytes who is where.
+    /// Learns routes from a client's frames.
     pub fn learn(&mut self, host: Duration, peer: PeerId, bytes: &[u8]) {
         pieces(bytes, |_, frame| {
             let Some(Frame { source, .. }) = frame else { return };
@@ -45,13 +46,13 @@ impl Router {
         self.routes.retain(|(.., heard)| host.saturating_sub(*heard) < FORGOTTEN);
     }
 
-    /// Forgets a peer that is gone.
+    /// Removes the routes of a peer.
     pub fn forget(&mut self, peer: PeerId) {
         self.routes.retain(|(_, at, _)| *at != peer);
     }
 
-    /// The frames of a client's bytes that the controller shall have, as they came. `us` is who we
-    /// are, `engaged` whether we steer.
+    /// The frames of a client that are forwarded to the controller, unmodified. `us` is this program's identity,
+    /// `engaged` whether it has control authority.
     pub fn to_controller(&mut self, bytes: &[u8], us: Source, engaged: bool) -> Vec<u8> {
         let mut on = Vec::new();
         let mut held = 0;
@@ -64,8 +65,8 @@ impl Router {
         on
     }
 
-    /// The frames of the controller's bytes that `peer` shall have: those for everybody, and those
-    /// for whoever was heard there; a key never.
+    /// The frames of the controller that are forwarded to `peer`: broadcasts, and those for a system seen there;
+    /// never a signing key.
     pub fn to_client(&self, bytes: &[u8], peer: PeerId) -> Vec<u8> {
         let mut on = Vec::new();
         pieces(bytes, |bytes, frame| {
@@ -90,9 +91,9 @@ impl Router {
     }
 }
 
-/// Where a client's frame goes.
+/// Destination of a client's frame.
 pub fn way(frame: Option<&Frame<'_>>, us: Source, engaged: bool) -> Way {
-    // Of an unknown message nothing is known but that it is none of ours.
+    // an unknown message is not one that is handled here
     let Some(frame) = frame else { return Way::Controller };
     if frame.source == us || frame.id == wire::SETUP_SIGNING {
         return Way::Nowhere;

@@ -1,9 +1,8 @@
-//! Signatures of MAVLink 2 frames: put on what leaves, demanded of what arrives.
+//! MAVLink 2 message signing: signs outgoing frames and verifies incoming ones.
 //!
-//! As the MAVLink guide has it: a frame's signature is the first 48 bits of the SHA-256 of key,
-//! frame, link number and timestamp; timestamps (10 µs since 2015) only rise in each stream of a
-//! sender. The codec's own signing keeps its timestamp to itself, so that it cannot outlive the
-//! program; it is not used.
+//! MAVLink guide: the signature is the first 48 bits of the SHA-256 of key, frame, link id and
+//! timestamp; timestamps (10 µs since 2015) increase in each stream of a sender. The codec's own
+//! signing is not used: its timestamp cannot be read, and so cannot be stored for the next start.
 
 mod key;
 mod stamp;
@@ -25,74 +24,74 @@ const FLAG_SIGNED: u8 = 0x01;
 const HEADER: usize = 10;
 const CHECKSUM: usize = 2;
 const BLOCK: usize = 13;
-/// Bytes of the signature proper.
+/// Length of the signature field in bytes.
 const SIGNATURE: usize = 6;
-/// A stream that is new here may be so far behind us: a minute, in units of 10 µs.
+/// Largest lag of the first timestamp of a new stream: a minute, in units of 10 µs.
 const MINUTE: u64 = 6_000_000;
-/// Streams remembered at most. Only who has the key makes new ones.
+/// Largest number of streams remembered. Only a holder of the key can add one.
 const MAX_STREAMS: usize = 1024;
-/// Timestamps have 48 bits.
+/// Largest timestamp: they have 48 bits.
 const STAMP_MAX: u64 = (1 << 48) - 1;
 /// 1 January 2015 in µs since 1970.
 const EPOCH_US: u64 = 1_420_070_400_000_000;
 
-/// A moment as signatures count it, units of 10 µs since 2015.
+/// The signing timestamp of a Unix time: units of 10 µs since 1 January 2015.
 pub fn stamp_of(unix_us: u64) -> u64 {
     (unix_us.saturating_sub(EPOCH_US) / 10).min(STAMP_MAX)
 }
 
-/// What became of frames.
+/// Counters of signed and verified frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SigningCounts {
-    /// Signed by us.
+    /// Frames signed here.
     pub signed: u64,
-    /// Believed.
+    /// Frames accepted with a valid signature.
     pub believed: u64,
-    /// Refused: without a signature.
+    /// Frames refused without a signature.
     pub unsigned: u64,
-    /// Refused: another key's signature, or a frame that was changed.
+    /// Frames refused for an invalid signature: another key, or modified content.
     pub forged: u64,
-    /// Refused: a timestamp that was used before, or that is a minute old.
+    /// Frames refused for a timestamp that was used before or is more than a minute old.
     pub replayed: u64,
-    /// Not sent: MAVLink 1 has no signatures.
+    /// MAVLink 1 frames not sent, as they cannot be signed.
     pub unsignable: u64,
 }
 
 impl SigningCounts {
-    /// Frames that were refused.
+    /// Total number of refused frames.
     pub fn refused(&self) -> u64 {
         self.unsigned + self.forged + self.replayed
     }
 }
 
-/// One key with its memory.
+/// A key with the timestamps of its streams.
 #[derive(Debug)]
 pub struct Signer {
     key: Key,
-    /// The newest timestamp, ours or a correspondent's.
+    /// The newest timestamp, sent or received.
     stamp: u64,
     streams: HashMap<(u8, Source), u64>,
     counts: SigningCounts,
 }
 
 impl Signer {
-    /// Signs with `key`, from timestamp `stamp` on.
+    /// A signer with `key`, starting from timestamp `stamp`.
     pub fn new(key: Key, stamp: u64) -> Self {
         Signer { key, stamp, streams: HashMap::new(), counts: SigningCounts::default() }
     }
 
-    /// The newest timestamp, which is to be kept for the next start.
+    /// The newest timestamp, to be stored for the next start.
     pub fn stamp(&self) -> u64 {
         self.stamp
     }
 
-    /// What became of frames so far.
+    /// Counters since the start.
     pub fn counts(&self) -> SigningCounts {
         self.counts
     }
 
-    /// The frames of `bytes`, each signed for link number `link` at `unix_us`. One that has a
-    /// signature keeps it, since a forwarded frame is its author's; one of MAVLink 1 is left out.
+    /// The frames of `bytes`, each signed with link id `link` at `unix_us` (µs since 1970). A frame that is signed
+    /// already is forwarded unmodified; a MAVLink 1 frame is dropped.
     pub fn sign(&mut self, unix_us: u64, link: u8, bytes: &[u8]) -> Vec<u8> {
         let mut signed = Vec::with_capacity(bytes.len() + BLOCK);
         pieces(bytes, |frame, _| match (frame[0] == STX, frame[2] & FLAG_SIGNED != 0) {
@@ -103,7 +102,7 @@ impl Signer {
         signed
     }
 
-    /// Appends an unsigned frame of MAVLink 2 with its signature.
+    /// Appends an unsigned MAVLink 2 frame with its signature.
     fn put(&mut self, unix_us: u64, link: u8, frame: &[u8], out: &mut Vec<u8>) {
         self.stamp = (self.stamp + 1).max(stamp_of(unix_us)).min(STAMP_MAX);
         let from = out.len();
@@ -123,7 +122,7 @@ impl Signer {
         self.counts.signed += 1;
     }
 
-    /// The signature of everything before it.
+    /// The signature over the bytes before it.
     fn signature(&self, before: &[u8]) -> [u8; SIGNATURE] {
         let hash = Sha256::new().chain_update(self.key.bytes()).chain_update(before).finalize();
         let mut signature = [0; SIGNATURE];
@@ -131,7 +130,7 @@ impl Signer {
         signature
     }
 
-    /// The frames of `bytes` that are to be believed at `unix_us`, as they came.
+    /// The frames of `bytes` whose signature is valid at `unix_us` (µs since 1970), unmodified.
     pub fn believed(&mut self, unix_us: u64, bytes: &[u8]) -> Vec<u8> {
         self.stamp = self.stamp.max(stamp_of(unix_us));
         let mut believed = Vec::with_capacity(bytes.len());
@@ -174,7 +173,7 @@ impl Signer {
     }
 }
 
-/// What a frame is.
+/// Verification result of a frame.
 enum Verdict {
     Believed,
     Unsigned,

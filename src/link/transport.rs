@@ -1,9 +1,9 @@
-//! The sockets and ports: every link of the program on one thread, with channels to the control
+//! Sockets and serial ports: all links of the program on one thread, with channels to the control
 //! thread.
 //!
-//! What arrives goes into a bounded channel that the caller chooses for each link, so that the
-//! vehicle's traffic can be served before the clients'. What is sent goes into a bounded channel
-//! of the link. A full channel drops and counts; nothing here ever blocks its caller.
+//! Received bytes go into a bounded channel that the caller chooses for each link, so that the
+//! vehicle's traffic can be served before the clients'. Frames to send go into a bounded channel
+//! of the link. A full channel drops frames and counts them; no call blocks.
 
 mod flood;
 mod serial;
@@ -25,92 +25,92 @@ use super::address::{Address, AddressError};
 use super::peer::{self, LinkId, PeerId};
 pub use serial::SerialFault;
 
-/// Frames that may wait to be sent on one link.
+/// Capacity of a link's outgoing queue, frames.
 const OUTBOX: usize = 1024;
-/// Between two rounds of the thread that are counted.
+/// Interval of the network thread's counted rounds.
 const ROUND: Duration = Duration::from_millis(10);
 
-/// Bytes from a peer: one datagram, or whole frames from a stream.
+/// Bytes from a peer: one datagram, or complete frames of a stream.
 #[derive(Clone, Debug)]
 pub struct Packet {
-    /// Who sent it.
+    /// Sender of the bytes.
     pub peer: PeerId,
-    /// What was sent.
+    /// The received bytes.
     pub bytes: Vec<u8>,
     /// When it arrived, host clock.
     pub arrived: Instant,
 }
 
-/// What happens on a link.
+/// An event on a link.
 #[derive(Clone, Debug)]
 pub enum Arrival {
-    /// Bytes came.
+    /// Bytes were received.
     Packet(Packet),
-    /// A TCP connection is up: the peer may be spoken to before it says anything.
+    /// A TCP connection is open: the peer can be sent to before it sends anything.
     Opened(PeerId),
-    /// A TCP connection is gone, or a serial port.
+    /// A TCP connection or a serial port was closed.
     Closed(PeerId),
-    /// Something about the link itself that its user should know.
+    /// A condition of the link to report to its user.
     Remark(Remark),
 }
 
-/// What is to be said about a link.
+/// A condition of a link to report to its user.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Remark {
-    /// The serial port has gone.
+    /// The serial port was disconnected.
     #[error("serial port {0} has gone: waiting for it to come back")]
     Unplugged(String),
-    /// The serial port is there again.
+    /// The serial port is available again.
     #[error("serial port {0} is back")]
     Replugged(String),
-    /// Bytes come, but no frame among them.
+    /// Bytes are received, but no valid frame.
     #[error(
         "bytes arrive on {port}, but no MAVLink frame among them: {baud} is probably not the baud \
          rate of the other end; set its port (SER_TEL2_BAUD on PX4, SERIAL2_BAUD on ArduPilot) or \
          --vehicle to the same rate"
     )]
     Noise {
-        /// The device.
+        /// Name of the device.
         port: String,
-        /// The rate it is open at.
+        /// Baud rate at which it is open.
         baud: u32,
     },
 }
 
-/// Why a link cannot be opened.
+/// A link cannot be opened.
 #[derive(Debug, Error)]
 pub enum TransportError {
-    /// The address cannot be used.
+    /// The address is invalid.
     #[error(transparent)]
     Address(#[from] AddressError),
-    /// Another program has the port.
+    /// The port is in use by another program.
     #[error(
         "opening {address}: port already in use: stop the other program or give another address with {option}"
     )]
     InUse {
-        /// The address.
+        /// Address of the link.
         address: Address,
         /// The command-line option it came from, such as `--client`.
         option: &'static str,
     },
-    /// The system refused the socket.
+    /// The operating system refused the socket.
     #[error("opening {address}: {source}; give another address with {option}")]
     Open {
-        /// The address.
+        /// Address of the link.
         address: Address,
         /// The command-line option it came from.
         option: &'static str,
-        /// What the system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The serial port cannot be opened.
     #[error("opening {address}: {fault}; {option} names the port")]
     Serial {
-        /// The address.
+        /// Address of the link.
         address: Address,
         /// The command-line option it came from.
         option: &'static str,
-        /// What is wrong with it.
+        /// The reason, with its remedy.
         fault: SerialFault,
     },
     /// The thread could not be started.
@@ -118,7 +118,7 @@ pub enum TransportError {
     Thread(std::io::Error),
 }
 
-/// What a link could not pass on.
+/// Counters of traffic that was lost.
 #[derive(Debug, Default)]
 struct Counters {
     received: AtomicU64,
@@ -130,22 +130,22 @@ struct Counters {
     flooded: AtomicU64,
 }
 
-/// A link's traffic since it was opened.
+/// Traffic counters of a link since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounts {
-    /// Packets received.
+    /// Number of packets received.
     pub received: u64,
-    /// Frames sent.
+    /// Number of frames sent.
     pub sent: u64,
-    /// Packets dropped because the control thread did not fetch them in time.
+    /// Packets dropped because the control thread's queue was full.
     pub inbox_full: u64,
-    /// Frames dropped because the network did not take them in time.
+    /// Frames dropped because the link's outgoing queue was full.
     pub outbox_full: u64,
-    /// Frames that the system refused to send.
+    /// Frames that the operating system refused to send.
     pub send_failed: u64,
     /// Datagrams dropped for their size.
     pub oversize: u64,
-    /// Datagrams dropped because their sender sends more than anybody has to say.
+    /// Datagrams dropped by the rate limit of their sender.
     pub flooded: u64,
 }
 
@@ -153,7 +153,7 @@ fn count(counter: &AtomicU64) {
     counter.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The receiving end of a link as its tasks see it.
+/// The link as its receiving tasks use it.
 #[derive(Clone)]
 struct Port {
     id: LinkId,
@@ -167,7 +167,7 @@ impl Port {
         PeerId { link: self.id, address }
     }
 
-    /// Passes bytes on, or drops them when nobody fetches.
+    /// Passes bytes on, or drops them when the queue is full.
     fn deliver(&self, address: SocketAddr, bytes: Vec<u8>) {
         count(&self.counters.received);
         let packet = Packet { peer: self.peer(address), bytes, arrived: Instant::now() };
@@ -176,8 +176,8 @@ impl Port {
         }
     }
 
-    /// Passes on that a connection is up or gone. This must not be lost to a full channel, or a
-    /// session would outlive its connection, so it waits, off the control thread.
+    /// Passes on that a connection was opened or closed. It waits for a full channel, off the control thread: if it
+    /// were lost, a session would outlive its connection.
     async fn announce(&self, mut arrival: Arrival) {
         while let Err(crossbeam_channel::TrySendError::Full(back)) = self.inbox.try_send(arrival) {
             arrival = back;
@@ -186,18 +186,18 @@ impl Port {
     }
 }
 
-/// The thread that owns every socket. Dropping it closes them all.
+/// The thread that owns all sockets. Dropping it closes them.
 pub struct Network {
     handle: Handle,
     rounds: Arc<AtomicU64>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
-    /// Whether one sender of datagrams is listened to without limit.
+    /// Whether the rate limit of datagram senders is off.
     takes_all: bool,
 }
 
 impl Network {
-    /// Starts the thread, with no link yet.
+    /// Starts the thread without links.
     pub fn start() -> Result<Self, TransportError> {
         let runtime =
             Builder::new_current_thread().enable_all().build().map_err(TransportError::Thread)?;
@@ -208,26 +208,26 @@ impl Network {
         let thread = std::thread::Builder::new()
             .name("network".into())
             .spawn(move || {
-                // Ends when asked to, or when the owner is gone.
+                // ends when asked to, or when the owner is gone
                 let _ = runtime.block_on(stopped);
             })
             .map_err(TransportError::Thread)?;
         Ok(Network { handle, rounds, stop: Some(stop), thread: Some(thread), takes_all: false })
     }
 
-    /// Links that are opened from now on take every datagram: a simulation in lockstep sends as fast as it is answered.
+    /// Disables the rate limit on links opened from now on: a simulation in lockstep sends as fast as it is answered.
     pub fn take_all(&mut self) {
         self.takes_all = true;
     }
 
-    /// How many rounds the thread has gone, one in 10 ms while it runs: between two of them every socket was looked at.
+    /// Rounds of the thread, one per 10 ms while it runs: between two of them every socket was polled.
     pub fn rounds(&self) -> u64 {
         self.rounds.load(Ordering::Relaxed)
     }
 
-    /// Opens a link whose arrivals go to `inbox`. Sockets are bound before this returns, so that
-    /// a port in use is one error at the start; `option` is what the error tells the user to
-    /// change. A `tcpout:` link connects, and connects again, by itself.
+    /// Opens a link whose arrivals go to `inbox`. Sockets are bound before this returns, so that a port in use is
+    /// reported at the start; `option` is the command-line option that the error names. A `tcpout:` link connects and
+    /// reconnects by itself.
     pub fn open(
         &self,
         id: LinkId,
@@ -298,7 +298,7 @@ impl Drop for Network {
     }
 }
 
-/// The sending end of a link, for the control thread.
+/// The sending side of a link, for the control thread.
 #[derive(Clone, Debug)]
 pub struct Link {
     id: LinkId,
@@ -309,29 +309,29 @@ pub struct Link {
 }
 
 impl Link {
-    /// The link's number.
+    /// Number of the link.
     pub fn id(&self) -> LinkId {
         self.id
     }
 
-    /// The address it is bound to; none for `tcpout:` and `serial:`.
+    /// The bound address; `None` for `tcpout:` and `serial:`.
     pub fn local(&self) -> Option<SocketAddr> {
         self.local
     }
 
-    /// The peer to speak to unasked: the target of a `udpout:` link, the end of a serial wire.
+    /// The peer to send to before it has sent anything: the target of a `udpout:` link, or the end of a serial wire.
     pub fn target(&self) -> Option<PeerId> {
         self.target
     }
 
-    /// Sends one frame, or drops and counts it when the network does not keep up. Never blocks.
+    /// Queues one frame, or drops and counts it when the queue is full. Never blocks.
     pub fn send(&self, to: PeerId, frame: Vec<u8>) {
         if self.outbox.try_send((to.address, frame)).is_err() {
             count(&self.counters.outbox_full);
         }
     }
 
-    /// The traffic so far.
+    /// Traffic counters since the link was opened.
     pub fn counts(&self) -> LinkCounts {
         let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         LinkCounts {

@@ -1,6 +1,6 @@
-//! The vehicle's side of the companion: state in, actuator commands out.
+//! The vehicle link: state frames in, actuator commands out.
 //!
-//! Behind [`Vehicle`] stand the simulator's shim ([`sitl`]) and real flight controllers ([`real`]).
+//! [`Vehicle`] is either the simulator's shim ([`sitl`]) or a real flight controller ([`real`]).
 
 mod fault;
 pub mod limits;
@@ -20,86 +20,84 @@ pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
 
-/// Standard deviations of angles of attack and sideslip by vanes, rad: customary for small aircraft.
+/// Standard deviations of angle of attack and sideslip from vanes, rad: typical of small aircraft.
 pub const VANE_SD: [f64; 2] = [0.3 * std::f64::consts::PI / 180.0; 2];
 
 /// The vehicle's state at one instant, complete and in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
-    /// Moment of the measurement, vehicle clock.
+    /// Time of the measurement, vehicle clock.
     pub time: Time,
-    /// How it stands to the state before it.
+    /// Order relative to the previous state.
     pub order: Order,
-    /// What is wrong with it: a part with a fault holds the last good value instead, or the
-    /// neutral state's when there was none.
+    /// Faults: a part with a fault keeps its last valid value, or the neutral state's if there was none.
     pub faults: Faults,
     /// The eight variables of flight.
     pub state: State,
-    /// Standard deviations of the flow angles in `state`, rad: of the angle of attack, of the sideslip.
+    /// Standard deviations of the angle of attack and the sideslip in `state`, rad.
     pub incidence_sd: [f64; 2],
-    /// Yaw, rad.
+    /// Yaw angle ψ, rad.
     pub yaw: f64,
     /// Time for which a simulator holds the body rates from this instant, s; 0 where they are sampled.
     pub rate_hold_s: f64,
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
-    /// Actuator positions and rates.
+    /// Actuator positions and rates, normalised.
     pub actuators: ActuatorState,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
-    /// Latitude and longitude, degrees, as last heard; NaN before.
+    /// Latitude and longitude, degrees, last received; NaN before.
     pub position: [f64; 2],
-    /// Velocity over ground, NED, m/s, as last heard; NaN before.
+    /// Velocity over ground, NED, m/s, last received; NaN before.
     pub velocity: [f64; 3],
-    /// Wind, NED, m/s, as last heard; NaN before.
+    /// Wind velocity, NED, m/s, last received; NaN before.
     pub wind: [f64; 3],
 }
 
-/// How a state frame stands to the one before it.
+/// Order of a state frame relative to the previous one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// The first one, or the first after the vehicle's clock started anew.
+    /// The first frame, or the first after a restart of the vehicle's clock.
     First,
-    /// Newer, with this many frames missing in between.
+    /// A newer frame, after this many lost ones.
     Next {
-        /// Frames of 10 ms that never came.
+        /// Number of 10 ms frames lost before it.
         lost: u32,
     },
-    /// The same again, as a shim in lockstep repeats what was not answered: answer it again, do
-    /// not act on it twice.
+    /// The same frame again, as a shim in lockstep repeats it without a reply: reply again, do not process it twice.
     Repeated,
-    /// Older than one already delivered: nothing to do.
+    /// A frame older than one delivered already: ignore it.
     Late,
 }
 
-/// What the pilot demands of the vehicle at a tick.
+/// The pilot's demand on the vehicle at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// What goes to the actuators.
+    /// Actuator outputs.
     pub outputs: Outputs,
-    /// Roll and pitch that are wanted, rad, for a controller that is commanded attitudes.
+    /// Commanded roll and pitch, rad, for a controller that is commanded attitudes.
     pub attitude: [f64; 2],
-    /// Why the aircraft should go back to its controller, if it should.
+    /// Fault for which control authority is to be returned; `None` to keep it.
     pub fault: Option<Fault>,
 }
 
-/// What a vehicle has to tell the pilot.
+/// A notice from the vehicle link to the pilot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
-    /// A line for the ground stations.
+    /// A text for the ground stations.
     Text(Severity, String),
-    /// The controller has given us control authority.
+    /// The controller has given control authority.
     Engaged,
-    /// The controller was asked to take the aircraft, for this reason, and has not confirmed it.
+    /// Return of control authority was requested for this reason, and is not confirmed.
     Released(String),
-    /// The controller has the aircraft again, for this reason: engage no more until asked.
+    /// The controller has control again, for this reason: do not engage until asked.
     HandedBack(String),
-    /// The controller's system id, which becomes ours.
+    /// The controller's system id, to be adopted.
     System(u8),
 }
 
 impl Notice {
-    /// What a notice that ends our steering says to the ground stations.
+    /// The text for the ground stations of a notice that ends the companion's control.
     pub fn ending(&self) -> Option<String> {
         match self {
             Notice::Released(reason) => {
@@ -111,19 +109,19 @@ impl Notice {
     }
 }
 
-/// A vehicle of one of the profiles.
+/// A connection to a vehicle of one of the profiles.
 #[expect(clippy::large_enum_variant, reason = "a program has one of them, or two")]
 #[derive(Clone, Debug)]
 pub enum Vehicle {
-    /// The simulator's shim.
+    /// The shim of the simulator.
     Sitl(Sitl),
     /// A real flight controller.
     Real(Box<Real>),
 }
 
 impl Vehicle {
-    /// Takes bytes from the link and delivers each state that they complete. `host` is the time
-    /// since the program's start.
+    /// Handles bytes from the link and delivers each state that they complete. `host` is the time since the program's
+    /// start.
     pub fn handle(
         &mut self,
         host: Duration,
@@ -137,7 +135,7 @@ impl Vehicle {
         }
     }
 
-    /// The frames that answer the state of `time`; none when there is nothing to say.
+    /// The frames that reply to the state of `time`; empty if none are due.
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         match self {
             Vehicle::Sitl(sitl) => sitl.command(time, demand.outputs),
@@ -145,7 +143,7 @@ impl Vehicle {
         }
     }
 
-    /// What is to be sent besides answers, when something is due.
+    /// Frames due other than replies; `None` if there are none.
     pub fn due(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
         match self {
             Vehicle::Sitl(sitl) => sitl.heartbeat(host, outputs),
@@ -153,8 +151,7 @@ impl Vehicle {
         }
     }
 
-    /// This computer did not listen for `missed`: what the vehicle said meanwhile may still come, and silence
-    /// proves nothing.
+    /// Excludes `missed`, a stall of this computer, from all timeouts: frames of that time may still arrive.
     pub fn excuse(&mut self, missed: Duration) {
         match self {
             Vehicle::Sitl(_) => {}
@@ -162,8 +159,7 @@ impl Vehicle {
         }
     }
 
-    /// Whether what we command reaches the surfaces through a controller's channels, whose signs
-    /// have to be found out.
+    /// Whether commands pass through a controller's channels, whose signs must be checked.
     pub fn has_channels(&self) -> bool {
         match self {
             Vehicle::Sitl(_) => false,
@@ -171,12 +167,12 @@ impl Vehicle {
         }
     }
 
-    /// Whether the surfaces that are commanded are those that fly, so that a record may show them.
+    /// Whether the commanded surfaces are those that move, so that a recording may contain them.
     pub fn flies_surfaces(&self) -> bool {
         matches!(self, Vehicle::Sitl(_)) || self.has_channels()
     }
 
-    /// Whether the surfaces do now what they are commanded: a real controller must have been seen to give them over.
+    /// Whether the surfaces follow the commands now: a real controller's mode must have shown it.
     pub fn moves_surfaces(&self) -> bool {
         match self {
             Vehicle::Sitl(_) => true,
@@ -192,7 +188,7 @@ impl Vehicle {
         }
     }
 
-    /// The oldest notice that was not fetched.
+    /// Removes and returns the oldest notice.
     pub fn take_notice(&mut self) -> Option<Notice> {
         match self {
             Vehicle::Sitl(sitl) => sitl.take_notice(),
@@ -200,7 +196,7 @@ impl Vehicle {
         }
     }
 
-    /// Where to answer: the peer that the state comes from.
+    /// The peer that the states come from.
     pub fn peer(&self) -> Option<PeerId> {
         match self {
             Vehicle::Sitl(sitl) => sitl.peer(),
@@ -208,7 +204,7 @@ impl Vehicle {
         }
     }
 
-    /// What was received so far.
+    /// Traffic counters since the start.
     pub fn counts(&self) -> VehicleCounts {
         match self {
             Vehicle::Sitl(sitl) => sitl.counts(),

@@ -1,4 +1,4 @@
-//! What is added to a target or a command to make an aircraft show its dynamics.
+//! Excitations that are added to a target or a command for system identification.
 
 use std::f64::consts::TAU;
 
@@ -6,12 +6,12 @@ use rand::RngExt;
 
 use greylag_num::stream::stream;
 
-/// Lines of a multisine.
+/// Number of sines of a multisine.
 const LINES: usize = 7;
-/// Time in which a multisine comes and goes, s: a step at its ends would be an excitation of its own.
+/// Fade-in and fade-out time of a multisine, s: a step at its ends would be an excitation of its own.
 const FADE_S: f64 = 0.25;
 
-/// What is excited.
+/// The excited command or target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Axis {
     /// The aileron command, −1..1.
@@ -20,7 +20,7 @@ pub enum Axis {
     Elevator,
     /// The throttle command, 0..1.
     Throttle,
-    /// The rudder command, −1..1; moves nothing on an aircraft without a rudder.
+    /// The rudder command, −1..1; without effect on an aircraft without a rudder.
     Rudder,
     /// The roll target, rad.
     Roll,
@@ -31,7 +31,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Every axis.
+    /// All axes.
     pub const ALL: [Axis; 7] = [
         Axis::Aileron,
         Axis::Elevator,
@@ -42,7 +42,7 @@ impl Axis {
         Axis::Airspeed,
     ];
 
-    /// Its name in schedule files.
+    /// Name in schedule files.
     pub const fn name(self) -> &'static str {
         match self {
             Axis::Aileron => "aileron",
@@ -56,31 +56,31 @@ impl Axis {
     }
 }
 
-/// The shape of an excitation of amplitude one.
+/// Waveform of an excitation with unit amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// +1 for `width` (s), or to the end of the step.
     Step {
-        /// How long, s; infinite for the rest of the step.
+        /// Duration, s; infinite for the rest of the step.
         width: f64,
     },
     /// +1, then −1, each for `width` (s).
     Doublet {
-        /// How long each, s.
+        /// Duration of each part, s.
         width: f64,
     },
     /// +1 for 3, −1 for 2, +1 for 1, −1 for 1 times `width` (s).
     ThreeTwoOneOne {
-        /// The unit of time, s.
+        /// The unit duration, s.
         width: f64,
     },
-    /// Sines from `low` to `high` (Hz) with random phases, of the power of one sine of amplitude 1.
+    /// Sines from `low` to `high` (Hz) with random phases, with the power of one sine of amplitude 1.
     Multisine {
-        /// Lowest frequency, Hz.
+        /// Lowest frequency in Hz.
         low: f64,
-        /// Highest frequency, Hz.
+        /// Highest frequency in Hz.
         high: f64,
-        /// What frequencies and phases are drawn from; multisines of different seeds are independent.
+        /// Seed of frequencies and phases; multisines of different seeds are independent.
         seed: u64,
         /// Angular frequency (rad/s) and phase (rad) of each line.
         lines: Vec<[f64; 2]>,
@@ -104,17 +104,16 @@ impl Shape {
 /// An excitation of one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excitation {
-    /// What is excited.
+    /// The excited axis.
     pub axis: Axis,
-    /// How far, in the axis's unit; negative begins the other way.
+    /// Amplitude in the axis's unit; negative reverses the sign.
     pub amplitude: f64,
-    /// When it begins, s after the step.
+    /// Start, s after that of the step.
     pub start: f64,
-    /// How it goes.
+    /// Waveform of the excitation.
     pub shape: Shape,
-    /// Share (0..=1) of the controller's reaction on this axis that is let through meanwhile: a good
-    /// controller undoes an excitation before the aircraft has moved. It has nothing to do with the authority over
-    /// surfaces or attitude of a real vehicle.
+    /// Fraction (0..=1) of the controller's reaction on this axis that is applied meanwhile: a good controller would
+    /// cancel an excitation before the aircraft has responded. Unrelated to control authority on a real vehicle.
     pub authority: f64,
 }
 
@@ -124,12 +123,12 @@ impl Excitation {
         Excitation { axis, amplitude, start, shape, authority: 1.0 }
     }
 
-    /// The same with only a share `authority` (0..=1) of the controller's reaction.
+    /// The same with only a fraction `authority` (0..=1) of the controller's reaction.
     pub fn against(self, authority: f64) -> Excitation {
         Excitation { authority, ..self }
     }
 
-    /// How long it lasts, s; infinite to the end of the step.
+    /// Duration, s; infinite to the end of the step.
     pub fn length(&self) -> f64 {
         match self.shape {
             Shape::Step { width } => width,
@@ -139,7 +138,7 @@ impl Excitation {
         }
     }
 
-    /// The farthest that it can go, in the axis's unit.
+    /// Largest absolute value, in the axis's unit.
     pub fn peak(&self) -> f64 {
         match &self.shape {
             Shape::Multisine { lines, .. } => self.amplitude.abs() * (lines.len() as f64).sqrt(),

@@ -1,4 +1,4 @@
-//! Schedule files: TOML of steps with their excitations, every figure with its unit.
+//! Schedule files: TOML with steps and excitations, units in the keys.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -13,26 +13,26 @@ use greylag_physics::airframe::{check_schema, named, toml_error};
 
 /// Highest frequency of a multisine, Hz: five samples a period at 100 Hz.
 const FREQUENCY_MAX_HZ: f64 = 20.0;
-/// Airspeed (m/s) by which an excitation may move the airspeed target at most.
+/// Largest amplitude of an excitation of the airspeed target, m/s.
 const AIRSPEED_AMPLITUDE_MAX_MPS: f64 = 50.0;
 
-/// Why a schedule cannot be used.
+/// A schedule cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ScheduleError {
     /// The file could not be read.
     #[error("cannot read schedule {path}: {why}; name a schedule file, such as `greylag design` writes", path = path.display())]
     Read {
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// The file is no schedule.
+    /// The file is not a valid schedule.
     #[error("schedule {path}: {why}", path = path.display())]
     Content {
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The fault and its remedy.
         why: String,
     },
 }
@@ -59,7 +59,7 @@ struct StepFile {
     excitation: Vec<ExcitationFile>,
 }
 
-/// An excitation as it stands in the file; which keys it needs depends on axis and shape.
+/// An excitation in the file; the required keys depend on axis and shape.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct ExcitationFile {
@@ -80,17 +80,19 @@ impl Schedule {
     /// Reads a schedule file (`schema = 1`).
     ///
     /// # Errors
-    /// If the file cannot be read, is no such TOML, or asks for what no schedule may.
+    ///
+    /// If the file cannot be read, is not valid TOML of this schema, or exceeds the bounds of a schedule.
     pub fn load(path: &Path) -> Result<Schedule, ScheduleError> {
         let text = greylag_physics::text_file::read(path)
             .map_err(|why| ScheduleError::Read { path: path.into(), why })?;
         Self::parse(&text).map_err(|why| ScheduleError::Content { path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
+    /// [`load`](Self::load) from the file's text; the error describes the fault.
     ///
     /// # Errors
-    /// If the text is no such TOML, or asks for what no schedule may.
+    ///
+    /// If the text is not valid TOML of this schema, or exceeds the bounds of a schedule.
     pub fn parse(text: &str) -> Result<Schedule, String> {
         let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(file.schema, 1)?;
@@ -132,7 +134,7 @@ impl Schedule {
     }
 }
 
-/// Degrees without the last bits that radians lose.
+/// Degrees without the rounding errors of the conversion from radians.
 fn tidy(degrees: f64) -> f64 {
     (degrees * 1e9).round() / 1e9
 }
@@ -181,7 +183,7 @@ impl ExcitationFile {
         Ok(excitation.against(self.authority.unwrap_or(1.0)))
     }
 
-    /// The amplitude under the key that the axis's unit asks for.
+    /// The amplitude under the key for the axis's unit.
     fn amplitude(&self, axis: Axis) -> Result<f64, String> {
         let all = [
             ("amplitude", self.amplitude),
@@ -241,7 +243,7 @@ impl ExcitationFile {
     }
 }
 
-/// What is wrong with `steps`, by the number of the step.
+/// The first fault of `steps`, by the number of the step.
 pub(super) fn check(steps: &[Step]) -> Result<(), String> {
     if steps.is_empty() {
         return Err(

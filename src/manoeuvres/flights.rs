@@ -1,4 +1,4 @@
-//! Whole test flights drawn from a seed: three that excite everything, and others to test on.
+//! Complete test flights drawn from a seed: three for estimation and two for validation.
 
 use rand::RngExt;
 
@@ -27,21 +27,21 @@ pub fn testing(seed: u64) -> [Schedule; 2] {
     })
 }
 
-/// Random numbers with the figures that every step varies by.
+/// Random numbers with the variation of each step.
 struct Draw(Stream);
 
 impl Draw {
-    /// Between `low` and `high`.
+    /// A value between `low` and `high`.
     fn within(&mut self, low: f64, high: f64) -> f64 {
         self.0.random_range(low..high)
     }
 
-    /// `nominal` give or take a fifth.
+    /// `nominal` ± 20 %.
     fn about(&mut self, nominal: f64) -> f64 {
         nominal * self.within(0.8, 1.2)
     }
 
-    /// −1 or 1.
+    /// A random sign, −1 or 1.
     fn side(&mut self) -> f64 {
         if self.0.random::<bool>() { 1.0 } else { -1.0 }
     }
@@ -66,7 +66,7 @@ fn drawn(
     Schedule { name: name.into(), description: about.into(), steps }
 }
 
-/// Small sines on every control under whatever else is flown, so that no moment is wasted.
+/// Small sines on every control in addition to any manoeuvre.
 fn shake(step: &mut Step, draw: &mut Draw) {
     let amplitudes = [(Aileron, 0.035), (Elevator, 0.03), (Throttle, 0.08)];
     for (axis, amplitude) in amplitudes {
@@ -108,7 +108,7 @@ fn roll(draw: &mut Draw, side: f64, v: f64) -> Step {
     step.with(firm(Aileron, side * amplitude, draw.within(0.1, 0.5), 0.4))
 }
 
-/// A pull, with the roll going on, in a bank.
+/// A pull-up in a bank, with roll excitation.
 fn pull(draw: &mut Draw, side: f64) -> Step {
     let (bank, amplitude) = (draw.within(40.0, 52.0), draw.about(0.25));
     let step = Step::hold(4.5, side * bank, 5.0, draw.within(20.0, 23.0));
@@ -122,7 +122,7 @@ fn skid(draw: &mut Draw, v: f64) -> Step {
     Step::hold(5.5, 0.0, 4.0, v).with(sines(Aileron, amplitude, 0.45, 1.1, draw.seed()))
 }
 
-/// Pitch, thrust, stall.
+/// Excites pitch, thrust and stall.
 fn along(draw: &mut Draw) -> Vec<Step> {
     let v = draw.within(16.0, 18.0);
     vec![
@@ -140,7 +140,7 @@ fn along(draw: &mut Draw) -> Vec<Step> {
     ]
 }
 
-/// Roll, yaw, sideslip.
+/// Excites roll, yaw and sideslip.
 fn across(draw: &mut Draw) -> Vec<Step> {
     let side = draw.side();
     vec![
@@ -159,7 +159,7 @@ fn across(draw: &mut Draw) -> Vec<Step> {
     ]
 }
 
-/// Everything at once, at three speeds, on all headings.
+/// Excites all axes, at three speeds, on all headings.
 fn mixed(draw: &mut Draw) -> Vec<Step> {
     let side = draw.side();
     let mut all = |duration: f64, roll: f64, pitch: f64, v: f64| {

@@ -1,8 +1,8 @@
-//! A flight-test schedule: which attitudes and airspeeds to hold, with what excitation on top.
+//! Flight-test schedules: attitudes and airspeeds to hold, with excitations for system identification.
 //!
-//! A schedule is a pure function of time: [`Schedule::at`] gives the target with what is added to
-//! the controller's command. [`Scheduled`] flies one, [`Overlay`] is its law; [`menu`] names ready-made
-//! manoeuvres, [`flights`] draws whole flights; the file form is [`Schedule::load`] and [`Schedule::to_toml`].
+//! A schedule is a pure function of time: [`Schedule::at`] gives the target and the excitation of the controller's
+//! command. [`Scheduled`] flies one, [`Overlay`] is its law; [`menu`] names standard manoeuvres, [`flights`] draws
+//! complete flights; the file form is [`Schedule::load`] and [`Schedule::to_toml`].
 
 mod excitation;
 mod file;
@@ -17,25 +17,25 @@ pub use scheduled::{Overlay, Scheduled};
 use greylag_control::Target;
 use greylag_physics::Command;
 
-/// Largest bank (degrees) that a schedule may ask for.
+/// Largest |bank| of a schedule, degrees.
 pub const ROLL_MAX_DEG: f64 = 70.0;
-/// Largest pitch angle (degrees) that a schedule may ask for.
+/// Largest |pitch angle| of a schedule, degrees.
 pub const PITCH_MAX_DEG: f64 = 35.0;
-/// Slowest and fastest airspeed (m/s) that a schedule may ask for.
+/// Smallest and largest airspeed of a schedule, m/s.
 pub const AIRSPEED_MPS: [f64; 2] = [5.0, 400.0];
-/// Cruise airspeed (m/s) of the aircraft for which the menu and the drawn flights are written.
+/// Cruise airspeed (m/s) of the aircraft that the menu and the drawn flights are written for.
 pub const CRUISE_MPS: f64 = 20.0;
-/// Longest schedule, s.
+/// Longest schedule in seconds.
 pub const DURATION_MAX_S: f64 = 3600.0;
 
-/// One step: an attitude with an airspeed held for a while, and what is added meanwhile.
+/// One step: an attitude and an airspeed held for a while, with excitations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// How long, s.
+    /// Duration of the step, s.
     pub duration: f64,
-    /// What is held.
+    /// Target of the step.
     pub target: Target,
-    /// What is added, all at once.
+    /// Excitations, all at once.
     pub excitations: Vec<Excitation>,
 }
 
@@ -50,27 +50,27 @@ impl Step {
         Step { duration: duration_s, target, excitations: Vec::new() }
     }
 
-    /// The same step with `excitation` on top.
+    /// The same step with `excitation` added.
     pub fn with(mut self, excitation: Excitation) -> Step {
         self.excitations.push(excitation);
         self
     }
 }
 
-/// What a schedule asks for at a moment.
+/// Target and excitation of a schedule at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// The attitude and the airspeed to hold.
     pub target: Target,
-    /// What is added to the controller's command.
+    /// Excitation added to the controller's command.
     pub added: Command,
-    /// Share (0..=1) of the controller's own reaction on aileron, elevator, throttle and rudder that is let
-    /// through, counted from its command when the excitation began.
+    /// Fraction (0..=1) of the controller's reaction on aileron, elevator, throttle and rudder that is applied,
+    /// relative to its command at the start of the excitation.
     pub authority: [f64; 4],
 }
 
 impl Demand {
-    /// `target` without excitation.
+    /// `target` without any excitation.
     pub fn hold(target: Target) -> Demand {
         Demand { target, added: Command::IDLE, authority: [1.0; 4] }
     }
@@ -79,9 +79,9 @@ impl Demand {
 /// A flight-test schedule; after its end the wings are level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Its name.
+    /// Name of the schedule.
     pub name: String,
-    /// What it is for, in one sentence.
+    /// Purpose in one sentence.
     pub description: String,
     steps: Vec<Step>,
 }
@@ -90,7 +90,8 @@ impl Schedule {
     /// A schedule of `steps`.
     ///
     /// # Errors
-    /// What is wrong with a step, by its number: a figure outside the bounds of this module.
+    ///
+    /// The fault of a step, by its number: a value outside the bounds of this module.
     pub fn new(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -100,20 +101,20 @@ impl Schedule {
         Ok(Schedule { name: name.into(), description: description.into(), steps })
     }
 
-    /// The steps.
+    /// Steps of the schedule.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// Its length, s.
+    /// Its length in seconds.
     pub fn duration(&self) -> f64 {
         self.steps.iter().map(|step| step.duration).sum()
     }
 
-    /// What is asked for at `t` (s after the start).
+    /// Target and excitation at `t` (s after the start).
     ///
-    /// Before the start it is the first step's target, after the end wings level at the last
-    /// airspeed, both without excitation.
+    /// Before the start it is the first step's target, after the end wings level at the last airspeed, both without
+    /// excitation.
     pub fn at(&self, t: f64) -> Demand {
         let mut begins = 0.0;
         for step in &self.steps {
@@ -125,7 +126,7 @@ impl Schedule {
         Demand::hold(self.after())
     }
 
-    /// What is wanted after the end: wings level, nose on the horizon, the last airspeed.
+    /// The target after the end: wings level, zero pitch, the last airspeed.
     pub fn after(&self) -> Target {
         let airspeed = self.steps.last().map_or(f64::NAN, |step| step.target.airspeed);
         Target { roll: 0.0, pitch: 0.0, airspeed }
@@ -142,7 +143,7 @@ impl Schedule {
         gentler
     }
 
-    /// The same schedule for an aircraft that cruises at `cruise` (m/s): airspeeds in proportion, written for
+    /// The same schedule for an aircraft with cruise airspeed `cruise` (m/s): airspeeds are scaled from
     /// [`CRUISE_MPS`].
     pub fn at_cruise(mut self, cruise: f64) -> Schedule {
         let factor = cruise / CRUISE_MPS;
@@ -154,7 +155,7 @@ impl Schedule {
         self
     }
 
-    /// The same schedule with sines of the rudder in every step, drawn from `seed`.
+    /// The same schedule with rudder sines in every step, drawn from `seed`.
     pub fn with_rudder(mut self, seed: u64) -> Schedule {
         const AMPLITUDE: f64 = 0.12;
         for (k, step) in self.steps.iter_mut().enumerate() {
@@ -164,14 +165,14 @@ impl Schedule {
         self
     }
 
-    /// This schedule, then `next`.
+    /// This schedule followed by `next`.
     pub fn then(mut self, next: Schedule) -> Schedule {
         self.steps.extend(next.steps);
         self
     }
 }
 
-/// What is asked for `t` (s) after the start of `step`.
+/// Target and excitation at `t` (s) after the start of `step`.
 fn within(step: &Step, t: f64) -> Demand {
     let mut demand = Demand::hold(step.target);
     let Demand { target, added, authority } = &mut demand;

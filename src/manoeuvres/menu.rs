@@ -9,15 +9,15 @@ const SPEEDS: [f64; 3] = [15.0, 19.0, 24.0];
 /// A manoeuvre of the menu.
 #[derive(Clone, Copy, Debug)]
 pub struct Manoeuvre {
-    /// Its name.
+    /// Name of the manoeuvre.
     pub name: &'static str,
-    /// What it is for, in one sentence.
+    /// Purpose in one sentence.
     pub description: &'static str,
     steps: fn() -> Vec<Step>,
 }
 
 impl Manoeuvre {
-    /// The manoeuvre as a schedule, wings level at its end.
+    /// The manoeuvre as a schedule that ends with wings level.
     pub fn schedule(&self) -> Schedule {
         let mut steps = (self.steps)();
         steps.push(Step::hold(2.0, 0.0, 2.0, 18.0));
@@ -33,12 +33,12 @@ pub const TURN: Manoeuvre = Manoeuvre {
     steps: || vec![Step::hold(6.5, 45.0, 5.0, 19.0)],
 };
 
-/// The manoeuvre of that name.
+/// The manoeuvre with that name.
 pub fn named(name: &str) -> Option<&'static Manoeuvre> {
     MENU.iter().find(|m| m.name == name)
 }
 
-/// Every manoeuvre.
+/// All manoeuvres of the menu.
 pub const MENU: &[Manoeuvre] = &[
     Manoeuvre {
         name: "elevator-3211",
@@ -203,8 +203,8 @@ pub const MENU: &[Manoeuvre] = &[
     },
 ];
 
-/// Slow with the nose up and the throttle closed to beyond the stall, then the nose down. The nose is
-/// held up for 3.2 s + 0.8 s · `depth`: the menu takes 1, the drawn flights 1.7 to 2.3.
+/// Slows down nose up with the throttle closed into the stall, then pushes the nose down. The nose is held up for 3.2
+/// s + 0.8 s · `depth`: the menu uses 1, the drawn flights 1.7 to 2.3.
 pub(super) fn stall(depth: f64) -> Step {
     let up = 3.2 + 0.8 * depth;
     let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
@@ -247,16 +247,16 @@ fn doublets(amplitude: f64) -> Vec<Step> {
     vec![on(Elevator), on(Aileron)]
 }
 
-/// Share of the controller's reaction during pulses of a surface.
+/// Fraction of the controller's reaction that is applied during surface pulses.
 const LOOSE: f64 = 0.25;
 
-/// `shape` on `axis`; on a surface with the controller held off, to the share [`LOOSE`] of its reaction.
+/// `shape` on `axis`; on a surface with the controller's reaction reduced to [`LOOSE`].
 pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
     let authority = if matches!(axis, Aileron | Elevator) { LOOSE } else { 1.0 };
     Excitation::new(axis, amplitude, start, shape).against(authority)
 }
 
-/// The same as [`pulse`] with the controller in full authority: for pulses on top of a manoeuvre.
+/// The same as [`pulse`] with the controller's full reaction: for pulses within a manoeuvre.
 pub(super) fn firm(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     Excitation::new(axis, amplitude, start, Shape::Step { width })
 }

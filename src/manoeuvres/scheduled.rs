@@ -1,41 +1,41 @@
-//! A controller that flies a schedule with another controller.
+//! A controller that flies a schedule by means of another controller.
 
 use crate::{Demand, Schedule};
 use greylag_control::{Controller, Observation, Target};
 use greylag_physics::{Command, Time};
 
-/// A schedule in flight: puts its excitation on top of whatever a controller commands.
+/// A schedule in progress: adds its excitation to a controller's commands.
 #[derive(Clone, Debug)]
 pub struct Overlay {
     schedule: Schedule,
     start: Option<Time>,
-    /// The controller's commands when excitations began that hold it off.
+    /// The controller's commands at the start of excitations that reduce its reaction.
     held: [Option<f64>; 4],
 }
 
 impl Overlay {
-    /// `schedule`, not begun.
+    /// A new overlay of `schedule`.
     pub fn new(schedule: Schedule) -> Overlay {
         Overlay { schedule, start: None, held: [None; 4] }
     }
 
-    /// Goes back to the start.
+    /// Returns to the start.
     pub fn reset(&mut self) {
         (self.start, self.held) = (None, [None; 4]);
     }
 
-    /// What is asked for at `now`; the first call begins the schedule.
+    /// Target and excitation at `now`; the first call starts the schedule.
     pub fn demand(&mut self, now: Time) -> Demand {
         let start = *self.start.get_or_insert(now);
         self.schedule.at(now.since(start).as_secs_f64())
     }
 
-    /// Whether the schedule has come to its end at `now`.
+    /// Whether the schedule has ended at `now`.
     pub fn is_over(&self, now: Time) -> bool {
         self.start.is_some_and(|start| now.since(start).as_secs_f64() >= self.schedule.duration())
     }
 
-    /// The command in its ranges, `own` being the controller's.
+    /// The command clamped to its ranges, `own` being the controller's.
     pub fn command(&mut self, demand: &Demand, own: Command) -> Command {
         let mut of = |axis: usize, own: f64, added: f64| {
             let share = demand.authority[axis];
@@ -56,16 +56,16 @@ impl Overlay {
     }
 }
 
-/// An inner controller towards a schedule's targets, with the schedule's excitation on top.
+/// An inner controller that tracks a schedule's targets, plus the schedule's excitation.
 ///
-/// The schedule begins with the first command after a reset.
+/// The schedule starts with the first command after a reset.
 pub struct Scheduled {
     inner: Box<dyn Controller>,
     overlay: Overlay,
 }
 
 impl Scheduled {
-    /// `inner` on `schedule`.
+    /// A controller with `inner` and `schedule`.
     pub fn new(inner: Box<dyn Controller>, schedule: Schedule) -> Scheduled {
         Scheduled { inner, overlay: Overlay::new(schedule) }
     }
@@ -81,7 +81,7 @@ impl Controller for Scheduled {
         self.inner.reset(seed);
     }
 
-    /// The target is the schedule's; the one given is not looked at.
+    /// The target is the schedule's; the argument is ignored.
     fn command(&mut self, seen: &Observation, _target: &Target) -> Command {
         let demand = self.overlay.demand(seen.time);
         let own = self.inner.command(seen, &demand.target);

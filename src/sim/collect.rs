@@ -1,4 +1,4 @@
-//! Exploration: episodes flown in JSBSim to learn from, section IV-A of \[GSFM26\].
+//! Data collection for model learning: exploratory episodes in JSBSim, section IV-A of \[GSFM26\].
 
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt as _};
@@ -11,9 +11,9 @@ use greylag_logs::{Flight, Sample};
 use greylag_num::stream::{self, Stream};
 use greylag_physics::{Command, State};
 
-/// Bins of roll and of pitch, each visited once before any is again.
+/// Number of bins of roll and of pitch; each cell is visited once before any is visited again.
 const BINS: usize = 5;
-/// Envelope of the targets, rad: Table II.
+/// Range of the target attitudes, rad: Table II.
 const ENVELOPE: [f64; 2] = [60.0 * DEGREE, 30.0 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Steps for which a random action is held: white noise never leaves the trim region.
@@ -21,19 +21,19 @@ const HELD: usize = 25;
 /// Correlation from step to step of Ornstein–Uhlenbeck actions: a time constant of 0.33 s.
 const MEMORY: f64 = 0.97;
 
-/// Purposes of the random streams.
+/// Ids of the random streams.
 const TARGETS: u64 = 10;
 const ACTIONS: u64 = 11;
 const CHOICES: u64 = 12;
 
-/// Which episode of which exploration.
+/// Identifies an episode of a data collection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Seed of the exploration.
+    /// Seed of the collection.
     pub seed: u64,
-    /// Round, 0 being the random one.
+    /// Round, 0 being the one with random actions only.
     pub round: u32,
-    /// Episode in the round, from 0.
+    /// Episode within the round, from 0.
     pub episode: u32,
 }
 
@@ -42,7 +42,7 @@ impl Place {
         stream::stream(self.seed, &[purpose, self.round.into(), self.episode.into()])
     }
 
-    /// The attitude wanted, with `airspeed` in m/s: stratified over 5 × 5 bins of roll and pitch.
+    /// The target attitude, with `airspeed` in m/s: stratified over 5 × 5 bins of roll and pitch.
     pub fn target(&self, airspeed: f64) -> Target {
         let cycle = u64::from(self.episode) / (BINS * BINS) as u64;
         let mut bins: Vec<usize> = (0..BINS * BINS).collect();
@@ -56,14 +56,13 @@ impl Place {
         Target { roll, pitch: within(bin / BINS, ENVELOPE[1]), airspeed }
     }
 
-    /// Part of the actions that are random: all in the first round, then half, a quarter, …
+    /// Fraction of random actions: one in the first round, then a half, a quarter, …
     pub fn random_part(&self) -> f64 {
         0.5_f64.powi(self.round.min(100) as i32)
     }
 }
 
-/// Random actions: held in even episodes, Ornstein–Uhlenbeck in odd ones; how wild they are is drawn
-/// for each episode.
+/// Random actions: held in even episodes, Ornstein–Uhlenbeck in odd ones; their amplitude is drawn for each episode.
 struct Wander {
     held: bool,
     size: f64,
@@ -94,10 +93,11 @@ impl Wander {
     }
 }
 
-/// Flies an episode of [`STEPS`] steps: `planner` steers, but for a part of the actions that is random
-/// (all without a planner). An aircraft that leaves the numbers ends the episode there.
+/// Flies an episode of [`STEPS`] steps: `planner` acts, except for a fraction of random actions (all without a
+/// planner). The episode ends when a state is not finite.
 ///
 /// # Errors
+///
 /// If the simulator cannot be reset.
 pub fn explore(
     simulator: &mut Simulator,
@@ -136,7 +136,7 @@ pub fn explore(
     Ok(Flight::from(samples))
 }
 
-/// A row of the log: the state and what acts at an instant, and the command given then.
+/// A row of the log: state, effective controls and the command given then.
 pub fn sample(seen: &Observation, command: Option<&Command>, target: &Target) -> Sample {
     let State { roll, pitch, airspeed, p, q, r, alpha, beta } = seen.state;
     let command = command.unwrap_or(&seen.previous[0]);

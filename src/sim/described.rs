@@ -1,14 +1,15 @@
-//! The simulator's aircraft as an airframe file describes it: surfaces, motors and conditions.
+//! Applies the surfaces, motors and conditions of an airframe file to the simulator's aircraft.
 
 use greylag_sitl::plant::{Mixing, Moved, PlantOptions};
 
 use greylag_physics::Airframe;
 use greylag_physics::mixer::{Does, Effector};
 
-/// Gives `plant` the surfaces, motors and conditions of `airframe`. Surfaces without JSBSim properties are left to the
-/// aircraft's own channels; what the command line holds is kept.
+/// Applies the surfaces, motors and conditions of `airframe` to `plant`. Surfaces without JSBSim properties use the
+/// aircraft's own channels; properties set on the command line are kept.
 ///
 /// # Errors
+///
 /// If some of the surfaces have a position and some have none, by name.
 pub fn describe(plant: &mut PlantOptions, airframe: &Airframe) -> Result<(), String> {
     for (name, value) in &airframe.conditions {
@@ -29,7 +30,7 @@ fn moved(effector: &Effector, plant: &PlantOptions) -> Result<Moved, String> {
     let Effector { name, does, gains, command, position, .. } = effector;
     let travel = match does {
         Does::Deflects(travel) => Some([travel.least, travel.most]),
-        // the motor that a file without [motors] has
+        // the motor of a file without [motors]
         Does::Pulls if position.is_none() && name == "throttle" => {
             return Ok(Moved::throttle(&plant.properties));
         }

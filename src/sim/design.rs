@@ -1,4 +1,5 @@
-//! Which manoeuvre tells two effects apart: the menu flown in models that have one or the other.
+//! Experiment design: the manoeuvre that best discriminates two effects, from simulations of models with one or the
+//! other.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -21,59 +22,59 @@ use greylag_sysid::progress::{Cancelled, Progress, say};
 use greylag_sysid::separation::{Separation, separation};
 use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 
-/// Evidence that settles which of two effects it is.
+/// Evidence that discriminates the two effects.
 pub const ENOUGH: f64 = 10.0;
-/// Longest schedule that is made, s.
+/// Longest schedule, s.
 pub const LONGEST_S: f64 = 600.0;
-/// Fewest passes: one on each of two opposite headings.
+/// Smallest number of repetitions: one on each of two opposite headings.
 const LEAST: f64 = 2.0;
-/// The step of the imagined aircraft, s.
+/// Step of the simulation, s.
 const STEP_S: f64 = 0.01;
 
-/// Why no manoeuvre can be designed.
+/// No manoeuvre can be designed.
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
-    /// An effect cannot be put into the model.
+    /// An effect cannot be added to the model.
     #[error(transparent)]
     Join(#[from] JoinError),
-    /// It is not known how large an effect may be.
+    /// The plausible size of an effect is unknown.
     #[error("how large {id} may be is not known; give its values (--values {id}=…)")]
     Amplitude {
-        /// The effect.
+        /// Id of the effect.
         id: String,
     },
-    /// The two are the same.
+    /// The two effects are the same.
     #[error("{id} cannot be distinguished from itself; name two effects")]
     Same {
-        /// The effect.
+        /// Id of the effect.
         id: String,
     },
-    /// The imagined flights cannot be compared.
+    /// The simulated flights cannot be compared.
     #[error("comparing imagined flights: {0}")]
     Compare(#[from] ClockError),
-    /// Whoever waited has ended it.
+    /// The progress callback cancelled the task.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
-/// One of the two effects.
+/// One of the two effects, with its coefficients.
 #[derive(Clone, Debug)]
 pub struct Suspect {
-    /// Its id.
+    /// Id of the effect.
     pub id: String,
-    /// Values of its coefficients, in its own order; empty for clear ones.
+    /// Values of its coefficients, in its own order; empty for clearly visible ones.
     pub values: Vec<f64>,
 }
 
-/// What a manoeuvre of the menu is expected to tell.
+/// Expected discrimination of a manoeuvre of the menu.
 #[derive(Clone, Debug)]
 pub struct Prospect {
-    /// Its name.
+    /// Name of the manoeuvre.
     pub name: &'static str,
-    /// Its length, s.
+    /// Length of the manoeuvre, s.
     pub duration_s: f64,
-    /// The separation when the first of the two is there, and when the second is; `None` if the
-    /// aircraft with it would leave its bounds.
+    /// The separation when the first effect is true, and when the second is; `None` if the aircraft with it would
+    /// leave its bounds.
     pub separations: [Option<Separation>; 2],
 }
 
@@ -84,18 +85,19 @@ impl Prospect {
         Some(a?.apart.min(b?.apart))
     }
 
-    /// Seconds of this manoeuvre for an evidence of [`ENOUGH`].
+    /// Duration of this manoeuvre for an evidence of [`ENOUGH`], s.
     pub fn seconds(&self) -> Option<f64> {
         self.apart().map(|apart| self.duration_s * ENOUGH / apart)
     }
 }
 
-/// What the menu is expected to tell of `suspects`, both missing from `model`, the quickest first.
+/// Expected discrimination of `suspects`, both missing from `model`, by the menu's manoeuvres, the fastest first.
 ///
-/// `controller` flies; noise is that of a small autopilot. `progress` hears how many manoeuvres were flown.
+/// `controller` flies; the noise is that of a small autopilot. `progress` reports the number of manoeuvres simulated.
 ///
 /// # Errors
-/// If an effect is unknown, there already, or its amplitude is not known, or `progress` ended it.
+///
+/// If an effect is unknown, present already, or its amplitude is unknown, or `progress` cancelled the task.
 pub fn prospects(
     model: &GreyBox,
     controller: &dyn Controller,
@@ -127,20 +129,20 @@ pub fn prospects(
     Ok(all)
 }
 
-/// A manoeuvre that tells two effects apart, repeated as often as it takes.
+/// A manoeuvre that discriminates two effects, repeated as often as necessary.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The manoeuvre.
+    /// The chosen manoeuvre.
     pub manoeuvre: &'static Manoeuvre,
-    /// Seconds of it for an evidence of [`ENOUGH`].
+    /// Duration for an evidence of [`ENOUGH`], s.
     pub seconds: f64,
-    /// How often it is flown, on opposite headings.
+    /// Number of repetitions, on alternating headings.
     pub times: usize,
-    /// The whole schedule.
+    /// The complete schedule.
     pub schedule: Schedule,
 }
 
-/// The quickest of `prospects`, which come as [`prospects`] sorts them; `None` if none tells within [`LONGEST_S`].
+/// The fastest of `prospects`, sorted as by [`prospects`]; `None` if none suffices within [`LONGEST_S`].
 pub fn plan(prospects: &[Prospect], cruise_mps: f64) -> Option<Plan> {
     let best = prospects.first()?;
     let seconds = best.seconds().filter(|seconds| *seconds < LONGEST_S)?;
@@ -150,29 +152,29 @@ pub fn plan(prospects: &[Prospect], cruise_mps: f64) -> Option<Plan> {
     Some(Plan { manoeuvre, seconds, times, schedule })
 }
 
-/// The manoeuvre so many times, each on the heading opposite to the last one: on a single heading the
-/// wind cannot be distinguished from an airspeed sensor's scale.
+/// The repeated manoeuvre, each repetition on the opposite heading: on a single heading wind cannot be distinguished
+/// from an airspeed scale error.
 fn repeated(manoeuvre: &Manoeuvre, times: usize) -> Schedule {
     let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
     (1..times).fold(manoeuvre.schedule(), again)
 }
 
-/// `model` with the effect.
+/// `model` with the effect added.
 fn truth(model: &GreyBox, suspect: &Suspect) -> Result<GreyBox, DesignError> {
     let mut with = model.clone();
     with.join(&suspect.id, &values(model, suspect)?)?;
     Ok(with)
 }
 
-/// The values of its coefficients: those given, else clear ones, else the middle of those at which a
-/// search starts.
+/// Values of its coefficients: those given, else clearly visible ones, else the centre of the search's starting
+/// values.
 fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     if !suspect.values.is_empty() {
         return Ok(suspect.values.clone());
     }
     let id = suspect.id.as_str();
     let Some(about) = catalogue::describe(id) else {
-        // joining it says what is known
+        // joining the effect reports the error
         return Ok(model.clone().join(id, &[]).map(|()| Vec::new())?);
     };
     let craft = Craft::lacking(model);
@@ -186,11 +188,12 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
 }
 
-/// The ways in which the effect may be fitted to data of `model`: for each set of shape constants `model` with one unit
-/// of each linear coefficient, or with the effect as a whole where it has none.
+/// Candidates for fitting the effect to data of `model`: for each set of shape constants, `model` with one unit of
+/// each linear coefficient, or with the whole effect where it has none.
 ///
 /// # Errors
-/// The effect is unknown, there already, or its size is not known.
+///
+/// The effect is unknown, present already, or its size is unknown.
 pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBox>>, DesignError> {
     let own = values(model, suspect)?;
     let about = catalogue::describe(&suspect.id);
@@ -215,7 +218,7 @@ pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBo
     all.map(one).collect()
 }
 
-/// The flight that `truth` makes of `schedule`; `None` if it leaves the bounds of a schedule.
+/// The simulated flight of `schedule` by `truth`; `None` if it leaves the bounds of a schedule.
 fn imagine(
     truth: &GreyBox,
     controller: &dyn Controller,
@@ -258,12 +261,12 @@ fn imagine(
         notes: Vec::new(),
     };
     let mut prepared = Prepared::new(&flight, 0.0)?;
-    // an imagined flight is free of noise; what is asked is what sensors would leave
+    // a simulated flight has no noise; the separation accounts for that of sensors
     (prepared.noise, prepared.force_noise) = (noise, force_noise);
     Ok((!prepared.windows.is_empty()).then_some(prepared))
 }
 
-/// What a perfect log has of a moment, the specific force as `truth` makes it.
+/// A noise-free log sample, with the specific force of `truth`.
 fn instant(truth: &GreyBox, seen: &Observation, memory: &mut InputMemory) -> Instant {
     let controls = seen.actuators.controls();
     let air = truth.air(&seen.state, seen.altitude);

@@ -1,4 +1,4 @@
-//! What a controller flies in: JSBSim, or a model imagined in its place.
+//! Environments for controllers: JSBSim, or a model in its place.
 
 #[cfg(feature = "sitl")]
 use greylag_sitl::plant::PlantError;
@@ -8,17 +8,17 @@ use greylag_model::{GreyBox, Twin};
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Command, Time};
 
-/// Why an environment cannot go on.
+/// An environment cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
-    /// The plant says so.
+    /// The plant reports an error.
     #[cfg(feature = "sitl")]
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// A model's state is no longer a number.
+    /// A state of the model is not finite.
     #[error("the imagined aircraft of model {0} left the numbers; its model does not hold there")]
     Diverged(String),
-    /// One of several equal simulators could not be made.
+    /// A copy of the simulator cannot be made.
     #[error("{0}")]
     Worker(String),
     /// The controller's command is not finite.
@@ -26,26 +26,28 @@ pub enum Trouble {
     Command,
 }
 
-/// A world that advances by 0.01 s a step.
+/// A simulated world with steps of 0.01 s.
 pub trait Environment {
-    /// Back to the neutral start.
+    /// Resets to the neutral start.
     ///
     /// # Errors
+    ///
     /// If the plant cannot be set there.
     fn reset(&mut self) -> Result<Observation, Trouble>;
-    /// One step under `command`, limited to its ranges.
+    /// Advances one step under `command`, clamped to its ranges.
     ///
     /// # Errors
-    /// If the aircraft has left the numbers.
+    ///
+    /// If a state is not finite.
     fn step(&mut self, command: Command) -> Result<Observation, Trouble>;
-    /// Load factor where it stands: the specific force along body z, upwards, divided by the standard gravity.
+    /// Load factor at the present state: the specific force along body z, upwards, divided by the standard gravity.
     fn load_factor(&self) -> f64;
-    /// The seed of what is random in it from the next reset on; a world without chance has none.
+    /// Sets the random seed from the next reset on; a deterministic environment has none.
     fn reseed(&mut self, _seed: u32) {}
 }
 
-/// One aircraft imagined by a model, with the exact actuator filters as its state. Many at once, for training, are
-/// [`Imagination`](crate::imagined::Imagination).
+/// One aircraft simulated by a model, with the exact actuator filters as its state. For many at once, in training,
+/// see [`Imagination`](crate::imagined::Imagination).
 #[derive(Clone, Debug)]
 pub struct Imagined {
     model: GreyBox,
@@ -55,7 +57,7 @@ pub struct Imagined {
 }
 
 impl Imagined {
-    /// An aircraft that flies as `model` says.
+    /// An aircraft simulated by `model`.
     pub fn new(model: GreyBox) -> Imagined {
         let twin = Twin::new(model.airframe.start(), model.airframe.reference.altitude);
         Imagined { model, twin, previous: [Command::IDLE; 2], steps: 0 }

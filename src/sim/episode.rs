@@ -1,4 +1,4 @@
-//! One episode of the paper's protocol: 1000 steps from neutral towards one target.
+//! One episode of the paper's protocol: 1000 steps from the neutral start to one target.
 
 use std::time::{Duration, Instant};
 
@@ -10,53 +10,54 @@ use greylag_physics::Command;
 
 pub use greylag_control::quality::{REACHED_DEG, attitude_error_deg};
 
-/// Steps of an episode (section V-E of \[GSFM26\]).
+/// Number of steps of an episode (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
 
-/// Steps over which the settled error is taken: the last fifth.
+/// Number of steps over which the settled error is taken: the last fifth.
 pub const SETTLED: usize = 200;
 
 /// Settled error above which an episode counts as diverged, degrees (Table VIII).
 pub const DIVERGED_DEG: f64 = 10.0;
 
-/// What came of an episode.
+/// Result of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Mean of roll and pitch RMSE over the last fifth, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
-    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole episode's
-    /// if they never do.
+    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole duration if they never
+    /// do.
     pub settling_s: f64,
-    /// Time that the controller needed for each step.
+    /// Computing time of the controller for each step.
     pub cost: Vec<Duration>,
-    /// What was flown.
+    /// The track that was flown.
     pub track: Track,
 }
 
-/// An episode to fly.
+/// Conditions of an episode.
 pub struct Episode<'a> {
-    /// Where.
+    /// The environment to fly in.
     pub environment: &'a mut dyn Environment,
-    /// With what.
+    /// The controller that flies.
     pub controller: &'a mut dyn Controller,
-    /// Seed of the controller's own randomness.
+    /// Seed of the controller's random numbers.
     pub seed: u64,
 }
 
-/// A target with the steps for which it is flown.
+/// A target with its duration in steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
-    /// Where to.
+    /// Attitude and airspeed target.
     pub target: Target,
-    /// For how many steps.
+    /// Duration in steps.
     pub steps: usize,
 }
 
 impl Episode<'_> {
-    /// Flies towards `target` and scores it; `watch` sees every step.
+    /// Flies towards `target` and scores it; `watch` is called at every step.
     ///
     /// # Errors
-    /// If the environment cannot be reset. A loss on the way is an outcome, not an error.
+    ///
+    /// If the environment cannot be reset. Losing the aircraft is a result, not an error.
     pub fn fly(
         self,
         target: &Target,
@@ -65,11 +66,12 @@ impl Episode<'_> {
         self.fly_leg(None, Leg { target: *target, steps: STEPS }, watch)
     }
 
-    /// Flies `leg` and scores it, from the start or from where `first` ends, which is flown and not scored; `watch` sees
-    /// every step.
+    /// Flies `leg` and scores it, starting from the reset state or from the end of `first`, which is flown and not
+    /// scored; `watch` is called at every step.
     ///
     /// # Errors
-    /// As for [`fly`](Episode::fly).
+    ///
+    /// The same as [`fly`](Episode::fly).
     pub fn fly_leg(
         self,
         first: Option<Leg>,
@@ -119,7 +121,7 @@ impl Outcome {
     }
 
     fn flown(track: Track, cost: Vec<Duration>) -> Outcome {
-        // what is seen at the start comes before the first step
+        // the initial observation precedes the first step
         let errors: Vec<[f64; 2]> = track.moments[1..]
             .iter()
             .map(|m| attitude_error_deg(m.attitude, &track.target))
@@ -139,8 +141,8 @@ fn seconds(steps: usize) -> f64 {
     steps as f64 * STEP
 }
 
-/// The settled error of \[GSFM26\] section V-E: the mean of roll and pitch RMSE, degrees, of
-/// attitude errors (roll, pitch) in degrees; NaN for none.
+/// The settled error of \[GSFM26\] section V-E: the mean of roll and pitch RMSE, degrees, of attitude errors (roll,
+/// pitch) in degrees; NaN without any.
 pub fn settled_error_deg(errors: &[[f64; 2]]) -> f64 {
     let rmse = |axis: usize| {
         let squares: f64 = errors.iter().map(|e| e[axis] * e[axis]).sum();

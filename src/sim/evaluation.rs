@@ -1,4 +1,4 @@
-//! Many episodes on all cores, summed up by group of targets.
+//! Evaluation of a controller on many targets, on all cores, summarised by group.
 
 use std::time::Duration;
 
@@ -20,24 +20,23 @@ use greylag_model::GreyBox;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};
 use greylag_num::{bootstrap, stream};
 
-/// Seed of the intervals' resamples: the same scores have the same intervals.
+/// Seed of the bootstrap: the same scores give the same intervals.
 const SEED: u64 = 95;
 
-/// What a controller reached on the targets.
+/// Scores of a controller on the targets.
 #[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
-    /// The controller's name.
+    /// Name of the controller.
     pub controller: String,
-    /// The model it was designed from or plans with.
+    /// Name of the model that it was designed from or plans with.
     pub model: String,
-    /// Scores by group; `all`, where both were flown, is easy with the hard corners: the 240 of the
-    /// paper's Table II.
+    /// Scores by group; `all`, where both were flown, is easy with the hard corners: the 240 of the paper's Table II.
     pub groups: Vec<Score>,
-    /// Time per step.
+    /// Computing time per step.
     pub ms_per_step: Cost,
-    /// The limits that the flights are measured against; `None` where they were not measured.
+    /// The limits that the flights are measured against; `None` without measurement.
     pub limits: Option<Limits>,
-    /// Every flight with its measures, in the order of the targets; empty where they were not measured.
+    /// Every flight with its measures, in the order of the targets; empty without measurement.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flights: Vec<Scored>,
 }
@@ -45,36 +44,36 @@ pub struct Evaluation {
 /// One flight of an evaluation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scored {
-    /// The group that it is of.
+    /// Group of the target.
     pub targets: String,
-    /// Where from, roll and pitch in degrees; `None` for the start of an episode.
+    /// Initial roll and pitch in degrees; `None` for the start of an episode.
     pub from_deg: Option<[f64; 2]>,
-    /// Where to, roll and pitch in degrees.
+    /// Target roll and pitch in degrees.
     pub to_deg: [f64; 2],
-    /// Settled error, degrees.
+    /// Settled attitude error, degrees.
     pub settled_deg: f64,
-    /// What happened on the way.
+    /// Quality measures of the flight.
     pub quality: Quality,
 }
 
-/// The score of one group of targets.
+/// Score of one group of targets.
 #[derive(Clone, Debug, Serialize)]
 pub struct Score {
-    /// The group's name.
+    /// Name of the group.
     pub targets: String,
-    /// Number of targets.
+    /// Number of targets flown.
     pub count: usize,
     /// Mean settled error, degrees.
     pub mean_deg: f64,
-    /// Its 95 % interval over the targets, as of the others (bootstrap).
+    /// Its 95 % bootstrap interval over the targets.
     pub mean_ci95_deg: [f64; 2],
     /// Median settled error, degrees.
     pub median_deg: f64,
-    /// Its 95 % interval.
+    /// Its 95 % bootstrap interval, degrees.
     pub median_ci95_deg: [f64; 2],
     /// Interquartile mean of the settled error, degrees.
     pub iqm_deg: f64,
-    /// Its 95 % interval.
+    /// Its 95 % bootstrap interval, degrees.
     pub iqm_ci95_deg: [f64; 2],
     /// Smallest settled error, degrees.
     pub min_deg: f64,
@@ -82,38 +81,38 @@ pub struct Score {
     pub max_deg: f64,
     /// Median of the time after which the attitude stays within 1° of the target, s.
     pub settling_s: f64,
-    /// Share of targets with more than 10° of settled error.
+    /// Fraction of targets with more than 10° of settled error.
     pub divergence_rate: f64,
-    /// Its 95 % interval.
+    /// Its 95 % bootstrap interval.
     pub divergence_ci95: [f64; 2],
-    /// Share of the flights that kept to load factor and angle of attack but for a transient, see
-    /// [`TRANSIENT`](greylag_control::quality::TRANSIENT); NaN where it was not measured.
+    /// Fraction of the flights within the limits of load factor and angle of attack, transients allowed, see
+    /// [`TRANSIENT`](greylag_control::quality::TRANSIENT); NaN without measurement.
     pub kept_rate: f64,
-    /// Share of the flights that overshoot roll and pitch by at most 1° or 3 % of the step, whichever is more.
+    /// Fraction of the flights that overshoot roll and pitch by at most 1° or 3 % of the step, whichever is larger.
     pub little_overshoot_rate: f64,
-    /// Each measure over the flights, by its id; empty where none was taken.
+    /// Summary of each quality measure by its id; empty without measurement.
     pub measures: Spreads,
 }
 
-/// Quantiles of the time a controller needs for one step, ms.
+/// Quantiles of the controller's computing time per step, ms.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cost {
-    /// Median.
+    /// Median of the times.
     pub p50: f64,
-    /// 99th percentile.
+    /// 99th percentile of the times.
     pub p99: f64,
-    /// 99.9th percentile.
+    /// 99.9th percentile of the times.
     pub p999: f64,
 }
 
-/// Makes a controller for a core.
+/// Makes a controller for a thread.
 pub type Make<'a> = &'a (dyn Fn() -> Box<dyn Controller> + Sync);
 
-/// Flies `rows` in JSBSim with clones of a controller, on all cores; `done` is called after each.
-/// Every row has random numbers of its own, whatever core it is flown on and whatever is flown
-/// beside it.
+/// Flies `rows` in JSBSim with clones of a controller, on all cores; `done` is called after each. Every row has its
+/// own random numbers, independent of the core and of the other rows.
 ///
 /// # Errors
+///
 /// If the plant cannot be built or reset.
 #[cfg(feature = "sitl")]
 pub fn evaluate(
@@ -123,7 +122,7 @@ pub fn evaluate(
     seed: u32,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, Trouble> {
-    // what cannot be flown is said before anything is
+    // errors are reported before the first flight
     Simulator::new(plant)?;
     let world = || Simulator::new(plant);
     fly(&world, make, &courses(rows, plant.start.airspeed_mps), seed, done)
@@ -132,7 +131,8 @@ pub fn evaluate(
 /// Flies `courses` in JSBSim, as [`evaluate`] flies targets.
 ///
 /// # Errors
-/// As for [`evaluate`].
+///
+/// The same as [`evaluate`].
 #[cfg(feature = "sitl")]
 pub fn evaluate_courses(
     plant: &PlantOptions,
@@ -145,10 +145,11 @@ pub fn evaluate_courses(
     fly(&|| Simulator::new(plant), make, courses, seed, done)
 }
 
-/// Flies `rows` in `model` in JSBSim's place, as [`evaluate`] does: nothing but the model decides the score.
+/// Flies `rows` in `model` instead of JSBSim, as [`evaluate`] does.
 ///
 /// # Errors
-/// Not for a controller that can be built: an aircraft that is lost is an outcome.
+///
+/// None for a controller that can be built: losing the aircraft is a result.
 pub fn imagine(
     model: &GreyBox,
     make: Make,
@@ -161,7 +162,8 @@ pub fn imagine(
 /// Flies `courses` in `model`, as [`imagine`] flies targets.
 ///
 /// # Errors
-/// As for [`imagine`].
+///
+/// The same as [`imagine`].
 pub fn imagine_courses(
     model: &GreyBox,
     make: Make,
@@ -171,10 +173,10 @@ pub fn imagine_courses(
     fly(&|| Ok(Imagined::new(model.clone())), make, courses, seed, &|| ())
 }
 
-/// What a controller reached in models drawn from one.
+/// Scores of a controller over random draws of a model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Robustness {
-    /// The score over all draws together.
+    /// The score over all draws.
     pub all: Evaluation,
     /// Of each draw: mean settled error, degrees, and the number of targets that diverged (settled error over
     /// [`DIVERGED_DEG`]).
@@ -182,11 +184,12 @@ pub struct Robustness {
 }
 
 impl Robustness {
-    /// Flies `courses` in draws 0 to `draws` − 1 of `model` with the seed `seed`, see [`GreyBox::drawn`]: Monte Carlo over
-    /// what is not known of the model. `done` is called after each draw.
+    /// Monte Carlo over the uncertainty of `model`: flies `courses` in draws 0 to `draws` − 1 with the seed `seed`,
+    /// see [`GreyBox::drawn`]. `done` is called after each draw.
     ///
     /// # Errors
-    /// As for [`imagine`].
+    ///
+    /// The same as [`imagine`].
     pub fn of(
         [controller, name]: [&str; 2],
         make: Make,
@@ -203,7 +206,7 @@ impl Robustness {
             let settled: Vec<f64> = flown.iter().map(|o| o.settled_deg).collect();
             let lost = settled.iter().filter(|deg| **deg > DIVERGED_DEG).count();
             each.push((mean(&settled), lost));
-            // a draw's tracks go with it: thousands of draws do not fit into memory
+            // the tracks of thousands of draws do not fit into memory
             all.take(courses, &flown, Some(&limits));
             done();
         }
@@ -211,27 +214,27 @@ impl Robustness {
     }
 }
 
-/// Where a flight goes.
+/// One flight of an evaluation: start, target, random stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
-    /// Its place in its set, from 0: what its random numbers are drawn for.
+    /// Its index in its set, from 0: it selects the random numbers.
     pub number: u32,
-    /// The set that it is of; `None` for steps between attitudes.
+    /// Group of the target; `None` for steps between attitudes.
     pub group: Option<Group>,
-    /// Flown before what is scored; `None` for flights that begin at the start of an episode.
+    /// Leg flown before the scored one; `None` for flights from the start of an episode.
     pub first: Option<Leg>,
-    /// What is scored.
+    /// The scored leg.
     pub leg: Leg,
 }
 
 impl Course {
-    /// The name of its group in tables and JSON.
+    /// Name of its group in tables and JSON.
     pub fn targets(&self) -> &'static str {
         self.group.map_or("steps", Group::name)
     }
 }
 
-/// The targets of a file as the paper flies them, wanting an airspeed (m/s).
+/// The targets of a file as in the paper, at an airspeed (m/s).
 pub fn courses(rows: &[Row], airspeed: f64) -> Vec<Course> {
     let course = |row: &Row| {
         let [roll, pitch] = [row.roll_deg, row.pitch_deg].map(f64::to_radians);
@@ -267,14 +270,14 @@ fn fly<E: Environment>(
         .collect()
 }
 
-/// Flights as they come in, without their tracks.
+/// Accumulates flights without their tracks.
 #[derive(Default)]
 struct Sums {
     flights: Vec<Flown>,
     cost: Vec<f64>,
 }
 
-/// What a score needs of a flight.
+/// Inputs of a score from one flight.
 struct Flown {
     group: Option<Group>,
     settled_deg: f64,
@@ -307,7 +310,7 @@ impl Sums {
             .into_iter()
             .map(|group| Score::new(group.name(), &of(&|g| g == Some(group))))
             .collect();
-        // "all" are the targets of Table II; a part of them is not
+        // "all" means the targets of Table II; a subset of them is not "all"
         if groups[..2].iter().all(|score| score.count > 0) {
             let table = |g| matches!(g, Some(Group::Easy | Group::HardCorners));
             groups.push(Score::new("all", &of(&table)));
@@ -330,14 +333,14 @@ impl Sums {
 }
 
 impl Evaluation {
-    /// Sums up `outcomes` of `rows`, by the settled error alone.
+    /// Summarises `outcomes` of `rows` by the settled error alone.
     pub fn new(controller: &str, model: &str, rows: &[Row], outcomes: &[Outcome]) -> Evaluation {
         let mut sums = Sums::default();
         sums.take(&courses(rows, f64::NAN), outcomes, None);
         sums.evaluation([controller, model], None)
     }
 
-    /// Sums up `outcomes` of `courses`, measured against `limits`.
+    /// Summarises `outcomes` of `courses`, measured against `limits`.
     pub fn measured(
         names: [&str; 2],
         courses: &[Course],
@@ -349,7 +352,7 @@ impl Evaluation {
         sums.evaluation(names, Some(*limits))
     }
 
-    /// The score of the group of that name.
+    /// The score of the group with this name.
     pub fn score(&self, targets: &str) -> Option<&Score> {
         self.groups.iter().find(|score| score.targets == targets)
     }

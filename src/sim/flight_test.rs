@@ -1,4 +1,4 @@
-//! A flight test in JSBSim: a schedule flown by a controller, every step's truth kept.
+//! A flight test in JSBSim: a controller flies a schedule, and the true state of every step is kept.
 
 use greylag_sitl::plant::{PlantOptions, Truth};
 
@@ -7,53 +7,54 @@ use greylag_control::{Controller, Target};
 use greylag_manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use greylag_physics::Command;
 
-/// Factor by which a schedule is made gentler when an aircraft does not stay inside its bounds.
+/// Factor on the excitation after the aircraft has left its bounds.
 const GENTLER: f64 = 0.75;
-/// Schedules tried before an aircraft is taken for one that cannot be flown.
+/// Number of schedules tried before the aircraft counts as unflyable.
 const TRIES: usize = 7;
 
-/// A flight as it was: the truth and the command of every step of 0.01 s.
+/// A flight without sensor errors: truth and command of every step of 0.01 s.
 #[derive(Clone, Debug)]
 pub struct Flown {
-    /// The truth before each step.
+    /// The true state before each step.
     pub truth: Vec<Truth>,
-    /// The command given at that moment.
+    /// The command of each step.
     pub commands: Vec<Command>,
 }
 
-/// Why a flight test did not come off.
+/// A flight test failed.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightTestError {
-    /// The simulator says so.
+    /// The simulator reports an error.
     #[error("flying schedule {schedule}: {why}")]
     Trouble {
-        /// The schedule's name.
+        /// Name of the schedule.
         schedule: String,
-        /// What it says.
+        /// The simulator's error.
         why: Box<Trouble>,
     },
-    /// The aircraft does not stay where it is asked to.
+    /// The aircraft left the bounds of a schedule.
     #[error(
         "flying schedule {schedule}: the aircraft is at roll {roll_deg:.0}°, pitch {pitch_deg:.0}° \
          after {time_s:.1} s, outside {ROLL_MAX_DEG}° and {PITCH_MAX_DEG}°; use a smaller hidden \
          effect, a gentler schedule or another controller"
     )]
     Departed {
-        /// The schedule's name.
+        /// Name of the schedule.
         schedule: String,
-        /// When, s.
+        /// Time of leaving, s.
         time_s: f64,
-        /// Its roll then, degrees.
+        /// Roll at that time, degrees.
         roll_deg: f64,
-        /// Its pitch then, degrees.
+        /// Pitch at that time, degrees.
         pitch_deg: f64,
     },
 }
 
-/// Flies `schedule` with `controller` in the aircraft and the air of `plant`.
+/// Flies `schedule` with `controller` in the aircraft and air of `plant`.
 ///
 /// # Errors
-/// If the plant cannot be built or leaves the numbers, or the aircraft leaves the bounds.
+///
+/// If the plant cannot be built, a state is not finite, or the aircraft leaves the bounds.
 pub fn fly(
     plant: &PlantOptions,
     controller: &dyn Controller,
@@ -84,10 +85,11 @@ pub fn fly(
     Ok(flown)
 }
 
-/// [`fly`], with gentler excitation as long as the aircraft leaves its bounds.
+/// [`fly`] with reduced excitation while the aircraft leaves its bounds.
 ///
 /// # Errors
-/// As [`fly`], of the gentlest schedule tried.
+///
+/// The same as [`fly`], of the last schedule tried.
 pub fn fly_within_bounds(
     plant: &PlantOptions,
     controller: &dyn Controller,

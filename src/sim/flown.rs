@@ -1,4 +1,4 @@
-//! JSBSim as the world of one aircraft that a policy is trained in: the paper's first regime.
+//! JSBSim as a training environment of one aircraft: the paper's first regime.
 
 use greylag_sitl::plant::PlantOptions;
 
@@ -12,7 +12,7 @@ use greylag_control::{Observation, Target};
 use greylag_num::{Lanes, Real};
 use greylag_physics::State;
 
-/// One aircraft in JSBSim.
+/// One aircraft in JSBSim as an environment.
 pub struct Flown {
     simulator: Simulator,
     seen: Observation,
@@ -26,6 +26,7 @@ impl Flown {
     /// An aircraft at the start, with the first of `targets`.
     ///
     /// # Errors
+    ///
     /// If JSBSim cannot be set up.
     pub fn new(plant: &PlantOptions, targets: Stratified) -> Result<Flown, Trouble> {
         let mut simulator = Simulator::new(plant)?;
@@ -58,7 +59,7 @@ impl World for Flown {
     }
 
     fn step(&mut self, _block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble> {
-        // what leaves the numbers is lost where it was last seen
+        // a state that is not finite is a loss at the last finite one
         let left = match self.simulator.step(command(action.map(|x| x.0[0].into()))) {
             Ok(seen) => {
                 self.seen = seen;

@@ -1,6 +1,6 @@
-//! An effect of a file as functions that JSBSim flies.
+//! Translates an effect file's formulas to JSBSim functions.
 //!
-//! It shares the tree with the effect, but none of its evaluation: JSBSim works the functions out itself.
+//! The expression tree is shared with the effect, its evaluation is not: JSBSim evaluates the functions itself.
 
 use greylag_sitl::hidden::{Filter, FilterKind, Hidden, Place};
 
@@ -10,15 +10,16 @@ use greylag_physics::formula::{Variable, Written};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Characters of a function: JSBSim reads it once, but a formula nested a few times deeper has a thousand times more.
+/// Largest length of a function in characters: JSBSim reads it once, but deeper nesting multiplies the length.
 const LONGEST: usize = 200_000;
-/// Metres per foot.
+/// Metres in a foot.
 const FT: f64 = 0.3048;
 
-/// `effect` with `values` of its coefficients, as JSBSim has it.
+/// `effect` with `values` of its coefficients in JSBSim's syntax.
 ///
 /// # Errors
-/// What JSBSim has not.
+///
+/// What JSBSim cannot express.
 pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     let mut writer = Writer { values, filters: Vec::new() };
     let mut functions = Vec::new();
@@ -30,7 +31,7 @@ pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     Ok(Hidden::written(effect.about.id, functions, writer.filters))
 }
 
-/// Where a channel is in JSBSim, and how much of ours its unit is.
+/// A channel's JSBSim property, and the factor to its unit.
 fn place(channel: Channel) -> (Place, f64) {
     match channel {
         Channel::Drag => (Place::Drag, LBF),
@@ -55,7 +56,7 @@ fn property(name: &str) -> String {
     format!("<property>{name}</property>")
 }
 
-/// A property in another unit.
+/// A property converted to another unit.
 fn scaled(factor: f64, name: &str) -> String {
     element("product", &[number(factor), property(name)])
 }
@@ -103,7 +104,7 @@ fn hat(rate: &str, per: &str) -> String {
     element("product", &[property(rate), property(per)])
 }
 
-/// Writes formulas, and notes the filters that they read.
+/// Writes formulas and collects the filters that they read.
 struct Writer<'a> {
     /// Values of the effect's parameters.
     values: &'a [f64],
@@ -137,7 +138,7 @@ impl Writer<'_> {
         self.values.get(parameter).copied().unwrap_or(0.0)
     }
 
-    /// The output of a filter of the flight controls.
+    /// Output property of a filter.
     fn filter(&mut self, function: Function, all: &[Expression]) -> Result<String, String> {
         let time_s = match all.get(1).map(|e| &e.node) {
             Some(Node::Parameter(k)) => self.value(*k),
@@ -155,7 +156,7 @@ impl Writer<'_> {
     }
 }
 
-/// Ramps one after the other: JSBSim's own tables take no expression.
+/// A sum of ramps: JSBSim's tables take no expression as input.
 fn table(x: &str, points: &[[f64; 2]]) -> String {
     let ramp = |pair: &[[f64; 2]]| {
         let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
@@ -198,12 +199,12 @@ fn call(function: Function, all: &[String]) -> String {
             let low = element("product", &[number(-1.0), width]);
             element("difference", &[all[0].clone(), element("max", &[held, low])])
         }
-        // filters of their own, which have their input settled
+        // separate filters whose inputs are settled
         Function::Lag | Function::Delay => all[0].clone(),
     }
 }
 
-/// −1, 0 or 1; JSBSim's own sign is 1 at zero.
+/// Sign with value 0 at zero; JSBSim's own is 1 there.
 fn sign(x: &str) -> String {
     let above = element("gt", &[x.to_owned(), number(0.0)]);
     let below = element("lt", &[x.to_owned(), number(0.0)]);

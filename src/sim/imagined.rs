@@ -1,4 +1,4 @@
-//! Many imagined aircraft at once: a model flown in lanes, section IV-B of \[GSFM26\].
+//! Many simulated aircraft at once: a model evaluated in lanes, section IV-B of \[GSFM26\].
 
 use std::sync::Arc;
 
@@ -13,14 +13,14 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Controls, State};
 
-/// Aircraft that move together.
+/// Aircraft per block of lanes.
 pub const WIDTH: usize = ROW;
 
-/// Steps of an imagined episode, as many as of a flown one.
+/// Steps of an episode, the same as in JSBSim.
 pub const STEPS: u32 = 1000;
 
-/// Beyond these the model is not believed and the episode ends: angles θ, α, β (rad), rates p, q, r
-/// (rad/s), airspeed (m/s).
+/// Validity limits of the model, at which the episode ends: angles θ, α, β (rad), rates p, q, r (rad/s), airspeed
+/// (m/s).
 const ENVELOPE: Envelope =
     Envelope { pitch: 1.48, incidence: 1.0, rate: 25.0, airspeed: [4.0, 60.0] };
 
@@ -32,33 +32,33 @@ struct Envelope {
     airspeed: [f64; 2],
 }
 
-/// How an aircraft's step ended.
+/// End of an aircraft's step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// The episode goes on.
+    /// The episode continues.
     No,
-    /// Its time is up: what follows would be worth as much as ever.
+    /// Truncated by the time limit: not terminal, the value is bootstrapped.
     Time,
-    /// It left the envelope.
+    /// Terminated: a validity limit was exceeded.
     Lost,
 }
 
-/// What a step of one block gives, before those that ended begin anew.
+/// Result of one step of a block, before ended episodes are reset.
 #[derive(Clone, Copy, Debug)]
 pub struct Stepped {
-    /// What is observed after it.
+    /// Observation after the step.
     pub observed: [Block; OBSERVATIONS],
-    /// The reward of eq. (30).
+    /// Reward of eq. (30).
     pub reward: Block,
-    /// How it ended for each aircraft.
+    /// End of the step for each aircraft.
     pub ended: [Ended; WIDTH],
 }
 
-/// Aircraft imagined by a model, each with its own target, filters and episode: many at once, for training. One
-/// aircraft to fly a controller in is [`Imagined`](crate::environment::Imagined).
+/// Aircraft simulated by a model, each with its own target, filters and episode: many at once, for training. To fly a
+/// controller in one aircraft see [`Imagined`](crate::environment::Imagined).
 ///
-/// The actuators' exact filters are part of the state. The air density is that of the start: over an
-/// episode it would change by less than 1 %.
+/// The exact actuator filters are part of the state. The air density is constant: over an episode it would change by
+/// less than 1 %.
 #[derive(Clone, Debug)]
 pub struct Imagination {
     model: Arc<GreyBox>,
@@ -82,13 +82,12 @@ struct Batch {
 }
 
 impl Imagination {
-    /// `instances` aircraft that fly as `model` says, at the neutral start; `targets` gives each
-    /// episode's.
+    /// `instances` aircraft of `model` at the neutral start; `targets` supplies the target of each episode.
     pub fn new(model: Arc<GreyBox>, instances: usize, targets: Stratified) -> Imagination {
         let lane = Block::from_f64;
         let (state, rest) = (model.airframe.start(), Controls::default());
         let mut memory = Memory::default();
-        // what the scheme remembers at the start is the acceleration there
+        // the scheme's memory at the start is the acceleration there
         model.step(&state, &rest, model.airframe.reference.altitude, &mut memory);
         let zero = lane(0.0);
         let rest =
@@ -115,7 +114,7 @@ impl Imagination {
         imagination
     }
 
-    /// Begins all episodes anew, `targets` having been given before.
+    /// Resets all episodes; `targets` were given out before.
     pub fn restart(&mut self, targets: u64) {
         self.targets.go_on_after(targets);
         for k in 0..self.batches.len() {
@@ -126,7 +125,7 @@ impl Imagination {
         }
     }
 
-    /// Gives an aircraft its next target.
+    /// Assigns the next target to an aircraft.
     fn aim(&mut self, batch: usize, lane: usize) {
         if batch * WIDTH + lane < self.instances {
             let Target { roll, pitch, airspeed } = self.targets.next_target();
@@ -136,28 +135,28 @@ impl Imagination {
         }
     }
 
-    /// Aircraft there are.
+    /// Number of aircraft.
     pub fn instances(&self) -> usize {
         self.instances
     }
 
-    /// Blocks there are; lanes of the last beyond the instances are of no account.
+    /// Number of blocks; lanes of the last one above the instances are unused.
     pub fn blocks(&self) -> usize {
         self.batches.len()
     }
 
-    /// Episodes begun, one for each target given, and those that ended outside the envelope.
+    /// Number of episodes started, one per target, and of those that ended outside the limits.
     pub fn episodes(&self) -> [u64; 2] {
         [self.targets.count(), self.lost]
     }
 
-    /// What the aircraft of a block observe now.
+    /// The present observations of a block's aircraft.
     pub fn observe(&self, block: usize) -> [Block; OBSERVATIONS] {
         let Batch { state, actuators, target, .. } = &self.batches[block];
         observe(state, &actuators.observed(&self.model.airframe.actuators), target)
     }
 
-    /// One step of a block under `action`; aircraft whose episodes end begin anew afterwards.
+    /// One step of a block under `action`; ended episodes are reset afterwards.
     pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
         let batch = &mut self.batches[block];
         let (observed, reward, outside) = batch.advance(&self.model, &self.task, action);
@@ -188,7 +187,7 @@ impl Imagination {
 }
 
 impl Batch {
-    /// Puts the aircraft of `chosen` back to the start.
+    /// Resets the aircraft of `chosen` to the start.
     fn begin(&mut self, chosen: Block, neutral: &Batch) {
         self.state = self.state.replaced(chosen, &neutral.state);
         self.actuators = self.actuators.replaced(chosen, &neutral.actuators);
@@ -198,8 +197,8 @@ impl Batch {
         }
     }
 
-    /// A step in the order of the simulator: the state moves under the actuators as they are, then the
-    /// actuators take the command. Gives what is observed, the reward, and 1 where it is outside.
+    /// One step in the simulator's order: the state advances under the present actuators, then the actuators take the
+    /// command. Returns observation, reward, and 1 where a limit is exceeded.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -225,7 +224,7 @@ impl Batch {
     }
 }
 
-/// A roll angle in −π..π that has moved by less than a turn.
+/// A roll angle wrapped to −π..π after less than a turn.
 #[inline(always)]
 fn wrapped(roll: Block) -> Block {
     let (half, turn) =
@@ -234,13 +233,13 @@ fn wrapped(roll: Block) -> Block {
     Block::where_less(roll, -half, roll + turn, roll)
 }
 
-/// 1 where a state is outside the envelope of an episode or no number, else 0.
+/// 1 where a state is outside the episode's limits or not finite, else 0.
 #[inline(always)]
 pub fn outside(state: &State<Block>) -> Block {
     ENVELOPE.left(state)
 }
 
-/// The least and the greatest of each state of an episode that goes on.
+/// Smallest and largest value of each state in an episode.
 pub fn bounds() -> [State; 2] {
     let Envelope { pitch, incidence, rate, airspeed: [slow, fast] } = ENVELOPE;
     let roll = std::f64::consts::PI;
@@ -251,11 +250,11 @@ pub fn bounds() -> [State; 2] {
 }
 
 impl Envelope {
-    /// 1 where a state is outside or no number, else 0.
+    /// 1 where a state is outside or not finite, else 0.
     #[inline(always)]
     fn left(&self, s: &State<Block>) -> Block {
         let inside = |x: Block, most: f64, others: Block| {
-            // the comparison is false for what is no number
+            // a comparison with NaN is false
             Block::where_less(x.abs(), Block::from_f64(most), others, Block::zero())
         };
         let [slow, fast] = self.airspeed;

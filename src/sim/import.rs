@@ -1,4 +1,4 @@
-//! An aircraft of JSBSim as airframe and model: central differences of its loads.
+//! Imports a JSBSim aircraft as airframe and model, by central differences of its loads.
 
 mod effects;
 mod files;
@@ -18,19 +18,19 @@ use greylag_physics::size::Size;
 use lateral::{AileronOverIncidence, WithLift};
 use propeller::Propeller;
 
-/// Metres per foot.
+/// Metres in a foot.
 const FT: f64 = 0.3048;
 /// Incidence at which derivatives are taken, rad: 3°.
 const ALPHA: f64 = 0.052;
-/// Half the interval of angles, rad: 2°.
+/// Half interval of angles, rad: 2°.
 const ANGLE: f64 = 0.035;
-/// A larger sideslip, at which the drag is taken once more, rad: 8°.
+/// Larger sideslip for a second value of the drag, rad: 8°.
 const FAR: f64 = 4.0 * ANGLE;
-/// Half the interval of dimensionless rates.
+/// Half interval of dimensionless rates.
 const RATE: f64 = 0.005;
-/// Pitch angle at which gravity turns the path otherwise than in level flight, rad: 60°.
+/// Pitch angle at which gravity curves the flight path differently from level flight, rad: 60°.
 const ATTITUDE: f64 = 1.05;
-/// Half the interval of commands.
+/// Half interval of commands.
 const COMMAND: f64 = 0.2;
 /// Incidences of the tables, degrees.
 const TABLE_DEG: [f64; 24] = [
@@ -38,19 +38,19 @@ const TABLE_DEG: [f64; 24] = [
     10.0, 12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 25.0, 30.0,
 ];
 
-/// What was made of an aircraft.
+/// Files of an imported aircraft.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    /// The airframe file.
+    /// Text of the airframe file.
     pub airframe: String,
-    /// The model file, beside `airframe.toml`.
+    /// Text of the model file, beside `airframe.toml`.
     pub model: String,
-    /// What airframe and model do not hold, one sentence each.
+    /// Effects that airframe and model do not represent, one sentence each.
     pub left_out: Vec<String>,
 }
 
 impl Imported {
-    /// Writes the properties that were held into the airframe file.
+    /// Writes the held properties into the airframe file.
     pub fn hold(&mut self, held: &[(String, f64)]) {
         if !held.is_empty() {
             self.airframe.push_str("\n# Held in the simulator: the model is of the aircraft in this condition.\n[conditions]\n");
@@ -61,37 +61,37 @@ impl Imported {
     }
 }
 
-/// Why an aircraft could not be imported.
+/// An aircraft cannot be imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    /// It cannot be flown or read.
+    /// The simulator cannot load or evaluate it.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// A surface moves to one side, or against its command.
+    /// A surface moves to one side only, or against its command.
     #[error(
         "the {surface} of the aircraft goes from {least:.4} to {most:.4} rad for commands from -1 to 1: an \
          airframe needs one that goes from below zero to above; name a position property of that sense with \
          --property"
     )]
     Surface {
-        /// Which.
+        /// Name of the surface.
         surface: &'static str,
-        /// At the command −1, rad.
+        /// Deflection at the command −1, rad.
         least: f64,
-        /// At the command 1, rad.
+        /// Deflection at the command 1, rad.
         most: f64,
     },
-    /// The wing makes no lift.
+    /// The wing has no lift slope.
     #[error(
         "the aircraft has no lift at {airspeed:.1} m/s: give the airspeed at which it flies with --cruise-mps"
     )]
     Lift {
-        /// Where it was asked, m/s.
+        /// Airspeed of the evaluation, m/s.
         airspeed: f64,
     },
 }
 
-/// The aircraft as it is asked.
+/// The aircraft under evaluation.
 struct Subject<'a> {
     plant: &'a mut Plant,
     start: Start,
@@ -99,17 +99,18 @@ struct Subject<'a> {
     span: f64,
     chord: f64,
     mass: MassProperties,
-    /// Coefficients by the rate of incidence as α̇c/2V, which every evaluation is freed of.
+    /// Coefficients' slopes over the rate of incidence, α̇c/2V, which are removed from every evaluation.
     alpha_rate: Coefficients,
 }
 
-/// D, Y, L and l, m, n as coefficients.
+/// Coefficients of D, Y, L and l, m, n.
 type Coefficients = [f64; 6];
 
-/// Imports the aircraft that `plant` flies about `cruise` (m/s) at `altitude` (m), under `name`.
+/// Imports the aircraft of `plant` about `cruise` (m/s) at `altitude` (m), under `name`.
 ///
 /// # Errors
-/// [`ImportError`], if it cannot be held in a state, or has a surface that an airframe cannot hold.
+///
+/// [`ImportError`], if it cannot be held in a state, or has a surface that an airframe file cannot represent.
 pub fn import(
     plant: &mut Plant,
     name: &str,
@@ -174,7 +175,7 @@ struct Polar {
 }
 
 impl Polar {
-    /// The first incidence (rad) at which the lift coefficient reaches `lift`, between the table's points.
+    /// The smallest incidence (rad) at which the lift coefficient reaches `lift`, interpolated.
     fn incidence(&self, lift: f64) -> f64 {
         let reaches = self.lift.windows(2).position(|w| w[0] < lift && lift <= w[1]);
         reaches.map_or(0.0, |k| {
@@ -184,7 +185,7 @@ impl Polar {
     }
 }
 
-/// What the linear coefficients leave.
+/// Residual of the linear coefficients.
 struct Beside {
     alpha_rate: Coefficients,
     propeller: Propeller,
@@ -192,7 +193,7 @@ struct Beside {
     aileron: Option<AileronOverIncidence>,
 }
 
-/// Slopes of the coefficients by what they depend on, at the incidence [`ALPHA`].
+/// Slopes of the coefficients at the incidence [`ALPHA`].
 struct Slopes {
     base: Coefficients,
     beta: Coefficients,
@@ -202,13 +203,13 @@ struct Slopes {
     aileron: Coefficients,
     elevator: Coefficients,
     rudder: Option<Coefficients>,
-    /// Drag by the size of sideslip and its square, and by the size of the elevator.
+    /// Drag over |sideslip| and its square, and over |elevator|.
     drag_beta: [f64; 2],
     drag_elevator: f64,
 }
 
 impl Subject<'_> {
-    /// Coefficients in `state`, the surfaces at `inputs`.
+    /// Coefficients in `state` with the surfaces at `inputs`.
     fn at(&mut self, state: &Start, inputs: &Inputs) -> Result<Coefficients, PlantError> {
         let loads = self.plant.loads(state, inputs)?;
         let pressure = self.pressure(&loads);
@@ -226,20 +227,21 @@ impl Subject<'_> {
         0.5 * loads.truth.air_density_kgpm3 * loads.truth.airspeed_mps.powi(2) * self.area
     }
 
-    /// Coefficients of `loads`, just evaluated, less what the rate of incidence makes.
+    /// Coefficients of `loads` without the contribution of the rate of incidence.
     fn steady(&mut self, loads: &Loads, pressure: f64) -> Result<Coefficients, PlantError> {
         let rate = self.incidence_rate(loads.truth.airspeed_mps)?;
         let all = self.coefficients(loads, pressure);
         Ok(std::array::from_fn(|k| all[k] - rate * self.alpha_rate[k]))
     }
 
-    /// α̇c/2V as JSBSim has it.
+    /// α̇c/2V in JSBSim's definition.
     fn incidence_rate(&mut self, airspeed: f64) -> Result<f64, PlantError> {
         let rate = self.plant.property("aero/alphadot-rad_sec")?;
         Ok(rate * self.chord / (2.0 * airspeed))
     }
 
-    /// Slopes of the coefficients by α̇c/2V: at one airflow, gravity turns the path faster in some attitudes than in others.
+    /// Slopes of the coefficients over α̇c/2V: at one airflow, gravity curves the path faster in some attitudes than
+    /// in others.
     fn alpha_rate(&mut self) -> Result<Coefficients, PlantError> {
         let mut sides = [([0.0; 6], 0.0); 2];
         for (side, pitch_rad) in sides.iter_mut().zip([0.0, ATTITUDE]) {
@@ -279,7 +281,7 @@ impl Subject<'_> {
         Ok((polar, most))
     }
 
-    /// Half the difference of the coefficients between two states, by `unit`.
+    /// Central difference of the coefficients between two states, per `unit`.
     fn slope(
         &mut self,
         unit: f64,
@@ -298,7 +300,7 @@ impl Subject<'_> {
         Ok((odd, even))
     }
 
-    /// The coefficients' slopes about the reference state.
+    /// Slopes of the coefficients about the reference state.
     fn slopes(&mut self, travel: &Travel) -> Result<Slopes, PlantError> {
         let base = self.at(&Start { alpha_rad: ALPHA, ..self.start }, &Inputs::default())?;
         let v = self.start.airspeed_mps;
@@ -345,12 +347,12 @@ impl Subject<'_> {
     }
 }
 
-/// Deflection at [`COMMAND`], the mean of both sides, rad.
+/// Deflection at [`COMMAND`], mean of both sides, rad.
 fn at_command(stops: Stops) -> f64 {
     COMMAND * 0.5 * (stops.most_rad - stops.least_rad)
 }
 
-/// a and b of a |β| + b β² from its values at [`ANGLE`] and [`FAR`].
+/// a and b of a |β| + b β² from the values at [`ANGLE`] and [`FAR`].
 fn size_and_square([near, far]: [f64; 2]) -> [f64; 2] {
     let square = (far / FAR - near / ANGLE) / (FAR - ANGLE);
     [near / ANGLE - square * ANGLE, square]

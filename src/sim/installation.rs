@@ -1,4 +1,4 @@
-//! How instruments are installed and calibrated: what that makes of a log, whoever flew.
+//! Installation and calibration errors of instruments, applied to a log.
 
 use std::f64::consts::TAU;
 
@@ -7,24 +7,25 @@ use rand::RngExt;
 use greylag_logs::{Flight, Sample};
 use greylag_num::stream::stream;
 
-/// Random stream of an installation.
+/// Random stream of installations.
 const DRAW: u64 = 73;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Errors of installation and calibration. [`Installation::TRUE`] has none.
+/// Installation and calibration errors. [`Installation::TRUE`] has none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Installation {
-    /// Rotation vector from the body's axes to the board's, rad, body axes: rates, specific force and attitude are the board's.
+    /// Rotation vector from body axes to the board, rad, body axes: rates, specific force and attitude are measured
+    /// in the board's axes.
     pub tilt: [f64; 3],
-    /// Gains of the gyros p, q, r less one.
+    /// Relative gain errors of the gyros p, q, r.
     pub gyro_gain: [f64; 3],
-    /// Gains of the accelerometers x, y, z less one.
+    /// Relative gain errors of the accelerometers x, y, z.
     pub force_gain: [f64; 3],
-    /// Gains of the vanes of α and β less one.
+    /// Relative gain errors of the vanes of α and β.
     pub vane_gain: [f64; 2],
-    /// Offset of the airspeed, m/s.
+    /// Airspeed bias, m/s.
     pub airspeed_offset: f64,
-    /// Time constant of the pitot's tubes, s.
+    /// Time constant of the pitot tubes, s.
     pub airspeed_lag: f64,
     /// Offset of the measured heading, rad.
     pub heading_offset: f64,
@@ -39,7 +40,7 @@ impl Default for Installation {
 }
 
 impl Installation {
-    /// No error.
+    /// No errors.
     pub const TRUE: Installation = Installation {
         tilt: [0.0; 3],
         gyro_gain: [0.0; 3],
@@ -51,8 +52,9 @@ impl Installation {
         velocity_late: 0.0,
     };
 
-    /// One error, as `seed` draws it: a board askew by 1° to 3° about one axis, a gain off by 3 % to 10 %, an airspeed off by
-    /// 0.5 to 1.5 m/s or late by 0.05 to 0.2 s, a heading off by 3° to 8°, a velocity late by 0.05 to 0.2 s; its name.
+    /// One error drawn from `seed`, with its name: a board rotated by 1° to 3° about one axis, a gain error of 3 % to
+    /// 10 %, an airspeed bias of 0.5 to 1.5 m/s or lag of 0.05 to 0.2 s, a heading error of 3° to 8°, a velocity
+    /// delay of 0.05 to 0.2 s.
     pub fn one(seed: u64) -> (&'static str, Installation) {
         let mut random = stream(seed, &[DRAW]);
         let kind = random.random_range(0..7_usize);
@@ -97,7 +99,7 @@ impl Installation {
         (name, all)
     }
 
-    /// Makes of `log` what these instruments log.
+    /// Applies the errors to `log`.
     pub fn apply(&self, log: &mut Flight) {
         self.delay(&mut log.samples);
         let turn = turned(self.tilt);
@@ -117,7 +119,7 @@ impl Installation {
         }
     }
 
-    /// What comes late: the airspeed through a first-order lag, the velocity as it was before.
+    /// Applies the delays: a first-order lag of the airspeed, a delay of the velocity.
     fn delay(&self, samples: &mut [Sample]) {
         let velocity: Vec<([f64; 3], f64)> =
             samples.iter().map(|s| (s.velocity_ned_mps, s.time_s)).collect();
@@ -144,7 +146,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// The rotation by the vector `by` (rad): Rodrigues' formula.
+/// Rotation by the vector `by` (rad): Rodrigues' formula.
 fn turned(by: [f64; 3]) -> Matrix {
     let angle = by.iter().map(|x| x * x).sum::<f64>().sqrt();
     let [x, y, z] = by;
@@ -161,7 +163,7 @@ fn turned(by: [f64; 3]) -> Matrix {
     })
 }
 
-/// Body to earth axes of roll, pitch, yaw (rad).
+/// Rotation from body to earth axes for roll, pitch, yaw (rad).
 fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix {
     let about = |axis: usize, angle: f64| {
         let mut by = [0.0; 3];
@@ -171,12 +173,12 @@ fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix {
     product(&product(&about(2, yaw), &about(1, pitch)), &about(0, roll))
 }
 
-/// Roll, pitch, yaw (rad) of body to earth axes, away from vertical flight.
+/// Roll, pitch, yaw (rad) of a rotation from body to earth axes, away from vertical flight.
 fn to_euler(m: &Matrix) -> [f64; 3] {
     [m[2][1].atan2(m[2][2]), (-m[2][0]).clamp(-1.0, 1.0).asin(), m[1][0].atan2(m[0][0])]
 }
 
-/// The velocity at `time`, by the samples before and after it; the first one before them all.
+/// The velocity at `time`, interpolated; the first one before the first sample.
 fn late(past: &[([f64; 3], f64)], time: f64) -> [f64; 3] {
     let after = past.iter().rposition(|(_, t)| *t <= time).map_or(0, |k| k + 1);
     let (Some(before), Some(next)) =

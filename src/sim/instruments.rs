@@ -1,4 +1,4 @@
-//! Instruments: from a flight as it was to the flight as it is logged.
+//! Sensor model: from a true flight to its log.
 
 use std::f64::consts::TAU;
 
@@ -10,58 +10,57 @@ use crate::flight_test::Flown;
 use greylag_logs::{Flight, Sample};
 use greylag_num::stream::{Stream, stream};
 
-/// What is random about instruments, each in a stream of its own.
+/// Ids of the random streams.
 const DRAW: u64 = 70;
 const NOISE: u64 = 71;
 
-/// A group of sensors on one clock.
+/// A group of sensors with a common delay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// Euler angles.
+    /// Attitude as Euler angles.
     Attitude,
-    /// Rate gyros: their clock is the log's.
+    /// Rate gyros; their time is the log's.
     Gyros,
-    /// Accelerometers.
+    /// Accelerometer triad.
     Accelerometers,
-    /// True airspeed.
+    /// True airspeed sensor.
     Airspeed,
-    /// Angle of attack and sideslip.
+    /// Vanes of angle of attack and sideslip.
     Vanes,
-    /// Velocity over ground.
+    /// Velocity over ground, NED.
     Velocity,
-    /// Deflections and throttle position.
+    /// Positions of surfaces and throttle.
     Actuators,
 }
 
 impl Group {
-    /// Number of groups.
+    /// Number of sensor groups.
     pub const COUNT: usize = 7;
 }
 
-/// The errors of a set of instruments in one flight.
+/// Sensor errors of one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instruments {
-    /// Constant errors of the gyros, rad/s.
+    /// Biases of the gyros, rad/s.
     pub gyro_bias: [f64; 3],
-    /// Constant errors of the accelerometers, m/s².
+    /// Biases of the accelerometers, m/s².
     pub force_bias: [f64; 3],
-    /// The airspeed shown is this times the true one.
+    /// Factor of the measured on the true airspeed.
     pub airspeed_scale: f64,
-    /// Constant error of α, rad.
+    /// Bias of α, rad.
     pub alpha_bias: f64,
-    /// Constant error of β, rad.
+    /// Bias of β, rad.
     pub beta_bias: f64,
-    /// How late each [`Group`] is, s, 0 to 0.01.
+    /// Delay of each [`Group`], s, 0 to 0.01.
     pub late: [f64; Group::COUNT],
-    /// Standard deviation of each group's white noise: rad, rad/s, m/s², m/s, rad, m/s, and 0 for the
-    /// actuators, which report what they do.
+    /// Standard deviation of each group's white noise: rad, rad/s, m/s², m/s, rad, m/s; 0 for the actuators.
     pub noise: [f64; Group::COUNT],
-    /// Standard deviation of the altitude's noise, m.
+    /// Standard deviation of the altitude noise, m.
     pub altitude_noise: f64,
 }
 
 impl Instruments {
-    /// Perfect instruments.
+    /// Ideal instruments without errors.
     pub const PERFECT: Instruments = Instruments {
         gyro_bias: [0.0; 3],
         force_bias: [0.0; 3],
@@ -81,9 +80,9 @@ impl Instruments {
         ..Instruments::PERFECT
     };
 
-    /// A small autopilot's instruments as `seed` draws them: [`Self::NOISY`], biases of 0.005 rad/s,
-    /// 0.1 m/s², 0.5° of α, 0.4° of β and 2 % of airspeed (standard deviations, none beyond twice),
-    /// every group but the gyros late by up to one sample.
+    /// A small autopilot's instruments drawn from `seed`: [`Self::NOISY`], biases of 0.005 rad/s, 0.1 m/s², 0.5° of
+    /// α, 0.4° of β and 2 % of airspeed (standard deviations, truncated at two), every group but the gyros delayed by
+    /// up to one sample.
     pub fn drawn(seed: u64) -> Instruments {
         let mut random = stream(seed, &[DRAW]);
         let mut bias = |sd: f64| {
@@ -106,7 +105,7 @@ impl Instruments {
         }
     }
 
-    /// What these instruments log of `flown`, with the noise of `seed`.
+    /// The log of `flown` by these instruments, with the noise of `seed`.
     pub fn log(&self, flown: &Flown, name: &str, seed: u64) -> Flight {
         let mut random = stream(seed, &[NOISE]);
         let mut samples: Vec<Sample> =
@@ -131,7 +130,7 @@ impl Instruments {
         let late = |group: Group, get: &dyn Fn(&Truth) -> f64| {
             get(now) + self.late[group as usize] / DT_S * (get(before) - get(now))
         };
-        // an angle close to the present one, so that nothing is interpolated across ±π
+        // an angle within half a turn of the present one, so that nothing is interpolated across ±π
         let turn = |get: &dyn Fn(&Truth) -> f64| {
             late(Group::Attitude, &|t| get(t) - TAU * ((get(t) - get(now)) / TAU).round())
         };

@@ -1,4 +1,4 @@
-//! Flying a controller and scoring it: environments, targets, episodes, evaluations, flight tests.
+//! Simulation and scoring of controllers: environments, targets, episodes, evaluations, flight tests.
 
 #[cfg(feature = "sitl")]
 pub mod collect;
@@ -47,5 +47,5 @@ pub use episode::{Episode, Outcome};
 pub use simulator::Simulator;
 pub use targets::{Group, TargetFile};
 
-/// Altitude at which an episode starts, m.
+/// Altitude at the start of an episode, m.
 pub const START_ALTITUDE: f64 = 600.0;

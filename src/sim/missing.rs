@@ -1,4 +1,4 @@
-//! An effect that the aircraft in JSBSim has, and a model lacks.
+//! An effect that the JSBSim aircraft has and a model lacks, as a test case of diagnosis.
 
 use greylag_sitl::hidden::{Hidden, HiddenError};
 use rand::RngExt;
@@ -8,30 +8,30 @@ use greylag_model::GreyBox;
 use greylag_num::stream::{Stream, stream};
 use greylag_physics::formula::Written;
 
-/// Stream of what is drawn about missing effects.
+/// Random stream of missing effects.
 const DRAW: u64 = 80;
 
-/// What the sizes of effects go by: those for which [`KINDS`] is written, and those of an aircraft.
+/// Sizes that scale the effects: those for which [`KINDS`] is written, and those of the aircraft.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Craft {
-    /// Factors on amplitudes by their unit: N, m, N m, N m s, kg m².
+    /// Factors on amplitudes by unit: N, m, N m, N m s, kg m².
     force: f64,
     length: f64,
     moment: f64,
     momentum: f64,
     inertia: f64,
-    /// Factors on the decay of thrust and of the surfaces' effectiveness with airspeed.
+    /// Factors on the decay of thrust and of surface effectiveness with airspeed.
     airspeed: f64,
-    /// On the stiffness in pitch.
+    /// Factor on the stiffness in pitch.
     stiffness: f64,
-    /// CDbeta, CDbeta2 and CDde of the aircraft's own file, which a hidden amplitude adds to.
+    /// CDbeta, CDbeta2 and CDde of the aircraft's own file, to which a hidden amplitude is added.
     own: [f64; 3],
-    /// Ids of effects that the model can be robbed of.
+    /// Ids of effects that can be removed from the model.
     has: Vec<String>,
 }
 
 impl Craft {
-    /// That of `reference`, the model that flies as the simulator does.
+    /// Sizes of `reference`, the model that matches the simulator.
     pub fn of(reference: &GreyBox) -> Craft {
         let value = |name: &str| {
             reference.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
@@ -60,7 +60,7 @@ impl Craft {
         }
     }
 
-    /// That of `model`, which lacks whatever it may be asked to have: for imagined aircraft.
+    /// Sizes of `model`, from which any effect may be missing: for simulated aircraft.
     pub fn lacking(model: &GreyBox) -> Craft {
         let own = ["lift_table", "drag_beta2", "drag_elevator_abs"].map(str::to_owned);
         let craft = Craft::of(model);
@@ -72,8 +72,8 @@ impl Craft {
         self.has.iter().any(|has| has == id)
     }
 
-    /// Every effect that can be missing, at this aircraft's sizes. One that is hidden in place of the aircraft's own
-    /// needs the model to have it.
+    /// All effects that can be missing, at this aircraft's sizes. One that replaces the aircraft's own requires that
+    /// the model has it.
     pub fn kinds(&self) -> Vec<MissingKind> {
         let own = |kind: &&MissingKind| match kind.id {
             "lift_stall" => self.has("lift_table"),
@@ -85,7 +85,7 @@ impl Craft {
         KINDS.iter().filter(own).chain(taken).map(|kind| self.sized(kind)).collect()
     }
 
-    /// The effect of that id at this aircraft's size.
+    /// The effect with that id at this aircraft's size.
     pub fn kind(&self, id: &str) -> Option<MissingKind> {
         self.kinds().into_iter().find(|kind| kind.id == id)
     }
@@ -128,16 +128,16 @@ const WRITTEN: Sizes = Sizes {
     stiffness: -0.4629,
 };
 
-/// One effect that can be missing.
+/// An effect that can be missing.
 #[derive(Clone, Copy, Debug)]
 pub struct MissingKind {
-    /// Its id in the catalogue.
+    /// Id in the catalogue.
     pub id: &'static str,
-    /// Unit of its amplitude, empty without one.
+    /// Unit of its amplitude; empty if dimensionless.
     pub unit: &'static str,
-    /// Amplitudes that show in a few minutes of flight, and that the aircraft flies with.
+    /// Amplitudes that are identifiable in a few minutes of flight, with the aircraft still flyable.
     pub clear: [f64; 2],
-    /// Whether the amplitude may as well be negative.
+    /// Whether the amplitude may be negative.
     pub either_sign: bool,
 }
 
@@ -149,11 +149,11 @@ const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingK
     MissingKind { id, unit, clear, either_sign: true }
 }
 
-/// Effects of an aircraft's own that its model is robbed of where it has them; nothing is hidden.
+/// Effects of the aircraft itself that are removed from its model where it has them; the simulator is unchanged.
 const OF_THE_MODEL: [MissingKind; 2] =
     [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
 
-/// Every effect that can be missing from any aircraft, with amplitudes for one of the size of the X8.
+/// Effects that can be missing from any aircraft, with amplitudes for the size of the X8.
 pub const KINDS: [MissingKind; 26] = [
     kind("drag_alpha2", "1/rad²", [0.6, 1.2]),
     kind("drag_beta2", "1/rad²", [0.5, 1.2]),
@@ -185,12 +185,12 @@ pub const KINDS: [MissingKind; 26] = [
 ];
 
 impl MissingKind {
-    /// The effect of that id, with amplitudes for an aircraft of the size of the X8.
+    /// The effect with that id, with amplitudes for an aircraft of the size of the X8.
     pub fn from_id(id: &str) -> Option<MissingKind> {
         KINDS.iter().chain(&OF_THE_MODEL).copied().find(|kind| kind.id == id)
     }
 
-    /// A clear amplitude drawn from `seed`.
+    /// A clearly identifiable amplitude drawn from `seed`.
     pub fn amplitude(&self, seed: u64) -> f64 {
         let mut random = stream(seed, &[DRAW, 1]);
         let [low, high] = self.clear;
@@ -199,13 +199,12 @@ impl MissingKind {
         self.allowed(rounded(signed))
     }
 
-    /// The size of the largest amplitude with which the aircraft is still flown as it is asked to; for a limit
-    /// to the rate, the lowest.
+    /// The largest amplitude at which the aircraft still follows its schedule; for a rate limit, the smallest.
     pub fn most(&self) -> f64 {
         let largest = self.clear[0].abs().max(self.clear[1].abs());
         match self.id {
             "rate_limit" => self.clear[0],
-            // beyond it, the inertia is not that of a body
+            // beyond it the inertia matrix is not positive definite
             "inertia_xz" => largest,
             // −29 N would be all the thrust there is
             "thrust_scale" | "mass_error" => 2.0 * largest,
@@ -213,7 +212,7 @@ impl MissingKind {
         }
     }
 
-    /// The nearest amplitude that can be hidden: a delay is a whole number of steps.
+    /// The nearest representable amplitude: a delay is a whole number of steps.
     pub fn allowed(&self, amplitude: f64) -> f64 {
         if self.id == "time_delay" {
             (100.0 * amplitude).round().max(1.0) / 100.0
@@ -223,55 +222,56 @@ impl MissingKind {
     }
 }
 
-/// Four significant figures.
+/// Rounds to four significant figures.
 pub(super) fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// An effect that is missing from a model.
+/// An effect that is missing from a model, with its amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
-    /// Its id in the catalogue.
+    /// Id in the catalogue.
     pub id: &'static str,
-    /// How much of it, in the unit of [`MissingKind::unit`].
+    /// Amplitude in the unit of [`MissingKind::unit`].
     pub amplitude: f64,
-    /// What JSBSim is given beyond its own file; nothing where the file has the effect.
+    /// Addition to the JSBSim aircraft; empty where its file has the effect.
     pub hidden: Option<Hidden>,
-    /// What a model has to lose to lack it, by its id.
+    /// Id of the effect that is removed from the model.
     pub taken_out: Option<&'static str>,
-    /// The true values of the catalogue entry's coefficients; empty where it only comes close.
+    /// True values of the catalogue entry's coefficients; empty where the entry only approximates the effect.
     pub values: Vec<f64>,
 }
 
-/// Why an effect cannot be made to be missing.
+/// An effect cannot be missing.
 #[derive(Debug, thiserror::Error)]
 pub enum MissingError {
-    /// No such effect.
+    /// The effect does not exist.
     #[error("effect {id:?} cannot be hidden; those that can are {known}")]
     Unknown {
-        /// What was asked for.
+        /// Id that was requested.
         id: String,
-        /// What there is.
+        /// Ids that exist.
         known: String,
     },
-    /// It is of a file, and has something in it that the simulator has not.
+    /// The effect of a file uses a variable that the simulator lacks.
     #[error("effect {id} cannot be hidden in JSBSim: {why}")]
     Formula {
-        /// The effect.
+        /// Name of the effect.
         id: &'static str,
-        /// What it has not.
+        /// The variable that is lacking.
         why: String,
     },
-    /// The simulator does not take it.
+    /// The simulator refuses the effect.
     #[error(transparent)]
     Hidden(#[from] HiddenError),
 }
 
 impl Missing {
-    /// The effect `id`, so that the aircraft `craft` has `amplitude` of it in all.
+    /// The effect `id` with `amplitude` as the aircraft `craft`'s total.
     ///
     /// # Errors
-    /// If there is no such effect, or its amplitude is not one that can be hidden.
+    ///
+    /// If there is no such effect, or its amplitude cannot be represented.
     pub fn new(craft: &Craft, id: &str, amplitude: f64) -> Result<Missing, MissingError> {
         let kind = craft.kind(id).ok_or_else(|| MissingError::Unknown {
             id: id.into(),
@@ -279,7 +279,7 @@ impl Missing {
         })?;
         let [own_beta, own_beta2, own_elevator] = craft.own;
         let a = kind.allowed(amplitude);
-        // what the aircraft has of its own must go out of the model, and is part of the amplitude
+        // the aircraft's own effect is removed from the model, and is part of the amplitude
         let (own, taken_out) = match kind.id {
             "drag_beta2" => (own_beta2, Some("drag_beta2")),
             "drag_elevator_abs" => (own_elevator, Some("drag_elevator_abs")),
@@ -307,7 +307,8 @@ impl Missing {
     /// An effect of a file, with `values` of its coefficients.
     ///
     /// # Errors
-    /// If JSBSim does not know one of its variables.
+    ///
+    /// If JSBSim lacks one of its variables.
     pub fn written(effect: &'static Written, values: &[f64]) -> Result<Missing, MissingError> {
         let hidden = hidden_formula::hidden(effect, values)
             .map_err(|why| MissingError::Formula { id: effect.about.id, why })?;
@@ -320,10 +321,11 @@ impl Missing {
         })
     }
 
-    /// An effect of `craft` drawn from `seed`: any one, or `id`, with `amplitude` or one that shows clearly.
+    /// An effect of `craft` drawn from `seed`: any one, or `id`, with `amplitude` or a clearly identifiable one.
     ///
     /// # Errors
-    /// As [`Missing::new`].
+    ///
+    /// The same as [`Missing::new`].
     pub fn drawn(
         craft: &Craft,
         seed: u64,
@@ -360,7 +362,7 @@ mod tests {
                 assert!(missing.hidden.is_some() && missing.amplitude != 0.0, "{missing:?}");
             }
         }
-        // the aircraft's own 0.1478 is part of what is asked for
+        // the aircraft's own 0.1478 is part of the total
         let side = Missing::new(&x8, "drag_beta2", 0.5).unwrap();
         assert!((side.hidden.unwrap().amplitude() - 0.3522).abs() < 1e-12);
         assert_eq!(Missing::new(&x8, "time_delay", 0.0234).unwrap().amplitude, 0.02);
@@ -373,7 +375,7 @@ mod tests {
         let x8 = craft("params/x8/jsbsim.toml").kinds();
         assert!(x8.iter().zip(&KINDS).all(|(a, b)| a.id == b.id && a.clear == b.clear));
         let aerosonde = craft("params/aerosonde/jsbsim.toml");
-        // 11 kg for 3.364
+        // 11 kg instead of 3.364
         let thrust = aerosonde.kind("thrust_scale").unwrap().clear[0];
         assert!((thrust / -10.0 - 11.0 / 3.364).abs() < 1e-9, "{thrust}");
         let robbed = Missing::new(&aerosonde, "rudder_linear", 1.0).unwrap();

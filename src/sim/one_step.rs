@@ -1,57 +1,59 @@
-//! One step of a model beside one step of what is flown, over a flight in which every control moves.
+//! One-step prediction errors of a model over a flight with all controls excited.
 
 use super::{Environment, Trouble};
 use greylag_control::{ControllerKind, Observation, SetupError, Target, build};
 use greylag_model::{GreyBox, Memory, STEP};
 use greylag_physics::Command;
 
-/// Angular frequencies of the waves on aileron, elevator, throttle and rudder, rad a step.
+/// Angular frequencies of the sines on aileron, elevator, throttle and rudder, rad per step.
 const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];
 
-/// A flight in which the LQI of the model holds attitudes, with a wave on top of each of its commands.
+/// A flight in which the model's LQI holds attitudes, with a sine added to each command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flight {
-    /// Its length, steps of 0.01 s.
+    /// Length in steps of 0.01 s.
     pub steps: usize,
-    /// Steps with waves; none follow.
+    /// Steps with sines; the rest are without.
     pub moved: usize,
-    /// Amplitude of the wave on each control, in units of its command.
+    /// Amplitude of the sine on each control, in units of its command.
     pub amplitude: Command,
 }
 
-/// How far the model's steps are from those flown.
+/// One-step prediction errors of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Root mean square over the flight, in parts of the state's scale x_c a second, in the order of `State::to_array`.
+    /// Root mean square over the flight, as a fraction of the state's scale x_c per second, in the order of
+    /// `State::to_array`.
     pub rms: [f64; 8],
-    /// What was seen after the last step.
+    /// Observation after the last step.
     pub last: Observation,
 }
 
 impl Errors {
-    /// The largest of [`Errors::rms`] and its place in the state.
+    /// The largest of [`Errors::rms`] and its index in the state.
     pub fn worst(&self) -> (usize, f64) {
         let largest = self.rms.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
         largest.unwrap_or_default()
     }
 }
 
-/// Why the flight was not flown.
+/// The flight failed.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightError {
-    /// The model allows no LQI.
+    /// No LQI can be designed from the model.
     #[error(transparent)]
     Controller(#[from] SetupError),
-    /// What is flown cannot go on.
+    /// The environment cannot continue.
     #[error(transparent)]
     Trouble(#[from] Trouble),
 }
 
-/// Flies `flight` in `environment` towards the `target` of each step, `model` predicting each step from the state
-/// and the deflections before it.
+/// Flies `flight` in `environment` towards the `target` of each step; `model` predicts each step from the state and
+/// the deflections before it.
 ///
 /// # Errors
-/// [`FlightError`], if the model allows no LQI, or the aircraft cannot be flown.
+///
+/// [`FlightError`], if no LQI can be designed, or the aircraft cannot be flown.
 pub fn errors(
     model: &GreyBox,
     environment: &mut impl Environment,
@@ -78,7 +80,7 @@ pub fn errors(
     Ok(Errors { rms: squares.map(|sum| (sum / flight.steps as f64).sqrt()), last: seen })
 }
 
-/// `own` with the waves of that step on top.
+/// `own` plus the sines of that step.
 fn moved(own: Command, amplitude: Command, step: usize) -> Command {
     let [aileron, elevator, throttle, rudder] =
         WAVES.map(|frequency| (frequency * step as f64).sin());

@@ -1,35 +1,35 @@
-//! What the paper's controllers reached, to stand beside ours.
+//! Published results of the paper's controllers, for comparison.
 
 /// A published value with its 95 % interval, degrees or percent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
-    /// The value.
+    /// The published value.
     pub value: f64,
-    /// Ends of its interval.
+    /// Bounds of its interval.
     pub ci95: [f64; 2],
 }
 
-/// One controller on one group of targets: Tables XI (true frozen prior, ten policies), VIII (six models,
+/// Results of one controller on one group of targets: Tables XI (true frozen prior, ten policies), VIII (six models,
 /// sixty) and V of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Published {
-    /// Its name here.
+    /// Name of the controller here.
     pub controller: &'static str,
-    /// The group of targets by its name here; `all` are the paper's 240.
+    /// Name of the group of targets here; `all` are the paper's 240.
     pub targets: &'static str,
     /// Median settled error, degrees.
     pub median_deg: Value,
-    /// Interquartile mean.
+    /// Interquartile mean of the settled error, degrees.
     pub iqm_deg: Value,
-    /// Mean.
+    /// Mean settled error, degrees.
     pub mean_deg: Value,
-    /// Share of the targets that diverged (settled error over 10°), percent; over all six models.
+    /// Fraction of the targets that diverged (settled error over 10°), percent; over all six models.
     pub diverged_percent: Value,
-    /// Time for a step, ms.
+    /// Computing time per step, ms.
     pub ms_per_step: f64,
 }
 
-/// What the paper says of a controller on a group of targets.
+/// The published results of a controller on a group of targets.
 pub fn published(controller: &str, targets: &str) -> Option<&'static Published> {
     ALL.iter().find(|p| p.controller == controller && p.targets == targets)
 }

@@ -1,4 +1,4 @@
-//! JSBSim as an environment.
+//! JSBSim as an [`Environment`].
 
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start, Truth};
 
@@ -7,7 +7,7 @@ use greylag_control::Observation;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// JSBSim.
+/// JSBSim with one aircraft.
 pub struct Simulator {
     plant: Plant,
     start: Start,
@@ -18,18 +18,19 @@ impl Simulator {
     /// Loads an aircraft.
     ///
     /// # Errors
-    /// If there is no such aircraft.
+    ///
+    /// If the aircraft does not exist.
     pub fn new(options: &PlantOptions) -> Result<Simulator, Trouble> {
         let plant = Plant::new(options)?;
         Ok(Simulator { plant, start: options.start, previous: [Command::IDLE; 2] })
     }
 
-    /// Where its episodes start.
+    /// Initial state of its episodes.
     pub fn start(&self) -> Start {
         self.start
     }
 
-    /// The whole truth of the plant.
+    /// The true state of the plant.
     pub fn truth(&self) -> Truth {
         self.plant.truth()
     }

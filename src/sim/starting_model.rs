@@ -1,4 +1,4 @@
-//! The model that a search for missing effects starts from: wrong coefficients, and less in it.
+//! Initial model of a search for missing effects: with coefficient errors, and without some effects.
 
 use std::fmt::Write;
 
@@ -9,18 +9,19 @@ use greylag_num::stream::stream;
 use greylag_physics::catalogue::describe;
 use greylag_physics::size::Size;
 
-/// How wrong coefficients are: standard deviation as a share of the value, none beyond twice.
+/// Standard deviation of the coefficient errors as a fraction of the value, truncated at two.
 pub const WRONG: f64 = 0.15;
-/// Stream of the errors.
+/// Random stream of the errors.
 const DRAW: u64 = 81;
-/// Between these angles, rad, a line stands in place of the table of lift: −4° and 7°, between the stalls.
+/// Incidence range, rad, of the line that replaces the lift table: −4° and 7°, between the stalls.
 const LINE: [f64; 2] = [-0.069_813_2, 0.122_173];
 
-/// The text of a model file made of `reference` (a model file's text): named `name`, every
-/// coefficient off by [`WRONG`] as `seed` draws it, without what is `missing`.
+/// Text of a model file made from `reference` (a model file's text): named `name`, every coefficient with an error of
+/// [`WRONG`] drawn from `seed`, without the `missing` effects.
 ///
 /// # Errors
-/// If the reference is no model file.
+///
+/// If the reference is not a model file.
 pub fn starting_model(
     reference: &str,
     name: &str,
@@ -77,12 +78,12 @@ fn most_thrust(effect: &toml::Value) -> Option<f64> {
     Some(value("T0_n")? + value("Tt_n")? + value("Ttt_n")?)
 }
 
-/// Thrust (N) of an effect `thrust_table` at the most throttle and the least airspeed.
+/// Thrust (N) of an effect `thrust_table` at full throttle and its smallest airspeed.
 fn most_in_table(effect: &toml::Value) -> Option<f64> {
     effect.get("T_n")?.get("value")?.as_array()?.last()?.as_array()?.first()?.as_float()
 }
 
-/// The effect `thrust_linear` that somebody writes who has not thought of the airspeed: half of the thrust at rest.
+/// The effect `thrust_linear` without airspeed dependence: half of the static thrust.
 fn linear_thrust(most: f64) -> toml::Value {
     let number =
         [("value", rounded(0.5 * most).into()), ("source", "half the thrust at rest".into())];
@@ -96,8 +97,8 @@ fn set(effect: &mut toml::Table, name: &str, value: f64) -> Option<()> {
     Some(())
 }
 
-/// Multiplies every coefficient by 1 + 0.15 of a normal draw; the draws go by the coefficients' names,
-/// so that what is taken out does not change the others.
+/// Multiplies every coefficient by 1 + 0.15 times a normal draw; draws are keyed by the coefficients' names, so that
+/// removing one does not change the others.
 fn make_wrong(effects: &mut toml::Table, seed: u64) {
     for (id, effect) in effects.iter_mut() {
         let Some(effect) = effect.as_table_mut() else { continue };
@@ -123,7 +124,7 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
     }
 }
 
-/// The nearest value that the coefficient can have on an aircraft of any size.
+/// The nearest plausible value of the coefficient for an aircraft of any size.
 fn possible(effect: &str, name: &str, value: f64) -> f64 {
     let about = describe(effect);
     let own = about.and_then(|about| about.coefficients.iter().find(|c| c.name == name));
@@ -133,7 +134,7 @@ fn possible(effect: &str, name: &str, value: f64) -> f64 {
     }
 }
 
-/// A model file in the order and with the one-line numbers of those that are shipped.
+/// A model file with the order and the one-line numbers of the shipped ones.
 fn text(file: &toml::Table) -> String {
     let mut out = String::new();
     let is_section = |value: &toml::Value| {

@@ -1,4 +1,4 @@
-//! Steps between random attitudes in flight, beside the targets that are flown to from level.
+//! Steps between random attitudes in flight, in addition to targets from level flight.
 
 use rand::RngExt;
 
@@ -8,15 +8,15 @@ use greylag_control::Target;
 use greylag_num::stream;
 use greylag_physics::Airframe;
 
-/// Purpose of the random stream.
+/// Id of the random stream.
 const STREAM: u64 = 242;
 /// Steps for which the first attitude is held: five seconds, in which every controller here settles or is lost.
 const HELD: usize = 500;
-/// Steps for which the second one is held and scored: the eight seconds of the demonstration.
+/// Steps for which the second one is held and scored: eight seconds, as in the demonstration.
 const SCORED: usize = 800;
 
-/// `count` steps of `seed`: from one attitude to another, both drawn evenly from the bank and pitch of the envelope, at
-/// the cruise airspeed.
+/// `count` steps of `seed`: from one attitude to another, both uniform over the envelope's bank and pitch, at the
+/// cruise airspeed.
 pub fn steps(seed: u64, count: u32, airframe: &Airframe) -> Vec<Course> {
     let envelope = &airframe.envelope;
     let step = |number: u32| {

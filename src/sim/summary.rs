@@ -1,4 +1,4 @@
-//! The measures of many flights: median with its interval, and the worst.
+//! Summary of quality measures over many flights: median with interval, and the worst.
 
 use std::collections::BTreeMap;
 
@@ -8,24 +8,24 @@ use greylag_control::quality::{MEASURES, Quality};
 use greylag_num::bootstrap;
 use greylag_num::statistics::quantile;
 
-/// Seed of the intervals' resamples: the same flights have the same intervals.
+/// Seed of the bootstrap: the same flights give the same intervals.
 const SEED: u64 = 96;
 
-/// A measure over some flights.
+/// Summary of one measure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Median.
+    /// Median over the flights.
     pub median: f64,
-    /// Its 95 % interval over the flights (bootstrap).
+    /// Its 95 % bootstrap interval over the flights.
     pub median_ci95: [f64; 2],
-    /// The worst.
+    /// The worst value.
     pub worst: f64,
 }
 
-/// Measures by their id.
+/// Summaries by the id of the measure.
 pub type Spreads = BTreeMap<&'static str, Spread>;
 
-/// Every measure over these flights; those of which no flight knows anything are left out.
+/// Summary of every measure over these flights; measures unknown in all flights are left out.
 pub fn spreads(flights: &[&Quality]) -> Spreads {
     let of = |measure: &greylag_control::quality::Measure| {
         let values = flights.iter().map(|q| (measure.get)(q));

@@ -1,4 +1,4 @@
-//! The targets that controllers are scored on: a fixed, seeded file.
+//! Target attitudes for scoring controllers: a fixed, seeded file.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use greylag_control::Target;
 use greylag_num::stream;
 use greylag_physics::{Airframe, State};
 
-/// How hard a target is, Table II of \[GSFM26\] in both its readings.
+/// Difficulty of a target, Table II of \[GSFM26\] in both its readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
@@ -22,29 +22,30 @@ pub enum Group {
     HardOutside,
 }
 
-/// A commanded attitude to score.
+/// An attitude to be reached and scored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// Its place in the file, from 0: what its random numbers are drawn for.
+    /// Its index in the file, from 0: it selects the random numbers.
     #[serde(skip)]
     pub number: u32,
-    /// Which group it belongs to.
+    /// Group of the target.
     pub group: Group,
-    /// Commanded roll, degrees.
+    /// Commanded roll in degrees.
     pub roll_deg: f64,
-    /// Commanded pitch, degrees.
+    /// Commanded pitch in degrees.
     pub pitch_deg: f64,
 }
 
-/// Bins of roll and of pitch, each visited once before any is again (section IV-A of \[GSFM26\]).
+/// Number of bins of roll and of pitch; each cell is visited once before any is visited again (section IV-A of
+/// \[GSFM26\]).
 const BINS: usize = 5;
-/// Purpose of the random stream of [`Stratified`].
+/// Id of the random stream of [`Stratified`].
 const STRATIFIED: u64 = 241;
 
-/// Targets without end, stratified over 5 × 5 bins of the envelope of Table II.
+/// An infinite sequence of targets, stratified over 5 × 5 bins of the envelope of Table II.
 ///
-/// Where it stands is a seed and a count, so that it can go on from a checkpoint.
+/// Its state is a seed and a count, so that it can be resumed from a checkpoint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stratified {
     seed: u64,
@@ -55,37 +56,37 @@ pub struct Stratified {
     bins: Vec<usize>,
 }
 
-/// Part of the targets that want the airspeed of the start, where others want another.
+/// Fraction of targets at the reference airspeed, where others are allowed.
 const SLOW: f64 = 0.5;
-/// Lowest wanted airspeed over the envelope's lowest, the highest over its cruise: what a pilot asks for.
+/// Smallest commanded airspeed over the envelope's smallest, and largest over its cruise.
 const WANTED: [f64; 2] = [1.15, 1.25];
 
 impl Stratified {
-    /// Targets of `seed` after the first `count`; a part `corners` of them (0..1) lies in the hard
-    /// corners instead, which are 4 % of the envelope (0 is the paper's).
+    /// Targets of `seed` after the first `count`; a fraction `corners` (0..1) of them is in the hard corners, which
+    /// are 4 % of the envelope (0 as in the paper).
     pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
         let start = State::NEUTRAL.airspeed;
         Stratified { seed, count, corners, start, airspeeds: [start; 2], bins: Vec::new() }
     }
 
-    /// The same targets at the reference airspeed of `airframe`, half of them at others that its envelope allows.
+    /// The same targets at the reference airspeed of `airframe`, half of them at other airspeeds of its envelope.
     pub fn at_airspeeds_of(self, airframe: &Airframe) -> Stratified {
         let ([low, high], envelope) = (WANTED, &airframe.envelope);
         let airspeeds = [low * envelope.airspeed_min_mps, high * envelope.airspeed_cruise_mps];
         Stratified { start: airframe.reference.airspeed, airspeeds, ..self }
     }
 
-    /// Goes on after `count` targets, wherever it stands.
+    /// Continues after `count` targets.
     pub fn go_on_after(&mut self, count: u64) {
         (self.count, self.bins) = (count, Vec::new());
     }
 
-    /// Targets given so far.
+    /// Number of targets given.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The next target.
+    /// The next target of the sequence.
     pub fn next_target(&mut self) -> Target {
         let (cycle, place) = (self.count / 25, (self.count % 25) as usize);
         if self.bins.is_empty() || place == 0 {
@@ -107,7 +108,7 @@ impl Stratified {
         Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed }
     }
 
-    /// The airspeed wanted with the target of that number, m/s.
+    /// The airspeed of the target with that number, m/s.
     fn airspeed(&self, number: u64) -> f64 {
         let [low, high] = self.airspeeds;
         let mut rng = stream::stream(self.seed, &[STRATIFIED, 2, number]);
@@ -121,11 +122,11 @@ impl Stratified {
 /// The target file: 140 easy, 100 hard in the corners, 100 hard outside the easy box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFile {
-    /// The targets, in the file's order.
+    /// The targets in file order.
     pub rows: Vec<Row>,
 }
 
-/// Why a target file could not be read.
+/// A target file cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "cannot read the target file {path}: {why}. It needs the columns group,roll_deg,pitch_deg; `greylag targets` writes one"
@@ -136,10 +137,10 @@ pub struct TargetError {
 }
 
 impl Group {
-    /// Every group.
+    /// All groups of targets.
     pub const ALL: [Group; 3] = [Group::Easy, Group::HardCorners, Group::HardOutside];
 
-    /// Its name in tables and JSON.
+    /// Name in tables and JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Group::Easy => "easy",
@@ -148,7 +149,7 @@ impl Group {
         }
     }
 
-    /// Where its targets lie, in words.
+    /// Bounds of its targets as text.
     const fn rule(self) -> &'static str {
         match self {
             Group::Easy => "easy is |roll| < 45 with |pitch| < 25",
@@ -171,7 +172,7 @@ impl Group {
 }
 
 impl TargetFile {
-    /// The file of `seed`: rounded to 0.01°, stratified in a 14 × 10 grid for the easy ones.
+    /// The target set of `seed`: rounded to 0.01°, stratified in a 14 × 10 grid for the easy ones.
     pub fn generate(seed: u64) -> TargetFile {
         let mut rng = stream::stream(seed, &[240]);
         let mut rows = Vec::new();
@@ -208,6 +209,7 @@ impl TargetFile {
     /// Reads a file with the columns `group,roll_deg,pitch_deg`.
     ///
     /// # Errors
+    ///
     /// If it cannot be read, is no such table, is empty, or has a row whose roll and pitch are outside its group's
     /// bounds (see [`Group`]).
     pub fn load(path: &Path) -> Result<TargetFile, TargetError> {
@@ -233,7 +235,7 @@ impl TargetFile {
         Ok(TargetFile { rows })
     }
 
-    /// The file as CSV.
+    /// The targets as CSV text.
     pub fn to_csv(&self) -> String {
         let row = |r: &Row| format!("{},{:.2},{:.2}\n", r.group.name(), r.roll_deg, r.pitch_deg);
         std::iter::once("group,roll_deg,pitch_deg\n".to_owned())

@@ -1,11 +1,11 @@
-//! Single flights for looking at: attitude over time, and what a planner saw at chosen moments.
+//! Single flights for display: attitude over time, and a planner's candidates at chosen times.
 
 use crate::{Environment, Trouble};
 use greylag_control::insight::Insight;
 use greylag_control::{Controller, Target};
 use greylag_model::STEP;
 
-/// Steps into the flight after which the planner is asked what it saw.
+/// Steps at which the planner's candidates are stored.
 pub const ASKED: [usize; 3] = [10, 50, 150];
 
 /// A flight towards one target.
@@ -13,14 +13,15 @@ pub const ASKED: [usize; 3] = [10, 50, 150];
 pub struct Tracking {
     /// Roll and pitch, rad, at every step; NaN once the aircraft is lost.
     pub attitude: Vec<[f64; 2]>,
-    /// The planner's sight at [`ASKED`]: step, and what it saw.
+    /// The planner's candidates at [`ASKED`]: step and insight.
     pub insights: Vec<(usize, Insight)>,
 }
 
 /// Flies `steps` steps towards `target`.
 ///
 /// # Errors
-/// If the environment cannot be reset. A loss on the way ends the flight.
+///
+/// If the environment cannot be reset. Losing the aircraft ends the flight.
 pub fn track(
     environment: &mut dyn Environment,
     controller: &mut dyn Controller,
@@ -47,7 +48,7 @@ pub fn track(
     Ok(flight)
 }
 
-/// Seconds of a step.
+/// Duration of a step, s.
 pub fn seconds(step: usize) -> f64 {
     step as f64 * STEP
 }

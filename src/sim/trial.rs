@@ -1,4 +1,4 @@
-//! One trial of finding what is missing: flights of an aircraft that has more than its model.
+//! One trial of diagnosis: flights of an aircraft with an effect that its model lacks.
 
 use std::f64::consts::TAU;
 
@@ -28,19 +28,20 @@ const LIGHT_20FT_MPS: f64 = 7.6;
 /// The aircraft of a trial.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The simulator's aircraft at its start, with what is held; its air and hidden effects are the trial's.
+    /// The simulator's aircraft at its start, with its held properties; its air and hidden effects are the trial's.
     pub plant: PlantOptions,
     /// Airspeed at which it cruises, m/s.
     pub cruise: f64,
-    /// Whether its rudder is moved.
+    /// Whether its rudder is excited.
     pub rudder: bool,
 }
 
 impl Subject {
-    /// The aircraft of `plant` as `airframe` describes it, from its reference airspeed on.
+    /// The aircraft of `plant` as described by `airframe`, starting at its reference airspeed.
     ///
     /// # Errors
-    /// If its surfaces cannot be flown.
+    ///
+    /// If the simulator cannot move its surfaces.
     pub fn new(mut plant: PlantOptions, airframe: &Airframe) -> Result<Subject, String> {
         describe(&mut plant, airframe)?;
         let Reference { airspeed, altitude } = airframe.reference;
@@ -52,7 +53,7 @@ impl Subject {
         })
     }
 
-    /// The schedule for this aircraft.
+    /// The schedule scaled to this aircraft.
     fn scaled(&self, schedule: &Schedule, seed: u64) -> Schedule {
         let schedule = schedule.clone().at_cruise(self.cruise);
         if self.rudder { schedule.with_rudder(seed) } else { schedule }
@@ -60,42 +61,43 @@ impl Subject {
 }
 
 impl Default for Subject {
-    /// The simulator's own default.
+    /// The simulator's default aircraft.
     fn default() -> Subject {
         Subject { plant: PlantOptions::default(), cruise: CRUISE_MPS, rudder: false }
     }
 }
 
-/// What is flown.
+/// Conditions of a trial.
 #[derive(Clone, Debug, Default)]
 pub struct Trial {
-    /// The aircraft.
+    /// The aircraft to be flown.
     pub subject: Subject,
-    /// What schedules, wind, instruments and noise are drawn from.
+    /// Seed of schedules, wind, instruments and noise.
     pub seed: u64,
-    /// What the aircraft has that its model lacks; none is a null.
+    /// The effect that the aircraft has and its model lacks; `None` for a null case.
     pub missing: Vec<Missing>,
-    /// Severity of the turbulence, 1 to 7, if there is any.
+    /// Severity of the turbulence, 1 to 7; `None` for still air.
     pub turbulence: Option<u8>,
-    /// How the instruments are installed, the same in all flights.
+    /// Installation errors of the instruments, the same in all flights.
     pub installed: Installation,
 }
 
-/// The logs of a trial.
+/// Logs of a trial.
 #[derive(Clone, Debug)]
 pub struct Logs {
-    /// Flights to fit on.
+    /// Flights for parameter estimation.
     pub training: Vec<Flight>,
-    /// Flights to test on.
+    /// Flights for model validation.
     pub testing: Vec<Flight>,
 }
 
 impl Trial {
-    /// Flies the training and the test flights of the seed under `controller`, gentler where the
+    /// Flies the training and the test flights of the seed under `controller`, with reduced excitation where the
     /// aircraft would leave its bounds, and logs them with instruments drawn for each flight.
     ///
     /// # Errors
-    /// If the aircraft cannot be built, or cannot be held inside its bounds.
+    ///
+    /// If the aircraft cannot be built, or leaves its bounds.
     pub fn fly(&self, controller: &dyn Controller) -> Result<Logs, FlightTestError> {
         let training = self.training(controller)?;
         let testing = flights::testing(self.seed);
@@ -105,10 +107,11 @@ impl Trial {
         Ok(Logs { training, testing })
     }
 
-    /// The flights to fit on alone.
+    /// The flights for estimation alone.
     ///
     /// # Errors
-    /// As [`Self::fly`].
+    ///
+    /// The same as [`Self::fly`].
     pub fn training(&self, controller: &dyn Controller) -> Result<Vec<Flight>, FlightTestError> {
         let schedules = flights::training(self.seed);
         schedules.iter().enumerate().map(|(k, s)| self.log(k, s, controller)).collect()

@@ -1,28 +1,30 @@
-//! What a policy is trained in: blocks of aircraft that are observed and stepped together.
+//! Training environments for policies: blocks of aircraft observed and stepped together.
 
 use crate::Trouble;
 use crate::imagined::{Block, Imagination, Stepped};
 use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
-/// A world of one or many aircraft, each in an episode of its own that begins anew when it ends.
+/// One or many aircraft, each in its own episode, which is reset when it ends.
 pub trait World {
-    /// Aircraft there are.
+    /// Number of aircraft.
     fn instances(&self) -> usize;
-    /// What the aircraft of a block observe; lanes beyond the instances are of no account.
+    /// Observations of a block's aircraft; lanes above the instances are unused.
     fn observe(&self, block: usize) -> [Block; OBSERVATIONS];
     /// One step of a block.
     ///
     /// # Errors
-    /// If the world cannot go on; an aircraft that is lost is no error.
+    ///
+    /// If the environment cannot continue; losing an aircraft is not an error.
     fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble>;
-    /// Begins all episodes anew, `targets` having been given before.
+    /// Resets all episodes; `targets` were given out before.
     ///
     /// # Errors
-    /// If the world cannot go back to the start.
+    ///
+    /// If the environment cannot be reset.
     fn restart(&mut self, targets: u64) -> Result<(), Trouble>;
-    /// Targets given so far.
+    /// Number of targets given.
     fn targets(&self) -> u64;
-    /// Episodes that ended outside the envelope.
+    /// Number of episodes that ended outside the limits.
     fn lost(&self) -> u64;
 }
 

@@ -104,7 +104,7 @@ impl Bench {
         let truth = self.controller.measured();
         if !self.cut {
             let seen = &mut self.seen;
-            self.desk.hear(self.host, &down, &mut self.up, |state, decision| {
+            self.desk.receive(self.host, &down, &mut self.up, |state, decision| {
                 seen.push(Seen { state: *state, truth, decision: *decision });
             });
         }

@@ -1,4 +1,4 @@
-//! The last search: candidates flown one by one in the model.
+//! The last tick's search for a reader: its candidates, flown one by one in the model.
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
@@ -8,12 +8,12 @@ use greylag_model::STEP;
 use greylag_physics::Command;
 use greylag_physics::actuators::Actuators;
 
-/// Candidates kept for the report, spread over all.
+/// Number of candidates kept for the report, spread evenly over all.
 const SHOWN: usize = 48;
 
 impl Cem {
-    /// What the tick that was planned from `seen` had before it. It flies some thousand steps, and
-    /// allocates.
+    /// The candidates and the choice of the tick that was planned from `seen`. It integrates some thousand steps and
+    /// allocates: not for use in flight.
     pub(super) fn last_insight(&self, seen: &Observation) -> Insight {
         let all = self.blocks.len() * WIDTH;
         let every = all.div_ceil(SHOWN).max(1);
@@ -26,7 +26,7 @@ impl Cem {
         }
     }
 
-    /// The path of a plan, or without one that of the base.
+    /// Roll and pitch along a plan, or along the base controller's own commands without one.
     fn path(&self, seen: &Observation, plan: Option<&Plan>) -> Path {
         let model = &self.model;
         let figures = &model.airframe.actuators;

@@ -1,4 +1,4 @@
-//! Changes of the search's settings, as a command line has them.
+//! Overrides of single planner settings, as `KEY=VALUE` on a command line.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,52 +6,52 @@ use std::str::FromStr;
 use super::rollout::{HORIZON, WIDTH};
 use super::settings::{Instructions, Settings, Start, Update, Value};
 
-/// One setting in other than its usual size, as `KEY=VALUE`.
+/// One planner setting that replaces its default, parsed from `KEY=VALUE`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// [`Settings::population`].
+    /// Replaces [`Settings::population`], the candidates per iteration.
     Population(usize),
-    /// [`Update::Elites`].
+    /// Replaces the number of elites, see [`Update::Elites`].
     Elites(usize),
-    /// [`Update::Weighted`].
+    /// Replaces the temperature λ, see [`Update::Weighted`].
     Temperature(f64),
-    /// [`Settings::iterations`].
+    /// Replaces [`Settings::iterations`], the iterations per tick.
     Iterations(usize),
-    /// [`Settings::start`].
+    /// Replaces [`Settings::start`], the initial mean.
     Start(Start),
-    /// [`Settings::spread`].
+    /// Replaces [`Settings::spread`], the initial standard deviation.
     Spread(f64),
-    /// [`Settings::persistence`].
+    /// Replaces [`Settings::persistence`], the correlation between steps.
     Persistence(f64),
-    /// [`Settings::kept`].
+    /// Replaces [`Settings::kept`], the elites carried over.
     Kept(usize),
-    /// [`Settings::proposals`].
+    /// Replaces [`Settings::proposals`], the candidates from the policy.
     Proposals(usize),
-    /// [`Settings::noise`], the deviation; it is cut off at three of them.
+    /// Replaces the standard deviation of [`Settings::noise`]; it is truncated at three standard deviations.
     Noise(f64),
-    /// [`Settings::alpha`].
+    /// Replaces [`Settings::alpha`], the weight of the terminal value.
     Alpha(Option<f64>),
-    /// [`Settings::value`].
+    /// Replaces [`Settings::value`], the terminal value function.
     Value(Value),
-    /// [`Settings::steps`].
+    /// Replaces [`Settings::steps`], the horizon in steps.
     Steps(usize),
-    /// [`Settings::chunk`].
+    /// Replaces [`Settings::chunk`], the ticks per plan.
     Chunk(usize),
-    /// [`Settings::delay`].
+    /// Replaces [`Settings::delay`], planning one tick ahead.
     Delay(bool),
-    /// [`Settings::margin`].
+    /// Replaces [`Settings::margin`], the improvement a plan needs.
     Margin(f64),
-    /// [`Settings::ilqr`].
+    /// Replaces [`Settings::ilqr`], iLQR's plan as a candidate.
     Ilqr(bool),
-    /// [`Settings::disturbance`].
+    /// Replaces [`Settings::disturbance`], the observer's time constant.
     Disturbance(Option<f64>),
-    /// [`Settings::trust`].
+    /// Replaces [`Settings::trust`], the limit on prediction errors.
     Trust(Option<f64>),
-    /// [`Settings::known`].
+    /// Replaces [`Settings::known`], the limit on extrapolation.
     Known(Option<f64>),
-    /// [`Settings::instructions`].
+    /// Replaces [`Settings::instructions`], the vector instruction set.
     Instructions(Instructions),
-    /// [`Settings::cores`].
+    /// Replaces [`Settings::cores`], the number of threads.
     Cores(usize),
 }
 
@@ -85,7 +85,7 @@ impl Change {
 }
 
 impl fmt::Display for Change {
-    /// As it is read.
+    /// Writes the change as `KEY=VALUE`, the form that is parsed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let switch = |on: bool| if on { "yes" } else { "no" };
         let unless_none = |x: Option<f64>| x.map_or("none".to_owned(), |x| x.to_string());
@@ -120,7 +120,7 @@ impl fmt::Display for Change {
     }
 }
 
-/// Why a text is no [`Change`].
+/// A text that is not a valid [`Change`].
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{text:?} changes no setting of the planner: {why}; give KEY=VALUE with population, elites, \

@@ -1,4 +1,5 @@
-//! When the planner does not plan: a model that has not predicted, or is asked beyond what it was trained on.
+//! Conditions for planning: the model's recent one-step predictions were good enough, and its residual is not
+//! extrapolating.
 
 use super::rollout::{Actions, HORIZON, WIDTH};
 use super::{Cem, Settings, flown};
@@ -6,19 +7,19 @@ use crate::disturbance::{Disturbance, TIME_CONSTANT_S};
 use crate::{Observation, Target};
 use greylag_physics::Command;
 
-/// What compares the model's predictions with what happened, if the settings ask for it.
+/// The observer of the model's prediction errors, if the settings ask for one.
 pub(super) fn predictions(settings: &Settings) -> Option<Disturbance> {
     settings.disturbance.or(settings.trust.map(|_| TIME_CONSTANT_S)).map(Disturbance::new)
 }
 
 impl Cem {
-    /// The estimated disturbance, where plans take it into account.
+    /// The estimated disturbance, where the settings include it in the plans.
     pub(super) fn disturbance(&self) -> Option<&Disturbance> {
         self.predictions.as_ref().filter(|_| self.settings.disturbance.is_some())
     }
 
-    /// Whether the model is one to plan with here: it has predicted the last half second well enough, gusts aside, and its
-    /// residual has seen data like this.
+    /// Whether the model may be planned with: its predictions over the last half second were good enough, gusts
+    /// aside, and its residual is within its training data.
     pub(super) fn is_trusted(&self, seen: &Observation) -> bool {
         let predicted = match (self.settings.trust, &self.predictions) {
             (Some(most), Some(predictions)) => !predictions.is_wrong(most),
@@ -33,7 +34,7 @@ impl Cem {
         predicted && known
     }
 
-    /// The policy's own command.
+    /// The policy's own command, without a search.
     pub(super) fn unsearched(&mut self, seen: &Observation, target: &Target) -> Command {
         (self.last, self.planned_for) = (None, None);
         // without noise the first lane is what the policy does

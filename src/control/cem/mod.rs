@@ -1,5 +1,5 @@
-//! CEM-MPC, section III-D of \[GSFM26\], with the policy's proposals and the critics' values that make
-//! it the hybrid controller of section IV-C.
+//! CEM-MPC, section III-D of \[GSFM26\]; with a policy's proposals and critics' values it is the hybrid
+//! controller of section IV-C.
 
 mod candidates;
 mod changes;
@@ -26,34 +26,34 @@ use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
 pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
 
-/// Candidates whose ends the critics value before a plane takes their place.
+/// Candidates whose terminal states the critics value before the fitted plane replaces them.
 const SURVEYED: usize = 128;
 
-/// Candidates that they value again at the end.
+/// Candidates of the last iteration that the critics value again.
 const RESCORED: usize = 64;
 
-/// Sideslip that costs a reward of 1 a step where the base flies a rudder, rad. The paper's task (eq. 30) does not know
-/// sideslip, and a plan that rolls faster than the rudder can follow would cost nothing.
+/// Sideslip that costs a reward of 1 per step where the base controller uses a rudder, rad. The paper's reward (eq.
+/// 30) has no sideslip term, so that a plan which rolls faster than the rudder can coordinate would cost nothing.
 const SIDESLIP: f64 = 0.3;
 
-/// What a search may lean on.
+/// The policy, base controller and second planner that a search may use.
 #[derive(Clone, Debug, Default)]
 pub struct Aids {
-    /// The policy that proposes, with its critics.
+    /// The policy that proposes candidates, with its critics.
     pub agent: Option<Agent>,
-    /// The controller whose plan is flown where the search finds none that is surely better.
+    /// The controller that flies unless the search finds a plan that is better by the margin.
     pub base: Option<Lqi>,
-    /// The planner whose plan is a candidate beside the base's.
+    /// The planner whose plan is added to the candidates.
     pub ilqr: Option<Ilqr>,
 }
 
 /// An action in the paper's units: aileron, elevator and throttle in −1..1 (eq. 29).
 type Action = [f64; 3];
 
-/// Actions over the horizon.
+/// Actions of one candidate over the horizon.
 type Plan = [Action; HORIZON];
 
-/// A plan with its worth.
+/// A plan with its estimated return.
 #[derive(Clone, Copy, Debug)]
 struct Valued {
     plan: Plan,
@@ -61,7 +61,7 @@ struct Valued {
     doubt: f32,
 }
 
-/// The planner. All its memory is taken when it is built; a plan costs the same every time.
+/// The CEM-MPC planner. All memory is allocated when it is built; the work per plan is constant.
 #[derive(Clone, Debug)]
 pub struct Cem {
     name: &'static str,
@@ -69,21 +69,22 @@ pub struct Cem {
     settings: Settings,
     agent: Option<Agent>,
     base: Option<Base>,
-    /// [`SIDESLIP`], where the base flies a rudder.
+    /// [`SIDESLIP`] where the base controller uses a rudder, else `None`.
     sideslip: Option<f64>,
     ilqr: Option<Ilqr>,
-    /// What compares the model's predictions with what happened.
+    /// Observer of the model's one-step prediction errors.
     predictions: Option<Disturbance>,
     machine: Machine,
-    /// That of the second core.
+    /// Rollout memory of the second core.
     second: Option<Machine>,
     blocks: Vec<Block>,
     worth: Vec<Worth>,
     order: Vec<(f32, u32)>,
-    /// The plan of the last tick, if it was the search's, and for how many ticks it has been flown.
+    /// The last tick's plan if the search's plan was flown, and the number of ticks for which it has been flown.
     last: Option<Plan>,
     age: usize,
-    /// Of a delayed search: what the next tick is to be planned for, and the moment that `last` is for.
+    /// With [`Settings::delay`]: the observation and target that the next tick is planned for, and the time that
+    /// `last` is for.
     next: Option<(Observation, Target)>,
     planned_for: Option<Time>,
     kept: Vec<Plan>,
@@ -93,7 +94,7 @@ pub struct Cem {
     tick: u64,
 }
 
-/// Time spent in a tick.
+/// Processing time of the parts of a tick.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
     prepare: Duration,
@@ -109,7 +110,7 @@ impl Spent {
     }
 }
 
-/// The controller that flies where the search finds nothing better, and what it would do next.
+/// The base controller with its commands over the horizon.
 #[derive(Clone, Debug)]
 struct Base {
     lqi: Lqi,
@@ -117,7 +118,7 @@ struct Base {
 }
 
 impl Cem {
-    /// A planner through `model` under the name `name`.
+    /// A planner with `model`, registered under `name`.
     ///
     /// # Panics
     /// If the settings ask for a policy or its critics and `aids` has none.
@@ -158,7 +159,7 @@ impl Cem {
         }
     }
 
-    /// The plan that the search ends with.
+    /// Runs the iterations of a tick; the plan they end with.
     fn search(&mut self, seen: &Observation, target: &Target) -> Option<Plan> {
         let mut rng = stream::stream(self.seed, &[self.tick]);
         self.tick += 1;
@@ -205,8 +206,8 @@ impl Cem {
         Some(mean)
     }
 
-    /// The best plan around the base's, if it is worth more than the base's by the margin and by what
-    /// the critics doubt of either.
+    /// Searches around the base controller's plan. `Some` only if the best plan's return exceeds the base's by the
+    /// margin and by the critics' disagreement on either.
     fn search_around_base(
         &mut self,
         seen: &Observation,
@@ -247,11 +248,11 @@ impl Cem {
         let middle = self.candidate(0);
         let chosen = if middle.worth >= best.worth { middle } else { best };
         let doubt = chosen.doubt.max(base.doubt) + self.settings.margin as f32;
-        // a comparison with what is no number is false: the base flies
+        // a comparison with NaN is false: the base flies
         (chosen.worth - base.worth > doubt).then_some(chosen.plan)
     }
 
-    /// The command planned a tick ago, or a new one if there is none for this moment.
+    /// The command planned a tick ago for this time, or a new one if there is none.
     fn planned_before(&mut self, seen: &Observation, target: &Target) -> Command {
         let off = |time: Time| (time.as_secs_f64() - seen.time.as_secs_f64()).abs();
         if !self.planned_for.is_some_and(|time| off(time) < STEP / 2.0) {
@@ -263,7 +264,7 @@ impl Cem {
         command
     }
 
-    /// What the model says will be observed a tick after `seen`.
+    /// The observation that the model predicts one tick after `seen`.
     fn after(&self, seen: &Observation, command: Command) -> Observation {
         let figures = &self.model.airframe.actuators;
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
@@ -282,7 +283,7 @@ impl Cem {
         }
     }
 
-    /// The base's command, or that of a plan that is surely better.
+    /// The base controller's command, or that of a plan that is better by the margin.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
         let begun = Instant::now();
         base.lqi.look_ahead(seen, target, &mut base.ahead);
@@ -290,7 +291,7 @@ impl Cem {
         let before = base.lqi.clone();
         let alone = base.lqi.command(seen, target);
         self.base = Some(base);
-        // the base's throttle takes the place of what stands here
+        // the base controller's throttle replaces the plan's
         let action = |[aileron, elevator]: [f64; 2]| [aileron, elevator, 0.0];
         if !self.is_trusted(seen) {
             self.last = None;
@@ -308,16 +309,16 @@ impl Cem {
     }
 }
 
-/// A plan a tick later, its last action held.
+/// A plan shifted by one tick, its last action repeated.
 fn shifted(plan: &Plan) -> Plan {
     std::array::from_fn(|h| plan[(h + 1).min(HORIZON - 1)])
 }
 
-/// The command of a planner that has no plan.
+/// The command of a planner without a plan: NaN, so that the caller flies its fallback.
 const LOST: Command =
     Command { aileron: f64::NAN, elevator: f64::NAN, throttle: f64::NAN, rudder: 0.0 };
 
-/// The command of an action.
+/// The command that corresponds to an action.
 fn flown([aileron, elevator, thrust]: &Action) -> Command {
     let [aileron, elevator, thrust] = [*aileron, *elevator, *thrust];
     Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0, rudder: 0.0 }.clamped()

@@ -1,4 +1,4 @@
-//! The candidates of an iteration: drawn, flown, weighed.
+//! The candidates of an iteration: sampling, rollouts, update of the distribution.
 
 use std::cmp::Ordering;
 use std::time::Instant;
@@ -13,7 +13,7 @@ use crate::task::Task;
 use crate::{Observation, Target};
 
 impl Cem {
-    /// Draws the candidates of an iteration into the blocks from `first` on.
+    /// Samples the candidates of an iteration into the blocks from `first` on.
     pub(super) fn sample(&mut self, rng: &mut impl Rng, first: usize, mean: &Plan, spread: &Plan) {
         let begun = Instant::now();
         let old = self.settings.persistence;
@@ -35,7 +35,8 @@ impl Cem {
         self.spent.draw += begun.elapsed();
     }
 
-    /// Draws the noise on the proposals of the blocks from `first` up to `end`; the first lane has none.
+    /// Samples the noise added to the proposals in the blocks from `first` up to `end`; lane 0 of the first block has
+    /// none.
     pub(super) fn sample_noise(&mut self, rng: &mut impl Rng, [first, end]: [usize; 2]) {
         let begun = Instant::now();
         let [deviation, most] = self.settings.noise;
@@ -51,7 +52,7 @@ impl Cem {
         self.spent.draw += begun.elapsed();
     }
 
-    /// Flies the blocks from `first` up to `end`.
+    /// Rolls out the blocks from `first` up to `end`.
     pub(super) fn fly(
         &mut self,
         seen: &Observation,
@@ -75,7 +76,7 @@ impl Cem {
             sideslip: self.sideslip,
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
-        // blocks that fly together stay together: the numbers are those of one core
+        // blocks are paired as on one core, so that results are equal to the bit
         let half = blocks.len().div_ceil(4) * 2;
         match &mut self.second {
             Some(second) if half < blocks.len() => {
@@ -92,7 +93,7 @@ impl Cem {
         self.spent.fly += begun.elapsed();
     }
 
-    /// A candidate with its worth.
+    /// A candidate with its return.
     pub(super) fn candidate(&self, index: usize) -> Valued {
         let (block, lane) = (index / WIDTH, index % WIDTH);
         let actions = &self.blocks[block];
@@ -101,8 +102,8 @@ impl Cem {
         Valued { plan, worth: returns[lane], doubt: doubt[lane] }
     }
 
-    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, as the update
-    /// weighs them, with the best of them; `None` if too few stay finite.
+    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, weighted by
+    /// [`Update`], and the best candidate; `None` if too few returns are finite.
     pub(super) fn refit(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
         let begun = Instant::now();
         let refitted = self.refitted(end);
@@ -114,7 +115,7 @@ impl Cem {
         self.order.clear();
         for (b, worth) in self.worth[..end].iter().enumerate() {
             for (i, &value) in worth.returns.iter().enumerate() {
-                // a candidate that leaves the numbers is the worst there is
+                // a return that is not finite ranks last
                 let value = if value.is_finite() { value } else { f32::NEG_INFINITY };
                 self.order.push((value, (b * WIDTH + i) as u32));
             }
@@ -157,7 +158,7 @@ impl Cem {
         Some((mean, spread, self.candidate(best.1 as usize)))
     }
 
-    /// Keeps the best candidates of an iteration.
+    /// Keeps the best candidates for the next iteration.
     pub(super) fn keep(&mut self, count: usize) {
         let count = count.min(self.order.len());
         self.kept.clear();
@@ -171,7 +172,7 @@ impl Cem {
         }
     }
 
-    /// Puts a plan into the place of a candidate.
+    /// Writes a plan into one lane of a block.
     pub(super) fn put(&mut self, block: usize, lane: usize, plan: &Plan) {
         for (actions, given) in self.blocks[block].iter_mut().zip(plan) {
             actions.iter_mut().zip(given).for_each(|(lanes, x)| lanes[lane] = *x as f32);
@@ -179,7 +180,7 @@ impl Cem {
     }
 }
 
-/// The better of two candidates first; ties go to the lower index, so the order is the same everywhere.
+/// Orders candidates by falling return; ties go to the lower index, so that the order is the same on every machine.
 fn better(a: &(f32, u32), b: &(f32, u32)) -> Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }

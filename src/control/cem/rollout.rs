@@ -14,61 +14,61 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{ActuatorState, Airframe, Command, State};
 
-/// Candidates of a block.
+/// Number of candidates in a block, one per lane.
 pub(super) const WIDTH: usize = ROW;
 
-/// Steps planned ahead, H of \[GSFM26\].
+/// Planning horizon H of \[GSFM26\], steps.
 pub(super) const HORIZON: usize = 5;
 
 /// The actions (aileron, elevator, throttle of eq. 29) of `WIDTH` candidates over the horizon.
 pub(super) type Block = [[[f32; WIDTH]; 3]; HORIZON];
 
-/// What all candidates of a tick share.
+/// Inputs of a rollout that all candidates of a tick share.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub model: &'a GreyBox,
     pub task: &'a Task,
     pub seen: &'a Observation,
     pub target: &'a Target,
-    /// The policy that proposes and whose critics value the end.
+    /// The policy that proposes actions, and whose critics value the terminal state.
     pub agent: Option<&'a Agent>,
-    /// Weight α of what the critics say of the end, eq. (26); `None` leaves them out.
+    /// Weight α of the critics' terminal value, eq. (26); `None` leaves it out.
     pub alpha: Option<f64>,
-    /// What values the end in the critics' place.
+    /// Terminal value function that replaces the critics.
     pub surrogate: Option<Surrogate>,
-    /// What the integrator remembers.
+    /// Past commands that the integrator needs.
     pub memory: Memory,
-    /// What the state's rate has beside the model's.
+    /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
-    /// The base that flies on behind a plan, and its throttle all along.
+    /// The base controller's law after the plan, and its throttle throughout.
     pub ahead: Option<&'a Ahead>,
-    /// Without a base: steps in all, the policy flying on behind the plan; five without a policy.
+    /// Without a base: total steps, flown by the policy after the plan; five without a policy.
     pub steps: usize,
-    /// Sideslip that costs a reward of 1 a step where a rudder is flown, rad.
+    /// Sideslip that costs a reward of 1 per step where a rudder is flown, rad.
     pub sideslip: Option<f64>,
 }
 
-/// Who chooses the actions of a block.
+/// The source of a block's actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Actions {
-    /// The block holds them.
+    /// The block holds the actions.
     Given,
-    /// The policy does; the block holds what is added to its actions, and has the sums afterwards.
+    /// The policy; the block holds offsets to its actions, and the sums afterwards.
     Policy,
-    /// The base does; likewise.
+    /// The base controller; the block holds offsets to its actions, and the sums afterwards.
     Base,
 }
 
-/// What the candidates of a block are worth.
+/// Returns and terminal values of a block's candidates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worth {
     /// Discounted returns, eq. (13), or eq. (26) with critics.
     pub returns: [f32; WIDTH],
-    /// How far the critics' values of the end lie apart, discounted and weighted as these are.
+    /// Disagreement of the two critics on the terminal value, discounted and weighted like it.
     pub doubt: [f32; WIDTH],
-    /// Where critics value the end: what they see there.
+    /// Observation at the terminal state, where critics value it.
     pub end: [[f32; WIDTH]; OBSERVATIONS],
-    /// Likewise: the smaller of their values, or what stands for it.
+    /// The smaller of the critics' values of the terminal state, or the surrogate's value.
     pub value: [f32; WIDTH],
 }
 
@@ -81,10 +81,9 @@ impl Worth {
     };
 }
 
-/// The vector instructions a rollout is compiled for, with memory for its networks.
+/// The vector instruction set that rollouts are compiled for, with scratch memory for the networks.
 ///
-/// Where a multiply-add is fused it is used: the last bits differ from those of a processor that has
-/// none.
+/// Fused multiply-add is used where the processor has it, so that the last bits differ between instruction sets.
 #[derive(Clone, Debug)]
 pub(super) enum Machine {
     #[cfg(target_arch = "x86_64")]
@@ -94,12 +93,12 @@ pub(super) enum Machine {
     Baseline(Units<Base<BASE_FUSED>>),
 }
 
-/// Two blocks at once: each weight of a network that is read is used twice.
+/// Evaluates two blocks together, so that each network weight is loaded once for both.
 #[cfg(target_arch = "x86_64")]
 type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
 impl Machine {
-    /// The widest that this processor has.
+    /// The widest instruction set of this processor.
     pub fn detect() -> Machine {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx512f") {
@@ -112,12 +111,12 @@ impl Machine {
         Machine::baseline()
     }
 
-    /// What the target always has.
+    /// The baseline instruction set of the compilation target.
     pub fn baseline() -> Machine {
         Machine::Baseline(Units::new(Base::zero()))
     }
 
-    /// Flies every block, and says what its candidates are worth.
+    /// Rolls out every block and writes the returns.
     pub fn fly(
         &mut self,
         scene: &Scene,
@@ -186,7 +185,7 @@ fn fly<R: Packed>(
     }
 }
 
-/// Imagined aircraft on their way.
+/// State of the simulated aircraft of a rollout.
 struct Flight<R> {
     state: State<R>,
     actuators: Actuators<R>,
@@ -200,8 +199,8 @@ struct Flight<R> {
 }
 
 impl<R: Packed> Flight<R> {
-    /// Effects on the deflections start at rest where the surfaces are: over the five steps a plan under
-    /// a lag or a delay so believes in more of the present deflection than really acts.
+    /// Lags and delays on the deflections start in steady state at the present deflections: over five steps, a plan
+    /// therefore overestimates how much of the present deflection acts.
     #[inline(always)]
     fn new(scene: &Scene) -> Self {
         let lane = R::from_f64;
@@ -232,7 +231,7 @@ impl<R: Packed> Flight<R> {
         }
     }
 
-    /// A step in the order of the simulator, and its reward.
+    /// Advances by one step in the simulator's order; returns the reward.
     #[inline(always)]
     fn advance(&mut self, scene: &Scene, command: Command<R>) {
         let Scene { model, task, seen, .. } = scene;
@@ -258,8 +257,7 @@ impl<R: Packed> Flight<R> {
     }
 }
 
-/// One component of the actions that blocks hold for a step; the last block stands in for those that are
-/// missing.
+/// One component of the actions of all blocks at a step; the last block is repeated for missing ones.
 #[inline(always)]
 fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     R::pack(
@@ -268,7 +266,7 @@ fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     )
 }
 
-/// The worth of as many blocks as `R` has rows, or fewer: a plan of five steps, and what follows it.
+/// Returns of up to `R` blocks: the plan's five steps, then the base controller or policy.
 #[inline(always)]
 fn rollout<R: Packed>(
     scene: &Scene,
@@ -287,8 +285,7 @@ fn rollout<R: Packed>(
         None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
-    // plain loops, and one place where the model is: an iterator that is not inlined leaves the vector
-    // instructions, a second copy of the model doubles what takes minutes to compile
+    // plain loops, and one call of the model: an iterator that is not inlined leaves the vector
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];
@@ -343,7 +340,7 @@ fn rollout<R: Packed>(
                 let first = critics[0].value(units, &view, &advised);
                 let second = critics[1].value(units, &view, &advised);
                 doubt = (first - second).abs().scale(alpha * flight.weight);
-                // a number that is lost stays lost
+                // a NaN stays NaN
                 first + (second - first).min(R::zero())
             }
         };
@@ -363,8 +360,8 @@ fn rollout<R: Packed>(
     }
 }
 
-/// `command` with its surfaces as far from the `last` one as the airframe's slew limit lets them go in a step: whoever
-/// flies a plan keeps to it, and a plan that does not know it oscillates once the channels are late as well.
+/// `command` with its surfaces limited to the airframe's slew rate from `last`. The pilot applies the same limit; a
+/// plan that ignores it oscillates when the channels are delayed as well.
 #[inline(always)]
 pub(super) fn slewed<R: Real>(
     command: Command<R>,
@@ -385,7 +382,7 @@ pub(super) fn slewed<R: Real>(
     }
 }
 
-/// A command with every component read as another kind of number.
+/// A command with its components converted to another number type.
 #[inline(always)]
 fn command_of<R>(c: Command, number: impl Fn(f64) -> R) -> Command<R> {
     Command {

@@ -1,60 +1,60 @@
-//! Size and shape of the search.
+//! Settings of the CEM planner.
 
 use super::changes::Change;
 use super::rollout::HORIZON;
 use crate::disturbance::{TIME_CONSTANT_S, TRUST};
 
-/// How the candidates of an iteration make the next distribution.
+/// How an iteration updates the sampling distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Update {
-    /// Mean and deviation of the K best: the cross-entropy method.
+    /// Mean and standard deviation of the K best candidates: the cross-entropy method.
     Elites(usize),
-    /// Mean and deviation of all, weighted with exp(return / λ): MPPI (Williams et al., 2017), λ in units
-    /// of the return.
+    /// Mean and standard deviation of all candidates, weighted with exp(return / λ): MPPI (Williams et al., 2017), λ
+    /// in units of the return.
     Weighted(f64),
 }
 
-/// Where the first iteration's mean lies.
+/// Mean of the first iteration's distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// In the middle of every action's range.
+    /// The centre of every action's range.
     Neutral,
-    /// On the policy's own plan.
+    /// The policy's own plan.
     Policy,
-    /// On the last tick's plan, a tick later (iCEM, Pinneri et al., CoRL 2020).
+    /// The last tick's plan, shifted by one tick (iCEM, Pinneri et al., CoRL 2020).
     Last,
 }
 
-/// What values the end of a candidate, where critics are asked at all.
+/// The terminal value function, where critics are used at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
-    /// The critics, each candidate.
+    /// The critics, for every candidate.
     Critics,
-    /// A plane through the critics' values of the tick's first 128 candidates; the best 64 of the last
-    /// iteration are valued by the critics again. Without a base only.
+    /// A plane fitted to the critics' values of the tick's first 128 candidates; the critics value the best 64 of the
+    /// last iteration again. Only without a base controller.
     Fitted,
 }
 
-/// Which vector instructions fly the candidates.
+/// Vector instruction set of the rollouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
-    /// The widest that the processor has.
+    /// The widest that the processor supports.
     Widest,
-    /// What every processor of the target has. A multiply-add may be rounded otherwise, so a flight repeats
-    /// to the bit under one of the two, not across them.
+    /// The baseline of the compilation target. Multiply-adds may round differently, so that a flight repeats to the
+    /// bit within one of the two choices, not across them.
     Portable,
 }
 
-/// Size of the search.
+/// Settings of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Candidates per iteration N, a multiple of 16.
     pub population: usize,
-    /// How the next distribution is made of the candidates.
+    /// How the sampling distribution is updated.
     pub update: Update,
-    /// Iterations I.
+    /// Iterations I per tick.
     pub iterations: usize,
-    /// Where the search starts.
+    /// The initial mean of the distribution.
     pub start: Start,
     /// Standard deviation of the first iteration, in units of the action.
     pub spread: f64,
@@ -66,42 +66,44 @@ pub struct Settings {
     /// Candidates of the first iteration that the policy proposes, a multiple of 16; the first of them
     /// without noise.
     pub proposals: usize,
-    /// Standard deviation of the noise on the others, and where it is cut off.
+    /// Standard deviation of the noise on the other proposals, and its truncation.
     pub noise: [f64; 2],
-    /// Weight α of the critics' value of the end, eq. (26).
+    /// Weight α of the critics' terminal value, eq. (26).
     pub alpha: Option<f64>,
-    /// What gives the value of a plan's end.
+    /// The terminal value function of a plan.
     pub value: Value,
-    /// Steps in all that a plan is flown in the model: the base flies from the sixth on, without a base the
-    /// policy; without either there are five.
+    /// Horizon in steps: after the fifth the base controller flies, or the policy without one; without either the
+    /// horizon is five.
     pub steps: usize,
-    /// Ticks that a plan is flown before the next one is made, up to 5; with a base every tick is planned.
+    /// Ticks for which a plan is flown before the next one is made, up to 5; with a base controller every tick is
+    /// planned.
     pub chunk: usize,
-    /// Whether a tick plans for the next one, from where the model will be then (RT-HCP's delay of one step),
-    /// so that planning may take the whole period. Without a base only, and a plan is then flown for one tick.
+    /// Whether a tick plans for the next one, from the state that the model predicts (RT-HCP's delay of one step), so
+    /// that planning may take the whole period. Only without a base controller, and a plan is then flown for one
+    /// tick.
     pub delay: bool,
-    /// What a plan must be worth beside the base's to be flown, in units of the return.
+    /// Return by which a plan must exceed the base controller's to be flown.
     pub margin: f64,
-    /// Whether iLQR's plan is among the candidates; it needs a base.
+    /// Whether iLQR's plan is among the candidates; it needs a base controller.
     pub ilqr: bool,
-    /// Time constant (s) with which what the model leaves unexplained is estimated; `None`: it is not.
+    /// Time constant of the disturbance estimate, s; `None` disables it.
     pub disturbance: Option<f64>,
-    /// Largest part of the motion that the model's one-step predictions may have missed in the last half second
-    /// for plans to be made; above it, unless what they missed is like gusts, the base flies alone, or without one the policy.
-    /// It needs either of them.
+    /// Largest relative one-step prediction error (root mean square over the last half second) at which plans are
+    /// made. Above it, unless the error looks like gusts, the base controller flies alone, or without one the policy;
+    /// one of them is required.
     pub trust: Option<f64>,
-    /// Largest distance from the data that the model's residual was trained on, see
-    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made
-    /// (1 holds 99.9 % of the training samples); beyond it, as with `trust`.
+    /// Largest distance from the training data of the model's residual, see
+    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made (1 holds 99.9 % of the
+    /// training samples); beyond it, the same fallback as for `trust`.
     pub known: Option<f64>,
-    /// What flies the candidates.
+    /// Vector instruction set of the rollouts.
     pub instructions: Instructions,
-    /// Cores that fly them, one or two; the commands are the same.
+    /// Number of cores used by the rollouts, one or two; the commands are identical.
     pub cores: usize,
 }
 
 impl Settings {
-    /// CEM-MPC alone. H = 5 is the paper's; N, K, I are not given there: 1024 rollouts a step in all.
+    /// CEM-MPC alone. H = 5 as in the paper; N, K and I are not stated there: 1024 rollouts per tick in all.
     pub const PAPER: Settings = Settings {
         population: 256,
         update: Update::Elites(16),
@@ -125,13 +127,13 @@ impl Settings {
         instructions: Instructions::Widest,
         cores: 1,
     };
-    /// CEM + π.
+    /// CEM with the policy's proposals (CEM + π).
     pub const POLICY: Settings = Settings { proposals: 32, ..Settings::PAPER };
-    /// CEM + Q.
+    /// CEM with the critics' terminal value (CEM + Q).
     pub const CRITICS: Settings = Settings { alpha: Some(1.0), ..Settings::PAPER };
-    /// The hybrid controller. It searches close to the policy's plan: critics are right to a few per cent of a
-    /// return, and the wider the search, the more of what it finds is their error (at a spread of 1 about the
-    /// middle of the range, with proposals spread by 0.2, it is worse than the policy it plans with).
+    /// The hybrid controller. It searches close to the policy's plan: critics are accurate to a few per cent of a
+    /// return, and a wider search exploits their errors (with a spread of 1 about the centre of the range and
+    /// proposals spread by 0.2, it is worse than the policy itself).
     pub const HYBRID: Settings = Settings {
         alpha: Some(1.0),
         start: Start::Policy,
@@ -140,8 +142,8 @@ impl Settings {
         trust: Some(TRUST),
         ..Settings::POLICY
     };
-    /// The hybrid controller whose policy flies on behind each plan up to step 40 in the model, before the critics
-    /// value the state. It is as good without critics.
+    /// The hybrid controller whose policy continues after each plan up to step 40 in the model, before the critics
+    /// value the terminal state. It performs equally well without critics.
     pub const OVER_POLICY: Settings = Settings {
         population: 64,
         update: Update::Elites(8),
@@ -152,12 +154,12 @@ impl Settings {
     };
     /// MPPI over the same rollouts.
     pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };
-    /// The hybrid controller over an LQI, which flies on behind each plan: that is what the end is
-    /// worth, in place of critics. Offset-free.
+    /// The hybrid controller over an LQI, which continues after each plan and so replaces the critics' terminal
+    /// value. Offset-free.
     ///
-    /// The margin is 0.12° of attitude error over all steps: less is the search's noise, and a plan that is
-    /// flown for it takes the LQI's integrals out of the loop (at 0.002 hard targets settle at 0.04°, at
-    /// 0.05 at 0.001°).
+    /// The margin corresponds to 0.12° of attitude error over all steps: smaller gains are sampling noise, and flying
+    /// them opens the loop of the LQI's integrators (hard targets settle at 0.04° with a margin of 0.002, at 0.001°
+    /// with 0.05).
     pub const OVER_LQI: Settings = Settings {
         population: 128,
         update: Update::Elites(12),
@@ -172,12 +174,12 @@ impl Settings {
         ..Settings::PAPER
     };
 
-    /// Whether the search needs a policy.
+    /// Whether the search requires a policy.
     pub(crate) fn needs_policy(&self) -> bool {
         self.proposals > 0 || self.alpha.is_some() || self.start == Start::Policy
     }
 
-    /// These settings with `changes`, the later ones over the earlier.
+    /// These settings with `changes` applied in order.
     pub fn with(self, changes: &[Change]) -> Settings {
         changes.iter().fold(self, |settings, change| change.made(settings))
     }

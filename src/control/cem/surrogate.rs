@@ -1,8 +1,7 @@
-//! A cheap terminal value: a plane through the ends that they have valued.
+//! A cheap terminal value: a plane fitted to terminal states that the critics have valued.
 //!
-//! Twin critics are piecewise linear, and the candidates of one tick end close together: a tick's own
-//! plane is to them what a distilled value network would be to all of flight, without training, a file
-//! or a doubt whether it belongs to the policy.
+//! Twin critics are piecewise linear, and the candidates of one tick end close together, so that a plane fitted anew
+//! in each tick approximates them well. It needs no training and no file.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -10,8 +9,8 @@ use super::rollout::Worth;
 use crate::policy::OBSERVATIONS as N;
 use greylag_num::Real;
 
-/// Part of an observation's variance that is added to it: ends that lie on a plane themselves have
-/// a slope along it only.
+/// Ridge regularisation as a fraction of each observation's variance: terminal states that lie on a plane determine
+/// the slope along it only.
 const RIDGE: f64 = 1e-4;
 
 /// v(o) ≈ level + slope · (o − centre), of observations as in eq. (28) of \[GSFM26\].
@@ -42,7 +41,7 @@ impl Surrogate {
             product.axpy(value - level, &off, 1.0);
         }
         for i in 0..N {
-            // what does not vary has no slope, and is no reason to divide by nothing
+            // an observation that does not vary has slope zero, and must not divide by zero
             square[(i, i)] += RIDGE * square[(i, i)] + f64::MIN_POSITIVE;
         }
         let slope = square.cholesky()?.solve(&product);
@@ -50,7 +49,7 @@ impl Surrogate {
         surrogate.slope.iter().all(|x| x.is_finite()).then_some(surrogate)
     }
 
-    /// The plane at observations in lanes.
+    /// Evaluates the plane at observations in lanes.
     #[inline(always)]
     pub fn value<R: Real>(&self, seen: &[R; N]) -> R {
         let mut value = R::from_f64(self.level);
@@ -63,7 +62,7 @@ impl Surrogate {
     }
 }
 
-/// The ends of a block's candidates, and what the critics say of each.
+/// Terminal observations of a block's candidates with the critics' values.
 fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
     (0..worth.value.len()).map(|lane| {
         let end = SVector::from_fn(|i, _| f64::from(worth.end[i][lane]));

@@ -1,31 +1,31 @@
-//! The limits of the envelope that plans and commands are held to.
+//! Envelope limits in SI units for plans and commands.
 
 use greylag_physics::Airframe;
 use greylag_physics::airframe::{Envelope, Incidence};
 
-/// Bank beyond its largest command that a transient may have, rad: 3 % of a step from −60° to 60°.
+/// Transient overshoot of bank above its largest command, rad: 3 % of a step from −60° to 60°.
 const OVERSHOOT: f64 = 0.0628;
 
-/// Limits in SI units: least and most.
+/// Minimum and maximum of each limited quantity, SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Load factor along the body's z axis, in g, positive upward.
     pub load: [f64; 2],
-    /// Angle of attack, rad: before the stall.
+    /// Angle of attack below the stall, rad.
     pub alpha: [f64; 2],
-    /// Sideslip to either side, rad.
+    /// Largest |sideslip|, rad.
     pub sideslip: f64,
-    /// Bank to either side, rad.
+    /// Largest |bank|, rad.
     pub bank: f64,
 }
 
 impl Bounds {
-    /// Those of an aircraft.
+    /// The bounds of an airframe file.
     pub fn of(airframe: &Airframe) -> Bounds {
         Bounds::new(&airframe.envelope, &airframe.incidence)
     }
 
-    /// Those of an envelope with the angles of attack that belong to it.
+    /// The bounds of `envelope` with the angles of attack of `incidence`.
     pub fn new(envelope: &Envelope, incidence: &Incidence) -> Bounds {
         let most = incidence.before_stall();
         Bounds {
@@ -36,7 +36,7 @@ impl Bounds {
         }
     }
 
-    /// The same with load factor, incidence and sideslip at `part` of their limits.
+    /// The same bounds with load factor, incidence and sideslip scaled by `part`.
     pub fn within(self, part: f64) -> Bounds {
         let scaled = |[low, high]: [f64; 2]| [part * low, part * high];
         Bounds {

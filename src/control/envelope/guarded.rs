@@ -1,4 +1,4 @@
-//! A controller behind the envelope limiter, as it flies in the pilot.
+//! A controller behind the envelope limiter, as the pilot flies it.
 
 use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;
@@ -6,7 +6,7 @@ use crate::{Controller, Observation, Target};
 use greylag_model::GreyBox;
 use greylag_physics::Command;
 
-/// A controller whose commands pass the limiter.
+/// A controller whose commands pass through the envelope limiter.
 pub struct Guarded {
     controller: Box<dyn Controller>,
     limiter: EnvelopeLimiter,

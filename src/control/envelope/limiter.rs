@@ -1,6 +1,6 @@
-//! The limiter between a controller and the surfaces: the elevator keeps load factor and incidence, the aileron keeps bank.
+//! The envelope limiter between a controller and the surfaces: elevator for load factor and incidence, aileron for bank.
 //!
-//! Each limit becomes a law for the surface, and the command is clamped between the laws of both sides (min/max selection, as in
+//! Each limit gives a control law for the surface, and the command is clamped between the laws of both sides (min/max selection, as in
 //! fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6). The law is that of an
 //! exponential control barrier function (Nguyen and Sreenath, ACC 2016): where x is limited to x_lim and ẍ follows the surface,
 //!
@@ -8,8 +8,9 @@
 //! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
 //! ```
 //!
-//! brings x to its limit without overshoot. A controller that stays below is not touched. Accelerations and surface effects are
-//! the model's at the state predicted for the moment at which a command acts, so rolling, speed and gravity are in them.
+//! brings x to its limit without overshoot. Commands inside the limits are unchanged. Accelerations and surface effects are
+//! evaluated with the model at the state predicted for the time at which a command acts, so that they include rolling,
+//! speed and gravity.
 
 use crate::Observation;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
@@ -20,7 +21,7 @@ use greylag_physics::airframe::Envelope;
 use greylag_physics::servos::Travel;
 use greylag_physics::{Command, Controls, State};
 
-/// Part of the load factor and of the incidence that is aimed at: the rest is for what the model does not know.
+/// Fraction of the load-factor and incidence limits that is aimed at; the rest covers model error.
 const PART: f64 = 0.96;
 /// ω of load factor and incidence, rad/s.
 const PITCH_POLE: f64 = 10.0;
@@ -28,38 +29,38 @@ const PITCH_POLE: f64 = 10.0;
 const BANK_POLE: f64 = 10.0;
 /// Steps after which a command acts: until the next tick, then the lag of a surface's actuator.
 const AHEAD: usize = 3;
-/// Deflection that shows what a surface does, in parts of its travel.
+/// Deflection for finite differences of a surface's effect, as a fraction of its travel.
 const PROBE: f64 = 0.1;
-/// Time along which the model's rates are differentiated, s.
+/// Time step for finite differences of the model's rates, s.
 const SPAN_S: f64 = 1e-3;
-/// Change of the angle of attack that shows the slope of the load factor, rad.
+/// Change of the angle of attack for the finite difference of the load factor, rad.
 const SLOPE_STEP: f64 = 0.01;
-/// Newton steps from the present angle of attack to that of a load factor.
+/// Newton steps from the present angle of attack to that of the load-factor limit.
 const NEWTON: usize = 2;
 
-/// What limited a command.
+/// The limit that changed a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// Load factor.
+    /// The load-factor limit.
     Load,
-    /// Angle of attack.
+    /// The angle-of-attack limit.
     Incidence,
-    /// Bank.
+    /// The bank limit.
     Bank,
-    /// Nothing: the model has not predicted what happened, so nothing is limited by it.
+    /// No limit: the model's predictions were wrong, so that the limiter is inactive.
     Distrust,
 }
 
-/// What the limiter made of a command.
+/// A command after the limiter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limited {
     /// The command to be flown.
     pub command: Command,
-    /// What has limited it.
+    /// The limit that changed it; `None` if it is unchanged.
     pub by: Option<Limit>,
 }
 
-/// The limiter of one aircraft. It takes no memory after it is built.
+/// The envelope limiter of one aircraft. It allocates only when it is built.
 #[derive(Clone, Debug)]
 pub struct EnvelopeLimiter {
     model: GreyBox,
@@ -67,14 +68,14 @@ pub struct EnvelopeLimiter {
     disturbance: Disturbance,
 }
 
-/// A surface that acts on a limit.
+/// The surface that acts on a limit.
 #[derive(Clone, Copy)]
 enum Surface {
     Elevator,
     Aileron,
 }
 
-/// Where a limit lies, and how fast it moves, per second.
+/// Value of a limit and its rate, per second.
 #[derive(Clone, Copy, Debug)]
 struct At {
     limit: Limit,
@@ -82,7 +83,7 @@ struct At {
     rate: f64,
 }
 
-/// The aircraft at the moment at which a command acts.
+/// The predicted state at the time at which a command acts.
 struct Moment<'a> {
     model: &'a GreyBox,
     unexplained: State,
@@ -91,13 +92,13 @@ struct Moment<'a> {
     controls: Controls,
 }
 
-/// The acceleration of a limited quantity and what a surface does to it.
+/// Second derivative of a limited quantity and its sensitivity to a surface.
 #[derive(Clone, Copy)]
 struct Motion {
     value: f64,
     rate: f64,
     acceleration: f64,
-    /// Change of the acceleration by rad of deflection.
+    /// Sensitivity of the second derivative to the deflection, per rad.
     effect: f64,
     deflection: f64,
 }
@@ -112,18 +113,18 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Keeps to another envelope from now on.
+    /// Replaces the envelope from now on.
     pub fn keep_to(&mut self, envelope: &Envelope) {
         self.bounds = Bounds::new(envelope, &self.model.airframe.incidence);
     }
 
-    /// Forgets what the model has left unexplained.
+    /// Clears the disturbance estimate, as on re-engagement.
     pub fn reset(&mut self) {
         self.disturbance = Disturbance::new(TIME_CONSTANT_S);
     }
 
-    /// The command nearest to `wanted` that keeps to the envelope. To be called once a tick with what flies; a command that is
-    /// not finite is left as it is.
+    /// The command nearest to `wanted` that stays inside the envelope. Call it once per tick with the command that
+    /// would fly; a command that is not finite is returned unchanged.
     pub fn limit(&mut self, seen: &Observation, wanted: Command) -> Limited {
         self.disturbance.update(&self.model, seen);
         if !wanted.is_finite() {
@@ -139,7 +140,7 @@ impl EnvelopeLimiter {
         out
     }
 
-    /// The moment at which a command of now acts, those before it being held.
+    /// The predicted state when a command given now acts, earlier commands being held.
     fn when_it_acts(&self, seen: &Observation) -> Moment<'_> {
         let figures = &self.model.airframe.actuators;
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
@@ -191,7 +192,7 @@ impl EnvelopeLimiter {
     }
 }
 
-/// Clamps a command between deflections with the limits that ask for them; the first has the last word.
+/// Clamps a command between the deflections of its limits; the first has priority.
 fn clamp(
     command: &mut f64,
     by: &mut Option<Limit>,
@@ -229,7 +230,7 @@ impl Moment<'_> {
         self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
     }
 
-    /// How the quantity `of` moves, and what `surface` does to it.
+    /// Rates of the quantity `of` and the sensitivity to `surface`.
     fn motion(&self, surface: Surface, of: impl Fn(&State) -> f64) -> Motion {
         let mut controls = self.controls;
         // rate and acceleration of the quantity: the acceleration is the change of the rate along the flow
@@ -248,20 +249,20 @@ impl Moment<'_> {
         Motion { value: of(&self.state), rate, acceleration, effect, deflection }
     }
 
-    /// The load factor at an angle of attack, at an elevator.
+    /// The load factor at an angle of attack and elevator.
     fn load(&self, alpha: f64, elevator: f64) -> f64 {
         let state = State { alpha, ..self.state };
         let controls = Controls { elevator, ..self.controls };
         load_factor_under(&state, &self.rate(&state, &controls))
     }
 
-    /// The elevators at which its own lift alone takes the load factor to its largest and to its least.
+    /// The elevators at which the elevator's own lift reaches the largest and the smallest load factor.
     fn lift_limits(&self, bounds: &Bounds, elevator: f64) -> [f64; 2] {
         let load = self.load(self.state.alpha, elevator);
         let travel = Surface::Elevator.travel(self.model);
         let probe = if elevator > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         let slope = (self.load(self.state.alpha, elevator + probe) - load) / probe;
-        // that of a canard goes the other way, with its moment
+        // a canard's lift has the other sign, as has its moment
         if slope <= 0.0 {
             return [f64::INFINITY, f64::NEG_INFINITY];
         }
@@ -269,7 +270,7 @@ impl Moment<'_> {
         [most, least]
     }
 
-    /// The angle of attack of the bounds' `side` (0 the least, 1 the most), which the load factor or the stall sets.
+    /// The angle of attack of one side of the bounds (0 minimum, 1 maximum), set by the load factor or the stall.
     fn incidence_limit(&self, bounds: &Bounds, side: usize, elevator: f64) -> At {
         let stall = At { limit: Limit::Incidence, value: bounds.alpha[side], rate: 0.0 };
         let mut alpha = self.state.alpha;
@@ -277,7 +278,7 @@ impl Moment<'_> {
         for _ in 0..NEWTON {
             let load = self.load(alpha, elevator);
             slope = (self.load(alpha + SLOPE_STEP, elevator) - load) / SLOPE_STEP;
-            // beyond the stall more incidence is no more lift
+            // beyond the stall a larger angle of attack gives no more lift
             if slope <= 0.0 || slope.is_nan() {
                 return stall;
             }
@@ -296,7 +297,7 @@ impl Moment<'_> {
 }
 
 impl Motion {
-    /// The deflection that brings the quantity to a limit.
+    /// The deflection at which the barrier condition holds with equality.
     fn law(&self, at: At, pole: f64) -> (f64, Limit) {
         let wanted = -2.0 * pole * (self.rate - at.rate) - pole * pole * (self.value - at.value);
         (self.deflection + (wanted - self.acceleration) / self.effect, at.limit)

@@ -3,7 +3,7 @@
 use greylag_model::STEP;
 use greylag_physics::State;
 
-/// Standard gravity, m/s²: what load factors are counted in.
+/// Standard gravity g0, m/s²: the unit of load factors.
 pub const G0: f64 = 9.806_65;
 
 /// Velocity along the body's z axis, m/s.

@@ -1,4 +1,4 @@
-//! The envelope, kept behind every controller: load factor, incidence and bank.
+//! Envelope protection behind every controller: load factor, incidence and bank.
 
 mod bounds;
 mod guarded;

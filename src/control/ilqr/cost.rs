@@ -1,8 +1,8 @@
-//! Costs of one number with their derivatives.
+//! Scalar cost terms with their derivatives.
 
 use std::ops::AddAssign;
 
-/// A cost with its slope and (Gauss–Newton) curvature over what costs.
+/// Value, slope and Gauss–Newton curvature of a cost term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cost {
     pub value: f64,
@@ -28,7 +28,7 @@ pub(super) fn square(x: f64, size: f64) -> Cost {
     Cost { value: 0.5 * (x * w) * (x * w), slope: w * w * x, curvature: w * w }
 }
 
-/// The same near zero, growing linearly beyond `far` (pseudo-Huber), where there is one.
+/// Quadratic near zero and linear beyond `far` (pseudo-Huber); quadratic throughout for `None`.
 pub(super) fn attitude(x: f64, size: f64, far: Option<f64>) -> Cost {
     let Some(far) = far else { return square(x, size) };
     let w = 1.0 / (size * size);
@@ -36,7 +36,7 @@ pub(super) fn attitude(x: f64, size: f64, far: Option<f64>) -> Cost {
     Cost { value: w * far * far * (root - 1.0), slope: w * x / root, curvature: w / root }
 }
 
-/// What lies beyond the bounds, squared over `size`.
+/// Squared excess outside the bounds, over `size`.
 pub(super) fn beyond(x: f64, [low, high]: [f64; 2], size: f64) -> Cost {
     if x > high {
         square(x - high, size)

@@ -1,9 +1,9 @@
-//! iLQR: the plan over half a second that the model's exact derivatives lead to.
+//! iLQR: a plan over half a second from exact derivatives of the model.
 //!
 //! Differential dynamic programming without second derivatives of the model (Todorov and Li, ACC 2005;
-//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration a tick from the last plan,
-//! which is the real-time iteration of Diehl et al. (2002). Throttle and the attitude that the airspeed
-//! allows are the LQI's, and what the model leaves unexplained is taken into it: no steady error.
+//! Tassa, Mansard and Todorov, ICRA 2014, for limited commands), one iteration per tick from the last plan,
+//! which is the real-time iteration of Diehl et al. (2002). Throttle and attitude limits come from the
+//! LQI. The disturbance estimate is part of the prediction, so that there is no steady-state error.
 
 mod cost;
 mod problem;
@@ -25,13 +25,13 @@ use problem::{Problem, Trajectory};
 pub use settings::{Barrier, Settings, Start};
 use solve::Solver;
 
-/// Steps planned ahead.
+/// Horizon in steps of 10 ms.
 const STEPS: usize = 50;
 
-/// Aileron and elevator in units of the largest deflection.
+/// Aileron and elevator commands as fractions of the largest deflection.
 type Surfaces = [f64; 2];
 
-/// The planner. It takes no memory after it is built.
+/// The iLQR planner. It allocates only when it is built.
 #[derive(Clone, Debug)]
 pub struct Ilqr {
     name: &'static str,
@@ -47,12 +47,12 @@ pub struct Ilqr {
 }
 
 impl Ilqr {
-    /// A planner through `model`, beside the LQI that it is given.
+    /// A planner with `model`, which starts from and falls back on `lqi`.
     pub fn new(model: &GreyBox, lqi: Lqi) -> Ilqr {
         Ilqr::with("ilqr", model, lqi, None, Settings::PLAIN)
     }
 
-    /// The same with other settings under a name of its own, and with a policy where there is one.
+    /// A planner with other settings and its own name, and a policy as a further start where there is one.
     pub fn with(
         name: &'static str,
         model: &GreyBox,
@@ -75,7 +75,7 @@ impl Ilqr {
         }
     }
 
-    /// The first `N` steps (50 at most) of this tick's plan, aileron and elevator; `None` if none stays finite.
+    /// The first `N` steps (at most 50) of this tick's plan, aileron and elevator; `None` if no plan is finite.
     pub(crate) fn plan<const N: usize>(
         &mut self,
         seen: &Observation,
@@ -86,16 +86,16 @@ impl Ilqr {
     }
 }
 
-/// The warm start: solver, last plan and its trajectory, kept from tick to tick.
+/// State kept between ticks for the warm start: solver, last plan and its trajectory.
 #[derive(Clone, Debug)]
 struct Desk {
     solver: Solver,
-    /// The plan of the last tick.
+    /// The last tick's plan.
     plan: Option<[Surfaces; STEPS]>,
     flown: Trajectory,
 }
 
-/// What a tick may start from beside the last plan.
+/// Starting points of a tick other than the last plan.
 struct Starts<'a> {
     lqi: &'a Ahead,
     actor: Option<&'a Actor>,
@@ -104,7 +104,7 @@ struct Starts<'a> {
 }
 
 impl Desk {
-    /// The plan of this tick; `None` if no plan stays finite.
+    /// Runs this tick's iterations; `None` if no plan is finite.
     fn improve(&mut self, problem: &Problem, starts: Starts) -> Option<[Surfaces; STEPS]> {
         let (mut start, mut cost) = problem.follow(starts.lqi, &mut self.flown);
         if let Some(last) = &self.plan {
@@ -112,7 +112,7 @@ impl Desk {
             shifted.rotate_left(1);
             shifted[STEPS - 1] = shifted[STEPS - 2];
             let found = problem.fly(&shifted, self.solver.spare());
-            // a comparison with what is no number is false
+            // a comparison with NaN is false
             if found < cost || !cost.is_finite() {
                 (start, cost) = (shifted, found);
                 self.solver.swap(&mut self.flown);
@@ -166,7 +166,7 @@ impl Controller for Ilqr {
         self.lqi.look_ahead(seen, target, &mut self.ahead);
         let before = self.lqi.clone();
         let alone = self.lqi.command(seen, target);
-        // a model that does not predict is no model to plan with
+        // a model whose predictions are wrong must not be planned with
         if self.disturbance.is_wrong(TRUST) {
             self.desk.plan = None;
             return alone;

@@ -1,4 +1,4 @@
-//! What a plan costs: rollout, cost and their derivatives.
+//! The optimal control problem of a tick: rollout, cost and their derivatives.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -19,38 +19,39 @@ use greylag_physics::{Command, Controls, State};
 /// two last commanded deflections, rad.
 pub(super) const STATES: usize = 16;
 
-/// Places of the deflections and of the last commanded ones.
+/// Indices of the deflections and of the last commanded ones.
 const SURFACES: [usize; 2] = [8, 12];
 
 /// A matrix over the states.
 pub(super) type Square = SMatrix<f64, STATES, STATES>;
 /// A vector over the states.
 pub(super) type Vector = SVector<f64, STATES>;
-/// How commands act.
+/// Input matrix of aileron and elevator.
 pub(super) type Input = SMatrix<f64, STATES, 2>;
 
-/// Incidence (rad) above which it costs where the envelope does not, and its excess that is as bad as other errors.
+/// Incidence (rad) above which it costs where the envelope sets no limit, and the excess that costs as much as the
+/// other scales.
 const STALL: [f64; 2] = [0.16, 0.02];
 
-/// One tick's problem.
+/// The optimal control problem of one tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Problem<'a> {
     pub model: &'a GreyBox,
     pub seen: &'a Observation,
     pub goal: Goal,
-    /// Throttle all along, 0..1.
+    /// Constant throttle over the plan, 0..1.
     pub throttle: f64,
-    /// Rudder command all along: the LQI's.
+    /// Constant rudder command over the plan, from the LQI.
     pub rudder: f64,
     pub memory: Memory,
-    /// What the state's rate has beside the model's.
+    /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
     pub settings: &'a Settings,
-    /// Where load factor, incidence and sideslip begin to cost.
+    /// Limits from which load factor, incidence and sideslip cost.
     pub bounds: Option<Bounds>,
 }
 
-/// States and surfaces along a plan.
+/// States and deflections along a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Trajectory {
     states: Vec<State>,
@@ -71,12 +72,12 @@ impl Trajectory {
         self.states.iter()
     }
 
-    /// The difference of two trajectories at a step.
+    /// The state difference of two trajectories at a step.
     pub fn less(&self, other: &Trajectory, step: usize) -> Vector {
         self.at(step) - other.at(step)
     }
 
-    /// The state at a step.
+    /// The state vector at a step.
     pub fn at(&self, step: usize) -> Vector {
         let s = self.states[step].to_array();
         let mut x = Vector::zeros();
@@ -88,7 +89,7 @@ impl Trajectory {
     }
 }
 
-/// An aircraft on its way along a plan.
+/// The simulated aircraft of a rollout.
 struct Flight {
     state: State,
     actuators: Actuators,
@@ -116,7 +117,7 @@ impl Problem<'_> {
         flight.previous = [command, flight.previous[0]];
     }
 
-    /// Writes where `flight` is.
+    /// Writes the state of `flight` into `out` at `step`.
     fn note(&self, flight: &Flight, step: usize, out: &mut Trajectory) {
         let figures = &self.model.airframe.actuators;
         let z = flight.actuators.observed(figures);
@@ -140,12 +141,12 @@ impl Problem<'_> {
         ];
     }
 
-    /// Flies a plan; what it costs.
+    /// Simulates a plan and returns its cost.
     pub fn fly(&self, plan: &[Surfaces; STEPS], out: &mut Trajectory) -> f64 {
         self.fly_with(out, |step, _| plan[step]).1
     }
 
-    /// Flies what `choose` says at each step, given the trajectory up to there; the plan and its cost.
+    /// Simulates the commands of `choose`, which sees the trajectory so far; returns the plan and its cost.
     pub fn fly_with(
         &self,
         out: &mut Trajectory,
@@ -154,7 +155,7 @@ impl Problem<'_> {
         self.fly_choosing(out, |step, _, trajectory| choose(step, trajectory))
     }
 
-    /// Flies the LQI's own way on; its plan and what that costs.
+    /// Simulates the LQI's commands; returns its plan and cost.
     pub fn follow(&self, ahead: &Ahead, out: &mut Trajectory) -> ([Surfaces; STEPS], f64) {
         let figures = &self.model.airframe.actuators;
         let mut reference = ahead.reference();
@@ -165,7 +166,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Flies the policy's way on; its plan and what that costs.
+    /// Simulates the policy's commands; returns its plan and cost.
     pub fn follow_policy(
         &self,
         actor: &Actor,
@@ -206,7 +207,7 @@ impl Problem<'_> {
         (plan, cost)
     }
 
-    /// What each component of a state costs, with its place in the state.
+    /// Cost of each state component with its index in the state.
     fn costs(&self, s: &State) -> [(usize, Cost); 7] {
         let [p, q, r, _, beta] = self.goal.steady;
         let tau = std::f64::consts::TAU;
@@ -235,7 +236,7 @@ impl Problem<'_> {
         self.costs(state).iter().map(|(_, cost)| cost.value).sum()
     }
 
-    /// What the load factor between two states costs.
+    /// Cost of the load factor between two states.
     fn load(&self, from: &State, to: &State) -> Cost {
         match (&self.bounds, &self.settings.envelope) {
             (Some(bounds), Some(barrier)) => {
@@ -245,8 +246,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Slope and curvature of what the load factor of a step costs, with its own slope over the state before, given how that
-    /// moves on; `None` where it costs nothing.
+    /// Gradient and curvature of the load-factor cost of a step with respect to the state before it, given the
+    /// transition; `None` where it costs nothing.
     pub fn load_terms(
         &self,
         trajectory: &Trajectory,
@@ -267,7 +268,7 @@ impl Problem<'_> {
         Some((cost, slope))
     }
 
-    /// Slope and curvature of what the state costs after `step` steps.
+    /// Gradient and curvature of the state cost after `step` steps.
     pub fn stage_terms(&self, trajectory: &Trajectory, step: usize) -> (Vector, Vector) {
         let (mut slope, mut curvature) = (Vector::zeros(), Vector::zeros());
         let weight = if step == STEPS { self.settings.last } else { 1.0 };
@@ -278,15 +279,15 @@ impl Problem<'_> {
         (slope, curvature)
     }
 
-    /// Where in the state `x` the last commanded surfaces stand, with the deflection (rad) that a
-    /// command of one asks for on their side.
+    /// Indices in the state `x` of the last commanded surfaces, with the deflection (rad) of full command on their
+    /// present side.
     pub fn last_commands(&self, x: &Vector) -> [(usize, f64); 2] {
         let figures = &self.model.airframe.actuators;
         let travels = [figures.aileron.travel, figures.elevator.travel];
         std::array::from_fn(|i| (SURFACES[i] + 2, travels[i].slope(x[SURFACES[i] + 2])))
     }
 
-    /// Weight of a squared step of the command.
+    /// Weight of a squared change of the command.
     pub fn move_weight(&self) -> f64 {
         1.0 / (self.settings.moves * self.settings.moves)
     }

@@ -1,53 +1,53 @@
-//! What a plan costs, and what it starts from.
+//! Settings of iLQR: cost scales and starting points.
 
-/// Sizes of the errors that are as bad as one another (Bryson's rule), and what a tick does with them.
+/// Cost scales by Bryson's rule: errors of these sizes cost the same. Also the work per tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Attitude error, rad.
+    /// Attitude error scale, rad.
     pub attitude: f64,
-    /// Attitude error beyond which the cost grows linearly (pseudo-Huber), rad; `None`: it is quadratic throughout.
+    /// Attitude error beyond which the cost grows linearly (pseudo-Huber), rad; `None` keeps it quadratic.
     pub far: Option<f64>,
-    /// Body rates beside those of the steady turn, rad/s.
+    /// Scale of body rates relative to the steady turn, rad/s.
     pub rate: f64,
-    /// Sideslip beside the steady one, rad.
+    /// Scale of sideslip relative to the steady turn, rad.
     pub sideslip: f64,
-    /// A step of the command, in units of the largest deflection.
+    /// Scale of a change of the command, as a fraction of the largest deflection.
     pub moves: f64,
-    /// What the last state costs, in stages.
+    /// Weight of the terminal state as a multiple of a stage.
     pub last: f64,
-    /// Whether the envelope's load factor, incidence and sideslip cost where they are passed.
+    /// Soft limits on load factor, incidence and sideslip; `None` leaves them out.
     pub envelope: Option<Barrier>,
-    /// Iterations a tick.
+    /// Iterations per tick.
     pub iterations: usize,
-    /// Where a tick may start from beside the last plan and the LQI's.
+    /// Starting points other than the last plan and the LQI's.
     pub start: Start,
 }
 
-/// What passing a limit costs.
+/// Soft limits: scales of the excess over the envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Barrier {
-    /// Part of the limit from which on it costs.
+    /// Fraction of the limit from which it costs.
     pub part: f64,
-    /// Excess of the load factor that is as bad as an error of `attitude`, g.
+    /// Scale of the load-factor excess, g.
     pub load: f64,
-    /// Excess of the angle of attack, rad.
+    /// Scale of the angle-of-attack excess, rad.
     pub alpha: f64,
-    /// Excess of the sideslip, rad.
+    /// Scale of the sideslip excess, rad.
     pub sideslip: f64,
 }
 
-/// A start beside the last plan and the LQI's.
+/// Starting points other than the last plan and the LQI's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// None.
+    /// No further starting point.
     Own,
-    /// The way that the policy would fly in the model, where there is a policy.
+    /// The policy's simulated flight, where there is a policy.
     Policy,
 }
 
 impl Settings {
-    /// Those of `ilqr`. Of a few tried on every seventh target they settle as soon as any and are the steadiest in moderate
-    /// turbulence.
+    /// Settings of `ilqr`. Of a few variants on every seventh target they settle as fast as any and are the steadiest
+    /// in moderate turbulence.
     pub const PLAIN: Settings = Settings {
         attitude: 0.05,
         far: None,
@@ -59,7 +59,7 @@ impl Settings {
         iterations: 1,
         start: Start::Own,
     };
-    /// Those of `hybrid-ilqr`.
+    /// Settings of the controller `hybrid-ilqr`.
     pub const HYBRID: Settings = Settings {
         far: Some(0.15),
         envelope: Some(Barrier { part: 0.94, load: 0.05, alpha: 0.01, sideslip: 0.05 }),

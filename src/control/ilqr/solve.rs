@@ -1,17 +1,17 @@
-//! One iteration: back along the trajectory for slopes and gains, forward for a better plan.
+//! One iLQR iteration: backward pass for gains, forward pass with a line search.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::problem::{Problem, STATES, Square, Trajectory, Vector};
 use super::{STEPS, Surfaces};
 
-/// How a command answers to a state beside the trajectory.
+/// Feedback gain of the commands on the state deviation.
 type Gain = SMatrix<f64, 2, STATES>;
 
-/// Parts of the step that are tried, the largest first.
+/// Step lengths of the line search, largest first.
 const PARTS: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
 
-/// Gains and open-loop changes with their memory.
+/// Feedback gains and feed-forward changes, with scratch memory.
 #[derive(Clone, Debug)]
 pub(super) struct Solver {
     gains: Vec<Gain>,
@@ -28,18 +28,18 @@ impl Solver {
         }
     }
 
-    /// Memory for another trajectory.
+    /// Scratch memory for a second trajectory.
     pub fn spare(&mut self) -> &mut Trajectory {
         &mut self.spare
     }
 
-    /// Changes places with the spare one.
+    /// Swaps `trajectory` with the scratch trajectory.
     pub fn swap(&mut self, trajectory: &mut Trajectory) {
         std::mem::swap(&mut self.spare, trajectory);
     }
 
-    /// The best of the tried steps from `plan`, which costs `cost` along `trajectory`, and its cost; `plan` if none is
-    /// better. `trajectory` is that of the answer.
+    /// The best of the line search from `plan`, which costs `cost` along `trajectory`, with its cost; `plan` if no
+    /// step improves it. `trajectory` becomes that of the result.
     pub fn iterate(
         &mut self,
         problem: &Problem,
@@ -64,7 +64,7 @@ impl Solver {
         (plan, cost)
     }
 
-    /// Fills gains and changes; `None` if a number is lost.
+    /// Backward pass: fills gains and feed-forward changes; `None` if a value is not finite.
     fn back(
         &mut self,
         problem: &Problem,
@@ -87,7 +87,7 @@ impl Solver {
                 q_x += n * cost.slope;
                 q_xx.ger(cost.curvature, &n, &n, 1.0);
             }
-            // the cost of moving a command from the last one, which is among the states
+            // the cost of the change from the last command, which is among the states
             let x = trajectory.at(step);
             for (c, (at, unit)) in problem.last_commands(&x).into_iter().enumerate() {
                 let moved = plan[step][c] - x[at] / unit;
@@ -114,8 +114,8 @@ impl Solver {
     }
 }
 
-/// The best change within −1..1 of the commands, and its answer to the state: a command at its limit does
-/// not answer (Tassa et al. 2014, for two commands, whose sides can all be tried).
+/// Box-constrained minimiser within −1..1 and its feedback gain, zero for a command at its limit (Tassa et al. 2014;
+/// with two commands all active sets can be tried).
 fn limited(
     slope: &Vector2<f64>,
     curvature: &Matrix2<f64>,

@@ -1,4 +1,4 @@
-//! The LQI as imagined aircraft fly it: its laws over the coming steps, evaluated in lanes.
+//! The LQI's control law over the coming steps, evaluated for many simulated aircraft in lanes.
 
 use super::design::{RUDDER_STATES, STATES};
 use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING};
@@ -9,10 +9,10 @@ use greylag_physics::airframe::Incidence;
 use greylag_physics::servos::ActuatorFigures;
 use greylag_physics::{ActuatorState, Airframe, Command, State};
 
-/// The law of one condition: the gain, and the steady flight that it holds.
+/// The gain of one flight condition and its steady state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Law {
-    /// Rows aileron and elevator.
+    /// Gain rows of aileron and elevator.
     gain: [[f64; STATES]; 2],
     /// p q r α β of the steady condition, rad/s and rad.
     steady: [f64; 5],
@@ -20,40 +20,40 @@ pub(super) struct Law {
     deflection: [f64; 2],
     /// Throttle that holds it, 0..1.
     throttle: f64,
-    /// Of an aircraft with a rudder.
+    /// The rudder's law, for an aircraft with a rudder.
     rudder: Option<RudderLaw>,
 }
 
-/// What a rudder adds to the law of one condition.
+/// The rudder's part of the gain of one flight condition.
 #[derive(Clone, Copy, Debug)]
 struct RudderLaw {
-    /// Rows aileron and elevator on the rudder's states.
+    /// Gains of aileron and elevator on the rudder's states.
     coupling: [[f64; RUDDER_STATES]; 2],
-    /// The rudder's row.
+    /// Gain row of the rudder.
     row: [f64; STATES],
     own: [f64; RUDDER_STATES],
     /// Rudder that holds the condition, rad.
     deflection: f64,
 }
 
-/// The surfaces that a law commands: how commands become deflections, and what pushes the nose down.
+/// Figures that convert deflections to commands, with the sign of the elevator.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfaces {
     pub figures: ActuatorFigures,
     pub incidence: Incidence,
 }
 
-/// What the law feeds back besides attitude and rates: rad and rad s.
+/// Reference and integrator states of the law, rad and rad s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inner<R> {
-    /// Reference roll and pitch.
+    /// Reference roll and pitch, rad.
     pub reference: [R; 2],
-    /// Integrals of their errors.
+    /// Integrals of the roll and pitch errors, rad s.
     pub integral: [R; 2],
 }
 
 impl Surfaces {
-    /// Those of an aircraft.
+    /// The surfaces of an airframe file.
     pub(super) fn of(airframe: &Airframe) -> Surfaces {
         Surfaces { figures: airframe.actuators, incidence: airframe.incidence }
     }
@@ -68,7 +68,7 @@ impl Law {
         rudder: None,
     };
 
-    /// Aileron, elevator and rudder as commands, not limited.
+    /// Commands of aileron, elevator and rudder, not limited.
     #[inline(always)]
     pub(super) fn surfaces<R: Real>(
         &self,
@@ -134,7 +134,7 @@ impl Law {
 }
 
 impl RudderLaw {
-    /// The rudder's deflection (rad) about `held`; what its states ask of aileron and elevator joins `u`.
+    /// The rudder's deflection (rad) about `held`; its states' contribution to aileron and elevator is added to `u`.
     #[inline(always)]
     fn act<R: Real>(&self, held: R, x: &[R; STATES], y: &[R; RUDDER_STATES], u: &mut [R; 2]) -> R {
         let mut yaw = held;
@@ -173,11 +173,11 @@ impl From<Entry> for Law {
     }
 }
 
-/// Steps over which one law holds.
+/// Steps for which one gain is held.
 pub(super) const HOLD: usize = 5;
 
-/// The LQI from some tick on, as far as it does not depend on the aircraft that flies it: the schedule
-/// is followed along the reference, at the airspeed of the tick; the integrals stand still.
+/// The part of the LQI's future that does not depend on the simulated aircraft: the gains scheduled along the
+/// reference, at the tick's airspeed, with constant integrators.
 #[derive(Clone, Debug)]
 pub(crate) struct Ahead {
     pub(super) laws: Vec<Law>,
@@ -190,7 +190,7 @@ pub(crate) struct Ahead {
 }
 
 impl Ahead {
-    /// Room for `steps` steps of an aircraft.
+    /// Allocates `steps` steps for an aircraft.
     pub(crate) fn new(steps: usize, airframe: &Airframe) -> Ahead {
         Ahead {
             laws: vec![Law::NONE; steps.div_ceil(HOLD)],
@@ -203,18 +203,18 @@ impl Ahead {
         }
     }
 
-    /// Steps looked ahead.
+    /// Number of steps ahead.
     #[inline(always)]
     pub(crate) fn steps(&self) -> usize {
         self.steps
     }
 
-    /// Roll and pitch (rad) of the LQI's own reference at the first step.
+    /// Roll and pitch (rad) of the LQI's reference at the first step.
     pub(crate) fn reference(&self) -> [f64; 2] {
         self.inner.reference
     }
 
-    /// The command at `step` of an aircraft; its `reference` (rad) moves on.
+    /// The command at `step` for a simulated aircraft; advances its `reference` (rad).
     #[inline(always)]
     pub(crate) fn command<R: Real>(
         &self,

@@ -1,4 +1,4 @@
-//! One LQI design: the gain that holds one flight condition.
+//! LQI design at one flight condition.
 
 use nalgebra::{RowSVector, SMatrix, SVector};
 
@@ -10,32 +10,32 @@ use greylag_physics::servos::Surface;
 /// step ago with the two last commanded deflections, then ∫φ and ∫θ.
 pub(super) const STATES: usize = 17;
 
-/// Further states of a design with a rudder: its deflection now and one step ago with the two last
-/// commanded deflections.
+/// Additional states of a design with a rudder: its deflection now and one step ago, and the two last commanded
+/// deflections.
 pub(super) const RUDDER_STATES: usize = 4;
 pub(super) const ALL: usize = STATES + RUDDER_STATES;
 
-/// The gain of one condition.
+/// The LQI gain at one flight condition.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gain {
     /// Rows aileron and elevator (rad).
     pub surfaces: SMatrix<f64, 2, STATES>,
-    /// Of an aircraft with a rudder.
+    /// The rudder's part, for an aircraft with a rudder.
     pub rudder: Option<RudderGain>,
 }
 
-/// What a rudder adds to the gain of one condition.
+/// The rudder's part of the gain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RudderGain {
-    /// Rows aileron and elevator on the rudder's states.
+    /// Gains of aileron and elevator on the rudder's states.
     pub coupling: SMatrix<f64, 2, RUDDER_STATES>,
-    /// The rudder's row on all states but its own, then on those.
+    /// Gains of the rudder on all states but its own, then on its own.
     pub row: RowSVector<f64, STATES>,
     pub own: RowSVector<f64, RUDDER_STATES>,
 }
 
 impl Gain {
-    /// No feedback; with a rudder or without.
+    /// Zero gain, with or without a rudder.
     pub fn zeros(with_rudder: bool) -> Gain {
         let rudder = with_rudder.then(|| RudderGain {
             coupling: SMatrix::zeros(),
@@ -45,7 +45,7 @@ impl Gain {
         Gain { surfaces: SMatrix::zeros(), rudder }
     }
 
-    /// Adds `part` of `other`.
+    /// Adds `other`, scaled by `part`.
     pub fn add(&mut self, other: &Gain, part: f64) {
         self.surfaces += other.surfaces * part;
         if let (Some(rudder), Some(other)) = (&mut self.rudder, &other.rudder) {
@@ -56,31 +56,31 @@ impl Gain {
     }
 }
 
-/// Places of φ θ p q r α β in the state of eq. (4): airspeed is scheduled on, not fed back.
+/// Indices of φ θ p q r α β in the state of eq. (4): airspeed is a scheduling variable, not fed back.
 const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
 
-/// Sizes of the errors that are as bad as one another (Bryson's rule): the cost of each is one over the square of its
-/// field here, so a larger number is a softer loop.
+/// Cost scales by Bryson's rule: the weight of each term is one over the square of its field, so that a larger value
+/// gives a softer loop.
 ///
-/// Found on the `jsbsim` model by settled error over the target file; the figures are forgiving.
+/// Tuned on the `jsbsim` model by the settled error over the target file; the result is not sensitive to them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
-    /// Attitude error, rad.
+    /// Attitude error scale, rad.
     pub attitude: f64,
     /// Integrated attitude error, rad s.
     pub integral: f64,
-    /// Body rate, rad/s.
+    /// Body rate scale, rad/s.
     pub rate: f64,
-    /// Sideslip, rad, where no rudder holds it.
+    /// Sideslip scale without a rudder, rad.
     pub sideslip: f64,
-    /// Sideslip, rad, of an aircraft with a rudder.
+    /// Sideslip scale with a rudder, rad.
     pub sideslip_by_rudder: f64,
-    /// Commanded deflection away from trim, rad.
+    /// Scale of the commanded deflection relative to trim, rad.
     pub deflection: f64,
 }
 
 impl Weights {
-    /// Those of the default design.
+    /// Weights of the default design.
     pub const DEFAULT: Weights = Weights {
         attitude: 0.05,
         integral: 0.02,
@@ -89,14 +89,14 @@ impl Weights {
         sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
-    /// Softer loops that bear more delay: the pitch loop 104 ms where the default bears 46, and 78 where
-    /// it bears 32 (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Softer still
-    /// (0.15, 0.1, 0.15) bears 200 ms.
+    /// Weights of softer loops with more delay margin: 104 ms in pitch where the default has 46, and 78 where it has
+    /// 32 (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Softer weights still (0.15, 0.1,
+    /// 0.15) have 200 ms.
     pub const DAMPED: Weights =
         Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }
 
-/// The gain that holds `trim`, or `None` if the model cannot be stabilised there.
+/// The gain at `trim`; `None` if the model cannot be stabilised there.
 pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Gain> {
     Some(match loops(model, trim, altitude, w)? {
         Loops::Two(_, _, k) => Gain { surfaces: k, rudder: None },
@@ -111,20 +111,20 @@ pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -
     })
 }
 
-/// A linear system with the gain that closes its loops: x₊ = a x + b u, u = −k x.
+/// A linear system with its state-feedback gain: x₊ = a x + b u, u = −k x.
 type Closed<const N: usize, const M: usize> =
     (SMatrix<f64, N, N>, SMatrix<f64, N, M>, SMatrix<f64, M, N>);
 
-/// The loops of one condition.
+/// Linear system and gain of one flight condition.
 #[expect(clippy::large_enum_variant, reason = "one lives at a time, while a gain is designed")]
 pub(super) enum Loops {
-    /// Aileron and elevator.
+    /// Two inputs: aileron and elevator.
     Two(SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 2>, SMatrix<f64, 2, STATES>),
-    /// Aileron, elevator and rudder.
+    /// Three inputs: aileron, elevator and rudder.
     Three(SMatrix<f64, ALL, ALL>, SMatrix<f64, ALL, 3>, SMatrix<f64, 3, ALL>),
 }
 
-/// The loops that hold `trim`, or `None` if the model cannot be stabilised there.
+/// Linear system and gain at `trim`; `None` if the model cannot be stabilised there.
 pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Loops> {
     let linear = linearise(model, trim, altitude);
     let figures = &model.airframe.actuators;
@@ -142,10 +142,10 @@ pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) ->
     }
 }
 
-/// A surface of the design: its column in the linear model, the place of its states, its filter.
+/// A surface of the design: its column in the linear model, the index of its states, its actuator filter.
 type Actuated<'a> = (usize, usize, &'a Surface);
 
-/// The system of N states under M `surfaces` with its gain.
+/// Solves the design of N states and M `surfaces`.
 fn solve<const N: usize, const M: usize>(
     linear: &Linear,
     surfaces: [Actuated; M],

@@ -1,4 +1,4 @@
-//! The gain schedule: trims with their gains over airspeed, roll and pitch.
+//! The gain schedule: trims and gains over airspeed, roll and pitch.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use greylag_model::{GreyBox, Trim};
 use greylag_physics::State;
 use greylag_physics::airframe::{Envelope, Incidence};
 
-/// Equally spaced values of one scheduling variable.
+/// Equally spaced grid values of one scheduling variable.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     first: f64,
@@ -16,11 +16,11 @@ struct Axis {
     count: usize,
 }
 
-/// Designs over the airspeed.
+/// Number of designs over airspeed.
 const AIRSPEEDS: usize = 20;
-/// Spacing of the designs over roll and pitch, degrees.
+/// Grid spacing over roll and pitch, degrees.
 const SPACING_DEG: f64 = 10.0;
-/// Last spacing: there is no steady turn at 90°.
+/// The grid's last interval, degrees: there is no steady turn at 90°.
 const STEEPEST: f64 = 8.0;
 
 /// Airspeed in m/s, roll in rad, pitch in rad: the envelope with a margin, in whole spacings.
@@ -55,7 +55,7 @@ impl Grid {
     }
 }
 
-/// What the schedule holds at a point.
+/// The schedule's value at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     /// φ θ p q r α β of the steady condition, rad and rad/s.
@@ -64,23 +64,23 @@ pub(super) struct Entry {
     pub deflection: [f64; 3],
     /// Throttle that holds it, 0..1.
     pub throttle: f64,
-    /// The gain there.
+    /// The gain at this point.
     pub gain: Gain,
 }
 
-/// Entries over the grid, airspeed slowest, with the smallest airspeeds per attitude.
+/// Grid entries, airspeed varying slowest, with the minimum airspeeds of each attitude.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
     grid: Grid,
     entries: Vec<Entry>,
-    /// Airspeed (m/s) from which on each attitude can be held with a margin before the stall.
+    /// Minimum airspeed (m/s) of each attitude with a margin before the stall.
     comfortable: Vec<f64>,
-    /// Airspeed (m/s) from which on it can be held at all.
+    /// Minimum airspeed (m/s) of each attitude without a margin.
     tolerable: Vec<f64>,
 }
 
 impl Axis {
-    /// From `low` to `high` spacings of an angle.
+    /// An angle's grid, from `low` to `high` spacings.
     fn attitude(low: f64, high: f64) -> Axis {
         // 30° at a time, so that those angles are exact
         let first = low / 3.0 * std::f64::consts::FRAC_PI_6;
@@ -91,7 +91,7 @@ impl Axis {
         self.first + self.step * index as f64
     }
 
-    /// The lower neighbour of `x` with the share of the upper one, held at the ends.
+    /// The lower neighbour of `x` and the weight of the upper one, clamped at the ends.
     fn place(self, x: f64) -> (usize, f64) {
         let place = ((x - self.first) / self.step).clamp(0.0, (self.count - 1) as f64);
         let low = (place as usize).min(self.count - 2);
@@ -102,7 +102,7 @@ impl Axis {
 impl Schedule {
     /// Designs the whole grid from `model`, on all cores.
     ///
-    /// A condition that cannot be trimmed takes the design of the next higher airspeed.
+    /// A grid point without a trim takes the design of the next higher airspeed.
     pub(super) fn new(model: &GreyBox, weights: &Weights) -> Result<Schedule, SetupError> {
         let grid = Grid::over(&model.airframe.envelope);
         let all = (0..grid.attitudes()).into_par_iter();
@@ -153,12 +153,12 @@ impl Schedule {
         sum
     }
 
-    /// The airspeed (m/s) from which on the attitude can be held with a margin before the stall.
+    /// The minimum airspeed (m/s) of an attitude with a margin before the stall.
     pub(super) fn comfortable_airspeed(&self, roll: f64, pitch: f64) -> f64 {
         self.over_attitude(&self.comfortable, roll, pitch)
     }
 
-    /// The part (0..=1) of `roll` that `airspeed` (m/s) allows at `pitch`.
+    /// The fraction (0..=1) of `roll` that `airspeed` (m/s) allows at `pitch`.
     pub(super) fn tolerable_part(&self, airspeed: f64, roll: f64, pitch: f64) -> f64 {
         let allowed =
             |part: f64| self.over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;
@@ -173,7 +173,7 @@ impl Schedule {
         low
     }
 
-    /// Bilinear interpolation of one number per attitude.
+    /// Bilinear interpolation over roll and pitch.
     fn over_attitude(&self, values: &[f64], roll: f64, pitch: f64) -> f64 {
         let Grid { roll: rolls, pitch: pitches, .. } = self.grid;
         let ((i, x), (j, y)) = (rolls.place(roll), pitches.place(pitch));
@@ -183,8 +183,8 @@ impl Schedule {
     }
 }
 
-/// The lowest airspeed (m/s) of a column that needs no more incidence than `alpha` (rad), linear
-/// between designs; the highest of the grid if none does.
+/// The lowest airspeed (m/s) of a column whose incidence is at most `alpha` (rad), linear between designs; the grid's
+/// highest if there is none.
 fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
     let airspeeds = grid.airspeed;
     let needs = |k: usize| column[k].map(|entry| entry.steady[5]);
@@ -199,7 +199,7 @@ fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
     }
 }
 
-/// The designs of one attitude over airspeed; `None` where there is none.
+/// The designs of one attitude over airspeed; `None` where the design fails.
 fn column(model: &GreyBox, grid: &Grid, index: usize, weights: &Weights) -> Vec<Option<Entry>> {
     let (roll, pitch) = grid.attitude(index);
     let altitude = model.airframe.reference.altitude;
@@ -224,7 +224,7 @@ fn column(model: &GreyBox, grid: &Grid, index: usize, weights: &Weights) -> Vec<
         .collect()
 }
 
-/// The design at airspeed `k`, or the next one above, or the highest there is.
+/// The design at airspeed `k`, else the next one above, else the highest.
 fn nearest(column: &[Option<Entry>], k: usize) -> Option<Entry> {
     column[k..].iter().flatten().next().or_else(|| column.iter().flatten().last()).copied()
 }

@@ -1,4 +1,4 @@
-//! How much gain, phase lag and delay each loop of an LQI bears, the other loops closed.
+//! Gain, phase and delay margins of each LQI loop, with the other loops closed.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,48 +9,49 @@ use super::Weights;
 use super::design::{ALL, Loops, STATES, loops};
 use greylag_model::{GreyBox, STEP, Trim, TrimError};
 
-/// Frequencies at which a loop is looked at, from [`LOWEST`] to half the sampling frequency.
+/// Number of frequencies of the loop transfer function, from [`LOWEST`] to half the sampling frequency.
 const FREQUENCIES: usize = 1500;
-/// Lowest frequency, rad/s.
+/// Lowest frequency evaluated, rad/s.
 const LOWEST: f64 = 0.05;
 
-/// What one loop bears.
+/// Stability margins of one loop, the others closed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoopMargins {
-    /// The surface whose command is the loop's.
+    /// The surface at which the loop is opened.
     pub surface: &'static str,
-    /// Factors on the loop's gain between which it stays stable; infinite without an upper one.
+    /// Gain factors between which the loop stays stable; infinite without an upper limit.
     pub gain: [f64; 2],
-    /// Phase lag that it bears, rad.
+    /// Phase margin, rad.
     pub phase: f64,
-    /// Delay that it bears, s.
+    /// Delay margin, s.
     pub delay: f64,
-    /// Frequency at which it crosses a gain of one last, rad/s.
+    /// Highest gain crossover frequency, rad/s.
     pub crossover: f64,
 }
 
-/// Why there are no margins.
+/// Margins could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MarginsError {
-    /// The flight condition does not exist.
+    /// There is no trim at this flight condition.
     #[error(transparent)]
     Trim(#[from] TrimError),
-    /// No gain stabilises it.
+    /// No gain stabilises the flight condition.
     #[error(
         "model {model} cannot be stabilised at {airspeed_mps:.1} m/s: see that its surfaces act"
     )]
     Unstable {
-        /// The model's name.
+        /// Name of the model.
         model: String,
-        /// The airspeed.
+        /// Airspeed of the flight condition, m/s.
         airspeed_mps: f64,
     },
 }
 
-/// The margins of the LQI of `model` in straight flight at `airspeed` (m/s): aileron, elevator, rudder.
+/// The margins of `model`'s LQI loops in straight flight at `airspeed` (m/s): aileron, elevator, rudder.
 ///
 /// # Errors
-/// If the model cannot fly straight there, or not be stabilised.
+///
+/// If the model has no straight-flight trim there, or cannot be stabilised.
 pub fn margins(
     model: &GreyBox,
     airspeed: f64,
@@ -74,7 +75,7 @@ fn each<const N: usize, const M: usize>(
     (0..M).map(|i| of_loop(names[i], &ratio(a, b, k, i))).collect()
 }
 
-/// The return ratio over frequency (rad/s) of the loop of input `broken`.
+/// The loop transfer function over frequency (rad/s), opened at input `broken`.
 fn ratio<const N: usize, const M: usize>(
     a: &SMatrix<f64, N, N>,
     b: &SMatrix<f64, N, M>,
@@ -103,7 +104,7 @@ fn ratio<const N: usize, const M: usize>(
     (0..FREQUENCIES).filter_map(at).collect()
 }
 
-/// The margins of a loop by its return ratio, between whose samples lines are drawn.
+/// The margins of a loop from its sampled transfer function, interpolated linearly.
 fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins {
     let mut margins = LoopMargins {
         surface,
@@ -114,7 +115,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
     };
     for pair in ratio.windows(2) {
         let ((w0, l0), (w1, l1)) = (pair[0], pair[1]);
-        // the loop's gain passes one
+        // gain crossover
         if (l0.norm() - 1.0) * (l1.norm() - 1.0) <= 0.0 && l0.norm() != l1.norm() {
             let part = (1.0 - l0.norm()) / (l1.norm() - l0.norm());
             let (w, l) = (w0 + part * (w1 - w0), l0 + (l1 - l0) * Complex::from(part));
@@ -123,7 +124,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
             margins.delay = margins.delay.min(lag / w);
             margins.crossover = margins.crossover.max(w);
         }
-        // it passes the negative real axis
+        // phase crossover
         if l0.im * l1.im <= 0.0 && l0.im != l1.im {
             let part = l0.im / (l0.im - l1.im);
             let real = l0.re + part * (l1.re - l0.re);
@@ -140,7 +141,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
 }
 
 impl LoopMargins {
-    /// The loop passes −1 if its gain is multiplied by `factor`.
+    /// Records a gain margin: multiplied by `factor`, the loop passes through −1.
     fn note_gain(&mut self, factor: f64) {
         let [least, most] = &mut self.gain;
         if factor < 1.0 { *least = least.max(factor) } else { *most = most.min(factor) }

@@ -18,22 +18,22 @@ use greylag_model::{GreyBox, STEP};
 use greylag_physics::Command;
 pub use margins::{LoopMargins, MarginsError, margins};
 
-/// Largest rate of the roll reference, rad/s: commanded steps become ramps that the surfaces can
-/// follow, so the integrators never see a large error.
+/// Largest rate of the roll reference, rad/s: command steps become ramps that the surfaces can follow, so that the
+/// integrators see small errors.
 const ROLL_RATE: f64 = 0.8;
 /// Largest rate of the pitch reference, rad/s.
 const PITCH_RATE: f64 = 0.5;
-/// Time constant that rounds the ramps' ends, s.
+/// Time constant of the filter that rounds the ramps, s.
 const ROUNDING: f64 = 0.35;
-/// Throttle per m/s of airspeed error.
+/// Proportional gain of airspeed to throttle, s/m.
 const AIRSPEED_KP: f64 = 0.3;
-/// Throttle per second and m/s of airspeed error, so per metre.
+/// Integral gain of airspeed to throttle, 1/m.
 const AIRSPEED_KI: f64 = 0.05;
 
-/// Where an LQI flies to.
+/// The steady state that the law regulates to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Goal {
-    /// Roll and pitch, rad, as far as the airspeed allows.
+    /// Reference roll and pitch, rad, limited by the airspeed.
     pub attitude: [f64; 2],
     /// p q r α β of the steady flight there, rad/s and rad.
     pub steady: [f64; 5],
@@ -51,19 +51,21 @@ pub struct Lqi {
 }
 
 impl Lqi {
-    /// Designs the controller for `model` over its envelope with a margin. A rudder holds sideslip at
-    /// zero; without one, turns have the sideslip that balances them.
+    /// Designs the controller for `model` over its envelope with a margin. With a rudder the sideslip is held at
+    /// zero; without one a turn has the sideslip of its equilibrium.
     ///
     /// # Errors
+    ///
     /// If the model cannot be trimmed or stabilised at some attitude at any airspeed.
     pub fn new(model: &GreyBox) -> Result<Lqi, SetupError> {
         Lqi::weighted("lqi", model, &Weights::DEFAULT)
     }
 
-    /// The same with other weights, under a name of its own.
+    /// Designs with other weights, under its own name.
     ///
     /// # Errors
-    /// As [`Lqi::new`].
+    ///
+    /// The same as [`Lqi::new`].
     pub fn weighted(
         name: &'static str,
         model: &GreyBox,
@@ -79,7 +81,7 @@ impl Lqi {
         })
     }
 
-    /// Moves the reference towards the target, and returns it.
+    /// Advances the reference towards the target and returns it.
     fn follow(&mut self, seen: &Observation, target: &Target) -> [f64; 2] {
         let mut reference = self.reference.unwrap_or([seen.state.roll, seen.state.pitch]);
         let wanted = self.wanted(seen, target);
@@ -93,26 +95,26 @@ impl Lqi {
         reference
     }
 
-    /// The attitude that the reference moves to: too slow for the bank asked for, bank as far as the
-    /// airspeed allows, and more with it.
+    /// The attitude that the reference moves to: below the airspeed that the commanded bank needs, the bank is
+    /// reduced.
     fn wanted(&self, seen: &Observation, target: &Target) -> [f64; 2] {
         let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
         [part * target.roll, target.pitch]
     }
 
-    /// The airspeed to hold (m/s): the target's, or what the attitude needs.
+    /// The airspeed to hold (m/s): the target's, or the minimum of the attitude if that is higher.
     fn airspeed(&self, target: &Target) -> f64 {
         self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed)
     }
 
-    /// Where it flies to from `seen`.
+    /// The steady state to regulate to from `seen`.
     pub(crate) fn goal(&self, seen: &Observation, target: &Target) -> Goal {
         let attitude @ [roll, pitch] = self.wanted(seen, target);
         let [_, _, steady @ ..] = self.schedule.at(seen.state.airspeed, roll, pitch).steady;
         Goal { attitude, steady }
     }
 
-    /// Writes into `ahead` how the LQI would fly on from `seen`.
+    /// Writes the LQI's law over the coming steps from `seen` into `ahead`.
     pub(crate) fn look_ahead(&self, seen: &Observation, target: &Target, ahead: &mut Ahead) {
         let mut follower = self.clone();
         let now = [seen.state.roll, seen.state.pitch];
@@ -130,8 +132,8 @@ impl Lqi {
         }
     }
 
-    /// Takes over from another controller that has flown instead: the reference goes on from where the
-    /// aircraft is, the integrals from where they were.
+    /// Takes over after another controller has flown: the reference starts at the present attitude, the integrators
+    /// keep the values in `before`.
     pub(crate) fn hand_over(&mut self, before: &Lqi, seen: &Observation) {
         self.integral = before.integral;
         self.reference = Some([seen.state.roll, seen.state.pitch]);

@@ -12,95 +12,96 @@ use greylag_model::weights;
 use greylag_num::Dense;
 use greylag_physics::Airframe;
 
-/// The files of a folder, the actor last: where it is, the others are.
+/// The files of a policy folder, the actor last: its presence implies the others.
 const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
 
-/// Place of the actor among them.
+/// Index of the actor in [`FILES`].
 const ACTOR: usize = 2;
 
-/// What each of a policy's files says of where it comes from.
+/// Provenance of a policy, stored in the header of each of its files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Layout of the files: [`Origin::SCHEMA`].
+    /// Schema of the file header: [`Origin::SCHEMA`].
     pub schema: String,
-    /// Fingerprint of the airframe that it flies, see [`fingerprint`].
+    /// Fingerprint of the airframe it was trained for, see [`fingerprint`].
     pub airframe: String,
     /// Name of the model it was trained in, or `jsbsim`.
     pub model: String,
     /// SHA-256 of that model's files, hexadecimal; empty for JSBSim.
     pub model_sha256: String,
-    /// Seed of the training.
+    /// Random seed of the training run.
     pub seed: u64,
-    /// Steps of the environment that it was trained for.
+    /// Environment steps of the training run.
     pub steps: u64,
-    /// Its evaluation at the end of training, if there was one.
+    /// Evaluation at the end of training; `None` if there was none.
     pub evaluation: Option<Evaluated>,
     /// The program that trained it, with its version.
     pub program: String,
 }
 
-/// What a policy reached at the end of its training, in what it was trained in.
+/// Evaluation of a policy at the end of its training, in the training environment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evaluated {
-    /// Targets flown.
+    /// Number of targets flown.
     pub targets: usize,
-    /// Mean settled error on easy ones, degrees.
+    /// Mean settled error on easy targets, degrees.
     pub easy_deg: f64,
-    /// Mean settled error on hard ones, degrees.
+    /// Mean settled error on hard targets, degrees.
     pub hard_deg: f64,
-    /// Share of targets that were lost.
+    /// Fraction of the targets on which the aircraft was lost.
     pub divergence_rate: f64,
 }
 
-/// Why a policy cannot be used.
+/// A policy folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
     /// A file cannot be read.
     #[error("cannot read policy {path}: {why}; a policy folder holds {}, or the last one alone", FILES.join(", "), path = path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// A file is none of a policy's.
+    /// A file is not a valid policy file.
     #[error("policy {path}: {why}; train it again with `greylag train policy`", path = path.display())]
     Content {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is invalid in it.
         why: String,
     },
-    /// It was trained for another aircraft.
+    /// The policy was trained for another airframe.
     #[error("policy {path} was trained for another airframe than {airframe}; fly it with the airframe of model {model}, train one for this with `greylag train policy --env model:FILE`, or fly hybrid-lqi or lqi, which need none", path = path.display())]
     Airframe {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// The airframe's name.
+        /// Name of the airframe to be flown.
         airframe: String,
-        /// The model it was trained in.
+        /// The model that the policy was trained in.
         model: String,
     },
-    /// Its files are of several trainings.
+    /// The files come from different training runs.
     #[error("policy {path}: its files come from different trainings; copy all of {} from one", FILES.join(", "), path = path.display())]
     Mixed {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
 }
 
 impl Origin {
-    /// The layout that this program reads and writes.
+    /// The schema that this program reads and writes.
     pub const SCHEMA: &'static str = "greylag.policy/1";
 }
 
 impl Agent {
-    /// The files of a folder in the order they are to be written, each with its name.
+    /// The files of a policy folder in the order in which they are to be written, each with its name.
     ///
     /// # Errors
-    /// What the writer of the format says.
+    ///
+    /// The serialisation error of safetensors.
     pub fn to_files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SafeTensorError> {
         let critics = self.critics.iter().flat_map(|both| both.iter().map(Critic::network));
         let first = if self.critics.is_some() { 0 } else { ACTOR };
@@ -112,10 +113,11 @@ impl Agent {
             .collect()
     }
 
-    /// Reads the policy in `folder` for `airframe`: its actor, and its critics unless it has neither.
+    /// Loads the policy in `folder` for `airframe`: its actor, and both critics unless neither exists.
     ///
     /// # Errors
-    /// A file is missing, none of a policy's, or of another airframe or training than the others.
+    ///
+    /// A file is missing, invalid, or of another airframe or training run.
     pub fn load(folder: &Path, airframe: &Airframe) -> Result<Agent, AgentError> {
         let alone = FILES[..ACTOR].iter().all(|name| !folder.join(name).exists());
         let (actor, origin) = read(&folder.join(FILES[ACTOR]))?;
@@ -143,7 +145,7 @@ impl Agent {
     }
 }
 
-/// The network of a file and what it says of itself.
+/// The network of a file with its provenance.
 fn read(path: &Path) -> Result<(Dense, Origin), AgentError> {
     let bytes = std::fs::read(path).map_err(|why| AgentError::Read { path: path.into(), why })?;
     let content = |why: String| AgentError::Content { path: path.into(), why };

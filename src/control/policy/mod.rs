@@ -1,6 +1,6 @@
-//! A trained policy: what it observes, its networks, its files, and the controller that flies it.
+//! A trained policy: its observation, networks, files, and the controller that flies it.
 //!
-//! Section IV-B of \[GSFM26\]. Training lives in `learn`; nothing of it is needed to fly.
+//! Section IV-B of \[GSFM26\]. Training lives in `learn` and is not needed to fly.
 
 mod file;
 mod networks;
@@ -16,18 +16,18 @@ use crate::{Controller, Observation, Target};
 use greylag_num::dense::Units;
 use greylag_physics::Command;
 
-/// The networks of a policy with what its files say of it.
+/// The networks of a policy with their provenance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Agent {
-    /// π.
+    /// The actor network π.
     pub actor: Arc<Actor>,
-    /// Q1, Q2; a policy that flies alone needs none.
+    /// The twin critics Q1 and Q2; not needed to fly the policy alone.
     pub critics: Option<Arc<[Critic; 2]>>,
-    /// Where it comes from.
+    /// Provenance stored in its files.
     pub origin: Origin,
 }
 
-/// The controller: the actor's answer at every tick.
+/// The controller that flies the actor's action at every tick.
 #[derive(Clone, Debug)]
 pub struct Policy {
     actor: Arc<Actor>,
@@ -35,12 +35,12 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// The policy of `agent`.
+    /// A controller for the actor of `agent`.
     pub fn new(agent: &Agent) -> Policy {
         Policy::of(agent.actor.clone())
     }
 
-    /// The policy of an actor.
+    /// A controller for `actor`.
     pub fn of(actor: Arc<Actor>) -> Policy {
         Policy { actor, units: Units::new(0.0) }
     }

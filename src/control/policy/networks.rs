@@ -8,10 +8,10 @@ use greylag_physics::Command;
 /// Components of an action: aileron, elevator and throttle, each in −1..1 (eq. 29 of \[GSFM26\]).
 pub const ACTIONS: usize = 3;
 
-/// Aircraft of a block.
+/// Number of aircraft in a block.
 const WIDTH: usize = 16;
 
-/// Why a network is none of a policy's.
+/// A network has the wrong shape for a policy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what} takes a network of {inputs} inputs and {outputs} outputs, not {found:?}{why}")]
 pub struct ShapeError {
@@ -22,19 +22,19 @@ pub struct ShapeError {
     why: &'static str,
 }
 
-/// π: from an observation to an action.
+/// The actor π: from an observation to an action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actor {
     network: Dense,
 }
 
-/// Q: from an observation and an action to the return expected from there on.
+/// A critic Q: from an observation and an action to the expected return.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Critic {
     network: Dense,
 }
 
-/// Refuses a network that has not the inputs and outputs it takes.
+/// Checks the numbers of inputs and outputs of a network.
 fn check(
     what: &'static str,
     inputs: usize,
@@ -53,7 +53,7 @@ fn check(
     Err(ShapeError { what, inputs, outputs, found: found.into(), why })
 }
 
-/// The command that an action stands for; throttle = (a + 1)/2. A policy does not steer a rudder.
+/// The command of an action; throttle = (a + 1)/2. A policy does not command the rudder.
 #[inline(always)]
 pub fn command<R: Real>([aileron, elevator, thrust]: [R; ACTIONS]) -> Command<R> {
     let throttle = (thrust + R::from_f64(1.0)).scale(0.5);
@@ -61,20 +61,21 @@ pub fn command<R: Real>([aileron, elevator, thrust]: [R; ACTIONS]) -> Command<R>
 }
 
 impl Actor {
-    /// The actor of a network, tanh being added after its last layer.
+    /// The actor of a network; tanh is applied after its last layer.
     ///
     /// # Errors
-    /// If the network has other inputs or outputs.
+    ///
+    /// If the number of inputs or outputs differs.
     pub fn new(network: Dense) -> Result<Actor, ShapeError> {
         check("an actor", OBSERVATIONS, ACTIONS, network).map(|network| Actor { network })
     }
 
-    /// The network, without the tanh.
+    /// The network without the final tanh.
     pub fn network(&self) -> &Dense {
         &self.network
     }
 
-    /// The network, to be trained. Whoever writes keeps it finite.
+    /// The network for training. The caller keeps its weights finite.
     pub fn network_mut(&mut self) -> &mut Dense {
         &mut self.network
     }
@@ -86,8 +87,8 @@ impl Actor {
         [answer[0].tanh(), answer[1].tanh(), answer[2].tanh()]
     }
 
-    /// The action of a single observation, in the widest vectors that the processor has; no operation
-    /// is fused or reordered between them, so all give the same numbers to the bit.
+    /// The action of a single observation, in the processor's widest vectors; no operation is fused or reordered, so
+    /// that all instruction sets agree to the bit.
     pub fn act_one(
         &self,
         units: &mut Units<f32>,
@@ -155,12 +156,13 @@ impl Critic {
     /// The critic of a network.
     ///
     /// # Errors
-    /// If the network has other inputs or outputs.
+    ///
+    /// If the number of inputs or outputs differs.
     pub fn new(network: Dense) -> Result<Critic, ShapeError> {
         check("a critic", OBSERVATIONS + ACTIONS, 1, network).map(|network| Critic { network })
     }
 
-    /// The network.
+    /// The underlying network.
     pub fn network(&self) -> &Dense {
         &self.network
     }

@@ -1,24 +1,24 @@
-//! What a policy observes: the fifteen numbers of eq. (28) of \[GSFM26\] with the airspeed error, of order one.
+//! Observation of a policy: the fifteen numbers of eq. (28) of \[GSFM26\] with the airspeed error, of order one.
 
 use crate::Target;
 use greylag_num::Real;
 use greylag_physics::{ActuatorState, State};
 
-/// Numbers observed.
+/// Number of components of an observation.
 pub const OBSERVATIONS: usize = 16;
 
-/// What each number is divided by, in the order of [`observe`]: rad, m/s and rad/s as they come, so
-/// that brisk flight, full deflection and the first error of a hard target are of order one.
+/// Scale of each component, in the order of [`observe`], in rad, m/s and rad/s: brisk flight, full deflection and the
+/// initial error of a hard target are of order one.
 pub const UNIT: [f64; OBSERVATIONS] =
     [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25, 4.0];
 
-/// The observation in lanes, double precision or dual numbers: the state φ θ V p q r α β, the actuators
-/// δa δ̇a δe δ̇e δt, then what is left to the target, φ* − φ, θ* − θ and V_a* − V_a.
+/// The observation in lanes, double precision or dual numbers: the state φ θ V p q r α β, the actuators δa δ̇a δe δ̇e
+/// δt, then the errors φ* − φ, θ* − θ and V_a* − V_a.
 ///
-/// Departs from the paper: it observes φ* and θ* themselves. With φ and θ beside them both say the same;
-/// the difference is what has to vanish, and so is given at a scale of its own. Airspeed counts from
-/// 16.67 m/s, throttle from one half. The paper wants one airspeed in every episode and does not observe
-/// it; such a policy flies that airspeed whatever is asked.
+/// Departs from the paper, which observes φ* and θ* themselves. With φ and θ in the observation the information is
+/// the same; the error is what must vanish, and so has its own scale. Airspeed is relative to 16.67 m/s, throttle to
+/// one half. The paper commands one airspeed in every episode and does not observe it; such a policy flies that
+/// airspeed whatever is commanded.
 #[inline(always)]
 pub fn observe<R: Real>(
     state: &State<R>,

@@ -1,20 +1,20 @@
-//! The limits of an aircraft's envelope, and how long a flight was outside of them.
+//! Envelope limits of an aircraft, and the time spent outside each.
 
 use serde::Serialize;
 
 use super::{Moment, Track};
 use greylag_physics::Airframe;
 
-/// How far load factor and angle of attack may pass their limits in a transient: a twentieth of the limit.
+/// Transient excess of load factor and angle of attack that is accepted: a twentieth of the limit.
 pub const TRANSIENT: f64 = 0.05;
 
-/// Rounding of a command's rate, as a part of the limit.
+/// Tolerance for rounding of a command's rate, as a fraction of the limit.
 const ROUNDING: f64 = 1e-9;
 
-/// Limits to measure against; infinite where the airframe file states none.
+/// Limits that a flight is measured against; infinite where the airframe file states none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
-    /// Largest bank, degrees.
+    /// Largest |bank|, degrees.
     pub bank_deg: f64,
     /// Least and largest pitch, degrees.
     pub pitch_deg: [f64; 2],
@@ -22,7 +22,7 @@ pub struct Limits {
     pub load_factor: [f64; 2],
     /// Angle of attack at which the wing stalls, degrees.
     pub stall_deg: f64,
-    /// Largest |sideslip|, degrees.
+    /// Largest |sideslip| in degrees.
     pub sideslip_deg: f64,
     /// Least and largest airspeed, m/s.
     pub airspeed_mps: [f64; 2],
@@ -30,33 +30,33 @@ pub struct Limits {
     pub slew_per_s: f64,
 }
 
-/// Seconds outside each limit.
+/// Time outside each limit, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct OutsideS {
-    /// Bank.
+    /// Time above the largest bank, s.
     pub bank: f64,
-    /// Pitch, up or down.
+    /// Time outside the pitch limits, s.
     pub pitch: f64,
-    /// Load factor above its largest.
+    /// Time above the largest load factor, s.
     pub load_factor: f64,
-    /// Load factor below its least.
+    /// Time below the smallest load factor, s.
     pub load_factor_low: f64,
-    /// Angle of attack beyond the stall.
+    /// Time above the stall angle of attack, s.
     pub stall: f64,
-    /// Sideslip.
+    /// Time above the largest sideslip, s.
     pub sideslip: f64,
-    /// Airspeed below its least.
+    /// Time below the smallest airspeed, s.
     pub slow: f64,
-    /// Airspeed above its largest.
+    /// Time above the largest airspeed, s.
     pub fast: f64,
-    /// A surface command that changes too fast.
+    /// Time with a surface command faster than its slew limit, s.
     pub slew: f64,
-    /// Any of these.
+    /// Time outside any of the limits, s.
     pub any: f64,
 }
 
 impl OutsideS {
-    /// The limits that were passed, in words, with the seconds beyond each.
+    /// Names of the limits that were exceeded, with the time outside each, s.
     pub fn passed(&self) -> Vec<(&'static str, f64)> {
         let all = [
             ("bank", self.bank),
@@ -74,7 +74,7 @@ impl OutsideS {
 }
 
 impl Limits {
-    /// Those of an airframe file.
+    /// The limits of an airframe file.
     pub fn of(airframe: &Airframe) -> Limits {
         let e = &airframe.envelope;
         Limits {
@@ -88,18 +88,17 @@ impl Limits {
         }
     }
 
-    /// Whether a flight with these least and largest values kept to load factor and angle of attack but for a
-    /// [`TRANSIENT`].
+    /// Whether the extremes of a flight stay within the limits of load factor and angle of attack plus [`TRANSIENT`].
     pub fn kept(&self, load_factor: [f64; 2], alpha_deg: [f64; 2]) -> bool {
         let room = |limit: f64| limit.abs() * TRANSIENT;
         let [least, most] = self.load_factor;
-        // what is not known has passed no limit
+        // NaN violates no limit
         !(load_factor[0] < least - room(least)
             || load_factor[1] > most + room(most)
             || alpha_deg[1] > self.stall_deg + room(self.stall_deg))
     }
 
-    /// Seconds of a flight outside each limit: each tick counts as long as it lasts.
+    /// Time outside each limit, s, every tick weighted with its duration.
     pub(super) fn outside(&self, track: &Track) -> OutsideS {
         let mut total = OutsideS::default();
         for (moment, before, length) in track.ticks() {
@@ -117,7 +116,7 @@ impl Limits {
         total
     }
 
-    /// Whether a moment lies beyond each limit, in the order of [`OutsideS::each`].
+    /// Whether a sample lies outside each limit, in the order of [`OutsideS::each`].
     fn beyond(&self, m: &Moment, slew: f64) -> [bool; 9] {
         let [roll, pitch] = m.attitude.map(f64::to_degrees);
         [
@@ -155,7 +154,7 @@ impl OutsideS {
         self.any += seconds(beyond.contains(&true));
     }
 
-    /// The seconds of several flights together.
+    /// The sum over two flights.
     pub fn plus(mut self, mut other: OutsideS) -> OutsideS {
         self.each().into_iter().zip(other.each()).for_each(|(total, more)| *total += *more);
         self.any += other.any;

@@ -1,35 +1,35 @@
-//! The measures by name: what tables, pages and JSON show, and how each is defined.
+//! The quality measures by name, with units and definitions, as tables, pages and JSON show them.
 
 use super::Quality;
 
-/// One measure.
+/// Name, unit and definition of one measure.
 #[derive(Clone, Copy)]
 pub struct Measure {
-    /// Its key in JSON.
+    /// Key in JSON output.
     pub id: &'static str,
-    /// What it is, in a table.
+    /// Title in a table.
     pub title: &'static str,
-    /// Its unit; empty of a number without one.
+    /// Unit; empty if dimensionless.
     pub unit: &'static str,
-    /// Its definition, with where that comes from.
+    /// Definition, with its source.
     pub definition: &'static str,
-    /// Which of two values is the worse one.
+    /// Direction in which the measure is worse.
     pub worse: Worse,
-    /// Its value.
+    /// Reads the value from a [`Quality`].
     pub get: fn(&Quality) -> f64,
 }
 
-/// Which of two values of a measure is the worse one.
+/// Direction in which a measure is worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worse {
-    /// The larger.
+    /// The larger value is worse.
     More,
-    /// The smaller.
+    /// The smaller value is worse.
     Less,
 }
 
 impl Measure {
-    /// The worst of `values`; NaN for none.
+    /// The worst of `values`; NaN if it is empty.
     pub fn worst(&self, values: &[f64]) -> f64 {
         let pick = match self.worse {
             Worse::More => f64::max,
@@ -39,14 +39,14 @@ impl Measure {
     }
 }
 
-/// The measure of that name.
+/// The measure with this JSON key.
 pub fn measure(id: &str) -> Option<&'static Measure> {
     MEASURES.iter().find(|m| m.id == id)
 }
 
 macro_rules! measures {
     ($($id:ident, $title:literal, $unit:literal, $worse:ident, $get:expr, $definition:literal;)*) => {
-        /// Every measure, the main ones first.
+        /// All measures, the main ones first.
         pub const MEASURES: &[Measure] = &[$(Measure {
             id: stringify!($id), title: $title, unit: $unit, definition: $definition,
             worse: Worse::$worse, get: $get,

@@ -1,7 +1,8 @@
-//! How well an attitude was flown: what happened on the way from one attitude to another, in numbers.
+//! Quality of an attitude manoeuvre, in numbers.
 //!
-//! A [`Track`] is what was seen and commanded; [`Track::quality`] measures it; [`MEASURES`] names each measure with its
-//! unit, its definition and where that comes from. It is pure: simulated flights and recordings are measured alike.
+//! A [`Track`] holds what was measured and commanded; [`Track::quality`] evaluates it; [`MEASURES`] names each
+//! measure with its unit, definition and source. The module is pure: simulated and recorded flights are measured
+//! alike.
 
 mod limits;
 mod measures;
@@ -17,37 +18,37 @@ pub use measures::{MEASURES, Measure, Worse, measure};
 /// Attitude error within which a target counts as reached, degrees.
 pub const REACHED_DEG: f64 = 1.0;
 
-/// Part of a step within which its end counts as reached: the usual band of settling times.
+/// Settling band as a fraction of the step.
 const BAND: f64 = 0.05;
 
-/// Part of a step that an overshoot may have and still be little.
+/// Overshoot, as a fraction of the step, that still counts as small.
 const LITTLE: f64 = 0.03;
 
-/// What a lost aircraft is off by in the time that was left to fly, degrees of roll and of pitch together.
+/// Error charged for the remaining time after a loss of the aircraft, degrees of roll and pitch together.
 const LOST_DEG: f64 = 360.0;
 
-/// One tick of a flight. What is not known is NaN and left out of the measures.
+/// One sample of a flight. Unknown values are NaN and left out of the measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// When, s.
+    /// Time of the sample, s.
     pub time_s: f64,
     /// Roll φ and pitch θ, rad.
     pub attitude: [f64; 2],
-    /// True airspeed, m/s.
+    /// True airspeed V_a, m/s.
     pub airspeed: f64,
     /// Angle of attack α, rad.
     pub alpha: f64,
-    /// Sideslip β, rad.
+    /// Sideslip angle β, rad.
     pub beta: f64,
     /// Load factor: the specific force along body z, upwards, divided by the standard gravity (CS-23.321: the
     /// aerodynamic force normal to the longitudinal axis divided by the weight); 1 in level flight.
     pub load_factor: f64,
-    /// The command given at this moment.
+    /// The command given at this time.
     pub command: Command,
 }
 
 impl Moment {
-    /// What was seen and commanded, under a load factor.
+    /// A sample from an observation, its load factor and its command.
     pub fn new(seen: &Observation, load_factor: f64, command: &Command) -> Moment {
         let s = &seen.state;
         Moment {
@@ -65,26 +66,26 @@ impl Moment {
 /// A flight towards one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Its ticks in time order, from the one at which the target was set.
+    /// Samples in time order, from the one at which the target was set.
     pub moments: Vec<Moment>,
-    /// Where to.
+    /// The commanded attitude and airspeed.
     pub target: Target,
-    /// The command in force before; `None` where the flight begins.
+    /// The command in force before the first sample; `None` at the start of a flight.
     pub before: Option<Command>,
-    /// Time that was left to fly when the aircraft was lost, s; 0 if it was not.
+    /// Remaining time when the aircraft was lost, s; 0 if it was not lost.
     pub lost_s: f64,
 }
 
-/// A number for each control.
+/// One value per control.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PerControl {
-    /// Aileron.
+    /// Value for the aileron.
     pub aileron: f64,
-    /// Elevator.
+    /// Value for the elevator.
     pub elevator: f64,
-    /// Rudder.
+    /// Value for the rudder.
     pub rudder: f64,
-    /// Throttle.
+    /// Value for the throttle.
     pub throttle: f64,
 }
 
@@ -98,47 +99,48 @@ impl PerControl {
         }
     }
 
-    /// Aileron, elevator and rudder together; what is not known of one is left out.
+    /// Sum over aileron, elevator and rudder; NaN values are left out.
     pub fn surfaces(&self) -> f64 {
         total([self.aileron, self.elevator, self.rudder].into_iter())
     }
 }
 
-/// The measures of a [`Track`]; [`MEASURES`] says how each is defined. NaN where nothing is known.
+/// The measures of a [`Track`], defined in [`MEASURES`]. NaN where a value is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// Roll and pitch from the start to the target, degrees.
+    /// Step of roll and pitch from the start to the target, degrees.
     pub step_deg: [f64; 2],
     /// Integral of |roll error| + |pitch error|, ° s.
     pub error_integral_deg_s: f64,
-    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole flight's if they
-    /// never do.
+    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole duration if they never
+    /// do.
     pub to_one_deg_s: f64,
-    /// Time after which the error in roll and pitch together stays within 5 % of the step, s; the same.
+    /// Time after which the combined roll and pitch error stays within 5 % of the step, s; the whole duration if it
+    /// never does.
     pub to_five_percent_s: f64,
-    /// How far roll and pitch went beyond the target, degrees.
+    /// Overshoot of roll and pitch, degrees.
     pub overshoot_deg: [f64; 2],
-    /// Least and largest load factor.
+    /// Smallest and largest load factor.
     pub load_factor: [f64; 2],
-    /// Least and largest angle of attack, degrees.
+    /// Smallest and largest angle of attack, degrees.
     pub alpha_deg: [f64; 2],
-    /// Largest |sideslip|, degrees.
+    /// Largest |sideslip| in degrees.
     pub sideslip_deg: f64,
-    /// Root mean square of the airspeed less what was wanted, m/s.
+    /// Root mean square of the airspeed error, m/s.
     pub airspeed_rms_mps: f64,
-    /// Least and largest airspeed, m/s.
+    /// Smallest and largest airspeed, m/s.
     pub airspeed_mps: [f64; 2],
-    /// Sum of |changes| of each command, in the command's unit.
+    /// Total variation of each command, in the command's unit.
     pub travel: PerControl,
     /// Mean square of each command's rate, 1/s².
     pub mean_square_rate: PerControl,
-    /// Share of the ticks with each command at a stop.
+    /// Fraction of the ticks with each command at a stop.
     pub saturated: PerControl,
-    /// Share of the ticks with any surface at a stop.
+    /// Fraction of the ticks with any surface at a stop.
     pub surface_saturated: f64,
-    /// Seconds outside each limit.
+    /// Time outside each limit, s.
     pub outside_s: OutsideS,
-    /// Whether load factor and angle of attack kept to their limits but for a transient, see [`TRANSIENT`].
+    /// Whether load factor and angle of attack stayed within their limits plus [`TRANSIENT`].
     pub kept: bool,
     /// Whether the aircraft was lost.
     pub lost: bool,
@@ -168,7 +170,7 @@ impl Track {
         let lost = self.lost_s > 0.0;
         Quality {
             step_deg: first.map(|e| -e),
-            // an aircraft may be lost before the first moment
+            // the aircraft may be lost before the first sample
             error_integral_deg_s: total(
                 [self.integral(&errors), LOST_DEG * self.lost_s].into_iter(),
             ),
@@ -198,7 +200,7 @@ impl Track {
         }
     }
 
-    /// Roll and pitch errors at every moment, degrees.
+    /// Roll and pitch errors of every sample, degrees.
     fn errors(&self) -> Vec<[f64; 2]> {
         self.moments.iter().map(|m| attitude_error_deg(m.attitude, &self.target)).collect()
     }
@@ -210,7 +212,7 @@ impl Track {
         total(parts.map(|(pair, (_, _, length))| 0.5 * length * (size(&pair[0]) + size(&pair[1]))))
     }
 
-    /// Time from the first moment to the last one at which `size` of the error exceeds `band`, s.
+    /// Time from the first sample to the last one at which `size` of the error exceeds `band`, s.
     fn stays(&self, errors: &[[f64; 2]], size: impl Fn(&[f64; 2]) -> f64, band: f64) -> f64 {
         let Some(start) = self.moments.first().map(|m| m.time_s) else {
             return if self.lost_s > 0.0 { self.lost_s } else { f64::NAN };
@@ -219,7 +221,7 @@ impl Track {
         away.map_or(0.0, |k| self.moments[k].time_s - start) + self.lost_s
     }
 
-    /// Every moment but the last, which only ends the flight: with the command before and how long it lasts, s.
+    /// Every sample but the last, which only ends the flight: with the command before it and its duration, s.
     fn ticks(&self) -> impl Iterator<Item = (&Moment, Option<&Command>, f64)> {
         let before = std::iter::once(self.before.as_ref());
         let before = before.chain(self.moments.iter().map(|m| Some(&m.command)));
@@ -227,7 +229,7 @@ impl Track {
         pairs.map(|(pair, before)| (&pair[0], before, pair[1].time_s - pair[0].time_s))
     }
 
-    /// Changes of a command with the time that each took, s.
+    /// Changes of a command, each with its duration, s.
     fn changes(&self, of: fn(&Command) -> f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let changed = move |(m, before, length): (&Moment, Option<&Command>, f64)| {
             before.map(|old| (of(&m.command) - of(old), length))
@@ -235,42 +237,42 @@ impl Track {
         self.ticks().filter_map(changed).filter(|(by, _)| by.is_finite())
     }
 
-    /// Mean over the ticks of a number that each command has.
+    /// Mean over the ticks of a value of each command.
     fn share(&self, of: impl Fn(&Command) -> f64) -> f64 {
         mean(self.ticks().map(|(m, ..)| of(&m.command)))
     }
 }
 
-/// 1 for a command at its stop or beyond, else 0; NaN for one that is not known.
+/// 1 for a command at or beyond its stop, else 0; NaN for NaN.
 fn stop(command: f64, most: f64) -> f64 {
     if command.is_nan() { f64::NAN } else { f64::from(u8::from(command.abs() >= most)) }
 }
 
-/// Roll and pitch (rad) less their commands, degrees, the shorter way round.
+/// Roll and pitch (rad) minus their commands, degrees, wrapped to ±180°.
 pub fn attitude_error_deg([roll, pitch]: [f64; 2], target: &Target) -> [f64; 2] {
     let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
     [wrap((roll - target.roll).to_degrees()), wrap((pitch - target.pitch).to_degrees())]
 }
 
-/// How far errors go beyond zero, seen from the first: in the direction of the step. Where there is no step, the
-/// largest |error|.
+/// Largest excursion of the error past zero, in the direction of the step; the largest |error| where there is no
+/// step.
 fn overshoot(mut errors: impl Iterator<Item = f64>) -> f64 {
     let Some(first) = errors.next() else { return f64::NAN };
     let beyond = |e: f64| if first == 0.0 { e.abs() } else { -first.signum() * e };
     errors.map(beyond).filter(|e| e.is_finite()).fold(0.0, f64::max)
 }
 
-/// Least and largest of what is known; NaN for nothing.
+/// Minimum and maximum, ignoring NaN; NaN if there is none.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::NAN; 2], |[least, most], x| [least.min(x), most.max(x)])
 }
 
-/// Sum of what is known; NaN for nothing.
+/// Sum, ignoring NaN; NaN if there is none.
 fn total(values: impl Iterator<Item = f64>) -> f64 {
     values.filter(|x| x.is_finite()).fold(f64::NAN, |sum, x| if sum.is_nan() { x } else { sum + x })
 }
 
-/// Mean of what is known; NaN for nothing.
+/// Mean, ignoring NaN; NaN if there is none.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) =
         values.filter(|x| x.is_finite()).fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));

@@ -1,4 +1,4 @@
-//! The measures on signals whose answers have closed forms.
+//! Quality measures on signals with closed-form results.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -118,7 +118,7 @@ fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
 }
 
-/// The jump with which a new target is answered counts where the flight went on before it.
+/// The command's jump at a new target counts if the flight had started before it.
 #[test]
 fn the_first_change_counts_from_the_command_before() {
     let command = Command { aileron: 0.5, ..Command::IDLE };
@@ -174,7 +174,7 @@ fn every_limit_is_judged_by_its_own_quantity() {
     assert_eq!(outside(&|m| m.alpha = f64::NAN), []);
 }
 
-/// A twentieth of the limit is a transient's room, more is not.
+/// An excess of a twentieth of the limit counts as a transient, a larger one does not.
 #[test]
 fn a_transient_may_pass_load_factor_and_stall_by_a_twentieth() {
     assert!(LIMITS.kept([-1.04, 2.09], [-5.0, 12.5]));

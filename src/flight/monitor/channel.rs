@@ -1,8 +1,8 @@
-//! The six channels, in words, with what is to be suspected when one departs.
+//! The six monitored channels with their names and likely causes of a deviation.
 
 use std::fmt;
 
-/// A component of what accelerates the aircraft.
+/// A component of specific force or angular acceleration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Specific force along body x.
@@ -20,7 +20,7 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// All, in the order of their numbers.
+    /// All channels in the order of their index.
     pub const ALL: [Channel; 6] = [
         Channel::Forward,
         Channel::Side,
@@ -32,7 +32,7 @@ impl Channel {
 }
 
 impl Channel {
-    /// What one cause commonly moves together: 0 along the plane of symmetry, 1 across it.
+    /// Index of the plane in which one cause acts: 0 longitudinal, 1 lateral.
     pub(super) fn plane(self) -> usize {
         match self {
             Channel::Forward | Channel::Normal | Channel::Pitch => 0,
@@ -57,16 +57,17 @@ impl fmt::Display for Channel {
 /// A channel has left its band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Warning {
-    /// Which.
+    /// The channel that deviates most.
     pub channel: Channel,
-    /// Its residual divided by the half width of its band, signed; no unit, beyond −1..1 is outside.
+    /// Its residual divided by the half width of its band, signed and dimensionless; outside −1..1 is outside the
+    /// band.
     pub share: f64,
-    /// Whether the residual follows the deflection of the channel's surface.
+    /// Whether the residual is correlated with the deflection of the channel's surface.
     pub follows_surface: bool,
 }
 
 impl Warning {
-    /// What is to be suspected.
+    /// The likely cause, as text.
     pub fn suspect(&self) -> &'static str {
         match (self.channel, self.follows_surface) {
             (Channel::Roll, true) => "an aileron that sticks or moves less than commanded",

@@ -1,12 +1,12 @@
-//! The model as a monitor: what is measured in flight against what the model predicts.
+//! The model monitor compares measured accelerations in flight with the model's predictions.
 //!
-//! For each channel, specific force and angular acceleration, the residual is what is measured less what the model
-//! predicts at the measured state and surfaces. Its band is two standard deviations of the prediction: of the model's
-//! coefficients by the widths that its file states (15 % where it states none) and of the measured inputs. A channel that
-//! leaves its band for 2 s departs; that is reported once, until it has been well inside for 5 s. What departs in the same
-//! plane within 20 s has the same cause, as far as anybody can tell in flight, and is not reported again.
+//! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at the
+//! measured state and surfaces. Its band is two standard deviations of the prediction, from the standard deviations of the
+//! model's coefficients (15 % where its file states none) and of the measured inputs. A channel outside its band for 2 s is
+//! reported once, and again only after it has been well inside for 5 s. Deviations in the same plane within 20 s are
+//! attributed to the same cause and not reported again.
 //!
-//! The monitor decides nothing: no command depends on it.
+//! No command depends on the monitor.
 
 mod channel;
 mod prediction;
@@ -20,40 +20,40 @@ use greylag_link::vehicle::{Faults, Telemetry};
 use greylag_model::GreyBox;
 use greylag_physics::{State, Time};
 
-/// Steps from which angular acceleration is taken, s.
+/// Accepted sample intervals for differencing body rates, s.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
-/// Departures in one plane within this time have one cause, s.
+/// Deviations in one plane within this time are attributed to one cause, s.
 const ONE_CAUSE_S: f64 = 20.0;
-/// Below this share of the least airspeed of the envelope the model is not asked.
+/// Fraction of the envelope's smallest airspeed below which nothing is compared.
 const SLOWEST: f64 = 0.8;
 
-/// What is measured in a channel, with what the model says of it: m/s² for forces, rad/s² for angular accelerations.
+/// Measurement and prediction of one channel: m/s² for specific forces, rad/s² for angular accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compared {
-    /// Measured: forces at the sample, angular accelerations as means over the step before it.
+    /// Measured value: forces at the sample, angular accelerations as means over the preceding step.
     pub measured: f64,
-    /// What the model predicts of that.
+    /// Value predicted by the model.
     pub predicted: f64,
     /// Half width of the band about the prediction: two standard deviations.
     pub band: f64,
 }
 
-/// Watches one aircraft with one model.
+/// Monitor of one aircraft against one model.
 #[derive(Clone, Debug)]
 pub struct Monitor {
     predictor: Predictor,
     slowest: f64,
     last: Option<Seen>,
-    /// Channels that the last state could be compared in: old residuals are not shown as present ones.
+    /// Channels compared at the last state: older residuals are not reported as present.
     compared: [bool; 6],
-    /// Measured and predicted in the last state that could be compared.
+    /// Measured and predicted values at the last comparison.
     values: [[f64; 2]; 6],
     watches: [Watch; 6],
-    /// When something was last reported along the plane of symmetry, and across it.
-    said: [Option<Time>; 2],
+    /// Time of the last report in the longitudinal and the lateral plane.
+    reported: [Option<Time>; 2],
 }
 
-/// The sample before.
+/// The previous sample.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     time: Time,
@@ -62,7 +62,7 @@ struct Seen {
 }
 
 impl Monitor {
-    /// A monitor by `model`.
+    /// A monitor with `model` for its predictions.
     pub fn new(model: GreyBox) -> Self {
         let slowest = SLOWEST * model.airframe.envelope.airspeed_min_mps;
         let predictor = Predictor::new(model);
@@ -73,12 +73,12 @@ impl Monitor {
             compared: [false; 6],
             values: [[f64::NAN; 2]; 6],
             watches: [Watch::default(); 6],
-            said: [None; 2],
+            reported: [None; 2],
         }
     }
 
-    /// Takes a state; the channel that departs most, if one departs now. A state that cannot be used, or that comes
-    /// after a gap, begins a new difference. It does not allocate.
+    /// Takes a state; returns the channel that deviates most, if a deviation is to be reported. A state that is
+    /// unusable or follows a gap restarts the differencing. It does not allocate.
     pub fn see(&mut self, frame: &Telemetry) -> Option<Warning> {
         self.compared = [false; 6];
         if frame.faults != Faults::NONE
@@ -99,15 +99,15 @@ impl Monitor {
         self.due(now.time)
     }
 
-    /// Forgets all, as when somebody else takes the aircraft.
+    /// Clears the state, as when another pilot takes control.
     pub fn forget(&mut self) {
         (self.last, self.compared) = (None, [false; 6]);
         self.watches = [Watch::default(); 6];
-        self.said = [None; 2];
+        self.reported = [None; 2];
     }
 
     /// Residuals divided by the half widths of their bands (two standard deviations), in the order of
-    /// [`Channel::ALL`]; no unit, beyond −1..1 is outside, NaN when not known.
+    /// [`Channel::ALL`]; dimensionless, outside −1..1 is outside the band, NaN when unknown.
     pub fn shares(&self) -> Six {
         std::array::from_fn(|k| if self.compared[k] { self.watches[k].share() } else { f64::NAN })
     }
@@ -158,11 +158,11 @@ impl Monitor {
         let watch = &mut self.watches[k];
         watch.report();
         let (channel, share) = (Channel::ALL[k], watch.share());
-        let said = &mut self.said[channel.plane()];
-        if said.is_some_and(|said| now.since(said).as_secs_f64() < ONE_CAUSE_S) {
+        let reported = &mut self.reported[channel.plane()];
+        if reported.is_some_and(|reported| now.since(reported).as_secs_f64() < ONE_CAUSE_S) {
             return None;
         }
-        *said = Some(now);
+        *reported = Some(now);
         Some(Warning { channel, share, follows_surface: watch.follows_surface() })
     }
 }

@@ -1,4 +1,4 @@
-//! What the model predicts of accelerations, with the width of that prediction.
+//! Predicted accelerations with their standard deviations.
 
 use greylag_link::vehicle::Telemetry;
 use greylag_model::GreyBox;
@@ -9,28 +9,28 @@ use greylag_physics::{AirData, Controls, State};
 /// Specific force (m/s², body x, y, z), then angular acceleration (rad/s², about x, y, z).
 pub type Six = [f64; 6];
 
-/// Standard deviations of what the model is asked with: airspeed (share of it), surfaces (rad), throttle. Customary for a
-/// pitot tube and servos of small aircraft. That of α and β comes with the state.
+/// Standard deviations of the model's inputs: relative airspeed, surfaces (rad), throttle; typical of a pitot tube
+/// and servos of small aircraft. Those of α and β come with the state.
 const AIRSPEED_SD: f64 = 0.02;
 const SURFACE_SD: f64 = 0.3 * DEGREE;
 const THROTTLE_SD: f64 = 0.02;
-/// Gusts whose rotation of the air, which no sensor shows, is allowed for, m/s, and their scale, m: σ_p of MIL-F-8785C
-/// is 1.9 σ_w / √(L b).
+/// Gust intensity (m/s) and scale (m) for the rotation of the air, which no sensor measures: σ_p of MIL-F-8785C is
+/// 1.9 σ_w / √(L b).
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// A model that is asked for accelerations.
+/// A model with the standard deviations of its coefficients.
 #[derive(Clone, Debug)]
 pub struct Predictor {
     model: GreyBox,
-    /// The prior width of each coefficient.
+    /// Prior standard deviation of each coefficient.
     widths: Vec<f64>,
     /// Standard deviation of the rotation of the air, rad/s.
     air_rotation: f64,
 }
 
-/// What the model is asked with.
+/// Inputs of the model at a sample.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     state: State,
@@ -38,10 +38,10 @@ struct Asked {
     altitude: f64,
 }
 
-/// An input that is not known exactly: what one standard deviation makes of it.
+/// Adds one standard deviation to one uncertain input.
 type Change = fn(&mut Asked, &Deviations);
 
-/// Standard deviations that are not constants.
+/// Standard deviations that vary in flight.
 #[derive(Clone, Copy, Debug)]
 struct Deviations {
     /// α and β, rad.
@@ -64,7 +64,7 @@ const CHANGES: [Change; 10] = [
 ];
 
 impl Predictor {
-    /// A predictor of what `model` says of itself.
+    /// A predictor with the standard deviations that `model` states.
     pub fn new(model: GreyBox) -> Self {
         let widths = model.coefficients().iter().map(greylag_model::Named::width).collect();
         let span = model.airframe.geometry.span;
@@ -77,8 +77,8 @@ impl Predictor {
         self.accelerations(&Asked::at(frame))
     }
 
-    /// The variance of the accelerations at `frame`: of the model's coefficients by their widths, of what it is asked
-    /// with by the sensors'.
+    /// Variance of the accelerations at `frame`: from the standard deviations of the coefficients and of the measured
+    /// inputs.
     pub fn variance(&self, frame: &Telemetry, mean: &Six) -> Six {
         let asked = Asked::at(frame);
         let mut variance = self.of_coefficients(&asked);
@@ -126,8 +126,7 @@ impl Asked {
     }
 }
 
-/// Variances of accelerations from those of independent forces (N²) and moments (N² m²). Sideslip is small enough to
-/// be left out.
+/// Variances of accelerations from those of independent forces (N²) and moments (N² m²). Sideslip is neglected.
 fn to_accelerations(parts: &[f64; 7], body: &RigidBody, air: &AirData) -> Six {
     let of = |part: Part| parts[part as usize];
     let (sin2, cos2) = (air.sin_alpha.powi(2), air.cos_alpha.powi(2));

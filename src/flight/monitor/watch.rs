@@ -1,24 +1,24 @@
-//! One channel: how far its residual is from its band, for how long.
+//! Monitor of one channel: size and duration of its residual outside the band.
 
-/// The residual is smoothed by this time, s: five samples of a gyro's differences.
+/// Time constant of the residual's low-pass, s: five samples of differenced gyro signals.
 const SMOOTHED_S: f64 = 0.1;
-/// Its effective value, and that of its width, are taken over this time, s, so that a residual that swings with a
-/// surface counts as one that stands.
+/// Averaging time of the root mean squares of residual and band, s, so that an oscillating residual counts like a
+/// constant one.
 const EFFECTIVE_S: f64 = 0.5;
-/// Times for which surface and residual are compared, s.
+/// Averaging time of the correlation of surface and residual, s.
 const COMPARED_S: f64 = 3.0;
-/// The band is so many standard deviations to either side.
+/// Half width of the band in standard deviations.
 const BAND: f64 = 2.0;
-/// A channel that was outside for this time departs, s.
+/// Time outside the band after which a deviation is reported, s.
 const OUTSIDE_S: f64 = 2.0;
-/// It may depart again once it was below this share of its band for so long, s.
+/// It is reported again only after the residual was below this fraction of the band for this time, s.
 const QUIET: f64 = 0.7;
 const QUIET_S: f64 = 5.0;
-/// Correlation from which a residual follows a surface, and the least movement that shows it, rad.
+/// Correlation above which a residual follows a surface, and the smallest surface movement that shows it, rad.
 const FOLLOWS: f64 = 0.8;
 const MOVES: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
-/// A channel that is watched.
+/// State of one monitored channel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Watch {
     residual: f64,
@@ -30,7 +30,7 @@ pub struct Watch {
     follows: Follows,
 }
 
-/// Running moments of a surface's deflection and the residual.
+/// Running moments of surface deflection and residual.
 #[derive(Clone, Copy, Debug, Default)]
 struct Follows {
     mean: [f64; 2],
@@ -54,28 +54,28 @@ impl Watch {
         self.departed &= self.quiet_s < QUIET_S;
     }
 
-    /// The residual divided by the half width of its band, signed; no unit, beyond −1..1 is outside, NaN before the
-    /// first.
+    /// The residual divided by the half width of its band, signed and dimensionless; outside −1..1 is outside the
+    /// band, NaN before the first.
     pub fn share(&self) -> f64 {
         (self.power.sqrt() / self.band()).copysign(self.residual)
     }
 
-    /// Half width of the band, in the residual's unit; NaN before the first.
+    /// Half width of the band in the residual's unit; NaN before the first.
     pub fn band(&self) -> f64 {
         self.variance.map_or(f64::NAN, |variance| BAND * variance.sqrt())
     }
 
-    /// Whether it has departed now, and has not been reported.
+    /// Whether a deviation is to be reported now.
     pub fn is_due(&self) -> bool {
         self.outside_s >= OUTSIDE_S && !self.departed
     }
 
-    /// It has been reported.
+    /// Marks the deviation as reported.
     pub fn report(&mut self) {
         self.departed = true;
     }
 
-    /// Whether the residual follows its surface.
+    /// Whether the residual is correlated with its surface.
     pub fn follows_surface(&self) -> bool {
         self.follows.correlation().is_some_and(|c| c.abs() >= FOLLOWS)
     }
@@ -83,7 +83,7 @@ impl Watch {
 
 impl Follows {
     fn see(&mut self, surface: f64, residual: f64, dt: f64) {
-        // Plain means at first, so that the beginning has no weight of its own.
+        // arithmetic means at first, so that the initial value has no extra weight
         self.seen_s += dt;
         let weight = dt / self.seen_s.min(COMPARED_S);
         let towards = |from: &mut f64, to: f64| *from += (to - *from) * weight;
@@ -94,7 +94,7 @@ impl Follows {
         towards(&mut self.product, surface * residual);
     }
 
-    /// The correlation; `None` while the surface stands.
+    /// The correlation; `None` while the surface does not move.
     fn correlation(&self) -> Option<f64> {
         let spread = |k: usize| (self.square[k] - self.mean[k].powi(2)).max(0.0).sqrt();
         let moves = spread(0) >= MOVES && spread(1) > 0.0;

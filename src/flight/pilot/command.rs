@@ -1,4 +1,4 @@
-//! Which command flies: planned, of the fallback, held, or level at trim.
+//! Selection of the command: planned, fallback, held, or level trim.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
@@ -8,32 +8,32 @@ use greylag_link::autopilot::Severity;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, Time};
 
-/// Part of a controller's deflections beyond their mean that is flown while they are eased. It divides the loop's gain at the
-/// frequency at which it swings, and so multiplies the delay that the loop bears by about as much.
-const EASED: f64 = 1.0 / 3.0;
-/// Time constant of that mean, s: a limit cycle of 1 to 8 Hz averages out, what a turn needs is in it.
+/// Factor on the deviation of a controller's deflections from their mean after an oscillation. It divides the loop
+/// gain at the oscillation frequency, and so multiplies the delay margin by about as much.
+const REDUCED_GAIN: f64 = 1.0 / 3.0;
+/// Time constant of that mean, s: a limit cycle of 1 to 8 Hz averages out, the deflections of a turn remain.
 const MEAN_S: f64 = 0.5;
-/// For how long they are eased after the loop has swung, s.
-const EASED_S: f64 = 5.0;
-/// Bank beyond which the aircraft is upset, and below which it no longer is, rad. Nearly on its back, up elevator pulls the
-/// nose down: the wings come level first. No envelope allows such a bank.
+/// Duration of the reduced gain after an oscillation, s.
+const REDUCED_S: f64 = 5.0;
+/// Bank above which the aircraft is upset, and below which it has recovered, rad. Near inverted flight, up elevator
+/// pulls the nose down: the wings are levelled first. No envelope allows such a bank.
 const UPSET: [f64; 2] = [FRAC_PI_2, FRAC_PI_3];
 
 impl Pilot {
-    /// Eases deflections from `time` on, because the loop about `axis` has swung for `lasted_s`, s.
-    pub(super) fn ease(&mut self, axis: Axis, lasted_s: f64, time: Time) {
-        self.eased = Some(time);
+    /// Reduces the gain from `time` on, because the loop about `axis` has oscillated for `lasted_s`, s.
+    pub(super) fn reduce_gain(&mut self, axis: Axis, lasted_s: f64, time: Time) {
+        self.oscillated = Some(time);
         let axis = match axis {
             Axis::Roll => "roll",
             Axis::Pitch => "pitch",
         };
         let words = format!(
-            "oscillates in {axis} since {lasted_s:.1} s: a third of the deflections for the next {EASED_S} s"
+            "oscillates in {axis} since {lasted_s:.1} s: a third of the deflections for the next {REDUCED_S} s"
         );
         self.texts.say(Severity::Error, words);
     }
 
-    /// `command`, or what rolls the aircraft upright where it is upset.
+    /// `command`, or recovery roll where the aircraft is upset.
     fn upright(&mut self, command: Command, roll: f64) -> Command {
         if self.by_attitude {
             return command;
@@ -53,8 +53,8 @@ impl Pilot {
         Command { aileron: -roll.signum(), throttle: command.throttle, ..level }
     }
 
-    /// `command` as it is flown at `time`.
-    fn as_eased(&mut self, command: Command, time: Time) -> Command {
+    /// `command` with the reduced gain, if it is active at `time`.
+    fn with_reduced_gain(&mut self, command: Command, time: Time) -> Command {
         let (last, mean) = self.mean.get_or_insert((time, command));
         let passed = time.since(*last).as_secs_f64();
         *last = time;
@@ -65,10 +65,10 @@ impl Pilot {
         ] {
             *mean += (wanted - *mean) * (passed / MEAN_S).min(1.0);
         }
-        if !within(self.eased, time, EASED_S) {
+        if !within(self.oscillated, time, REDUCED_S) {
             return command;
         }
-        let toward = |mean: f64, wanted: f64| mean + EASED * (wanted - mean);
+        let toward = |mean: f64, wanted: f64| mean + REDUCED_GAIN * (wanted - mean);
         Command {
             aileron: toward(mean.aileron, command.aileron),
             elevator: toward(mean.elevator, command.elevator),
@@ -102,7 +102,7 @@ impl Pilot {
         if let Some(programme) = &mut self.programme {
             command = programme.excite(command);
         }
-        command = self.as_eased(command, seen.time);
+        command = self.with_reduced_gain(command, seen.time);
         command = self.inside_envelope(command, seen);
         command = self.upright(command, seen.state.roll);
         command.throttle =
@@ -126,7 +126,7 @@ impl Pilot {
         (self.level_command(), Source::Level)
     }
 
-    /// The command while the state cannot be used.
+    /// The command while the state is unusable.
     pub(super) fn without_state(&self) -> (Command, Source) {
         let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
         if short && !self.vehicle_lost {

@@ -1,4 +1,4 @@
-//! Complaints: what goes on being wrong is said now and then, not at every tick.
+//! Rate limit of warnings about persistent faults.
 
 use super::Pilot;
 use super::estimate::within;
@@ -6,13 +6,13 @@ use super::telemetry::LATE_AIR;
 use greylag_link::autopilot::Severity;
 use greylag_physics::Time;
 
-/// Least time between two lines about the same kind of trouble, s.
+/// Least time between two warnings of the same kind, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;
 
-/// Airspeed and altitude that are late for this time are said to be, s: after a gap the first is 20 ms away.
+/// Delay of airspeed and altitude that is reported, s: after a gap the first is 20 ms away.
 const LATE_AIR_S: f64 = 0.5;
 
-/// When each kind of trouble was last reported.
+/// Time of the last report of each kind.
 #[derive(Debug, Default)]
 pub(super) struct Complaints {
     pub(super) defect: Option<Time>,
@@ -36,7 +36,7 @@ impl Pilot {
     }
 }
 
-/// Whether a complaint may be made again at `now`; notes it if so.
+/// Whether a warning may be repeated at `now`; records the time if so.
 pub(super) fn due(last: &mut Option<Time>, now: Time) -> bool {
     let silent = within(*last, now, COMPLAINT_INTERVAL_S);
     if !silent {

@@ -1,6 +1,6 @@
-//! The numbers a pilot flies by: the airframe's envelope, times, slew limits, trim of straight flight.
+//! Settings of the pilot: envelope, timeouts, slew limits, trim of straight flight.
 //!
-//! "Level trim" is short for [`Trim::straight`] with level wings: level flight, or the descent at idle throttle where
+//! "Level trim" abbreviates [`Trim::straight`] with level wings: level flight, or the descent at idle throttle where
 //! no throttle holds level flight.
 
 use super::polarity::Answers;
@@ -10,20 +10,20 @@ use greylag_physics::airframe::Envelope;
 /// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
 const TRIM_SPACING: f64 = 1.0;
 
-/// The pilot's settings. Units are in the names, since parameters and files show them as they are.
+/// The pilot's settings. Fields have their units in their names, since parameters and files show them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// The airframe's envelope.
+    /// Flight envelope from the airframe file.
     pub envelope: Envelope,
-    /// Age of the last setpoint (or stick input) at which its mode is left, s.
+    /// Age of the last setpoint (or stick input) at which its mode ends, s.
     pub offboard_loss_s: f64,
     /// Age of the last fresh state at which the vehicle link counts as lost, s.
     pub vehicle_loss_s: f64,
-    /// Gap in usable state over which the command in force is continued, s.
+    /// Longest gap in usable states over which the last command is held, s.
     pub state_hold_s: f64,
-    /// Fastest change of the throttle command, in units of 0..1 per second.
+    /// Slew limit of the throttle command, in units of 0..1 per second.
     pub throttle_slew_per_s: f64,
-    /// Where OFFBOARD takes its throttle from.
+    /// Source of the throttle in OFFBOARD.
     pub thrust_source: ThrustSource,
     /// Largest bank and pitch at which arming is allowed, degrees.
     pub arm_tilt_max_deg: f64,
@@ -32,44 +32,45 @@ pub struct Config {
     /// Trim of straight flight with level wings ([`Trim::straight`]): level, or a glide at idle throttle; by rising
     /// airspeed.
     pub trim: Vec<TrimPoint>,
-    /// What the model answers to the surfaces, to check their signs by.
+    /// Modelled responses to the surfaces, for the check of their signs; `None` to skip it.
     pub answers: Option<Answers>,
 }
 
-/// Where OFFBOARD takes its throttle from (parameter GL_THRUST_SRC).
+/// Source of the throttle in OFFBOARD (parameter GL_THRUST_SRC).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ThrustSource {
-    /// The controller holds the cruise airspeed.
+    /// The controller's throttle, which holds the cruise airspeed.
     Cruise,
-    /// The setpoint's thrust is the throttle, where it gives one.
+    /// The setpoint's thrust, where it has one.
     Setpoint,
 }
 
 /// One row of the trim table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrimPoint {
-    /// True airspeed, m/s.
+    /// True airspeed V_a, m/s.
     pub airspeed_mps: f64,
-    /// Pitch, degrees: the angle of attack in level flight, less than it in a glide.
+    /// Pitch, degrees: the angle of attack in level flight, smaller in a glide.
     pub pitch_deg: f64,
-    /// Elevator command, −1..1.
+    /// Elevator command as a fraction, −1..1.
     pub elevator: f64,
-    /// Throttle command, 0..1.
+    /// Throttle command as a fraction, 0..1.
     pub throttle: f64,
 }
 
 impl Config {
-    /// Settings for the aircraft that `model` describes: its envelope, its trim of straight flight.
+    /// Settings for the aircraft of `model`: its envelope and its trim of straight flight.
     ///
     /// # Errors
-    /// If the model flies straight at the cruise airspeed neither level nor in a glide, or what [`Config::check`] finds.
+    ///
+    /// If the model has no trim at the cruise airspeed, level or in a glide, or what [`Config::check`] finds.
     pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
         row(envelope.airspeed_cruise_mps)?;
         let count =
             ((envelope.airspeed_max_mps - envelope.airspeed_min_mps) / TRIM_SPACING) as usize;
-        // Airspeeds at which the model has neither trim are left to their neighbours.
+        // airspeeds without a trim are interpolated from their neighbours
         let speeds = (0..=count).map(|i| envelope.airspeed_min_mps + i as f64 * TRIM_SPACING);
         let mut config = Config::new(envelope, speeds.filter_map(|v| row(v).ok()).collect());
         config.answers = Some(Answers::of(model, envelope.airspeed_cruise_mps)?);
@@ -77,7 +78,7 @@ impl Config {
         Ok(config)
     }
 
-    /// The default settings with an envelope, with the rows of a trim table.
+    /// Default settings with an envelope and the rows of a trim table.
     pub fn new(envelope: Envelope, trim: Vec<TrimPoint>) -> Self {
         Config {
             envelope,
@@ -110,27 +111,27 @@ fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
     })
 }
 
-/// A setting that cannot be flown with.
+/// A setting is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
-    /// A number is outside its range.
+    /// A value is outside its range.
     #[error("pilot setting `{name}` is {value}: give a number from {low} to {high}")]
     Range {
-        /// The setting.
+        /// Name of the setting.
         name: &'static str,
-        /// What it is.
+        /// Value of the setting.
         value: f64,
-        /// The least allowed.
+        /// Smallest value that is allowed.
         low: f64,
-        /// The most allowed.
+        /// Largest value that is allowed.
         high: f64,
     },
     /// Two settings contradict each other.
     #[error("pilot setting `{smaller}` must lie below `{larger}`: correct one of them")]
     Order {
-        /// The one that must be smaller.
+        /// The setting that must be smaller.
         smaller: &'static str,
-        /// The one that must be larger.
+        /// The setting that must be larger.
         larger: &'static str,
     },
     /// The trim table cannot be interpolated.
@@ -138,7 +139,7 @@ pub enum ConfigError {
         "pilot table `trim` needs at least one row, finite numbers, and rising airspeeds: correct the rows"
     )]
     Trim,
-    /// The model flies straight at the cruise airspeed neither level nor in a glide.
+    /// The model has no trim at the cruise airspeed, level or in a glide.
     #[error("the pilot needs level trim at the cruise airspeed: {0}")]
     NoTrim(#[from] TrimError),
 }
@@ -147,7 +148,8 @@ impl Config {
     /// Checks ranges and order.
     ///
     /// # Errors
-    /// The first setting that is out of its range, or the first pair that contradicts itself.
+    ///
+    /// The first setting outside its range, or the first contradictory pair.
     pub fn check(&self) -> Result<(), ConfigError> {
         for (name, value, low, high) in self.ranges() {
             if !(value >= low && value <= high) {
@@ -203,7 +205,7 @@ impl Config {
         ]
     }
 
-    /// Trim of straight flight at an airspeed (m/s): linear between the rows, constant beyond the ends.
+    /// Trim of straight flight at an airspeed (m/s): linear between the rows, constant outside.
     pub fn trim_at(&self, airspeed_mps: f64) -> TrimPoint {
         let (first, last) = (self.trim[0], self.trim[self.trim.len() - 1]);
         if airspeed_mps <= first.airspeed_mps {

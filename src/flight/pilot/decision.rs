@@ -1,57 +1,57 @@
-//! What the pilot asks of a planner, and what it answers to the vehicle.
+//! Requests to a planner and decisions for the vehicle.
 
 use greylag_control::{Observation, Target};
 use greylag_link::autopilot::Mode;
 use greylag_link::vehicle::{Demand, Fault, Outputs};
 use greylag_physics::{Command, Time};
 
-/// What a planner is asked for at a tick.
+/// Planning request of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
-    /// What is seen.
+    /// Observation at this tick.
     pub observation: Observation,
-    /// What is wanted, already inside the envelope.
+    /// Target, already limited to the envelope.
     pub target: Target,
-    /// Set when the planner takes over from something else: it must forget its past.
+    /// Set on engagement: the planner must reset its internal state.
     pub engage: bool,
 }
 
-/// What became of the request.
+/// Reply to the request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Plan {
     /// The planner's command, in time; it need not be finite or in range.
     Ready(Command),
-    /// A planner exists, but its command did not come in time.
+    /// The planner's command did not arrive in time.
     Late,
-    /// A planner exists, but was at an earlier request and has not heard of this one.
+    /// The planner was still busy with an earlier request and did not receive this one.
     Busy,
-    /// No planner was asked.
+    /// There is no planner.
     None,
 }
 
-/// Who flew this tick.
+/// Origin of the command of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Source {
-    /// The planner's command.
+    /// The planner's own command.
     Planned,
-    /// The fallback controller's, because the plan was late.
+    /// The fallback controller's command, because the plan was late.
     Late,
-    /// The fallback controller's, because there was no plan, or none of finite numbers.
+    /// The fallback controller's command, because there was no finite plan.
     Fallback,
-    /// The command in force, continued over a short gap in the state.
+    /// The last command, held over a short gap in the state.
     Held,
-    /// Surfaces and throttle at the constants of level trim, because the state cannot be used.
+    /// Level trim, because the state is unusable.
     Level,
-    /// The sticks'.
+    /// Pilot sticks, directly.
     Sticks,
-    /// The check of signs: level trim, with small pulses.
+    /// The check of signs: level trim with small pulses.
     Check,
-    /// Nobody: disarmed, all outputs zero.
+    /// Disarmed: all outputs are zero.
     Disarmed,
 }
 
 impl Source {
-    /// The word for it in the recording.
+    /// Name in recordings.
     pub fn name(self) -> &'static str {
         match self {
             Source::Planned => "planned",
@@ -66,31 +66,31 @@ impl Source {
     }
 }
 
-/// The outcome of a tick.
+/// The pilot's decision of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision {
     /// Time of the state frame that is answered, vehicle clock.
     pub time: Time,
-    /// What the actuators shall do: finite and in range. Armed, it is within the slew limit of the last one; disarmed,
-    /// it is [`Command::IDLE`] at once.
+    /// Actuator command: finite and in range. Armed, it is within the slew limit of the last one; disarmed, it is
+    /// [`Command::IDLE`] immediately.
     pub command: Command,
-    /// Who decided it.
+    /// Origin of the command.
     pub source: Source,
     /// Whether the outputs are live.
     pub armed: bool,
-    /// The mode in force.
+    /// The active mode.
     pub mode: Mode,
-    /// The target in force, after the envelope; roll and pitch are NaN when sticks or nobody fly.
+    /// The target after envelope limits; roll and pitch are NaN under sticks or disarmed.
     pub target: Target,
-    /// Whether a failsafe is in force.
+    /// Whether a failsafe is active.
     pub failsafe: bool,
-    /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
+    /// Fault found by the sign check or the oscillation guard since arming.
     pub refused: Option<Fault>,
 }
 
 impl Decision {
-    /// What it asks of the vehicle. A real controller gets the aircraft back when the state cannot
-    /// be flown on, and when a failsafe is in force: it flies better blind than we do.
+    /// The demand on the vehicle. A real controller gets control back when the state is unusable or a failsafe is
+    /// active: it has sensors of its own.
     pub fn demand(&self) -> Demand {
         let fault = match (self.source, self.failsafe) {
             (Source::Level, _) => Some(Fault::State),

@@ -1,4 +1,4 @@
-//! Commands on their way to the surfaces pass the envelope limiter, whoever gave them.
+//! Envelope limiter applied to every command, whatever its origin.
 
 use super::{Pilot, due};
 use greylag_control::Observation;
@@ -7,14 +7,14 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::Command;
 
 impl Pilot {
-    /// Keeps every command of a controller inside the envelope by what `limiter`'s model predicts. Where a flight controller flies
-    /// attitudes by itself, its own protection stays and this one has no say.
+    /// Limits every command to the envelope by the predictions of `limiter`. Where a flight controller is commanded
+    /// attitudes, only its own protection applies.
     pub fn protect_with(&mut self, mut limiter: EnvelopeLimiter) {
         limiter.keep_to(&self.config.envelope);
         self.envelope = Some(limiter);
     }
 
-    /// `command`, or the nearest one inside the envelope.
+    /// The command nearest to `command` inside the envelope.
     pub(super) fn inside_envelope(&mut self, command: Command, seen: &Observation) -> Command {
         let Some(limiter) = self.envelope.as_mut().filter(|_| !self.by_attitude) else {
             return command;

@@ -1,4 +1,4 @@
-//! The estimate: the newest state that can be believed, with its age.
+//! The newest usable state with its age.
 
 use std::time::Duration;
 
@@ -6,24 +6,23 @@ use super::telemetry::{defect, repeats};
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::Time;
 
-/// How far vehicle time may run backwards before the vehicle counts as restarted. Frames that
-/// overtake one another do so by one or two cycles.
+/// Largest step back of vehicle time that is not a restart. Reordered frames step back by one or two cycles.
 pub(super) const RESTART: Duration = Duration::from_secs(1);
 
-/// What a frame is worth.
+/// Usability of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Frame {
-    /// A new state.
+    /// A new, usable state.
     Usable,
-    /// A state, equal to the bit to the one before: usable for a while, but not fresh.
+    /// A state equal bit by bit to the previous one: usable for a while, but not fresh.
     Frozen,
-    /// Not newer than the last frame: its command has been decided already.
+    /// Not newer than the last frame: its command was decided already.
     Repeated,
-    /// Its numbers cannot be flown on, with the reason.
+    /// The state is unusable, for this reason.
     Defective(&'static str),
 }
 
-/// The newest believable frame, with when it came (pilot's clock).
+/// The newest usable frame with its arrival time (pilot's clock).
 #[derive(Debug, Default)]
 pub(super) struct Estimate {
     last: Option<Telemetry>,
@@ -34,7 +33,7 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// Takes a frame in at `now`.
+    /// Takes a frame at `now`.
     pub(super) fn take(&mut self, now: Time, frame: &Telemetry) -> Frame {
         if self.newest.is_some_and(|newest| frame.time <= newest) {
             return Frame::Repeated;
@@ -54,26 +53,26 @@ impl Estimate {
         Frame::Usable
     }
 
-    /// Whether `frame` comes from before the vehicle's newest by more than reordering explains.
+    /// Whether `frame` is older than the newest by more than reordering explains.
     pub(super) fn restarted(&self, frame: &Telemetry) -> bool {
         self.newest.is_some_and(|newest| newest.since(frame.time) > RESTART)
     }
 
-    /// Counts the state as fresh from `now`, as when it has been standing still with a reason.
+    /// Counts the state as fresh at `now`, as when it is constant for a known reason.
     pub(super) fn refresh(&mut self, now: Time) {
         if self.usable_at.is_some() {
             self.fresh_at = Some(now);
         }
     }
 
-    /// Nobody listened for `missed`: what came before is not older for it.
+    /// Excludes the stall `missed` from all ages.
     pub(super) fn excuse(&mut self, missed: Duration) {
         for at in [&mut self.usable_at, &mut self.fresh_at].into_iter().flatten() {
             *at = at.plus(missed);
         }
     }
 
-    /// Whether the last believable frame was equal to the one before.
+    /// Whether the last usable frame equals the one before.
     pub(super) fn is_frozen(&self) -> bool {
         self.frozen
     }
@@ -82,12 +81,12 @@ impl Estimate {
         self.last.as_ref()
     }
 
-    /// Whether a usable state came within `limit_s` before `now`.
+    /// Whether a usable state arrived within `limit_s` before `now`.
     pub(super) fn usable_within(&self, now: Time, limit_s: f64) -> bool {
         within(self.usable_at, now, limit_s)
     }
 
-    /// Whether a fresh state came within `limit_s` before `now`; `None` if there never was one.
+    /// Whether a fresh state arrived within `limit_s` before `now`; `None` before the first.
     pub(super) fn fresh_within(&self, now: Time, limit_s: f64) -> Option<bool> {
         self.fresh_at.map(|_| within(self.fresh_at, now, limit_s))
     }
@@ -95,6 +94,6 @@ impl Estimate {
 
 /// Whether `then` lies at most `limit_s` before `now`.
 pub(super) fn within(then: Option<Time>, now: Time, limit_s: f64) -> bool {
-    // Half a microsecond of tolerance: the limit itself is on the good side.
+    // half a microsecond of tolerance: the limit itself counts as within
     then.is_some_and(|then| now.since(then).as_secs_f64() <= limit_s + 5e-7)
 }

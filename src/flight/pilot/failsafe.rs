@@ -1,4 +1,4 @@
-//! What is lost, what comes back: the vehicle, the setpoints, the sticks, the vehicle's clock.
+//! Loss and recovery of vehicle, setpoints, sticks and the vehicle's clock.
 
 use std::time::Duration;
 
@@ -8,20 +8,20 @@ use super::{Complaints, Pilot};
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Change of a command that a flying aircraft shows within a fifth of a second, in units of 0..1:
-/// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), which no sensor misses.
+/// Change of a command to which a flying aircraft responds visibly within a fifth of a second, in units of 0..1:
+/// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), above the resolution of any sensor.
 const UNFELT_TRAVEL: f64 = 0.005;
 
-/// Sensors that stand still under commands that move are lost after this time, s: an aircraft that
-/// rolls as fast as it may rolls on by 20° meanwhile, and real sensors do not repeat to the bit.
+/// Time after which constant sensor values under changing commands count as frozen, s: an aircraft at its largest
+/// roll rate rolls by 20° meanwhile, and real sensors do not repeat bit by bit.
 const FROZEN_LOSS_S: f64 = 0.2;
 
-/// A vehicle that is back has to stay for this long before it is said, s: as long as one must be silent to be lost.
+/// Time for which a recovered vehicle link must persist before it is reported, s; equal to the timeout of its loss.
 const STEADY_S: f64 = 0.5;
 
 impl Pilot {
-    /// A state that stands still while nothing asks it to move is no fault: the vehicle waits for
-    /// its launch, or a simulator without noise has settled.
+    /// Accepts constant sensor values while no command changes: the vehicle waits for its launch, or a simulator
+    /// without noise has settled.
     pub(super) fn excuse_stillness(&mut self, quality: Frame, now: Time) {
         let (was, is) = (self.last_moved, self.in_force);
         let moves =
@@ -35,7 +35,7 @@ impl Pilot {
         }
     }
 
-    /// Whether the state is fresh; `None` if there never was one.
+    /// Whether the state is fresh; `None` before the first.
     pub(super) fn state_fresh(&self) -> Option<bool> {
         let limit = match self.estimate.is_frozen() {
             true => self.config.vehicle_loss_s.min(FROZEN_LOSS_S),
@@ -44,8 +44,8 @@ impl Pilot {
         self.estimate.fresh_within(self.clock, limit)
     }
 
-    /// This computer did not listen for `missed`: no state, setpoint or stick that came before is older for it. What is
-    /// flown is what was flown before, on the next state.
+    /// Excludes `missed`, a stall of this computer, from the ages of state, setpoints and sticks: the next state is
+    /// flown as before the stall.
     pub fn excuse(&mut self, missed: Duration) {
         self.estimate.excuse(missed);
         let later = |at: &mut Time| *at = at.plus(missed);
@@ -54,14 +54,17 @@ impl Pilot {
         self.vehicle_back.iter_mut().for_each(later);
     }
 
-    /// Finds a lost vehicle, and says that one is back once it has stayed for a while: a link that comes and goes is one loss.
+    /// Detects the loss of the vehicle, and reports its recovery once it has persisted: an intermittent link is one
+    /// loss.
     pub(super) fn watch_vehicle(&mut self) {
         if self.state_fresh() == Some(false) && !self.vehicle_lost {
             self.lose_vehicle();
         }
-        if self.loss_told && !self.vehicle_lost && !within(self.vehicle_back, self.clock, STEADY_S)
+        if self.loss_reported
+            && !self.vehicle_lost
+            && !within(self.vehicle_back, self.clock, STEADY_S)
         {
-            self.loss_told = false;
+            self.loss_reported = false;
             let words = match self.armed && self.mode == Mode::Hold {
                 true => "vehicle link back: flying in HOLD",
                 false => "vehicle link back",
@@ -72,8 +75,8 @@ impl Pilot {
 
     fn lose_vehicle(&mut self) {
         self.vehicle_lost = true;
-        let news = !self.loss_told || (self.armed && self.mode != Mode::Hold);
-        self.loss_told = true;
+        let news = !self.loss_reported || (self.armed && self.mode != Mode::Hold);
+        self.loss_reported = true;
         if self.armed {
             self.mode = Mode::Hold;
         }
@@ -105,7 +108,7 @@ impl Pilot {
         }
     }
 
-    /// The vehicle's clock has started again: all that was known is of another life.
+    /// Resets after a restart of the vehicle's clock: earlier states and times are invalid.
     pub(super) fn restart(&mut self) {
         if self.estimate.last().is_some() {
             self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
@@ -114,10 +117,10 @@ impl Pilot {
         self.setpoint = None;
         self.sticks = None;
         self.vehicle_lost = false;
-        (self.loss_told, self.vehicle_back) = (false, None);
+        (self.loss_reported, self.vehicle_back) = (false, None);
         self.complaints = Complaints::default();
         self.oscillation = Oscillation::default();
-        self.eased = None;
+        self.oscillated = None;
         self.upset = false;
         self.forget_controllers();
     }

@@ -1,4 +1,4 @@
-//! The limits: what may be commanded at an airspeed, and how fast a command may change.
+//! Envelope and slew limits of targets and commands.
 
 use super::config::Config;
 use greylag_control::Target;
@@ -8,34 +8,33 @@ use greylag_physics::Command;
 pub const TICK_S: f64 = 0.01;
 /// Airspeed margin over which pitch protection fades in, m/s.
 const PROTECTION_BAND: f64 = 2.0;
-/// Pitch allowed at most below the minimum airspeed, rad: clearly nose down, not a dive.
+/// Largest pitch below the minimum airspeed, rad: clearly nose down, not a dive.
 const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
-/// Pitch required at least above the maximum airspeed, rad: clearly nose up, not a climb.
+/// Smallest pitch above the maximum airspeed, rad: clearly nose up, not a climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
-/// Load factor that lift still allows at the minimum airspeed. An envelope sets that airspeed near
-/// 1.41 times the stall speed (13 to 9.2 m/s for the X8), where lift allows 2; keeping 1.2 times
-/// the stall speed in a turn leaves 2 / 1.2².
+/// Load factor available at the minimum airspeed. An envelope sets that airspeed near 1.41 times the stall speed (13
+/// to 9.2 m/s for the X8), where lift allows 2; a margin of 1.2 times the stall speed in a turn leaves 2 / 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The limits in force. SI units, radians.
+/// Limits in SI units and radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest bank, rad.
+    /// Largest |bank|, rad.
     pub bank_max: f64,
-    /// Largest pitch, rad.
+    /// Largest pitch angle, rad.
     pub pitch_max: f64,
-    /// Smallest pitch, rad.
+    /// Smallest pitch angle, rad.
     pub pitch_min: f64,
-    /// Smallest airspeed, m/s.
+    /// Smallest true airspeed, m/s.
     pub airspeed_min: f64,
-    /// Largest airspeed, m/s.
+    /// Largest true airspeed, m/s.
     pub airspeed_max: f64,
     /// Largest load factor of a level turn.
     pub load_max: f64,
-    /// Largest change of a surface command in a tick.
+    /// Largest change of a surface command per tick.
     pub surface_step: f64,
-    /// Largest change of the throttle command in a tick.
+    /// Largest change of the throttle command per tick.
     pub throttle_step: f64,
 }
 
@@ -56,15 +55,15 @@ impl From<&Config> for Limits {
 }
 
 impl Limits {
-    /// The bank that a level turn may have at `airspeed` (m/s), rad: the load factor 1/cos φ stays
-    /// below both the limit and what lift allows, which grows as V².
+    /// The bank limit of a level turn at `airspeed` (m/s), rad: the load factor 1/cos φ stays below the limit and
+    /// below the available lift, which grows as V².
     pub fn bank_limit(&self, airspeed: f64) -> f64 {
         let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
         let load = lift.min(self.load_max).max(1.0);
         (1.0 / load).acos().min(self.bank_max)
     }
 
-    /// The pitch that may be commanded at `airspeed` (m/s), least and most, rad.
+    /// Smallest and largest pitch that may be commanded at `airspeed` (m/s), rad.
     pub fn pitch_limits(&self, airspeed: f64) -> (f64, f64) {
         let slow = ((airspeed - self.airspeed_min) / PROTECTION_BAND).clamp(0.0, 1.0);
         let fast = ((self.airspeed_max - airspeed) / PROTECTION_BAND).clamp(0.0, 1.0);
@@ -73,7 +72,7 @@ impl Limits {
         (least, most)
     }
 
-    /// `target` brought inside the envelope at `airspeed` (m/s).
+    /// `target` limited to the envelope at `airspeed` (m/s).
     pub fn limit(&self, target: Target, airspeed: f64) -> Target {
         let bank = self.bank_limit(airspeed);
         let (least, most) = self.pitch_limits(airspeed);
@@ -95,7 +94,7 @@ impl Limits {
         }
     }
 
-    /// `wanted` in range, and no further from `last` than one tick allows.
+    /// `wanted` limited to its range and to the slew limit of a tick from `last`.
     pub fn slew(&self, last: Command, wanted: Command) -> Command {
         let wanted = wanted.clamped();
         let near = |from: f64, to: f64, step: f64| to.clamp(from - step, from + step);

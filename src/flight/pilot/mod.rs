@@ -1,8 +1,7 @@
-//! The pilot: from telemetry, time, requests to one command a tick.
+//! The pilot: from telemetry, time and requests to one command per tick.
 //!
-//! No socket, clock, lock or `Result` inside a tick, so that a recording is an input: the same
-//! calls give the same commands to the bit. A tick has two phases, so that a planner can run
-//! between them: [`Pilot::observe`] says what is wanted, [`Pilot::decide`] what shall be done.
+//! A tick uses no socket, clock, lock or `Result`, so that a recording can be replayed: the same
+//! calls give the same commands to the bit. [`Pilot`] describes the order of calls.
 //!
 //! ```text
 //! planned command ─► fallback controller ─► command held 50 ms ─► wings level at trim constants
@@ -48,10 +47,24 @@ use polarity::Check;
 use programme::Programme;
 use texts::Texts;
 
-/// A loop that swings again within this time does not only swing for once, s.
+/// Time within which a second oscillation counts as persistent, s.
 const SWINGS_AGAIN_S: f64 = 20.0;
 
 /// The pilot of one aircraft.
+///
+/// Kinds of methods:
+///
+/// - set-up before flight: [`Pilot::take_on`], [`Pilot::follow`], [`Pilot::protect_with`], [`Pilot::monitor_with`];
+/// - time: [`Pilot::advance`], about every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of
+///   this computer;
+/// - tick: [`Pilot::observe`] with a state frame, then [`Pilot::decide`] with the plan for the request that `observe`
+///   returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
+/// - requests of clients: the trait [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
+/// - vehicle: [`Pilot::engaged`] when a real controller has given control authority.
+///
+/// Rule of time: `now` is vehicle time and does not decrease; a clock that jumps back is taken for a restart of the
+/// vehicle, after which all earlier states are dropped. The pilot reads no clock: the same calls give the same
+/// commands to the bit.
 pub struct Pilot {
     config: Config,
     limits: Limits,
@@ -59,9 +72,9 @@ pub struct Pilot {
     fallback: Box<dyn Controller>,
     estimate: Estimate,
     texts: Texts,
-    /// The vehicle's time now, also while no states come.
+    /// Present vehicle time, also between states.
     clock: Time,
-    /// Time of the state that is being answered.
+    /// Time of the state that is answered.
     answering: Time,
     armed: bool,
     mode: Mode,
@@ -69,19 +82,19 @@ pub struct Pilot {
     sticks: Option<(Time, Sticks)>,
     setpoint_lost: bool,
     vehicle_lost: bool,
-    /// Whether a loss was said of which the end was not.
-    loss_told: bool,
-    /// When the vehicle last came back from a loss.
+    /// Whether a loss was reported and its end was not.
+    loss_reported: bool,
+    /// When the vehicle link last recovered.
     vehicle_back: Option<Time>,
-    /// Since when airspeed and altitude are late.
+    /// Since when airspeed and altitude are missing.
     air_late: Option<Time>,
-    /// The setpoint of which it was said that the limits cut it: roll and pitch, rad.
+    /// The setpoint whose limitation was reported: roll and pitch, rad.
     cut: Option<[f64; 2]>,
-    /// The command in force.
+    /// The last command.
     in_force: Command,
-    /// The command that was in force before it; repeated states do not count.
+    /// The command before it; repeated states do not count.
     before: Command,
-    /// The command in force when the state last changed.
+    /// The last command when the state last changed.
     last_moved: Command,
     source: Source,
     target: Target,
@@ -95,25 +108,25 @@ pub struct Pilot {
     check: Option<Check>,
     /// The guard against oscillations.
     oscillation: Oscillation,
-    /// Whether there is a controller to give the aircraft to.
+    /// Whether a flight controller can take control back.
     hands_back: bool,
-    /// Whether a controller flies attitudes by itself, so that our surfaces are not those that fly.
+    /// Whether a controller is commanded attitudes, so that our surface commands do not act.
     by_attitude: bool,
-    /// When the loop last swung: deflections are eased for a while after it.
-    eased: Option<Time>,
-    /// What the controller's deflections are on the average of the last half second, and until when.
+    /// Time of the last oscillation: the gain is reduced for a while after it.
+    oscillated: Option<Time>,
+    /// Low-pass of the controller's commands, and the time of its last update.
     mean: Option<(Time, Command)>,
-    /// Whether the aircraft is being rolled upright.
+    /// Whether recovery from an upset is active.
     upset: bool,
-    /// What the sign check or the oscillation guard has found wrong since the aircraft was armed.
+    /// Fault found by the sign check or the oscillation guard since arming.
     refused: Option<Fault>,
-    /// The model that says what it has not predicted, where there is one.
+    /// The model monitor, where there is one.
     monitor: Option<Monitor>,
-    /// What keeps the commands inside the envelope, where there is a model to predict with.
+    /// The envelope limiter, where there is a model for its predictions.
     envelope: Option<EnvelopeLimiter>,
 }
 
-/// What `observe` found, for `decide`.
+/// Result of `observe` for `decide`.
 #[derive(Clone, Copy, Debug)]
 enum Pending {
     Disarmed,
@@ -125,9 +138,10 @@ enum Pending {
 }
 
 impl Pilot {
-    /// A pilot, disarmed and in HOLD, that flies by `config` and falls back on `fallback`.
+    /// A pilot, disarmed and in HOLD, with settings `config` and the controller `fallback`.
     ///
     /// # Errors
+    ///
     /// What [`Config::check`] finds.
     pub fn new(config: Config, fallback: Box<dyn Controller>) -> Result<Self, ConfigError> {
         config.check()?;
@@ -151,7 +165,7 @@ impl Pilot {
             sticks: None,
             setpoint_lost: false,
             vehicle_lost: false,
-            loss_told: false,
+            loss_reported: false,
             vehicle_back: None,
             air_late: None,
             cut: None,
@@ -171,7 +185,7 @@ impl Pilot {
             hands_back: false,
             by_attitude: false,
             mean: None,
-            eased: None,
+            oscillated: None,
             upset: false,
             refused: None,
             monitor: None,
@@ -179,14 +193,14 @@ impl Pilot {
         })
     }
 
-    /// Flies `schedule` in offboard in place of the client's attitudes, from each entry on. The client
-    /// still has to send setpoints: without them offboard ends as it always does.
+    /// Flies `schedule` in OFFBOARD instead of the client's attitudes, starting at each entry into the mode. The
+    /// client still has to send setpoints: without them the offboard timeout applies.
     pub fn follow(&mut self, schedule: Schedule) {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Prepares for `vehicle`: where a controller moves the surfaces for us, their signs are checked; where it flies attitudes by
-    /// itself, our surfaces do not fly, and nothing is said of them.
+    /// Configures the pilot for `vehicle`: where surface commands pass through a controller's channels, their signs
+    /// are checked; where attitudes are commanded, surface checks and oscillation reports are off.
     pub fn take_on(&mut self, vehicle: &Vehicle) {
         self.by_attitude = !vehicle.flies_surfaces();
         if vehicle.has_channels() {
@@ -194,25 +208,24 @@ impl Pilot {
         }
     }
 
-    /// Checks the surfaces' signs from now on, whenever control authority is taken, and gives the aircraft back when they are
-    /// wrong or the loop oscillates: for a vehicle whose controller moves the surfaces for us. Without the model's answers
-    /// in the settings no signs can be checked.
+    /// Enables the check of surface signs at every engagement. Control is returned to the controller when they are
+    /// wrong or the loop oscillates persistently. Without modelled responses in the settings no signs are checked.
     pub fn check_signs(&mut self) {
         self.hands_back = true;
         self.check = self.config.answers.clone().map(Check::new);
     }
 
-    /// The vehicle's controller has given us control authority, if it is one to give it.
+    /// Takes note that the vehicle's controller has given control authority.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
-        (self.oscillation, self.eased, self.mean) = (Oscillation::default(), None, None);
+        (self.oscillation, self.oscillated, self.mean) = (Oscillation::default(), None, None);
         if let Some(check) = &mut self.check {
             check.begin(self.in_force);
         }
     }
 
-    /// Lets time pass to `now`: finds lost setpoints, lost sticks, a lost vehicle. To be called
-    /// also while no frames come. A clock that jumps back is a vehicle that has restarted.
+    /// Advances time to `now` and checks the timeouts of setpoints, sticks and vehicle. Call it also while no frames
+    /// arrive. A clock that jumps back is a restart of the vehicle.
     pub fn advance(&mut self, now: Time) {
         if self.clock.since(now) > RESTART {
             self.restart();
@@ -222,8 +235,8 @@ impl Pilot {
         self.watch_client();
     }
 
-    /// First phase of a tick: takes in a state frame that came at `now`, and says what a planner
-    /// should plan, if anything.
+    /// First phase of a tick: takes a state frame that arrived at `now`; returns the request to a planner, if there
+    /// is one.
     pub fn observe(&mut self, now: Time, frame: &Telemetry) -> Option<Request> {
         if self.estimate.restarted(frame) {
             self.restart();
@@ -248,7 +261,7 @@ impl Pilot {
         }
     }
 
-    /// Second phase of a tick: the answer to the frame last observed.
+    /// Second phase of a tick: the decision on the frame last observed.
     pub fn decide(&mut self, plan: Plan) -> Decision {
         let (wanted, source) = match self.pending {
             Pending::Disarmed => (Command::IDLE, Source::Disarmed),
@@ -276,8 +289,8 @@ impl Pilot {
         self.decision()
     }
 
-    /// Looks for an oscillation in what was flown on: deflections are eased for a while. If the loop swings again soon and there
-    /// is a controller, it gets the aircraft back.
+    /// Checks the flown commands for an oscillation and reduces the gain for a while. If it recurs soon and there is
+    /// a controller, control is returned.
     fn guard(&mut self) {
         let Pending::Fly { seen, .. } = &self.pending else { return };
         if self.by_attitude {
@@ -287,24 +300,24 @@ impl Pilot {
         let found = self.oscillation.see(time, &seen.state, &self.before, &self.in_force, step);
         let Some((axis, lasted_s)) = found else { return };
         self.oscillation = Oscillation::default();
-        if self.hands_back && within(self.eased, time, SWINGS_AGAIN_S) {
+        if self.hands_back && within(self.oscillated, time, SWINGS_AGAIN_S) {
             self.refused = Some(Fault::Oscillation(axis));
         } else {
-            self.ease(axis, lasted_s, time);
+            self.reduce_gain(axis, lasted_s, time);
         }
     }
 
-    /// Notes which share of the cycle the control task needed lately, 0..1, for the status.
+    /// Stores the recent processing time of the control task as a fraction of its cycle, 0..1, for the status.
     pub fn note_load(&mut self, load: f64) {
         self.load = load;
     }
 
-    /// Passes on a line from outside to the ground stations.
-    pub fn tell(&mut self, severity: Severity, words: &str) {
+    /// Sends a text from outside the pilot to the ground stations.
+    pub fn send_text(&mut self, severity: Severity, words: &str) {
         self.texts.say(severity, words);
     }
 
-    /// The settings in force.
+    /// The present settings.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -333,7 +346,7 @@ impl Pilot {
         }
     }
 
-    /// Whoever flies next starts afresh from the command in force.
+    /// Resets the controllers, so that the next one starts from the last command.
     fn forget_controllers(&mut self) {
         self.planner_engaged = false;
         self.fallback_engaged = false;
@@ -369,7 +382,7 @@ impl Pilot {
         };
         let (wish, throttle) = self.scheduled_wish(frame.time).unwrap_or_else(|| self.wish());
         self.target = self.limits.limit(wish, frame.state.airspeed);
-        self.tell_of_limits(&wish);
+        self.report_limits(&wish);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
         // Noise of a sensor at rest.
         state.airspeed = state.airspeed.max(0.0);

@@ -1,54 +1,55 @@
-//! The oscillation guard: does the loop through a surface swing by itself, at the surface's limits?
+//! The oscillation guard detects a limit cycle of the loop through a surface at its limits.
 //!
-//! A loop with more delay than it was designed for can fall into a limit cycle that the slew limit of its
-//! surface sustains: the X8 by ArduPlane's channels swung at 2.6 Hz, q to 228 °/s, for 50 s, with every
-//! state fresh and every command in range. What gives it away is a rate that changes its sign again
-//! and again with the command at its limit, or over half of its travel, each time. A manoeuvre does so once
-//! or twice; air does not make a command sweep like that.
+//! A loop with more delay than its margin can enter a limit cycle that the surface's slew limit sustains: the X8 by
+//! ArduPlane's channels oscillated at 2.6 Hz, q to 228 °/s, for 50 s, with every state fresh and every command in
+//! range. Its signature is a rate that changes sign repeatedly with the command at its limit, or sweeping over half
+//! of its travel, in each half period. A manoeuvre shows this once or twice; turbulence does not move a command this
+//! far.
 
 use super::limits::TICK_S;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, State, Time};
 
-/// A steady turn has a pitch rate: what is slower than this is taken off, s.
+/// Time constant of the high-pass on the rate, s: the pitch rate of a steady turn is removed.
 const SLOW_S: f64 = 0.5;
-/// A half swing lasts between these, s: 1 to 8 Hz. Slower ones are flight, faster ones structure or
-/// noise.
+/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics, faster is structure or noise.
 const HALF_SWING_S: [f64; 2] = [0.06, 0.5];
-/// Least peak of a half swing, rad/s (23 °/s): three times what light turbulence gives, a quarter of
-/// the mildest limit cycle that was seen (pitch 4° rms at 2.6 Hz is 90 °/s).
+/// Smallest peak of a half period, rad/s (23 °/s): three times that in light turbulence, a quarter of the mildest
+/// limit cycle observed (pitch 4° rms at 2.6 Hz is 90 °/s).
 const PEAK: f64 = 0.4;
-/// A rate below this has no sign, rad/s (3 °/s): ten times the noise of a gyro.
+/// Dead band of the rate's sign, rad/s (3 °/s): ten times the noise of a gyro.
 const NO_SIGN: f64 = 0.05;
-/// Least share of a half swing with the command at its slew limit or its stop: a fifth, less what sums of ticks lose.
+/// Smallest fraction of a half period with the command at its slew limit or stop: a fifth, with tolerance for
+/// rounding of sums.
 const LIMITED: f64 = 0.2 - 1e-6;
-/// A command that sweeps this much within a half swing swings too, limit or not: half of the travel from −1 to 1. Where a
-/// surface answers 60 ms late, a limit cycle has half swings that hardly touch the limit.
+/// Sweep of the command in a half period that also counts: half of the travel from −1 to 1. With a delay of 60 ms the
+/// half periods of a limit cycle hardly reach the limits.
 const SWEPT: f64 = 1.0;
-/// Half swings in a row, and how long they last together, s. A step between ±60° gives three.
+/// Consecutive half periods, and their total duration in s, that count as an oscillation. A step between ±60° has
+/// three.
 const SWINGS: u32 = 4;
 const LONG_S: f64 = 0.6;
-/// Part of a step or of full travel that counts as all of it.
+/// Fraction of a step or of full travel that counts as the limit.
 const ALL: f64 = 0.999;
 
-/// One axis.
+/// Detector of one axis.
 #[derive(Clone, Copy, Debug)]
 struct Swings {
     mean: Option<f64>,
-    /// Sign of the half swing that goes on, 0 before the first.
+    /// Sign of the present half period, 0 before the first.
     sign: f64,
-    /// How long it has lasted, and how long of that the command was at its limit, s.
+    /// Its duration, and the time of it with the command at a limit, s.
     lasts: f64,
     limited: f64,
     peak: f64,
-    /// Least and largest command of it.
+    /// Smallest and largest command in it.
     range: [f64; 2],
-    /// Half swings in a row that were swings, and how long they lasted together, s.
+    /// Consecutive half periods that qualified, and their total duration, s.
     row: u32,
     row_s: f64,
 }
 
-/// The range of no command.
+/// The empty range of commands.
 const NONE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 impl Default for Swings {
@@ -58,7 +59,7 @@ impl Default for Swings {
     }
 }
 
-/// The guard of roll and pitch.
+/// Detectors of roll and pitch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Oscillation {
     axes: [Swings; 2],
@@ -66,8 +67,9 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// Takes in a tick: its time and state, the commands before and after it, and the largest change of a
-    /// surface in a tick. The axis that oscillates, if one does, and for how long, s. A starved processor leaves ticks out, so time counts, not ticks.
+    /// Takes a tick: its time and state, the commands before and after it, and the largest change of a surface per
+    /// tick. Returns the oscillating axis, if any, and the duration, s. Durations are measured by time, not by ticks,
+    /// since an overloaded processor skips ticks.
     pub(super) fn see(
         &mut self,
         time: Time,
@@ -90,7 +92,7 @@ impl Oscillation {
 }
 
 impl Swings {
-    /// How long it has swung, s, if it does.
+    /// Duration of the oscillation, s, if there is one.
     fn see(&mut self, passed: f64, rate: f64, command: f64, limited: bool) -> Option<f64> {
         if !rate.is_finite() {
             return None;
@@ -109,7 +111,7 @@ impl Swings {
         (self.row >= SWINGS && self.row_s >= LONG_S).then_some(self.row_s)
     }
 
-    /// A half swing has ended: whether it was one decides on the row.
+    /// Evaluates a half period at its end.
     fn close(&mut self) {
         let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&self.lasts)
             && self.peak >= PEAK

@@ -1,12 +1,12 @@
-//! The parameter table: names and ranges that clients see, tied to the pilot's settings.
+//! The parameter table of clients: names, ranges and their settings.
 
 use super::config::{Config, ThrustSource};
 use greylag_link::autopilot::{Parameter, ParameterValue, Verdict};
 
-/// A real parameter: its name, how to read it, how to write it.
+/// A real parameter: name, getter, setter.
 type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
 
-/// The real parameters, in the order of their index. Names have at most 16 characters.
+/// The real parameters in index order. Names have at most 16 characters.
 const REALS: [Real; 12] = [
     ("GL_OFFB_LOSS_S", |c| c.offboard_loss_s, |c, x| c.offboard_loss_s = x),
     ("GL_VEH_LOSS_S", |c| c.vehicle_loss_s, |c, x| c.vehicle_loss_s = x),
@@ -27,12 +27,12 @@ const REALS: [Real; 12] = [
 ];
 /// Index of GL_THRUST_SRC: 0 holds the cruise airspeed, 1 takes the setpoint's thrust.
 const THRUST_SOURCE: usize = REALS.len();
-/// Index of SYSID_THISMAV, which ground stations look for: fixed by the autopilot identity.
+/// Index of SYSID_THISMAV, which ground stations read: constant.
 const SYSTEM_ID: usize = REALS.len() + 1;
 /// The system id of the autopilot identity.
 const AUTOPILOT_SYSTEM: i32 = 1;
 
-/// The table that shows `config`.
+/// The parameter table of `config`.
 pub(super) fn table(config: &Config) -> Vec<Parameter> {
     let reals = REALS
         .iter()
@@ -50,7 +50,8 @@ pub(super) fn table(config: &Config) -> Vec<Parameter> {
 /// `config` with parameter `index` set to `value`.
 ///
 /// # Errors
-/// The verdict to give when the value is refused.
+///
+/// The verdict of a refusal.
 pub(super) fn changed(
     config: &Config,
     index: usize,

@@ -1,4 +1,4 @@
-//! The pilot while nobody may steer yet: the check of signs, from arming to its verdict.
+//! The pilot during the check of signs, from arming to its verdict.
 
 use super::estimate::Frame;
 use super::polarity::Verdict;
@@ -7,7 +7,7 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::{Command, Time};
 
 impl Pilot {
-    /// Takes the state into the check of signs, if there is one; what is pending while it lasts.
+    /// Passes the state to the check of signs, if it is active; the pending decision while it lasts.
     pub(super) fn check_polarity(&mut self, quality: Frame) -> Option<Pending> {
         if self.refused.is_none() && !self.check.as_ref()?.is_open() {
             return None;
@@ -35,13 +35,13 @@ impl Pilot {
         open.then_some(Pending::Check { time: frame.time, airspeed })
     }
 
-    /// The command while nobody may steer.
+    /// The command during the check.
     pub(super) fn check_command(&self, time: Time, airspeed: f64) -> Command {
         let pulsed = self.check.as_ref().and_then(|check| check.command(time));
         pulsed.unwrap_or_else(|| self.level_at(airspeed))
     }
 
-    /// What holds the aircraft level at an airspeed, m/s.
+    /// Level trim at an airspeed, m/s.
     fn level_at(&self, airspeed: f64) -> Command {
         let trim = self.config.trim_at(airspeed);
         let throttle = self.limits.protect(trim.throttle, airspeed);

@@ -1,4 +1,4 @@
-//! The flight-test schedule that a pilot flies in offboard, if it was given one.
+//! The flight-test schedule flown in OFFBOARD, if there is one.
 
 use super::texts::Texts;
 use greylag_control::Target;
@@ -6,7 +6,7 @@ use greylag_link::autopilot::Severity;
 use greylag_manoeuvres::{Demand, Overlay, Schedule};
 use greylag_physics::{Command, Time};
 
-/// Where a schedule stands.
+/// Phase of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Waiting,
@@ -14,8 +14,8 @@ enum Stage {
     Over,
 }
 
-/// A schedule in the pilot's hands: it wishes for targets as a client does, and adds its excitation to
-/// the command; envelope, slew limits, airspeed protection and failsafes come after it.
+/// A schedule under the pilot: it supplies targets as a client does and adds its excitation to the command; envelope,
+/// slew limits, airspeed protection and failsafes apply after it.
 #[derive(Debug)]
 pub(super) struct Programme {
     name: String,
@@ -25,19 +25,19 @@ pub(super) struct Programme {
 }
 
 impl Programme {
-    /// `schedule`, not begun.
+    /// A programme of `schedule` that has not started.
     pub(super) fn new(schedule: Schedule) -> Programme {
         let name = schedule.name.clone();
         Programme { name, overlay: Overlay::new(schedule), demand: None, stage: Stage::Waiting }
     }
 
-    /// Goes back to the start, as when offboard is left.
+    /// Returns to the start, as when OFFBOARD ends.
     pub(super) fn stop(&mut self) {
         self.overlay.reset();
         (self.demand, self.stage) = (None, Stage::Waiting);
     }
 
-    /// What it wishes for at `now`; the first call begins it.
+    /// The target at `now`; the first call starts the schedule.
     pub(super) fn wish(&mut self, now: Time, texts: &mut Texts) -> Target {
         let demand = self.overlay.demand(now);
         let over = self.overlay.is_over(now);
@@ -50,7 +50,7 @@ impl Programme {
         demand.target
     }
 
-    /// The command with the excitation of the last wish, if it is flown now.
+    /// The command plus the excitation of the last target, if it is active.
     pub(super) fn excite(&mut self, own: Command) -> Command {
         match self.demand.take() {
             Some(demand) => self.overlay.command(&demand, own),

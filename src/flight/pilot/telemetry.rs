@@ -1,9 +1,9 @@
-//! Whether a state frame of the vehicle can be believed.
+//! Checks of the usability of a state frame.
 
 use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
 
-/// The faults that make a state unusable. Specific force is recorded, not flown on.
+/// Faults that make a state unusable. Specific force is only recorded.
 const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ATTITUDE, "attitude"),
     (Faults::RATES, "body rates"),
@@ -13,11 +13,10 @@ const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ACTUATORS, "actuators"),
 ];
 
-/// The reason that ends by itself: after a gap the first airspeed is still to come.
+/// Temporary reason: after a gap the first airspeed arrives later.
 pub(super) const LATE_AIR: &str = "airspeed and altitude are late";
 
-/// What of this frame cannot be flown on, if anything: what the link has found, and what is not
-/// finite or beyond any aircraft all the same.
+/// Why this frame is unusable, if it is: a fault found by the link, or a value that is not finite or implausible.
 pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
     let found = STATE_FAULTS.iter().find(|(fault, _)| frame.faults.contains(*fault));
     found.map(|(_, name)| *name).or_else(|| implausible(frame))
@@ -42,7 +41,7 @@ fn implausible(frame: &Telemetry) -> Option<&'static str> {
     }
 }
 
-/// Whether every measured value equals that of `earlier` to the bit: a sensor that has stopped.
+/// Whether every measured value equals that of `earlier` bit by bit: a frozen sensor.
 pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
     let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
     same(&frame.state.to_array(), &earlier.state.to_array())
@@ -50,7 +49,7 @@ pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
         && same(&frame.specific_force, &earlier.specific_force)
 }
 
-/// π with the rounding of a 32-bit quaternion, rad.
+/// π plus the rounding of a 32-bit quaternion, rad.
 const HALF_TURN: f64 = std::f64::consts::PI + 1e-3;
 
 #[cfg(test)]
@@ -121,7 +120,7 @@ mod tests {
 
     #[test]
     fn the_edge_of_the_plausible_is_still_flown() {
-        // Inverted in a spin near a gyroscope's full scale: real, and when the pilot is needed most.
+        // inverted in a spin near a gyroscope's full scale: plausible, and the pilot is needed most
         let mut frame = good();
         frame.state.roll = -std::f64::consts::PI;
         frame.state.p = 34.9;

@@ -1,13 +1,13 @@
-//! The lines that wait for the ground stations, bounded.
+//! A bounded queue of texts for the ground stations.
 
 use std::collections::VecDeque;
 
 use greylag_link::autopilot::{Severity, Text};
 
-/// Lines kept at most: an hour without a client must not fill the memory.
+/// Capacity: an hour without a client must not exhaust the memory.
 const CAPACITY: usize = 32;
 
-/// A queue of lines; the oldest gives way to the newest.
+/// A queue of texts; when full, the oldest is dropped.
 #[derive(Debug, Default)]
 pub(super) struct Texts {
     waiting: VecDeque<Text>,

@@ -1,15 +1,15 @@
-//! What is wished for: the target of the schedule, of the mode, or level.
+//! The target of a tick before envelope limits: of the schedule, of the mode, or level.
 
 use super::{Pilot, ThrustSource, due};
 use greylag_control::Target;
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// A cut of less than half a degree is not worth a line, rad.
-const TOLD: f64 = 0.5 * std::f64::consts::PI / 180.0;
+/// Smallest reduction of an attitude by the envelope that is reported, rad.
+const REPORTED_CUT: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 impl Pilot {
-    /// The target of the schedule, if one is flown at `now`.
+    /// The target of the schedule, if one is active at `now`.
     pub(super) fn scheduled_wish(&mut self, now: Time) -> Option<(Target, Option<f64>)> {
         let programme = self.programme.as_mut()?;
         if self.mode == Mode::Offboard && self.setpoint.is_some() {
@@ -19,7 +19,7 @@ impl Pilot {
         None
     }
 
-    /// The target of the mode, before the envelope, with the throttle if the mode sets it itself.
+    /// The target of the mode before envelope limits, with the throttle if the mode sets it.
     pub(super) fn wish(&self) -> (Target, Option<f64>) {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
@@ -29,7 +29,7 @@ impl Pilot {
                 (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
             }
             (Mode::Stabilized, _, Some((_, s))) => {
-                // A stick forward is nose down; each half of its travel reaches its own limit.
+                // a stick forward is nose down; each half of its travel is scaled to its own limit
                 let pitch = if s.pitch > 0.0 {
                     s.pitch * self.limits.pitch_min
                 } else {
@@ -41,16 +41,17 @@ impl Pilot {
         }
     }
 
-    /// Says that a client's attitude is cut by the envelope; once for each that it asks for, and no oftener than other complaints.
-    pub(super) fn tell_of_limits(&mut self, wish: &Target) {
-        let cut = |wanted: f64, flown: f64| (wanted - flown).abs() > TOLD;
+    /// Reports that the envelope limits a client's attitude; once per setpoint, within the rate limit.
+    pub(super) fn report_limits(&mut self, wish: &Target) {
+        let cut = |wanted: f64, flown: f64| (wanted - flown).abs() > REPORTED_CUT;
         let (roll, pitch) = (cut(wish.roll, self.target.roll), cut(wish.pitch, self.target.pitch));
         if self.mode != Mode::Offboard || !(roll || pitch) {
             self.cut = None;
             return;
         }
         let asked = [wish.roll, wish.pitch];
-        let known = |cut: [f64; 2]| cut.iter().zip(asked).all(|(a, b)| (a - b).abs() <= TOLD);
+        let known =
+            |cut: [f64; 2]| cut.iter().zip(asked).all(|(a, b)| (a - b).abs() <= REPORTED_CUT);
         if self.cut.is_some_and(known) || !due(&mut self.complaints.limits, self.clock) {
             return;
         }

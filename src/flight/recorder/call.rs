@@ -1,4 +1,4 @@
-//! A call of the pilot as a line of `flight.calls`: with the vehicle's frames, all that it decided by.
+//! Calls of the pilot as lines of `flight.calls`: with the vehicle's frames, all its inputs.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,45 +11,45 @@ use greylag_physics::{Command, Time};
 /// The first line of the file.
 pub const HEADER: &str = "greylag-calls 1";
 
-/// What became of a request to plan.
+/// Reply to a planning request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Planned {
-    /// A command came in time.
+    /// A command arrived in time.
     Ready(Command),
-    /// None came in time.
+    /// No command arrived in time.
     Late,
-    /// None came, for the planner was at an earlier request and never heard of this one.
+    /// The planner was busy with an earlier request and did not receive this one.
     Busy,
-    /// Nobody was asked, or nobody could answer.
+    /// There was no request, or no planner.
     None,
 }
 
-/// One call. Numbers are written so that they read back to the bit.
+/// One call. Numbers are written so that they are read back to the bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Call {
-    /// Time passed to this moment.
+    /// Time was advanced.
     Advance(Time),
-    /// This computer had not listened for this long.
+    /// This computer had stalled for this long.
     Excuse(Duration),
-    /// The state of this time was observed, with this plan, and answered by this command.
+    /// The state of this time was observed, with this plan and this command.
     Tick(Time, Planned, Command),
-    /// Arming was asked for, by force or not.
+    /// Arming was requested, with or without force.
     Arm(Time, bool),
-    /// Disarming was asked for, by force or not.
+    /// Disarming was requested, with or without force.
     Disarm(Time, bool),
-    /// The controller gave control authority over.
+    /// The controller gave control authority.
     Engaged(Time),
-    /// A mode was asked for.
+    /// A mode was requested.
     Mode(Time, Mode),
-    /// A setpoint came.
+    /// A setpoint was received.
     Setpoint(Time, AttitudeSetpoint),
-    /// Stick positions came.
+    /// Stick positions were received.
     Sticks(Time, Sticks),
-    /// A parameter was to be set.
+    /// A parameter was set.
     Parameter(usize, ParameterValue),
 }
 
-/// The modes that can be asked for.
+/// The modes that can be requested.
 const MODES: [Mode; 5] = [Mode::Manual, Mode::Hold, Mode::Return, Mode::Offboard, Mode::Stabilized];
 
 impl fmt::Display for Call {
@@ -89,7 +89,7 @@ impl fmt::Display for Call {
     }
 }
 
-/// A command in words: aileron, elevator, throttle, and the rudder unless it is centred.
+/// A command as text: aileron, elevator, throttle, and the rudder unless it is zero.
 struct Words<'a>(&'a Command);
 
 impl fmt::Display for Words<'_> {
@@ -100,13 +100,13 @@ impl fmt::Display for Words<'_> {
     }
 }
 
-/// Whether two commands are equal to the bit.
+/// Whether two commands are equal bit by bit.
 pub fn same(a: &Command, b: &Command) -> bool {
     let bits = |c: &Command| [c.aileron, c.elevator, c.throttle, c.rudder].map(f64::to_bits);
     bits(a) == bits(b)
 }
 
-/// A line that is no call.
+/// A line is not a valid call.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no call of the pilot; the file is damaged, or of a newer program")]
 pub struct CallError(String);
@@ -119,7 +119,7 @@ impl FromStr for Call {
     }
 }
 
-/// The value in a line about a parameter.
+/// The value of a parameter line.
 fn parameter(words: &[&str]) -> Option<ParameterValue> {
     match *words.get(2)? {
         "real" => Some(ParameterValue::Real(words.get(3)?.parse().ok()?)),

@@ -1,39 +1,39 @@
-//! Where a recording goes, without overwriting another.
+//! The folder of a recording; existing ones are never overwritten.
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Where to record.
+/// Destination of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A new folder under this one, numbered after the highest there: `0001`, `0002` …
+    /// A new folder in this one, numbered after the highest present: `0001`, `0002` …
     Numbered(PathBuf),
     /// Exactly this folder, which must not exist yet.
     Exactly(PathBuf),
 }
 
-/// Why a recording cannot begin.
+/// A recording cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The folder is there already.
+    /// The folder exists already.
     #[error("cannot record to {}: it exists already; name a new folder (fly --record, demo --out) or move the old one away", path.display())]
     Exists {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// Something cannot be created.
+    /// A file or folder cannot be created.
     #[error("cannot create recording {}: {source}; name a folder that can be written", path.display())]
     File {
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
 }
 
 impl Place {
-    /// Makes the folder.
+    /// Creates the folder.
     pub(super) fn create(&self) -> Result<PathBuf, RecordError> {
         match self {
             Place::Numbered(root) => numbered(root),

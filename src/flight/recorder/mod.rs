@@ -1,7 +1,7 @@
-//! The recorder: a thread of its own that writes `flight.csv`, `flight.tlog`, `flight.calls`.
+//! The recorder: a thread that writes `flight.csv`, `flight.tlog`, `flight.calls`.
 //!
-//! Control hands entries over a bounded queue and never waits: what does not fit is dropped, with
-//! a count. A disk that fails ends the file, is reported once, and the flight goes on.
+//! The control thread queues entries and never waits: entries that do not fit are dropped and counted. A failing disk
+//! ends the file concerned and is reported once; the flight continues.
 
 pub mod call;
 mod folder;
@@ -21,12 +21,12 @@ use greylag_link::framing::{FrameCounts, Frames};
 use greylag_logs::csv::Rows;
 use queue::Queue;
 
-/// Entries that may wait: four seconds of a 100 Hz loop with its traffic.
+/// Capacity of the queue: four seconds of a 100 Hz loop with its traffic.
 const QUEUE: usize = 4096;
-/// Longest time that a written entry stays in memory.
+/// Longest time before written entries are flushed.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
-/// One thing to be recorded.
+/// An entry of the queue.
 #[derive(Debug)]
 enum Entry {
     Row(Box<Row>),
@@ -34,7 +34,7 @@ enum Entry {
     Call(Call),
 }
 
-/// The handle that control holds.
+/// The handle of the control thread.
 #[derive(Debug)]
 pub struct Recorder {
     queue: Queue<Entry, Written>,
@@ -42,22 +42,23 @@ pub struct Recorder {
     folder: PathBuf,
 }
 
-/// What a recording came to.
+/// Counters of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
-    /// Rows of `flight.csv`.
+    /// Number of rows in `flight.csv`.
     pub rows: u64,
-    /// Frames of `flight.tlog`.
+    /// Number of frames in `flight.tlog`.
     pub frames: u64,
-    /// Entries that did not fit the queue, and rows, frames and calls that came after the disk had failed.
+    /// Entries dropped because the queue was full or the disk had failed.
     pub dropped: u64,
 }
 
 impl Recorder {
-    /// Makes the folder, creates its files, starts the thread.
+    /// Creates the folder and its files, and starts the thread.
     ///
     /// # Errors
-    /// If the folder exists already, or something cannot be created.
+    ///
+    /// If the folder exists already, or a file cannot be created.
     pub fn start(place: &Place) -> Result<Self, RecordError> {
         let folder = place.create()?;
         let csv = folder::create(&folder, "flight.csv")?;
@@ -67,9 +68,10 @@ impl Recorder {
             .map_err(|source| RecordError::File { path: folder, source })
     }
 
-    /// A recorder over any three writers, in place of the files of `folder`.
+    /// A recorder with three writers instead of the files of `folder`.
     ///
     /// # Errors
+    ///
     /// If its thread cannot be started.
     pub fn over(
         folder: PathBuf,
@@ -83,12 +85,12 @@ impl Recorder {
         Ok(Recorder { queue, troubles, folder })
     }
 
-    /// Where the files lie.
+    /// Path of the folder.
     pub fn folder(&self) -> &std::path::Path {
         &self.folder
     }
 
-    /// Records a tick.
+    /// Records a tick as a row.
     pub fn row(&self, row: Row) {
         self.queue.hand_over(Entry::Row(Box::new(row)));
     }
@@ -103,17 +105,17 @@ impl Recorder {
         self.queue.hand_over(Entry::Call(call));
     }
 
-    /// What has gone wrong since the last call; each file fails at most once.
+    /// Errors since the last call; each file fails at most once.
     pub fn trouble(&self) -> Option<String> {
         self.troubles.try_recv().ok()
     }
 
-    /// Entries dropped so far because the queue was full.
+    /// Entries dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped()
     }
 
-    /// Writes what is waiting, closes the files, says what they came to.
+    /// Writes the queued entries, closes the files and returns the counters.
     pub fn finish(mut self) -> Written {
         self.close()
     }
@@ -130,7 +132,7 @@ impl Drop for Recorder {
     }
 }
 
-/// A file that ends at its first failure.
+/// A file that is closed at its first error.
 struct File<W> {
     name: &'static str,
     out: Option<W>,
@@ -138,7 +140,7 @@ struct File<W> {
 }
 
 impl<W> File<W> {
-    /// Does `work` on the file; `false` if it has failed, now or before.
+    /// Runs `work` on the file; `false` if it has failed, now or earlier.
     fn attempt(&mut self, work: impl FnOnce(&mut W) -> std::io::Result<()>) -> bool {
         let Some(out) = &mut self.out else {
             return false;
@@ -151,7 +153,7 @@ impl<W> File<W> {
     }
 }
 
-/// The recorder's thread: its files and what they came to.
+/// The recorder's files with their counters.
 struct Files<C: Write, T: Write, L: Write> {
     csv: File<Rows<BufWriter<C>>>,
     tlog: File<BufWriter<T>>,

@@ -1,8 +1,8 @@
-//! A queue into a thread that never holds up whoever fills it: what does not fit is dropped and counted.
+//! A queue to a thread that never blocks the sender: entries that do not fit are dropped and counted.
 
 use crate::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
 
-/// The filling end of a queue of `E` into a thread that comes to a `W`.
+/// The sending end of a queue of `E` to a thread that returns a `W`.
 #[derive(Debug)]
 pub struct Queue<E, W> {
     entries: Option<Sender<E>>,
@@ -11,9 +11,10 @@ pub struct Queue<E, W> {
 }
 
 impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
-    /// A queue for `size` entries into a thread called `name`, which does `work` until the queue is closed and empty.
+    /// A queue of `size` entries to a thread called `name`, which runs `work` until the queue is closed and empty.
     ///
     /// # Errors
+    ///
     /// The thread cannot be started.
     pub fn start(
         name: &str,
@@ -25,7 +26,7 @@ impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
         Ok(Queue { entries: Some(entries), dropped: AtomicU64::new(0), thread: Some(thread) })
     }
 
-    /// Hands `entry` over, or drops it if the queue is full or its thread has died. Never waits.
+    /// Queues `entry`, or drops it if the queue is full or its thread has ended. Never blocks.
     pub fn hand_over(&self, entry: E) {
         let lost = self.entries.as_ref().is_none_or(|entries| entries.try_send(entry).is_err());
         if lost {
@@ -33,13 +34,13 @@ impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
         }
     }
 
-    /// How many entries were dropped so far.
+    /// Number of entries dropped.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Closes the queue, waits until all that is in it is done, and gives what it came to; the default if the thread has died
-    /// of a panic or the queue was closed before.
+    /// Closes the queue, waits for the thread and returns its result; the default if the thread has panicked or was
+    /// closed before.
     pub fn close(&mut self) -> W {
         self.entries = None;
         self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or_default()

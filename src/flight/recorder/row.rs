@@ -8,21 +8,21 @@ use greylag_link::vehicle::{Faults, Telemetry};
 use greylag_logs::Sample;
 use greylag_logs::csv::Rows;
 
-/// One tick: what was seen, what was decided, how long it took.
+/// One tick: state, decision and latency.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// The columns of the log format.
     pub sample: Sample,
-    /// What was decided.
+    /// The pilot's decision.
     pub decision: Decision,
-    /// From the arrival of the state frame to the sending of the command, µs.
+    /// Time from the arrival of the state frame to the sending of the command, µs.
     pub latency_us: f64,
-    /// Residuals of the model divided by the half widths of their bands, as in `Status::residuals`; NaN when not known.
+    /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; NaN when unknown.
     pub residuals: [f64; 6],
 }
 
 impl Row {
-    /// The columns beside those of the log format.
+    /// The columns in addition to those of the log format.
     pub const EXTRA: [&'static str; 12] = [
         "airspeed_target_mps",
         "mode",
@@ -38,15 +38,14 @@ impl Row {
         RESIDUALS[5],
     ];
 
-    /// The row of a tick: a state with what was decided on it, after `latency_us` µs.
+    /// The row of a tick: a state with its decision and latency (µs).
     pub fn new(state: &Telemetry, decision: &Decision, latency_us: f64) -> Self {
         let residuals = [f64::NAN; 6];
         Row { sample: sample(state, decision), decision: *decision, latency_us, residuals }
     }
 
-    /// The row without surfaces, for a controller that is commanded attitudes: what the companion's
-    /// own loop would have commanded was never sent, and what its actuators did is not known. The
-    /// throttle is sent.
+    /// The row without surfaces, for a controller that is commanded attitudes: the companion's surface commands were
+    /// not sent, and the actuator state is unknown. The throttle is sent.
     pub fn without_surfaces(mut self) -> Self {
         let sample = &mut self.sample;
         for column in [
@@ -93,7 +92,7 @@ impl Row {
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // A part with a fault still holds its last good value; in a log it is missing.
+    // a part with a fault holds its last valid value; in a log it is missing
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };

@@ -1,34 +1,33 @@
-//! Vehicle time between two state frames, by the host's monotonic clock.
+//! Vehicle time between two state frames, extrapolated by the host's monotonic clock.
 
 use std::time::{Duration, Instant};
 
 use greylag_physics::Time;
 
-/// How the vehicle's time passes.
+/// Advance of vehicle time between frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// As on the wall: between frames it goes on with the host's clock, as long as somebody listens.
+    /// Real time: between frames it advances with the host's clock, while the link is polled.
     RealTime,
-    /// In steps of the answers: it stands between frames, until the vehicle has been silent for
-    /// [`PATIENCE`]. So a flight does not depend on the speed of the machine.
+    /// Lockstep: it stands between frames, until the vehicle has been silent for [`PATIENCE`]. A flight then does not
+    /// depend on the speed of the machine.
     Lockstep,
 }
 
-/// Silence after which a vehicle in lockstep is no longer taken to be computing: the shim repeats
-/// an unanswered frame after one second.
+/// Silence after which a vehicle in lockstep no longer counts as computing: the shim repeats an unanswered frame
+/// after one second.
 pub const PATIENCE: Duration = Duration::from_millis(1200);
 
-/// Most of a silence that counts between two looks at the link: a companion that was held up itself has not
-/// listened meanwhile.
+/// Largest interval between two polls that counts as silence: a companion that stalled did not listen meanwhile.
 const LISTENED: Duration = Duration::from_millis(100);
 
-/// Maps the host's clock to the vehicle's.
+/// Maps host time to vehicle time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
     pace: Pace,
     /// Time of the newest state.
     anchor: Option<Time>,
-    /// Silence since the anchor that was listened to, and until when.
+    /// Silence since the anchor while the link was polled, and the last poll.
     listened: (Duration, Option<Instant>),
 }
 
@@ -37,18 +36,18 @@ impl Clock {
         Clock { pace, anchor: None, listened: (Duration::ZERO, None) }
     }
 
-    /// How the vehicle's time passes.
+    /// Advance of vehicle time between frames.
     pub(super) fn pace(&self) -> Pace {
         self.pace
     }
 
-    /// A state of vehicle time `time` arrived at `arrived`.
+    /// Sets the anchor: a state of vehicle time `time` arrived at `arrived`.
     pub(super) fn set(&mut self, arrived: Instant, time: Time) {
         self.anchor = Some(time);
         self.listened = (Duration::ZERO, Some(arrived));
     }
 
-    /// The link is looked at, at `host`.
+    /// Notes a poll of the link at `host`.
     pub(super) fn listen(&mut self, host: Instant) {
         self.listened = (self.silence(host), Some(host));
     }
@@ -64,7 +63,7 @@ impl Clock {
         }
     }
 
-    /// How long the vehicle has been silent at `host` while somebody listened.
+    /// Silence of the vehicle at `host` while the link was polled.
     fn silence(&self, host: Instant) -> Duration {
         let (silence, until) = self.listened;
         let since = until.map_or(Duration::ZERO, |until| host.saturating_duration_since(until));
@@ -99,7 +98,7 @@ mod tests {
         }
         // Half a second beyond the patience the pilot finds the link lost.
         assert_eq!(clock.at(later(1700)), time(5500));
-        // A companion that stood still for five seconds has not heard five seconds of silence.
+        // A companion that stalled for five seconds did not observe five seconds of silence.
         assert_eq!(clock.at(later(6700)), time(5600));
         clock.set(later(6700), time(5010));
         assert_eq!(clock.at(later(9000)), time(5010));

@@ -1,4 +1,4 @@
-//! The control thread: one loop that answers state frames, then serves clients.
+//! The control thread: a loop that answers state frames, then serves clients.
 
 mod clients;
 mod vehicle;
@@ -26,35 +26,35 @@ use greylag_link::routing::Router;
 use greylag_link::transport::{Arrival, Remark};
 use greylag_link::vehicle::{Outputs, Real, Sitl, Vehicle};
 
-/// Between two looks at what is due: heartbeats, streams, lost links.
+/// Interval of periodic duties: heartbeats, streams, timeouts.
 const POLL: Duration = Duration::from_millis(10);
-/// A cycle of the control loop.
+/// Period of the control loop.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Silence at the start after which it is said that there is no vehicle.
+/// Silence at the start after which a missing vehicle is reported.
 const NO_VEHICLE: Duration = Duration::from_secs(2);
-/// Weight of the newest tick in the load that the status shows.
+/// Weight of the newest tick in the reported load.
 const LOAD_WEIGHT: f64 = 0.02;
-/// The autopilot identity.
+/// Identity of the autopilot towards clients.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// After a stall the network's thread has this long to hand over what came meanwhile; a thread that does not is dead.
+/// Time for the network thread to deliver queued packets after a stall.
 const HAND_OVER: Duration = Duration::from_secs(2);
-/// Between two looks at how long this thread was kept from running.
+/// Interval of queries to the scheduler.
 const WAITED: Duration = Duration::from_secs(1);
 
-/// Who sent what is taken.
+/// Origin of a packet.
 enum Arrived {
     Vehicle(Arrival),
     Client(Arrival),
 }
 
-/// All that the control thread owns.
+/// State owned by the control thread.
 pub(super) struct Control {
     pilot: Pilot,
     planner: Planner,
     vehicle: Vehicle,
     clients: Clients,
-    /// Between clients and a real controller.
+    /// Router between clients and a real controller.
     router: Option<Router>,
     ports: Ports,
     recorder: Option<Recorder>,
@@ -63,7 +63,7 @@ pub(super) struct Control {
     clock: Clock,
     timing: Timing,
     attention: Attention,
-    /// What the scheduler had counted when it was last asked, and when to ask again.
+    /// The scheduler's last counters, and when to query again.
     waited: Waited,
     next_waited: Instant,
     reports: Reports,
@@ -136,7 +136,7 @@ impl Control {
             if host >= next_poll {
                 self.poll(host);
                 rounds.fetch_add(1, Ordering::Relaxed);
-                // After a stall the beats that were missed stay missed.
+                // periods missed in a stall are not made up
                 next_poll = (next_poll + POLL).max(host);
             }
         }
@@ -147,7 +147,7 @@ impl Control {
         self.duration.is_some_and(|duration| self.started.elapsed() >= duration)
     }
 
-    /// Takes what has arrived, the vehicle's before a client's, or waits until `until`.
+    /// Takes one arrival, the vehicle's before a client's, or waits until `until`.
     fn take_one(&mut self, until: Instant) {
         let wait = until.saturating_duration_since(Instant::now());
         let arrived = select_biased! {
@@ -155,7 +155,7 @@ impl Control {
             recv(self.ports.from_clients) -> arrival => arrival.ok().map(Arrived::Client),
             default(wait) => None,
         };
-        self.attend();
+        self.excuse_stall();
         match arrived {
             Some(Arrived::Vehicle(arrival)) => self.take_vehicles(arrival),
             Some(Arrived::Client(arrival)) => self.take_client(arrival),
@@ -163,12 +163,12 @@ impl Control {
         }
     }
 
-    /// Finds that this computer has not listened, waits until the network's thread has handed over what came
-    /// meanwhile, and excuses everybody for the time: silence that nobody listened to is no loss.
-    fn attend(&mut self) {
+    /// Detects a stall of this computer, waits until the network thread has delivered what arrived meanwhile, and
+    /// excludes the stall from all timeouts.
+    fn excuse_stall(&mut self) {
         let host = Instant::now();
         let Some((behind, since)) = self.attention.look(host, self.ports.rounds()) else { return };
-        // One round may end what the stall began; the next has looked at every socket.
+        // one round may end what the stall began; the next has polled every socket
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);
@@ -189,16 +189,16 @@ impl Control {
         };
         self.waited = waited;
         if let Some(words) = self.reports.note(now, missed, cause) {
-            self.pilot.tell(Severity::Warning, &words);
+            self.pilot.send_text(Severity::Warning, &words);
         }
     }
 
-    /// Says something about a link to the ground stations, and to whoever shows events.
+    /// Reports a link condition to the ground stations and as an event.
     fn remark(&mut self, remark: &Remark) {
-        self.pilot.tell(Severity::Warning, &remark.to_string());
+        self.pilot.send_text(Severity::Warning, &remark.to_string());
     }
 
-    /// Does what is due at `host`.
+    /// Performs the periodic duties at `host`.
     fn poll(&mut self, host: Instant) {
         self.clock.listen(host);
         let now = self.now(host);
@@ -209,12 +209,12 @@ impl Control {
             (self.waited, self.next_waited) = (Waited::now(), host + WAITED);
         }
         if let Some(words) = self.reports.due(host) {
-            self.pilot.tell(Severity::Warning, &words);
+            self.pilot.send_text(Severity::Warning, &words);
         }
         if let Some(trouble) = self.recorder.as_ref().and_then(Recorder::trouble) {
-            self.pilot.tell(Severity::Warning, &trouble);
+            self.pilot.send_text(Severity::Warning, &trouble);
         }
-        self.heed_vehicle();
+        self.take_notices();
         let mut pilot = RecordingAutopilot {
             pilot: &mut self.pilot,
             vehicle: &self.vehicle,
@@ -223,14 +223,14 @@ impl Control {
         };
         self.clients.poll(now, &mut pilot);
         self.send_to_clients();
-        self.greet_vehicle(now.host);
+        self.send_due(now.host);
         if self.last_arrival.is_none() && now.host > NO_VEHICLE && !self.told_no_vehicle {
             self.told_no_vehicle = true;
             self.say(Event::NoVehicle);
         }
     }
 
-    /// Records a packet that arrived, or left, at `host`.
+    /// Records a packet received or sent at `host`.
     fn record(&mut self, host: Instant, bytes: &[u8]) {
         if let Some(recorder) = &self.recorder {
             recorder.bytes(self.stamps.of(host), bytes);
@@ -244,7 +244,7 @@ impl Control {
     }
 
     fn say(&self, event: Event) {
-        // Nobody may be listening; control does not wait to be heard.
+        // nobody may be reading the events; control does not wait
         let _ = self.events.try_send(event);
     }
 

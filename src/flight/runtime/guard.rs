@@ -1,4 +1,4 @@
-//! The signatures of a flight's links: which of them are signed, with what key.
+//! Message signing of a flight's links.
 
 use std::path::PathBuf;
 
@@ -7,38 +7,38 @@ use greylag_link::address::Address;
 use greylag_link::peer::LinkId;
 use greylag_link::signing::{Key, KeyError, Signer, SigningCounts, StampError, StampFile};
 
-/// How links are signed.
+/// Signing options of a flight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Signing {
-    /// The file that holds the key; the timestamp is kept beside it.
+    /// Path of the key file; the timestamp is stored beside it.
     pub key: PathBuf,
     /// Whether the vehicle's link is signed.
     pub vehicle: VehicleLink,
-    /// Those of the clients' links that are declared local: nothing is signed there.
+    /// Client links that are declared local: nothing is signed there.
     pub local: Vec<Address>,
 }
 
-/// What is demanded on the vehicle's link.
+/// Signing of the vehicle's link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VehicleLink {
-    /// Signatures.
+    /// Signatures are required.
     Signed,
-    /// Nothing.
+    /// No signatures.
     Open,
 }
 
-/// Why links cannot be signed.
+/// Signing cannot be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum SigningError {
-    /// The key cannot be used.
+    /// The key is unusable.
     #[error(transparent)]
     Key(#[from] KeyError),
-    /// The timestamp cannot be kept.
+    /// The timestamp cannot be stored.
     #[error(transparent)]
     Stamp(#[from] StampError),
 }
 
-/// The signer with the numbers of the links that it guards.
+/// The signer with the numbers of its links.
 pub(super) struct Guard {
     signer: Signer,
     file: StampFile,
@@ -46,7 +46,7 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Reads key and timestamp. Link 0 is the vehicle's, the clients' follow.
+    /// Reads key and timestamp. Link 0 is the vehicle's, the clients' links follow.
     pub(super) fn open(signing: &Signing, options: &FlightOptions) -> Result<Self, SigningError> {
         let key = Key::load(&signing.key)?;
         let (file, stamp) = StampFile::open(&signing.key)?;
@@ -59,7 +59,7 @@ impl Guard {
         Ok(Guard { signer: Signer::new(key, stamp), file, links })
     }
 
-    /// What leaves on `link` in place of `bytes`.
+    /// The signed form of `bytes` that leave on `link`.
     pub(super) fn sign(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
         if !self.links.contains(&link) {
             return bytes;
@@ -69,7 +69,7 @@ impl Guard {
         signed
     }
 
-    /// What is to be believed of `bytes` that came on `link`.
+    /// The authenticated frames of `bytes` that arrived on `link`.
     pub(super) fn believed(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
         if !self.links.contains(&link) {
             return bytes;

@@ -1,31 +1,31 @@
-//! Whether this computer ran when it should have: stalls of the control and of the network thread, in words with their cause.
+//! Detection of stalls of the control and network threads, with their cause.
 
 use std::time::{Duration, Instant};
 
-/// A thread that wakes later than this has not run when it should have: ten cycles.
+/// Delay of a thread that counts as a stall: ten cycles.
 const LATE: Duration = Duration::from_millis(100);
-/// The longest time between two looks of a thread that runs: it looks once a cycle at least.
+/// Longest interval between two checks of a running thread: one per cycle at least.
 const USUAL: Duration = Duration::from_millis(10);
-/// Least time between two lines about it.
-const SAID_AGAIN: Duration = Duration::from_secs(5);
-/// From this share of a stall on that the thread was ready to run, other work had the processor.
+/// Least time between two reports.
+const REPORT_INTERVAL: Duration = Duration::from_secs(5);
+/// Fraction of a stall in which the thread was runnable from which the cause is other load.
 const BUSY: f64 = 0.5;
 
-/// Which thread did not run.
+/// The thread that stalled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Behind {
-    /// The control thread, and so probably the whole program.
+    /// The control thread, and probably the whole program.
     Control,
-    /// The network thread alone: the control thread ran beside it.
+    /// The network thread alone, while the control thread ran.
     Network,
 }
 
-/// Looks whether the threads that listen have run.
+/// Stall detector of the threads that listen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attention {
-    /// Last look of the control thread.
+    /// Last check by the control thread.
     looked: Instant,
-    /// Rounds of the network thread, and when the control thread saw them grow.
+    /// Rounds of the network thread, and when they last increased.
     network: (u64, Instant),
 }
 
@@ -34,7 +34,8 @@ impl Attention {
         Attention { looked: host, network: (0, host) }
     }
 
-    /// A look at `host`, with the rounds of the network thread: since when nobody has listened, if it is too long.
+    /// Checks at `host`, with the rounds of the network thread; on a stall the thread and the time since which it did
+    /// not listen.
     pub(super) fn look(&mut self, host: Instant, rounds: u64) -> Option<(Behind, Instant)> {
         let looked = std::mem::replace(&mut self.looked, host);
         if rounds != self.network.0 {
@@ -48,34 +49,34 @@ impl Attention {
         }
     }
 
-    /// Both threads listen again at `host`.
+    /// Restarts after a stall: both threads listen again at `host`.
     pub(super) fn resume(&mut self, host: Instant, rounds: u64) {
         *self = Attention { looked: host, network: (rounds, host) };
     }
 }
 
-/// How late this computer was for a stall that began at `since` and ended at `host`.
+/// Length of the stall from `since` to `host`, without the usual interval.
 pub(super) fn lateness(since: Instant, host: Instant) -> Duration {
     host.saturating_duration_since(since).saturating_sub(USUAL)
 }
 
-/// Why a thread did not run.
+/// Cause of a stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// It was ready to run, and something else ran.
+    /// The thread was runnable, and other work had the processor.
     Busy,
-    /// It was not to run.
+    /// The thread was suspended.
     Stopped,
-    /// Nothing tells.
+    /// The cause is unknown.
     Unknown,
 }
 
-/// Time for which this thread was ready to run and did not, as the system's scheduler counts it.
+/// Time for which this thread was runnable without running, from the scheduler's counters.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Waited(Option<Duration>);
 
 impl Waited {
-    /// Asks the system; nothing where it does not tell.
+    /// Reads the counters; zero where the system has none.
     pub(super) fn now() -> Self {
         let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
         Waited(
@@ -85,7 +86,7 @@ impl Waited {
         )
     }
 
-    /// Why the thread was late by `missed`, by what it has waited since `self`.
+    /// Cause of a stall of `missed`, from the counters before and after it.
     pub(super) fn cause(self, now: Waited, missed: Duration) -> Cause {
         match (self.0, now.0) {
             (Some(before), Some(after)) => {
@@ -97,23 +98,26 @@ impl Waited {
     }
 }
 
-/// What is said of stalls: each at once, unless one was said a moment ago; then all of five seconds together.
+/// Rate limit of stall reports: immediate, or summed over five seconds after a recent one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reports {
-    /// When the last line was said.
-    said: Option<Instant>,
-    /// Stalls since then, and the longest.
-    unsaid: (u32, Duration),
+    /// Time of the last report.
+    reported: Option<Instant>,
+    /// Number of stalls since then, and the longest.
+    unreported: (u32, Duration),
 }
 
 impl Reports {
-    /// A stall that ended at `host`; what is to be said of it at once.
+    /// Adds a stall that ended at `host`; the report due immediately, if any.
     pub(super) fn note(&mut self, host: Instant, missed: Duration, cause: Cause) -> Option<String> {
-        if self.said.is_some_and(|said| host.saturating_duration_since(said) < SAID_AGAIN) {
-            self.unsaid = (self.unsaid.0 + 1, self.unsaid.1.max(missed));
+        if self
+            .reported
+            .is_some_and(|reported| host.saturating_duration_since(reported) < REPORT_INTERVAL)
+        {
+            self.unreported = (self.unreported.0 + 1, self.unreported.1.max(missed));
             return None;
         }
-        self.said = Some(host);
+        self.reported = Some(host);
         let late = format!("this computer was late by {:.1} s", missed.as_secs_f64());
         Some(match cause {
             Cause::Busy => format!("{late}: {}", busy()),
@@ -122,14 +126,16 @@ impl Reports {
         })
     }
 
-    /// What is to be said at `host` of stalls that were not said yet.
+    /// The report due at `host` on stalls not yet reported.
     pub(super) fn due(&mut self, host: Instant) -> Option<String> {
-        let (times, longest) = self.unsaid;
-        let waits = self.said.is_none_or(|said| host.saturating_duration_since(said) < SAID_AGAIN);
+        let (times, longest) = self.unreported;
+        let waits = self
+            .reported
+            .is_none_or(|reported| host.saturating_duration_since(reported) < REPORT_INTERVAL);
         if times == 0 || waits {
             return None;
         }
-        (self.said, self.unsaid) = (Some(host), (0, Duration::ZERO));
+        (self.reported, self.unreported) = (Some(host), (0, Duration::ZERO));
         let longest = longest.as_secs_f64();
         Some(format!(
             "this computer was late {times} times more, by {longest:.1} s at most: {}",
@@ -138,7 +144,7 @@ impl Reports {
     }
 }
 
-/// What keeps the processors, in words.
+/// The processes that use the processor, as text.
 fn busy() -> String {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let load = std::fs::read_to_string("/proc/loadavg").ok();

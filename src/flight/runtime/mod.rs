@@ -48,62 +48,61 @@ use greylag_physics::servos::Travels;
 use planner::{Planner, Threaded};
 use ports::Ports;
 
-/// Events that may wait for whoever shows them; more are dropped.
+/// Capacity of the event queue; further events are dropped.
 const EVENTS: usize = 1024;
 
-/// How to fly.
+/// Options of a flight.
 #[derive(Clone, Debug)]
 pub struct FlightOptions {
-    /// The vehicle's link.
+    /// Link address of the vehicle.
     pub vehicle: Address,
-    /// The clients' links.
+    /// Link addresses for clients.
     pub clients: Vec<Address>,
-    /// Where to record, if at all.
+    /// Destination of the recording; `None` for no recording.
     pub record: Option<Place>,
     /// Real time or lockstep.
     pub pace: Pace,
-    /// Ends by itself after this time.
+    /// Duration after which the flight ends by itself.
     pub duration: Option<Duration>,
     /// Time after the arrival of a state frame at which a plan is late.
     pub plan_deadline: Duration,
-    /// How far the airframe's surfaces go.
+    /// Travel of the airframe's surfaces.
     pub travels: Travels,
-    /// Surfaces and motors of the airframe, where it names them: the `sitl` profile sends their commands too.
+    /// Surfaces and motors of the airframe, where it names them: the `sitl` profile also sends their commands.
     pub mixer: Option<Mixer>,
-    /// How a real flight controller is flown; `None` is the simulator's shim.
+    /// Profile of a real flight controller; `None` is the simulator's shim.
     pub controller: Option<Profile>,
-    /// The least delay at which the loop through a real controller's surfaces swings by itself, where it is known.
+    /// Delay margin of the loop through a real controller's surfaces, where known.
     pub delay_margin: Option<Duration>,
-    /// How links are signed, if at all.
+    /// Message signing of the links; `None` for none.
     pub signing: Option<Signing>,
 }
 
 impl FlightOptions {
-    /// The time that a planner has by default: a cycle of 10 ms less what the rest of the loop
-    /// and the link need.
+    /// Default deadline of a planner: a cycle of 10 ms less the time for the rest of the loop and the link.
     pub const PLAN_DEADLINE: Duration = Duration::from_millis(8);
 }
 
-/// Who flies.
+/// Pilot and controller of a flight.
 pub struct Companion {
-    /// Decides.
+    /// The pilot, which decides.
     pub pilot: Pilot,
-    /// Computes the command of each tick.
+    /// The controller, which computes the command of each tick.
     pub controller: Box<dyn Controller>,
-    /// Where it computes it.
+    /// Where the controller runs.
     pub placement: Placement,
 }
 
-/// Where a controller runs.
+/// Thread that a controller runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placement {
-    /// In the control loop: for controllers that need microseconds.
+    /// The control thread: for controllers that need microseconds.
     Loop,
-    /// On a thread of its own, with a deadline: for planners.
+    /// Its own thread with a deadline: for planners.
     Thread,
 }
 
-/// Why a flight cannot begin.
+/// A flight cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightError {
     /// A link cannot be opened.
@@ -112,7 +111,7 @@ pub enum FlightError {
     /// The recording cannot be created.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Links cannot be signed.
+    /// Signing cannot be set up.
     #[error(transparent)]
     Signing(#[from] SigningError),
     /// A thread cannot be started.
@@ -120,38 +119,39 @@ pub enum FlightError {
     Thread(&'static str, std::io::Error),
 }
 
-/// What a flight has to say while it lasts.
+/// Events of a flight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A line that also goes to the ground stations.
+    /// A text that is also sent to the ground stations.
     Text(Text),
-    /// The first state of the vehicle has come.
+    /// The first state of the vehicle was received.
     VehicleFound(PeerId),
-    /// No vehicle has been heard since the start.
+    /// Nothing was received from a vehicle since the start.
     NoVehicle,
 }
 
-/// A flight under way.
+/// A running flight.
 pub struct Flight {
-    /// What it has to say.
+    /// Events of the flight.
     pub events: Receiver<Event>,
-    /// The address of the vehicle's link; none for `tcpout:`.
+    /// The bound address of the vehicle's link; `None` for `tcpout:`.
     pub vehicle: Option<SocketAddr>,
-    /// The addresses of the clients' links, in the order of the options.
+    /// The bound addresses of the clients' links, in the order of the options.
     pub clients: Vec<Option<SocketAddr>>,
-    /// Where it is recorded.
+    /// Folder of the recording.
     pub recording: Option<std::path::PathBuf>,
-    /// How many rounds the control thread has gone, one in 10 ms at least while it lives.
+    /// Rounds of the control thread, at least one per 10 ms while it lives.
     pub rounds: Arc<AtomicU64>,
     thread: JoinHandle<Summary>,
 }
 
 impl Flight {
-    /// Opens the links and the recording, then flies on a thread of its own until `stop` is set
-    /// or the duration is over. Either everything is open when this returns, or nothing.
+    /// Opens the links and the recording, then flies on its own thread until `stop` is set or the duration is over.
+    /// When this returns, either all are open or none.
     ///
     /// # Errors
-    /// The first thing that cannot be opened.
+    ///
+    /// The first link or file that cannot be opened.
     pub fn start(
         options: &FlightOptions,
         companion: Companion,
@@ -180,12 +180,12 @@ impl Flight {
         Ok(Flight { events, vehicle, clients, recording, rounds, thread })
     }
 
-    /// Whether it is still under way.
+    /// Whether the flight is running.
     pub fn is_flying(&self) -> bool {
         !self.thread.is_finished()
     }
 
-    /// Waits for its end; `None` if the control thread has died of a panic.
+    /// Waits for the end; `None` if the control thread has panicked.
     pub fn join(self) -> Option<Summary> {
         self.thread.join().ok()
     }

@@ -1,4 +1,4 @@
-//! Who computes the plan of a tick: a controller in the loop, or one on a thread of its own.
+//! The planner of a tick: a controller in the loop, or one on its own thread.
 
 mod threaded;
 
@@ -9,7 +9,7 @@ use greylag_control::Controller;
 pub(super) use threaded::Threaded;
 use threaded::run;
 
-/// The controller of the flight, where it runs.
+/// The controller of the flight and where it runs.
 pub(super) enum Planner {
     /// Fast enough to be called in the loop.
     Inline(Box<dyn Controller>),
@@ -36,7 +36,7 @@ mod tests {
     use greylag_physics::{ActuatorState, Command, State, Time};
     use std::time::Duration;
 
-    /// Something to plan for, of no interest beside its being there.
+    /// An arbitrary planning request.
     fn any_request(engage: bool) -> Request {
         let observation = Observation {
             time: Time::default(),
@@ -79,7 +79,7 @@ mod tests {
         }
     }
 
-    /// A planner, what tells that a plan is begun, and what lets one that waits go.
+    /// A planner with channels that signal the start of a plan and release a waiting one.
     struct Bench {
         planner: Threaded,
         begun: Receiver<()>,
@@ -87,7 +87,7 @@ mod tests {
     }
 
     impl Bench {
-        /// `waits`: which plans wait, the first first.
+        /// `waits`: whether each plan waits, in order.
         fn new(pace: Pace, waits: &[bool]) -> Bench {
             let ((begun, started), (go, gate)) = (bounded(9), bounded(9));
             let waits = waits.iter().rev().copied().collect();
@@ -96,7 +96,7 @@ mod tests {
             Bench { planner, begun: started, go }
         }
 
-        /// A plan that nothing holds up, however slow the machine.
+        /// A plan that is ready in time on any machine.
         fn in_time(&mut self, engage: bool) -> Plan {
             self.planner.deadline = Duration::from_secs(60);
             self.planner.plan(&any_request(engage), Instant::now())
@@ -108,7 +108,7 @@ mod tests {
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        /// Waits for plans that came too late.
+        /// Waits for late plans.
         fn done(&self, plans: usize) {
             while self.planner.plans.len() < plans {
                 std::thread::sleep(Duration::from_millis(1));

@@ -1,4 +1,4 @@
-//! The links of a flight, by number.
+//! The links of a flight by number.
 
 use std::net::SocketAddr;
 
@@ -10,12 +10,12 @@ use greylag_link::peer::{LinkId, PeerId};
 use greylag_link::signing::SigningCounts;
 use greylag_link::transport::{Arrival, Link, Network, Packet};
 
-/// Packets of the vehicle that may wait: two seconds, far beyond what control may stall.
+/// Capacity of the vehicle's queue: two seconds, longer than the control thread may stall.
 const VEHICLE_QUEUE: usize = 256;
-/// Packets of clients that may wait; a flood loses the rest.
+/// Capacity of the clients' queue; a flood loses the rest.
 const CLIENT_QUEUE: usize = 512;
 
-/// The open links with the channels of what arrives on them.
+/// The open links with the channels of their arrivals.
 pub(super) struct Ports {
     vehicle: Link,
     pub(super) clients: Vec<Link>,
@@ -52,12 +52,12 @@ impl Ports {
         self.clients.iter().map(Link::local).collect()
     }
 
-    /// How many rounds the network's thread has gone.
+    /// Rounds of the network thread.
     pub(super) fn rounds(&self) -> u64 {
         self.network.rounds()
     }
 
-    /// The vehicle when it may be spoken to unasked.
+    /// The vehicle's peer, when it may be sent to before it has sent anything.
     pub(super) fn vehicle_target(&self) -> Option<PeerId> {
         self.vehicle.target()
     }
@@ -68,7 +68,7 @@ impl Ports {
         self.vehicle.send(peer, frames);
     }
 
-    /// Sends a frame to a client on the link where it was heard.
+    /// Sends a frame to a client on the link it was received from.
     pub(super) fn send_to_client(&mut self, unix_us: u64, peer: PeerId, frame: Vec<u8>) {
         let frame = self.signed(unix_us, peer.link, frame);
         if let Some(link) = self.clients.iter().find(|link| link.id() == peer.link)
@@ -85,7 +85,7 @@ impl Ports {
         }
     }
 
-    /// Takes out of a packet what is not to be believed.
+    /// Removes unauthenticated frames from a packet.
     pub(super) fn sift(&mut self, unix_us: u64, packet: &mut Packet) {
         if let Some(guard) = &mut self.guard {
             let bytes = std::mem::take(&mut packet.bytes);
@@ -93,7 +93,7 @@ impl Ports {
         }
     }
 
-    /// What became of signatures, where there are any.
+    /// Signing counters, where links are signed.
     pub(super) fn signing(&self) -> Option<SigningCounts> {
         self.guard.as_ref().map(Guard::counts)
     }

@@ -1,4 +1,4 @@
-//! The pilot as clients see it, with an ear on the lines it says to them, a note of each call.
+//! The pilot as seen by clients; records each call and reports each text as an event.
 
 use super::Event;
 use crate::pilot::Pilot;
@@ -9,7 +9,7 @@ use greylag_link::autopilot::{
 use greylag_link::vehicle::Vehicle;
 use greylag_physics::Time;
 
-/// Passes everything on to the pilot; each line for the ground stations becomes an event as well.
+/// Forwards all calls to the pilot; each text for the ground stations also becomes an event.
 pub(super) struct RecordingAutopilot<'a, F: FnMut(Event)> {
     pub(super) pilot: &'a mut Pilot,
     pub(super) vehicle: &'a Vehicle,
@@ -27,7 +27,7 @@ impl<F: FnMut(Event)> RecordingAutopilot<'_, F> {
 
 impl<F: FnMut(Event)> Autopilot for RecordingAutopilot<'_, F> {
     fn arm(&mut self, now: Time, force: bool) -> Verdict {
-        // What the controller needs is not a check that force can skip.
+        // conditions of the controller are no pre-arm check that force could skip
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(format!("arming refused: {obstacle}")),
             None => {

@@ -1,4 +1,4 @@
-//! How punctually this computer wakes a thread, and the scheduler's class for those that must be on time.
+//! Wake-up latency of this computer, and the real-time scheduling class.
 
 use std::fmt;
 use std::io;
@@ -6,16 +6,19 @@ use std::time::{Duration, Instant};
 
 use super::timing::Histogram;
 
-/// Priority among the real-time threads, 1..99: above most, below the kernel's own (50 where interrupts have threads).
+/// Real-time priority, 1..99: above most, below the kernel's own (50 where interrupts have threads).
 const PRIORITY: i32 = 40;
-/// The cycle that is measured.
+/// Period of the measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// A share of 0.01 of the wakings may be later than this, and none than that: a plan has 8 ms of a cycle of 10 ms.
+/// A hundredth of the wake-ups may be later than the first, none later than the second: a plan has 8 ms of a cycle of
+/// 10 ms.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
-/// Puts this thread, and all that it starts, into the scheduler's class SCHED_FIFO: it runs before everything that is not.
+/// Puts this thread, and all that it starts, into the scheduling class SCHED_FIFO: it runs before all threads outside
+/// it.
 ///
 /// # Errors
+///
 /// If the system does not permit it, or has no such class.
 pub fn take_real_time() -> io::Result<()> {
     #[cfg(target_os = "linux")]
@@ -30,7 +33,7 @@ pub fn take_real_time() -> io::Result<()> {
     Err(io::Error::from(io::ErrorKind::Unsupported))
 }
 
-/// How late a thread wakes that sleeps until each 10 ms.
+/// Wake-up latency of a thread that sleeps for each 10 ms.
 #[derive(Clone, Debug, Default)]
 pub struct Punctuality {
     late: Histogram,
@@ -47,24 +50,24 @@ impl Punctuality {
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
             let woken = Instant::now();
             late.note(woken.saturating_duration_since(due));
-            // A waking that was missed is not made up for.
+            // missed wake-ups are not made up
             due = due.max(woken.checked_sub(CYCLE).unwrap_or(woken));
         }
         Punctuality { late }
     }
 
-    /// Takes one waking that was `late`.
+    /// Adds a wake-up that was late by `late`.
     pub fn note(&mut self, late: Duration) {
         self.late.note(late);
     }
 
-    /// Whether a companion can fly by it.
+    /// Whether the latency suffices for flight.
     pub fn is_good(&self) -> bool {
         let us = |limit: Duration| limit.as_secs_f64() * 1e6;
         self.late.quantile_us(0.99) <= us(LATE.0) && self.late.max_us() <= us(LATE.1)
     }
 
-    /// What can be done about it here, each a sentence.
+    /// Remedies on this computer, each a sentence.
     pub fn advice(&self, class: Class) -> Vec<String> {
         if self.is_good() {
             return Vec::new();
@@ -90,12 +93,12 @@ impl fmt::Display for Punctuality {
     }
 }
 
-/// The scheduler's class of the companion's threads.
+/// Scheduling class of the companion's threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// That of all programs.
+    /// The default class.
     Usual,
-    /// SCHED_FIFO.
+    /// The real-time class SCHED_FIFO.
     RealTime,
 }
 
@@ -108,7 +111,7 @@ fn load() -> String {
         .map_or_else(String::new, |load| format!(" (load {load} on {processors} processors)"))
 }
 
-/// The governor of the processor's clock, when it is one that saves power.
+/// The processor's frequency governor, if it saves power.
 fn governor() -> Option<String> {
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor";
     let governor = std::fs::read_to_string(path).ok()?;

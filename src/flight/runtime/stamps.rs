@@ -1,9 +1,9 @@
-//! The stamps of recorded packets: the time of day at the start, carried on by a clock that never jumps.
+//! Timestamps of recorded packets: the time of day at the start plus a monotonic clock.
 
 use std::time::{Instant, SystemTime};
 
-/// Stamps of one recording. A time of day that is set in flight does not show in them, so that a replay
-/// sees the ages that the flight saw; no two packets in a row have the same, which keeps them apart.
+/// Timestamps of one recording. Changes of the time of day in flight have no effect, so that a replay sees the same
+/// ages; timestamps of successive packets differ, which keeps packets apart.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stamps {
     started: Instant,
@@ -13,12 +13,12 @@ pub(super) struct Stamps {
 }
 
 impl Stamps {
-    /// Stamps of a recording that began at `started`, a moment ago.
+    /// Timestamps of a recording that started at `started`.
     pub(super) fn since(started: Instant) -> Self {
         Stamps { started, epoch_us: unix_us().saturating_sub(us_since(started)), last: None }
     }
 
-    /// The stamp of a packet that arrived, or left, at `host`, µs since 1970.
+    /// The timestamp of a packet received or sent at `host`, µs since 1970.
     pub(super) fn of(&mut self, host: Instant) -> u64 {
         let us = self.epoch_us + host.saturating_duration_since(self.started).as_micros() as u64;
         let stamp = if self.last == Some(us) { us + 1 } else { us };
@@ -31,7 +31,7 @@ fn us_since(started: Instant) -> u64 {
     started.elapsed().as_micros() as u64
 }
 
-/// Microseconds since 1970, as `.tlog` counts them.
+/// Microseconds since 1970, as in `.tlog` files.
 pub(super) fn unix_us() -> u64 {
     SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
@@ -50,7 +50,7 @@ mod tests {
         let us = |us| started + Duration::from_micros(us);
         let first = stamps.of(us(1000));
         assert_eq!(stamps.of(us(301_000)) - first, 300_000);
-        // An answer that has left in the microsecond of the next arrival.
+        // a reply sent in the microsecond of the next arrival
         let [one, two] = [us(400_000), us(400_000)].map(|at| stamps.of(at));
         assert_eq!(two - one, 1);
         assert!(first.abs_diff(unix_us()) < 10_000_000);

@@ -1,4 +1,4 @@
-//! What a flight came to, in a few lines.
+//! Summary of a flight as text.
 
 use std::fmt;
 use std::fs::File;
@@ -11,26 +11,26 @@ use greylag_link::client::ClientCounts;
 use greylag_link::signing::SigningCounts;
 use greylag_link::vehicle::VehicleCounts;
 
-/// The end of a flight.
+/// Counters and timing of a finished flight.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// Seconds that the program flew, by the host's clock.
+    /// Duration of the flight by the host's clock, s.
     pub duration_s: f64,
-    /// What came over the vehicle link.
+    /// Counters of the vehicle link.
     pub vehicle: VehicleCounts,
-    /// What clients sent.
+    /// Counters of client traffic.
     pub clients: ClientCounts,
-    /// What became of signatures, where links are signed.
+    /// Signing counters, where links are signed.
     pub signing: Option<SigningCounts>,
-    /// Loop timing.
+    /// Timing of the control loop.
     pub timing: Timing,
-    /// Where the recording lies, with what it holds.
+    /// Path of the recording and its counters.
     pub recording: Option<(PathBuf, Written)>,
 }
 
 impl Summary {
-    /// Leaves the summary as `summary.txt` beside the recording. The folder was new, so nothing is
-    /// overwritten; a disk that does not take it has been reported already.
+    /// Writes `summary.txt` into the recording's folder. The folder was new, so that nothing is overwritten; a
+    /// failing disk was reported already.
     pub(super) fn save(&self) {
         if let Some((folder, _)) = &self.recording
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))

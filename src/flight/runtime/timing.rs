@@ -1,4 +1,4 @@
-//! Loop timing: how long each answer took, how far apart the frames came.
+//! Timing of the control loop: latency and frame intervals.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Counts a duration.
+    /// Adds a duration to the histogram.
     pub fn note(&mut self, duration: Duration) {
         let us = usize::try_from(duration.as_micros()).unwrap_or(RESOLVED_US);
         self.buckets[us.min(RESOLVED_US)] += 1;
@@ -28,18 +28,17 @@ impl Histogram {
         self.max_us = self.max_us.max(duration.as_nanos() as f64 / 1000.0);
     }
 
-    /// How many were counted.
+    /// Number of durations added.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The longest, µs.
+    /// Largest of the durations, µs.
     pub fn max_us(&self) -> f64 {
         self.max_us
     }
 
-    /// The duration that a share (0..1) of all do not exceed, µs, rounded up to the microsecond;
-    /// NaN when nothing was counted.
+    /// The quantile (0..1) of the durations, µs, rounded up to the microsecond; NaN without any.
     pub fn quantile_us(&self, share: f64) -> f64 {
         let rank = ((share * self.count as f64).ceil() as u64).max(1);
         let mut seen = 0;
@@ -60,21 +59,21 @@ pub struct Timing {
     pub latency: Histogram,
     /// Between the arrivals of two state frames.
     pub interval: Histogram,
-    /// Cycles without their answer: in real time those whose answer took longer than 10 ms; in lockstep,
-    /// where the vehicle's time stands until it is there, those whose state had to be sent again.
+    /// Missed cycles: in real time those with a latency above 10 ms; in lockstep, where vehicle time waits for the
+    /// reply, those whose state was sent again.
     pub missed: u64,
-    /// Ticks without a plan in time: it came after its deadline, or the planner was still at an earlier request.
+    /// Ticks without a plan in time: it came after its deadline, or the planner was busy with an earlier request.
     pub late_plans: u64,
-    /// States that nobody flew on, because newer ones had come before it was their turn.
+    /// States not answered because newer ones had arrived.
     pub overtaken: u64,
-    /// Times that this computer did not listen for more than 0.1 s.
+    /// Number of stalls of more than 0.1 s.
     pub stalls: u64,
-    /// The longest of them.
+    /// Length of the longest stall.
     pub longest_stall: Duration,
 }
 
 impl Timing {
-    /// Why this computer was too slow to fly in real time, in one sentence with the cure; nothing if it was not.
+    /// Why this computer was too slow for real time, in one sentence with the remedy; `None` if it was not.
     pub fn trouble(&self) -> Option<String> {
         let cycles = self.latency.count().max(1) as f64;
         let missed = self.missed as f64 / cycles;
@@ -91,7 +90,7 @@ impl Timing {
     }
 }
 
-/// Share of the cycles whose command may come late before the computer is called slow.
+/// Fraction of late cycles above which the computer counts as too slow.
 const TOO_MANY: f64 = 0.02;
 
 #[cfg(test)]
@@ -104,7 +103,7 @@ mod tests {
         for us in 0..1000 {
             histogram.note(Duration::from_micros(us));
         }
-        // Of 0, 1 … 999 µs a half do not exceed 499 µs: told as the bucket's end.
+        // Of 0, 1 … 999 µs a half do not exceed 499 µs: reported as the bucket's end.
         assert_eq!(histogram.quantile_us(0.5), 500.0);
         assert_eq!(histogram.quantile_us(0.99), 990.0);
         assert_eq!(histogram.quantile_us(1.0), 999.0);

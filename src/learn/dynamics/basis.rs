@@ -1,4 +1,4 @@
-//! The trainable coefficients in coordinates in which each changes the rates as much as any other.
+//! Coordinates of the trainable coefficients in which each has the same effect on the rates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,66 +13,67 @@ use greylag_physics::{Channel, State, Wrench};
 
 /// The name under which the product of inertia is trainable.
 ///
-/// No other inertia is: scaling moments and inertias, or forces and mass, together changes nothing,
-/// so no data could tell them from the coefficients.
+/// No other inertia is: scaling moments and inertias, or forces and mass, together changes nothing, so that no data
+/// could separate them from the coefficients.
 pub const JXZ: &str = "rigid_body.jxz_kgm2";
 
-/// Samples that the coordinates are made from.
+/// Number of samples that determine the coordinates.
 const SAMPLES: usize = 4096;
 
-/// Part of the strongest direction's strength, squared, under which a direction is not seen.
+/// Squared relative strength below which a direction counts as unidentifiable.
 const UNSEEN: f64 = 1e-9;
 
-/// θ_p = θ_p0 + T η: η has as many entries as the data sees directions.
+/// θ_p = θ_p0 + T η: η has as many entries as there are identifiable directions.
 ///
-/// Adam moves every parameter at its own pace, but along the axes it is given: coefficients differ a
-/// thousandfold in size and move in company (aileron power with roll damping), so the axes are those
-/// of the rates that they make over the flights: ∂(F_p/x_c)/∂η has unit covariance.
+/// Adam scales every parameter separately, along the given axes. Coefficients differ a thousandfold in
+/// size and are correlated (aileron power with roll damping), so that the axes are chosen by their
+/// effect on the rates over the flights: ∂(F_p/x_c)/∂η has unit covariance.
 #[derive(Clone, Debug)]
 pub struct Basis {
     /// Places in the model's list, the list's length standing for Jxz.
     pub places: Vec<usize>,
-    /// θ_p0.
+    /// Initial coefficients θ_p0.
     start: DVector<f64>,
-    /// What is physically possible, where there are bounds.
+    /// Physically possible ranges, where there are bounds.
     bounds: Vec<Option<(f64, f64)>>,
     /// 1/σ² of θ_p0 as a prior where the model's file states σ, else zero.
     information: DVector<f64>,
-    /// T.
+    /// The transformation T.
     turn: DMatrix<f64>,
-    /// Names of the coefficients that the data does not see, or not apart from others.
+    /// Names of the coefficients that the data does not identify, or not separately from others.
     pub unseen: Vec<String>,
 }
 
-/// Why coefficients cannot be trained.
+/// Coefficients cannot be trained.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrainableError {
     /// The model has no such coefficient.
     #[error("model {model} has no coefficient {name:?} that can be trained; it has {known}")]
     Unknown {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// The name.
+        /// Name that was requested.
         name: String,
-        /// What it has.
+        /// Names that the model has.
         known: String,
     },
-    /// An effect goes with the altitude.
+    /// An effect depends on the altitude.
     #[error(
         "model {model} has the effect {effect}, which goes with the altitude, and the rollouts that are learned from do not know it: leave it out of the prior"
     )]
     Effect {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// The effect.
+        /// Name of the effect.
         effect: &'static str,
     },
 }
 
-/// Whether a model can be learned through at all.
+/// Whether a model's slopes can be computed for training.
 ///
 /// # Errors
-/// If one of its effects goes with the altitude.
+///
+/// If one of its effects depends on the altitude.
 pub fn check(model: &GreyBox) -> Result<(), TrainableError> {
     let written = |id: &str| {
         let effect = Kind::from_id(id).and_then(Kind::written);
@@ -85,15 +86,14 @@ pub fn check(model: &GreyBox) -> Result<(), TrainableError> {
     }
 }
 
-/// Names of all that can be trained of `model`: the coefficients that its forces and moments are
-/// linear in, and Jxz.
+/// Names of all trainable coefficients of `model`: those that forces and moments are linear in, and Jxz.
 pub fn trainable(model: &GreyBox) -> Vec<String> {
     let mut names = vec![JXZ.to_owned()];
     for about in model.effects() {
         let Some(kind) = Kind::from_id(about.id) else { continue };
         let count = about.coefficients.len();
         for (k, c) in about.coefficients[..count - about.shape].iter().enumerate() {
-            // what changes the body is no force
+            // an effect on inertia is no force
             let one: Vec<f64> = (0..count).map(|i| if i == k { 0.1 } else { 0.0 }).collect();
             let (mut body, mut still) = (*model.bare_body(), *model.bare_body());
             kind.change(&one, &mut body);
@@ -167,12 +167,12 @@ impl Basis {
         self.turn.ncols()
     }
 
-    /// Whether nothing is trained.
+    /// Whether there are no coordinates.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// How far each coefficient moves with coordinate `k`, in the order of `places`.
+    /// Slopes of the coefficients over coordinate `k`, in the order of `places`.
     pub fn column(&self, k: usize) -> impl Iterator<Item = f64> + '_ {
         (0..self.turn.nrows()).map(move |i| self.turn[(i, k)])
     }
@@ -185,13 +185,13 @@ impl Basis {
         (0..self.len()).map(|k| of(k).sum()).collect()
     }
 
-    /// What the stated widths of the coefficients say of the coordinates: Tᵀ Σ⁻¹ T, zero where none is stated.
+    /// Prior information on the coordinates from the stated standard deviations: Tᵀ Σ⁻¹ T, zero where none is stated.
     pub fn prior_information(&self) -> DMatrix<f64> {
         let weighed = DMatrix::from_diagonal(&self.information) * &self.turn;
         self.turn.transpose() * weighed
     }
 
-    /// Gives `model` the coefficients at `coordinates`, kept where an aircraft can have them.
+    /// Sets the coefficients of `model` from `coordinates`, clamped to their possible ranges.
     pub fn apply(&self, model: &mut GreyBox, coordinates: &[f64]) {
         let theta = &self.start + &self.turn * DVector::from_column_slice(coordinates);
         let mut values: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
@@ -250,7 +250,7 @@ pub(crate) fn columns(model: &GreyBox, track: &Track, k: usize) -> Vec<[f64; 8]>
     columns
 }
 
-/// The rates that a wrench alone makes of the state.
+/// The state rates due to a wrench alone.
 pub(crate) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wrench) -> [f64; 8] {
     let still = rigid_body::state_rate(state, air, [0.0; 3], [0.0; 3]).to_array();
     let none = State { p: 0.0, q: 0.0, r: 0.0, ..*state };
@@ -263,7 +263,7 @@ pub(crate) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wr
     std::array::from_fn(|i| rate[i] - still[i])
 }
 
-/// T with Tᵀ G T = 1 on the directions that the data sees, and who has no part in them.
+/// T with Tᵀ G T = 1 on the identifiable directions, and the coefficients outside them.
 fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let n = gram.nrows();
     if n == 0 {

@@ -1,4 +1,4 @@
-//! The engine: minibatches in the precision asked for, in the widest vectors there are.
+//! Loss and gradient of minibatches in the chosen arithmetic and vector width.
 
 use crate::dynamics::kernel::Double;
 #[cfg(target_arch = "aarch64")]
@@ -9,7 +9,7 @@ use crate::dynamics::loss::{Loss, Minibatch, Objective};
 use crate::dynamics::rollout::{Gradient, Subject};
 use crate::dynamics::windows::{Track, Window};
 
-/// What an engine computes in.
+/// Arithmetic of an engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
     /// Blocks of single-precision lanes. Where no multiply-add is fused (x86 from before 2013) it is
@@ -19,7 +19,7 @@ pub enum Arithmetic {
     Double,
 }
 
-/// Computes losses and gradients of minibatches. All memory is taken when it is made.
+/// Computes losses and gradients of minibatches. It allocates only when it is built.
 #[derive(Clone, Debug)]
 pub struct Engine(Kind);
 
@@ -35,7 +35,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// In the widest lanes that this processor has; `None` where no multiply-add is fused.
+    /// In the processor's widest vectors; `None` where multiply-add is not fused.
     #[cfg_attr(
         not(any(target_arch = "x86_64", target_arch = "aarch64")),
         expect(unused_variables, reason = "elsewhere no multiply-add is known to be fused")
@@ -89,10 +89,11 @@ impl Engine {
         }
     }
 
-    /// The loss alone.
+    /// The loss without its gradient.
     ///
     /// # Panics
-    /// As [`step`](Engine::step).
+    ///
+    /// The same as [`step`](Engine::step).
     pub fn loss(
         &mut self,
         subject: &Subject,

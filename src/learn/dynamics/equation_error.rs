@@ -1,15 +1,15 @@
-//! A first value of the prior's coefficients by equation error, before any rollout is flown.
+//! Initial coefficients of the prior by equation error, before any rollout.
 //!
-//! F_p is linear in what is trained, so over a short window the change of the measured state less the
-//! integral of F_p along the measured path is a linear regression. It finds in a second what a gradient
-//! through rollouts finds slowly: a fast mode (the roll damping) settles within a rollout, after which
-//! only ratios of coefficients show. The paper starts from the prior as given.
+//! F_p is linear in what is trained, so that over a short window the change of the measured state less the integral
+//! of F_p along the measured path is a linear regression. It finds quickly what a gradient through rollouts finds
+//! slowly: a fast mode (the roll damping) settles within a rollout, after which only ratios of coefficients are
+//! identifiable. The paper starts from the prior as given.
 //!
-//! Coefficients whose file states a standard deviation have it as a prior: what a flight hardly shows stays near it. Others
-//! are as the flights say, and all stay within what is physically possible.
+//! Coefficients whose file states a standard deviation have it as a prior, so that poorly identifiable ones stay near
+//! their value. Others are estimated from the flights alone, and all stay within their physically possible ranges.
 //!
-//! What forces that are not trained lack over the flow angles, which the residual is to learn, is fitted along
-//! and dropped: else a drag that is too small is taken for a lack of thrust.
+//! Errors over the flow angles of forces without trained coefficients, which the residual is to learn, are fitted as
+//! nuisance terms and dropped: otherwise too small a drag would be compensated by too little thrust.
 
 use std::ops::{AddAssign, SubAssign};
 
@@ -22,48 +22,48 @@ use greylag_model::{GreyBox, Integrator, STEP};
 use greylag_num::statistics::correlation_length;
 use greylag_physics::{Channel, Controls, State, Wrench};
 
-/// Steps of a window: noise of the states is divided by it, slow effects are still seen.
+/// Steps of a window: noise of the states is divided by it, slow effects remain visible.
 const STEPS: usize = 5;
 
-/// Windows that take part, at most.
+/// Largest number of windows used.
 const WINDOWS: usize = 20_000;
 
-/// Passes: Jxz bends the regression a little, and the weights follow the residuals.
+/// Number of iterations: Jxz makes the regression slightly nonlinear, and the weights depend on the residuals.
 const PASSES: usize = 12;
 
 /// Where Tukey's weights end, in robust standard deviations: 95 % efficient on normal errors.
 const REACH: f64 = 4.685;
 
-/// Part of a channel's own size below which an error is no error: integration of the path.
+/// Fraction of a channel's magnitude below which an error counts as zero: integration error of the path.
 const FLOOR: f64 = 1e-3;
 
-/// The rates that forces and moments make: airspeed, p, q, r, alpha, beta.
+/// Rates that depend on forces and moments: airspeed, p, q, r, alpha, beta.
 pub(super) const CHANNELS: [usize; 6] = [2, 3, 4, 5, 6, 7];
 
-/// Channels in which the prior may lack something over the flow angles.
+/// Channels with nuisance terms over the flow angles.
 const FORCES: [Channel; 3] = [Channel::Drag, Channel::Lift, Channel::Side];
 
-/// Terms of what it may lack: 1, α, α², α³, β².
+/// Number of nuisance terms: 1, α, α², α³, β².
 const TERMS: usize = 5;
 
-/// How the errors are weighed.
+/// Weighting of the errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Weighting {
-    /// Tukey's biweight: what is far off does not count.
+    /// Tukey's biweight: outliers have zero weight.
     Tukey,
-    /// All alike: least squares.
+    /// Equal weights: least squares.
     Alike,
 }
 
-/// A window or a sample: for each channel its error in units of x_c, and the slopes of the prediction.
+/// A window or a sample: each channel's error in units of x_c, and the slopes of the prediction.
 pub(super) struct Row {
     pub error: [f64; 6],
-    /// With respect to the coordinates, then to what the prior may lack.
+    /// Slopes over the coordinates, then over the nuisance terms.
     pub slopes: Vec<[f64; 6]>,
 }
 
 impl Row {
-    /// The row after a step of what is fitted.
+    /// The row after a step of the fitted parameters.
     pub fn advance(&mut self, step: &DVector<f64>) {
         for (slopes, step) in self.slopes.iter().zip(step.iter()) {
             self.error.iter_mut().zip(slopes).for_each(|(error, slope)| *error -= slope * step);
@@ -71,17 +71,17 @@ impl Row {
     }
 }
 
-/// What is fitted.
+/// The fitted parameters.
 pub(super) struct Fit<'a> {
     pub basis: &'a Basis,
-    /// The forces that are fitted along: those on which no trained coefficient acts.
+    /// The forces with nuisance terms: those on which no trained coefficient acts.
     along: Vec<Channel>,
-    /// What they come to, [`TERMS`] coefficients a force.
+    /// Their nuisance coefficients, [`TERMS`] per force.
     lacking: Vec<f64>,
 }
 
-/// The coordinates at which `prior` follows `tracks` best, windows that it cannot follow (a stall that
-/// it does not have) counting little or nothing.
+/// The coordinates at which `prior` fits `tracks` best; windows that it cannot fit (a stall outside its structure)
+/// have little or no weight.
 pub fn coordinates(prior: &GreyBox, basis: &Basis, tracks: &[Track]) -> Vec<f64> {
     if basis.is_empty() {
         return Vec::new();
@@ -107,7 +107,7 @@ pub fn coordinates(prior: &GreyBox, basis: &Basis, tracks: &[Track]) -> Vec<f64>
     eta
 }
 
-/// The forces on which none of the trained coefficients of `prior` acts.
+/// The forces on which no trained coefficient of `prior` acts.
 fn forces_along(prior: &GreyBox, basis: &Basis) -> Vec<Channel> {
     let state = State { p: 0.1, q: 0.1, r: 0.1, alpha: 0.1, beta: 0.1, ..State::NEUTRAL };
     let controls =
@@ -122,19 +122,19 @@ fn forces_along(prior: &GreyBox, basis: &Basis) -> Vec<Channel> {
 }
 
 impl<'a> Fit<'a> {
-    /// The coordinates of `basis`, and what the forces of `prior` that are not trained may lack, at zero.
+    /// The coordinates of `basis` and the nuisance coefficients, all zero.
     pub fn new(prior: &GreyBox, basis: &'a Basis) -> Fit<'a> {
         let along = forces_along(prior, basis);
         let lacking = vec![0.0; TERMS * along.len()];
         Fit { basis, along, lacking }
     }
 
-    /// How many numbers are fitted.
+    /// Number of fitted parameters.
     pub fn count(&self) -> usize {
         self.basis.len() + self.lacking.len()
     }
 
-    /// One window at the coefficients of `model`.
+    /// The regression row of one window with the coefficients of `model`.
     fn row(&self, model: &GreyBox, tracks: &[Track], window: &Window) -> Row {
         let basis = self.basis;
         let track = &tracks[window.track as usize];
@@ -170,7 +170,7 @@ impl<'a> Fit<'a> {
         row
     }
 
-    /// The rates that each term of each force that is fitted along makes.
+    /// State rates of each nuisance term of each force.
     pub fn rates_along(&self, model: &GreyBox, state: &State, altitude: f64) -> Vec<[f64; 8]> {
         let air = model.air(state, altitude);
         let State { alpha, beta, .. } = *state;
@@ -199,8 +199,8 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The step of what is fitted that a weighted least-squares fit asks for; `known` is the information of a prior on the first
-/// of these numbers, and how far they are from it.
+/// The weighted least-squares step of the fitted parameters; `known` is the information of a prior on the first of
+/// them, and their distance from it.
 pub(super) fn solve(
     rows: &[Row],
     count: usize,
@@ -216,7 +216,7 @@ pub(super) fn solve(
         let moved = rows.iter().map(|r| r.slopes.iter().map(|s| s[i] * s[i]).sum::<f64>());
         let size = (moved.sum::<f64>() / rows.len() as f64).sqrt();
         let deviation = (1.4826 * *median).max(FLOOR * size).max(f64::MIN_POSITIVE);
-        // beside a prior, windows that say the same count once
+        // beside a prior, redundant windows count once
         let said_by = match known {
             Some((information, _)) if information.iter().any(|x| *x != 0.0) => {
                 let errors = rows.iter().map(|r| r.error[i].clamp(-deviation, deviation));
@@ -245,7 +245,7 @@ pub(super) fn solve(
     }
     let size: f64 = normal.diagonal().iter().copied().fold(0.0, f64::max);
     for k in 0..count {
-        // a direction that no window shows stays
+        // a direction without information stays
         normal[(k, k)] += 1e-12 * size;
     }
     normal.cholesky().map(|c| c.solve(&right))

@@ -1,4 +1,4 @@
-//! The model folder that a training leaves: `model.toml`, its airframe, `residual.safetensors`.
+//! The model folder that a training writes: `model.toml`, its airframe, `residual.safetensors`.
 
 use std::path::{Path, PathBuf};
 
@@ -7,49 +7,50 @@ use crate::dynamics::basis::JXZ;
 use greylag_model::residual::{Origin, fingerprint};
 use greylag_model::{GreyBox, Integrator};
 
-/// Why a model cannot be written.
+/// A model cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// A file cannot be read or written.
     #[error("cannot {doing} {path}: {why}; check that its folder exists, can be written to and has room", path = path.display())]
     File {
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// The prior's file has another form than when it was read.
+    /// The prior's file has changed since it was read.
     #[error("cannot write a model after {path}: {why}; give the prior's file as it was", path = path.display())]
     Prior {
-        /// The prior's file.
+        /// Path of the prior's file.
         path: PathBuf,
-        /// What is wrong.
+        /// What has changed.
         why: String,
     },
 }
 
-/// Names of the files in a model folder.
+/// File names in a model folder.
 pub const MODEL: &str = "model.toml";
-/// The airframe, copied so that the folder is whole.
+/// Copy of the airframe, so that the folder is self-contained.
 pub const AIRFRAME: &str = "airframe.toml";
-/// The residual.
+/// The residual network.
 pub const RESIDUAL: &str = "residual.safetensors";
 
-/// What a model's file says in words.
+/// Texts of a model file.
 #[derive(Clone, Copy, Debug)]
 pub struct Text<'a> {
-    /// What it was learned from, one sentence.
+    /// Training data in one sentence.
     pub about: &'a str,
     /// Full names of the coefficients that were trained.
     pub trained: &'a [String],
 }
 
-/// Writes `model`, learned from the prior in the file `prior`, into `folder`. What stands there is replaced,
-/// the model file last.
+/// Writes `model`, learned from the prior in the file `prior`, into `folder`. Existing files are replaced, the model
+/// file last.
 ///
 /// # Errors
+///
 /// If a file cannot be read or written.
 pub fn save(
     model: &GreyBox,
@@ -112,7 +113,7 @@ pub fn save(
     write(MODEL, text.as_bytes())
 }
 
-/// Puts the coefficient `name` of `model` into the model file's `table`; `None` if that has no such entry.
+/// Writes the coefficient `name` of `model` into the model file's `table`; `None` if that has no such entry.
 fn write_trained(
     table: &mut toml::Table,
     model: &GreyBox,
@@ -136,7 +137,7 @@ fn write_trained(
     Some(())
 }
 
-/// What a residual's file says of a training of `model` on `data` (SHA-256, hexadecimal).
+/// Provenance in a residual's file: a training of `model` on `data` (SHA-256, hexadecimal).
 pub fn origin(model: &GreyBox, data: &str, seed: u64) -> Origin {
     Origin {
         schema: Origin::SCHEMA.into(),

@@ -1,11 +1,10 @@
-//! Instruction sets: what a pass is made of, each part compiled once for each set.
+//! Functions of a pass, each compiled once per instruction set.
 //!
-//! The prior is by far the largest part, so it is called and not inlined: what calls it is compiled for
-//! the same instructions, and two schemes through time share one copy of its value, its slopes and its
-//! coefficients' slopes.
+//! The prior is by far the largest part, so that it is called and not inlined: its callers are compiled for the same
+//! instructions, and two integration schemes share one copy of its value, its slopes and its coefficients' slopes.
 
 use crate::dynamics::packet::Packet;
-use crate::dynamics::prior::{At, Said, Slopes};
+use crate::dynamics::prior::{At, PriorOutputs, Slopes};
 use crate::dynamics::rollout::{Gradient, Pass, SumSlopes, Sums, Trace};
 use greylag_model::GreyBox;
 #[cfg(target_arch = "aarch64")]
@@ -13,20 +12,24 @@ use greylag_num::Base;
 #[cfg(target_arch = "x86_64")]
 use greylag_num::{Avx2, Avx512};
 
-/// A set of instructions with the numbers that it moves.
+/// A set of instructions with its number type.
 pub trait InstructionSet: Copy + Send + Sync {
-    /// What a pass computes in.
+    /// The number type of a pass.
     type Number: Packet;
-    /// [`At::ask`].
-    fn ask<const WHOLE: bool>(self, model: &GreyBox, at: &At<Self::Number>) -> Said<Self::Number>;
-    /// [`At::slope`].
+    /// Calls [`At::ask`] for the prior.
+    fn ask<const WHOLE: bool>(
+        self,
+        model: &GreyBox,
+        at: &At<Self::Number>,
+    ) -> PriorOutputs<Self::Number>;
+    /// Calls [`At::slope`] for the state's slopes.
     fn slope<const WHOLE: bool>(
         self,
         model: &GreyBox,
         at: &At<Self::Number>,
         slopes: &Slopes<Self::Number>,
     ) -> [Self::Number; 8];
-    /// [`At::coefficients`].
+    /// Calls [`At::coefficients`] for the coefficients' slopes.
     fn coefficients<const WHOLE: bool>(
         self,
         model: &GreyBox,
@@ -34,9 +37,9 @@ pub trait InstructionSet: Copy + Send + Sync {
         slopes: &Slopes<Self::Number>,
         sums: &mut [Self::Number],
     );
-    /// [`Pass::forward`].
+    /// Calls [`Pass::forward`] on a block.
     fn forward(self, pass: &Pass<Self>, trace: &mut Trace<Self::Number>) -> (Sums, Self::Number);
-    /// [`Pass::reverse`].
+    /// Calls [`Pass::reverse`] on a block.
     fn reverse(
         self,
         pass: &Pass<Self>,
@@ -46,7 +49,7 @@ pub trait InstructionSet: Copy + Send + Sync {
     );
 }
 
-/// One rollout at a time in double precision, in whatever the target always has: for tests.
+/// One rollout at a time in double precision, with the baseline instructions: for tests.
 #[derive(Clone, Copy, Debug)]
 pub struct Double;
 
@@ -62,7 +65,7 @@ pub struct In512(());
 
 #[cfg(target_arch = "x86_64")]
 impl In256 {
-    /// The set, if this processor has it.
+    /// The instruction set, if this processor supports it.
     pub fn detect() -> Option<In256> {
         let there = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         there.then_some(In256(()))
@@ -71,13 +74,13 @@ impl In256 {
 
 #[cfg(target_arch = "x86_64")]
 impl In512 {
-    /// The set, if this processor has it.
+    /// The instruction set, if this processor supports it.
     pub fn detect() -> Option<In512> {
         is_x86_feature_detected!("avx512f").then_some(In512(()))
     }
 }
 
-/// Lanes in what the target always has.
+/// Lanes with the baseline instructions of the target.
 #[cfg(target_arch = "aarch64")]
 #[derive(Clone, Copy, Debug)]
 pub struct Neon;
@@ -93,13 +96,13 @@ macro_rules! compiled {
                 self,
                 model: &GreyBox,
                 at: &At<$number>,
-            ) -> Said<$number> {
+            ) -> PriorOutputs<$number> {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
                 fn compiled<const WHOLE: bool>(
                     model: &GreyBox,
                     at: &At<$number>,
-                ) -> Said<$number> {
+                ) -> PriorOutputs<$number> {
                     at.ask::<WHOLE>(model)
                 }
                 compiled!(call compiled::<WHOLE>(model, at) $($features)?)

@@ -7,45 +7,45 @@ use crate::dynamics::packet::Packet;
 use crate::dynamics::rollout::{Gradient, Pass, Recorded, Subject, SumSlopes, Sums, Trace};
 use crate::dynamics::windows::{Track, Window};
 
-/// How the residual is kept small.
+/// Penalty on the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Penalty {
-    /// ‖F_a‖/‖F_p‖, eq. (24).
+    /// The ratio ‖F_a‖/‖F_p‖, eq. (24).
     Ratio,
-    /// ‖F_a‖, as in PhIHP and APHYNITY.
+    /// The norm ‖F_a‖, as in PhIHP and APHYNITY.
     Absolute,
 }
 
-/// What is minimised.
+/// The training objective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Objective {
     /// Scale of errors and rates: x_c of eq. (21), or ones.
     pub scale: [f64; 8],
-    /// How the residual is kept small.
+    /// Penalty on the residual.
     pub penalty: Penalty,
-    /// What the prediction error is divided by: L_prior of eq. (23), or 1.
+    /// Divisor of the prediction error: L_prior of eq. (23), or 1.
     pub unit: f64,
     /// λ of eq. (24).
     pub lambda: f64,
 }
 
-/// What a minibatch came to.
+/// Loss terms of a minibatch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loss {
-    /// L_pred, eq. (20).
+    /// Prediction loss L_pred, eq. (20).
     pub prediction: f64,
-    /// ‖F_p‖, eq. (22), 1/s.
+    /// Norm ‖F_p‖, eq. (22), 1/s.
     pub prior: f64,
-    /// ‖F_a‖, 1/s.
+    /// Norm ‖F_a‖ in 1/s.
     pub learned: f64,
     /// The whole objective, eq. (24).
     pub objective: f64,
-    /// Rollouts left out because they left the numbers.
+    /// Rollouts left out because a state was not finite.
     pub lost: usize,
 }
 
 impl Objective {
-    /// The loss of sums over `points` points, with the slopes with respect to the sums.
+    /// The loss of sums over `points` points, with its slopes over the sums.
     pub fn of(&self, sums: &Sums, points: f64) -> (Loss, SumSlopes) {
         let prediction = sums.error / points;
         let [prior, learned] = [sums.prior, sums.learned].map(|s| (s / points).sqrt());
@@ -71,7 +71,7 @@ impl Objective {
 }
 
 impl Gradient {
-    /// Zero, for `subject`.
+    /// A zero gradient for `subject`.
     pub fn zero(subject: &Subject) -> Gradient {
         Gradient {
             network: vec![0.0; subject.network.network().parameters().len()],
@@ -92,7 +92,7 @@ impl Gradient {
     }
 }
 
-/// What one block of lanes needs.
+/// Memory of one block of lanes.
 #[derive(Clone, Debug)]
 struct Work<R> {
     windows: Vec<Window>,
@@ -100,11 +100,11 @@ struct Work<R> {
     trace: Trace<R>,
     gradient: Gradient,
     sums: Sums,
-    /// Rollouts that count.
+    /// Number of rollouts that count.
     good: usize,
 }
 
-/// Memory for minibatches, taken once.
+/// Memory for minibatches, allocated once.
 #[derive(Clone, Debug)]
 pub struct Minibatch<S: InstructionSet> {
     works: Vec<Work<S::Number>>,
@@ -113,7 +113,7 @@ pub struct Minibatch<S: InstructionSet> {
 }
 
 impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
-    /// Room for `windows` rollouts of up to `steps` steps.
+    /// Memory for rollouts of up to `steps` steps.
     pub fn new(subject: &Subject, windows: usize, steps: usize, set: S) -> Self {
         let gradient = Gradient::zero(subject);
         let work = Work {
@@ -135,10 +135,11 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
 
     /// The loss of `windows` with its gradient.
     ///
-    /// Blocks are summed in their order, so that the result does not depend on the number of cores.
+    /// Blocks are summed in order, so that the result does not depend on the number of cores.
     ///
     /// # Panics
-    /// If there are more windows than there is room for.
+    ///
+    /// If there are more windows than memory for them.
     pub fn step(
         &mut self,
         subject: &Subject,
@@ -164,10 +165,11 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
         (loss, &self.gradient)
     }
 
-    /// The loss alone.
+    /// The loss without its gradient.
     ///
     /// # Panics
-    /// As [`step`](Minibatch::step).
+    ///
+    /// The same as [`step`](Minibatch::step).
     pub fn loss(
         &mut self,
         subject: &Subject,
@@ -213,7 +215,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
 }
 
 impl<R: Packet> Work<R> {
-    /// Flies the block; rollouts that leave the numbers are taken out and the rest flown again.
+    /// Integrates the block; rollouts whose state is not finite are removed and the rest integrated again.
     fn fly(
         &mut self,
         subject: &Subject,

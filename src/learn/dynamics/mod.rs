@@ -1,4 +1,4 @@
-//! The grey box learned from flights: prior coefficients and residual together, section IV-A of \[GSFM26\].
+//! Learning a grey-box model from flights: prior coefficients and residual together, section IV-A of \[GSFM26\].
 
 pub(super) mod basis;
 pub(super) mod engine;

@@ -1,4 +1,4 @@
-//! The network's forward pass with its trace kept, and the backward pass through it.
+//! Forward pass of a network with stored activations, and its backward pass.
 
 use crate::dynamics::packet::Packet;
 use greylag_model::residual::{INPUTS, OUTPUTS};
@@ -8,7 +8,7 @@ use greylag_num::{Dense, Real};
 /// Inputs and outputs of a tile of a weight matrix whose gradient is summed in registers.
 const TILE: usize = 4;
 
-/// A network made ready for both passes.
+/// A network prepared for both passes.
 #[derive(Clone, Debug)]
 pub struct Passes {
     network: Dense,
@@ -17,7 +17,7 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// Both passes of `network`.
+    /// Prepares `network` for both passes.
     pub fn new(network: Dense) -> Self {
         let zeros = |n: usize| vec![0.0; n];
         let sizes = network.sizes();
@@ -27,12 +27,12 @@ impl Passes {
         passes
     }
 
-    /// The network.
+    /// The underlying network.
     pub fn network(&self) -> &Dense {
         &self.network
     }
 
-    /// Takes over the parameters that `change` leaves behind.
+    /// Updates the parameters by `change`.
     pub fn update(&mut self, change: impl FnOnce(&mut [f32])) {
         change(self.network.parameters_mut());
         self.renew();
@@ -49,18 +49,18 @@ impl Passes {
         }
     }
 
-    /// Numbers that the forward pass keeps of a point: all units but the last layer's.
+    /// Length of a point's trace of the forward pass: all units but the last layer's.
     pub fn trace(&self) -> usize {
         let sizes = self.network.sizes();
         sizes[..sizes.len() - 1].iter().sum()
     }
 
-    /// Numbers that the backward pass keeps of a point: all units but the first layer's.
+    /// Length of a point's slopes of the backward pass: all units but the first layer's.
     pub fn slopes(&self) -> usize {
         self.network.sizes()[1..].iter().sum()
     }
 
-    /// The network's answer; `trace` keeps what the backward pass needs.
+    /// The network's output; `trace` receives the activations.
     #[inline(always)]
     pub fn forward<R: Real>(&self, input: [R; INPUTS], trace: &mut [R]) -> [R; OUTPUTS] {
         let mut output = [R::zero(); OUTPUTS];
@@ -81,8 +81,8 @@ impl Passes {
         output
     }
 
-    /// The slope with respect to the inputs, from the slope with respect to the outputs; `slopes`
-    /// keeps those of all units before they are rectified.
+    /// Slopes over the inputs, from those over the outputs; `slopes` receives those of all units before
+    /// rectification.
     #[inline(always)]
     pub fn backward<R: Real>(
         &self,
@@ -114,8 +114,7 @@ impl Passes {
         input
     }
 
-    /// Adds to `gradient` what `points` points contribute, whose traces and slopes lie one after the
-    /// other.
+    /// Adds the contributions of `points` points, whose traces and slopes are consecutive, to `gradient`.
     #[inline(always)]
     pub fn gather<R: Packet>(&self, traces: &[R], slopes: &[R], gradient: &mut [f64]) {
         let sizes = self.network.sizes();
@@ -140,7 +139,7 @@ impl Passes {
     }
 }
 
-/// What a layer's gradient is made of: Σ over points of unit · slope.
+/// Gradient of a layer: Σ over points of unit · slope.
 struct Sides<'a, R> {
     traces: &'a [R],
     slopes: &'a [R],

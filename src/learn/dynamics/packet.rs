@@ -1,18 +1,18 @@
-//! Packets: a scalar, or a block of lanes, that rollouts move in together.
+//! Packets: a scalar or a block of lanes, for simultaneous rollouts.
 
 use greylag_num::{Lanes, Packed, ROW, Real, Register};
 
-/// A [`Real`] of which the single numbers can be reached.
+/// A [`Real`] with access to its lanes.
 pub trait Packet: Real {
-    /// How many numbers it holds.
+    /// Number of lanes.
     const WIDTH: usize;
-    /// A packet of the numbers `lane(0)`, `lane(1)`, …
+    /// A packet of `lane(0)`, `lane(1)`, …
     fn gather(lane: impl FnMut(usize) -> f64) -> Self;
     /// The number in lane `index`.
     fn lane(&self, index: usize) -> f64;
     /// The sum over the lanes.
     fn sum(self) -> Self::Sum;
-    /// What a sum over the lanes is kept in.
+    /// Number type of a sum over the lanes.
     type Sum: Into<f64>;
 }
 
@@ -33,7 +33,7 @@ impl Packet for f64 {
     }
 }
 
-/// One row of lanes in any kind of register.
+/// One row of lanes in any vector register.
 impl<const N: usize, const FUSED: bool, V: Register> Packet for Lanes<N, FUSED, V> {
     const WIDTH: usize = {
         assert!(N == ROW && V::LANES == ROW, "a packet is one row");

@@ -1,4 +1,4 @@
-//! The prior at a point: its rates, and the slopes through it to state and coefficients.
+//! The prior at a point: its rates, and their slopes over state and coefficients.
 
 use crate::dynamics::packet::Packet;
 use greylag_model::{GreyBox, Starting, Weights, parted};
@@ -7,53 +7,53 @@ use greylag_physics::effects::{Needs, Terms};
 use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, State, Wrench};
 
-/// Altitude given to the airflow, m: far from the ground. What air there is comes with the density.
+/// Altitude for the airflow, m: far from the ground. The air density is an input.
 pub const ALOFT: f64 = f64::INFINITY;
 
-/// What the prior says at a point.
+/// Outputs of the prior at a point.
 #[derive(Clone, Copy, Debug)]
-pub struct Said<R> {
+pub struct PriorOutputs<R> {
     /// Specific force plus gravity, body axes, m/s².
     pub acceleration: Vector<R>,
-    /// Angular acceleration, rad/s².
+    /// Angular acceleration in rad/s².
     pub spin: Vector<R>,
     /// F_p, the rates of the state.
     pub rate: State<R>,
 }
 
-/// Slopes of the loss with respect to the three of [`Said`].
+/// Slopes of the loss over the outputs [`PriorOutputs`].
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes<R> {
-    /// With respect to the acceleration.
+    /// Slope over the specific force plus gravity.
     pub acceleration: Vector<R>,
-    /// With respect to the angular acceleration.
+    /// Slope over the angular acceleration.
     pub spin: Vector<R>,
-    /// With respect to the rates.
+    /// Slope over the state's rates.
     pub rate: State<R>,
 }
 
-/// Where the prior is asked: state, controls and air density (kg/m³).
+/// A point of evaluation: state, controls and air density (kg/m³).
 #[derive(Clone, Copy, Debug)]
 pub struct At<R> {
-    /// The state.
+    /// State at the point.
     pub state: State<R>,
-    /// The controls.
+    /// Controls at the point.
     pub controls: Controls<R>,
-    /// Air density, kg/m³.
+    /// Air density in kg/m³.
     pub density: R,
 }
 
 impl<R: Real> At<R> {
-    /// The airflow there.
+    /// The airflow at the point.
     #[inline(always)]
     pub fn air(&self, model: &GreyBox) -> AirData<R> {
         AirData::new(&self.state, self.density, ALOFT, &model.airframe.geometry)
     }
 
-    /// What the prior of `model` says: with `WHOLE` all of its effects, else those that need only the point, in code
-    /// that holds nothing else.
+    /// Outputs of `model`'s prior: with `WHOLE` all of its effects, else those that depend on the point alone, in
+    /// code without the others.
     #[inline(always)]
-    pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> Said<R> {
+    pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> PriorOutputs<R> {
         let air = self.air(model);
         let (acceleration, spin) = if WHOLE {
             model.accelerations_inlined(&self.state, &self.controls, &air)
@@ -61,17 +61,17 @@ impl<R: Real> At<R> {
             model.independent_accelerations(&self.state, &self.controls, &air)
         };
         let rate = rigid_body::state_rate(&self.state, &air, acceleration, spin);
-        Said { acceleration, spin, rate }
+        PriorOutputs { acceleration, spin, rate }
     }
 
-    /// The slope with respect to the state.
+    /// The slope over the state.
     #[inline(always)]
     pub fn slope<const WHOLE: bool>(&self, model: &GreyBox, slopes: &Slopes<R>) -> [R; 8] {
         transposed(&self.state.to_array(), &Asked::<R, WHOLE> { model, at: self, slopes })
     }
 }
 
-/// The prior as a function of the state, with the slopes with respect to what it says.
+/// The prior as a function of the state, with the slopes over its outputs.
 struct Asked<'a, R, const WHOLE: bool> {
     model: &'a GreyBox,
     at: &'a At<R>,
@@ -83,30 +83,29 @@ impl<R: Real, const WHOLE: bool> Sloped<R, 8> for Asked<'_, R, WHOLE> {
     fn part(&self, x: [Dual<2, R>; 8]) -> [R; 2] {
         let controls = self.at.controls.map(fixed);
         let at = At { state: State::from_array(x), controls, density: fixed(self.at.density) };
-        let said = at.ask::<WHOLE>(self.model);
+        let outputs = at.ask::<WHOLE>(self.model);
         let slopes = self.slopes;
         let mut sum = [R::zero(); 2];
         for i in 0..3 {
-            add(&mut sum, &said.acceleration[i], slopes.acceleration[i]);
-            add(&mut sum, &said.spin[i], slopes.spin[i]);
+            add(&mut sum, &outputs.acceleration[i], slopes.acceleration[i]);
+            add(&mut sum, &outputs.spin[i], slopes.spin[i]);
         }
-        for (out, slope) in said.rate.to_array().iter().zip(slopes.rate.to_array()) {
+        for (out, slope) in outputs.rate.to_array().iter().zip(slopes.rate.to_array()) {
             add(&mut sum, out, slope);
         }
         sum
     }
 }
 
-/// A function of `N` inputs, with slopes with respect to its outputs.
+/// A function of `N` inputs, with slopes over its outputs.
 ///
-/// A trait and not a closure, because its method can be made to be inlined: vector instructions end
-/// where a call begins.
+/// A trait and not a closure, because its method can be forced to inline: vector instructions end at a call.
 pub trait Sloped<R: Real, const N: usize> {
     /// Σ over outputs of slope times derivative, in the two directions that the inputs mark.
     fn part(&self, inputs: [Dual<2, R>; N]) -> [R; 2];
 }
 
-/// A number that does not move.
+/// A constant as a dual number.
 #[inline(always)]
 pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
     Dual { value: x, gradient: [R::zero(); 2] }
@@ -114,8 +113,8 @@ pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
 
 /// Σ of slopes times derivatives with respect to each of `inputs`, two at a time.
 ///
-/// Two at a time and not all at once, because the compiler has to see the prior whole in each
-/// direction, and because what the network costs is far more.
+/// Two at a time and not all at once, because the compiler inlines the whole prior for each
+/// direction, and because the network costs far more.
 #[inline(always)]
 pub fn transposed<R: Real, const N: usize>(
     inputs: &[R; N],
@@ -152,10 +151,9 @@ pub fn add<R: Real>(sum: &mut [R; 2], out: &Dual<2, R>, slope: R) {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes with respect to the coefficients, then to Jxz, the last of `sums`.
+    /// Adds the slopes over the coefficients, then over Jxz, the last of `sums`.
     ///
-    /// Exact for effects that are linear in the coefficients asked for; without `WHOLE` they must need only the
-    /// point.
+    /// Exact for effects that are linear in these coefficients; without `WHOLE` they must depend on the point alone.
     #[inline(always)]
     pub fn coefficients<const WHOLE: bool>(
         &self,
@@ -193,11 +191,11 @@ impl<R: Packet> At<R> {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes with respect to the coefficients of all effects, `wrench` being those with respect to the forces
-    /// and moments; the moments.
+    /// Adds the slopes over the coefficients of all effects, given those over forces and moments, `wrench`; returns the
+    /// moments.
     ///
-    /// The sums over the effects that need only the point, as they are, with centred surfaces and at rest, are what the
-    /// other effects are made of: the slopes with respect to these sums go on to the coefficients of the former.
+    /// The other effects depend on three sums over the effects of the point alone (as they are, with centred surfaces,
+    /// and at rest): the slopes over these sums propagate to the coefficients of the latter.
     #[inline(always)]
     fn whole(
         &self,
@@ -278,13 +276,13 @@ impl<R: Packet> At<R> {
 /// Channels of the three sums of [`GreyBox::independent_sums`].
 const CHANNELS_OF_SUMS: usize = 21;
 
-/// What moves in each of two directions: a channel of the three sums, counted on, or the coefficient of a place.
+/// Perturbation of each of two directions: a channel of the three sums, counted on, or the coefficient of a place.
 struct Moves {
     channels: [Option<usize>; 2],
     places: [Option<usize>; 2],
 }
 
-/// Coefficients of which two move, one in each direction.
+/// Coefficients of which two are perturbed, one in each direction.
 #[derive(Clone, Copy)]
 struct Marked<'a> {
     model: &'a GreyBox,
@@ -304,7 +302,7 @@ impl<R: Real> Weights<Dual<2, R>> for Marked<'_> {
     }
 }
 
-/// Takes the terms of a prior's effects: slopes with respect to coefficients, and the moments.
+/// Collects the terms of a prior's effects: slopes over coefficients, and the moments.
 struct Tally<'a, R> {
     model: &'a GreyBox,
     first: usize,

@@ -1,10 +1,10 @@
 //! Joint training by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973).
 //!
-//! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual
-//! the best coefficients are those that leave no part of it in the span of ∂F_p/∂θ: a linear regression of the
-//! residual on these slopes, over the samples of the flights. The gradient of the rollouts approaches the same
-//! condition in the mean square, where a stall that the prior lacks is most of the residual and bends the
-//! coefficients; Tukey's weights take it out.
+//! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual the
+//! best coefficients leave no part of it in the span of ∂F_p/∂θ: a linear regression of the residual on these slopes,
+//! over the samples of the flights. The gradient of the rollouts approaches the same condition in the mean square,
+//! where a stall outside the prior's structure dominates the residual and biases the coefficients; Tukey's weights
+//! exclude it.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -14,13 +14,13 @@ use crate::dynamics::equation_error::{CHANNELS, Fit, Row, Weighting, solve};
 use crate::dynamics::windows::{Track, regular};
 use greylag_model::{GreyBox, Residual};
 
-/// Samples that take part, at most.
+/// Largest number of samples used.
 const SAMPLES: usize = 8192;
 
-/// Passes of the weights.
+/// Number of reweighting iterations.
 const PASSES: usize = 8;
 
-/// The step of the coordinates of `basis` at which `prior` says what of `residual` it can say.
+/// Least-squares step of the coordinates of `basis` that moves into `prior` the part of `residual` in its span.
 pub(super) fn step(
     prior: &GreyBox,
     residual: &Residual,
@@ -49,7 +49,7 @@ pub(super) fn step(
 }
 
 impl Fit<'_> {
-    /// What the residual adds at a sample, and the slopes of what the prior could say in its place.
+    /// The residual at a sample, and the slopes of the prior there.
     fn sample(&self, prior: &GreyBox, residual: &Residual, track: &Track, k: usize) -> Row {
         let (state, controls) = (&track.states[k], &track.controls[k]);
         let scale = prior.scale();

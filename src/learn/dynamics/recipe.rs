@@ -1,22 +1,22 @@
-//! The recipe of a training: what is minimised, over what, how long.
+//! Settings of a model training: objective, parameters, length.
 
 use serde::{Deserialize, Serialize};
 
 use crate::dynamics::loss::Penalty;
 use greylag_model::GreyBox;
 
-/// Whose loss is minimised.
+/// The objective's origin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
-    /// \[GSFM26\]: scaled by x_c, divided by the bare prior's error, ‖F_a‖/‖F_p‖ kept small.
+    /// \[GSFM26\]: scaled by x_c, divided by the bare prior's error, with a penalty on ‖F_a‖/‖F_p‖.
     Scaled,
-    /// APHYNITY's and PhIHP's: x_c = 1, not divided, ‖F_a‖ kept small. PhIHP leaves the prior frozen.
+    /// APHYNITY and PhIHP: x_c = 1, no divisor, penalty on ‖F_a‖. PhIHP freezes the prior.
     Plain,
 }
 
 impl Criterion {
-    /// The scale of errors and rates.
+    /// Scale of errors and rates.
     pub fn scale(self, model: &GreyBox) -> [f64; 8] {
         match self {
             Criterion::Scaled => model.scale(),
@@ -24,7 +24,7 @@ impl Criterion {
         }
     }
 
-    /// How the residual is kept small.
+    /// Penalty on the residual.
     pub fn penalty(self) -> Penalty {
         match self {
             Criterion::Scaled => Penalty::Ratio,
@@ -33,26 +33,26 @@ impl Criterion {
     }
 }
 
-/// Where the trained coefficients start.
+/// Initial values of the trained coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// At the prior's, as in the paper.
+    /// Those of the prior, as in the paper.
     AsGiven,
-    /// Where a robust regression on short windows puts them.
+    /// Those of a robust regression on short windows.
     EquationError,
 }
 
-/// How the prior's coefficients are learned along with the residual.
+/// Method of training the prior's coefficients together with the residual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Joint {
     /// By the gradient of the rollouts, at [`Recipe::prior_rate`]: the paper's.
     #[default]
     Gradient,
-    /// By variable projection, robust: what of the residual the prior can say moves into its coefficients.
+    /// By robust variable projection: the part of the residual in the prior's span moves into its coefficients.
     Projection,
-    /// Likewise by least squares: where the gradient would end.
+    /// By least-squares variable projection: the limit of the gradient.
     LeastSquares,
 }
 
@@ -62,44 +62,43 @@ impl Joint {
     }
 }
 
-/// Everything that decides what a training gives, but for data and prior.
+/// All settings that determine the result, other than data and prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
     /// Units of the hidden layers of the residual.
     pub hidden: Vec<usize>,
-    /// Lengths of the rollouts n, in steps: equal shares of the updates have each in turn.
+    /// Rollout lengths n, in steps: each has an equal share of the updates in turn.
     pub steps: Vec<usize>,
-    /// Rollouts in a minibatch.
+    /// Rollouts per minibatch.
     pub batch: usize,
-    /// Updates in all.
+    /// Total number of updates.
     pub updates: u64,
-    /// Learning rate at the start; it falls as a cosine.
+    /// Initial learning rate; cosine schedule.
     pub rate: f64,
-    /// Part of it that is left at the end.
+    /// Final fraction of the learning rate.
     pub rate_end: f64,
-    /// Learning rate of the prior's coordinates at the start; 0 holds them where they start. Moved along,
-    /// they make the residual as small as it can be in the mean square: what the prior lacks where it
-    /// lacks most, as a stall, then bends them.
+    /// Initial learning rate of the prior's coordinates; 0 freezes them. If trained, they minimise the residual in
+    /// the mean square: a stall outside the prior's structure then biases them.
     pub prior_rate: f64,
-    /// Where the trained coefficients start.
+    /// Initial values of the trained coefficients.
     pub start: Start,
-    /// How they are learned along.
+    /// Method of training them.
     #[serde(default, skip_serializing_if = "Joint::is_gradient")]
     pub joint: Joint,
     /// λ0 of eq. (24).
     pub lambda: f64,
-    /// τ of eq. (24), by which λ grows an update.
+    /// τ of eq. (24), the growth of λ per update.
     pub tau: f64,
-    /// Whose loss.
+    /// The objective's origin.
     pub criterion: Criterion,
-    /// Count each rollout by 1/(e² + floor²), e being how far the prior is off at its end, in root mean
-    /// squares over the rollouts: the residual is then as good where the prior errs little as where it
-    /// errs most, as in a stall. All count alike without it, as in the paper.
+    /// Weights each rollout by 1/(e² + floor²), e being the prior's error at its end relative to the root mean square
+    /// over the rollouts: the residual is then as accurate where the prior errs little as where it errs most, as in a
+    /// stall. `None` weights all equally, as in the paper.
     pub floor: Option<f64>,
-    /// Full names of the prior's coefficients that are trained; none for a frozen prior.
+    /// Full names of the trained coefficients of the prior; empty for a frozen prior.
     pub trainable: Vec<String>,
-    /// Seed of the network's start and of the minibatches.
+    /// Seed of the network's initial weights and of the minibatches.
     pub seed: u64,
 }
 
@@ -126,7 +125,7 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// What is wrong with it, if anything is.
+    /// What is invalid, if anything is.
     pub fn fault(&self) -> Option<&'static str> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if self.steps.is_empty() || self.steps.iter().any(|n| !(1..=500).contains(n)) {
@@ -153,13 +152,13 @@ impl Recipe {
         None
     }
 
-    /// The rollouts' length at an update.
+    /// Rollout length at an update.
     pub fn steps_at(&self, update: u64) -> usize {
         let place = update as u128 * self.steps.len() as u128 / u128::from(self.updates.max(1));
         self.steps[(place as usize).min(self.steps.len() - 1)]
     }
 
-    /// What is left of the learning rates at an update.
+    /// Learning-rate factor at an update.
     pub fn pace_at(&self, update: u64) -> f64 {
         let done = update as f64 / self.updates as f64;
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * done).cos());

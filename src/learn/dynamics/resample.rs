@@ -1,20 +1,20 @@
-//! A flight that was sampled more slowly than the model steps, at the model's step.
+//! Resamples a flight with a longer sample time to the model's step.
 //!
-//! States follow cubics through four samples (Catmull–Rom), controls straight lines. A reconstructed path is
-//! smooth, so a cubic is off by a few parts in a thousand of what happens between samples at 25 Hz; at 10 Hz
-//! the fastest motions of a small aircraft lie between the samples.
+//! States are interpolated by cubics through four samples (Catmull–Rom), controls linearly. A reconstructed path is
+//! smooth, so that a cubic errs by a few parts in a thousand at 25 Hz; at 10 Hz the fastest motions of a small
+//! aircraft lie between the samples.
 
 use greylag_model::STEP;
 use greylag_physics::{Controls, State};
 
-/// Longest time between samples that learning takes, s.
+/// Longest sample time for learning, s.
 pub const SLOWEST_S: f64 = 0.1;
 
 /// A sample: state, controls, altitude in m.
 pub type Row = (State, Controls, f64);
 
-/// `rows` that are `step_s` apart as rows that are [`STEP`] apart, from the first on. The angles of roll may
-/// jump by a turn between rows.
+/// `rows` with sample time `step_s` resampled to [`STEP`], starting from the first. Roll angles may wrap between
+/// rows.
 pub fn resampled(rows: &[Row], step_s: f64) -> Vec<Row> {
     if rows.len() < 2 {
         return rows.to_vec();
@@ -24,12 +24,12 @@ pub fn resampled(rows: &[Row], step_s: f64) -> Vec<Row> {
     (0..count).map(|k| at(rows, k as f64 * STEP / step_s)).collect()
 }
 
-/// The row at `place`, in samples from the first.
+/// The interpolated row at `place`, in samples from the first.
 fn at(rows: &[Row], place: f64) -> Row {
     let last = rows.len() - 1;
     let k = (place as usize).min(last - 1);
     let part = place - k as f64;
-    // at either end the outermost sample stands for the one beyond
+    // at either end the outermost sample replaces the missing one
     let around = [k.saturating_sub(1), k, k + 1, (k + 2).min(last)].map(|i| &rows[i]);
     let near = around[1].0.roll;
     let states = around.map(|(state, ..)| {

@@ -1,4 +1,4 @@
-//! Where the learned residual acts: on which channel it acts, in which regime, how strongly.
+//! Map of the learned residual: channels, regimes and magnitudes.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,18 +10,18 @@ use greylag_physics::State;
 /// Names of the state's rates, in the order of [`State::to_array`].
 pub const CHANNELS: [&str; 8] = ["roll", "pitch", "airspeed", "p", "q", "r", "alpha", "beta"];
 
-/// Bins of a regime variable.
+/// Number of bins of a regime variable.
 const BINS: usize = 10;
 
-/// Fewest samples of a bin that is shown.
+/// Smallest number of samples of a bin that is shown.
 const SUPPORT: usize = 20;
 
-/// What a residual adds over recorded flights.
+/// Statistics of a residual over recorded flights.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResidualMap {
     /// ‖F_a‖/‖F_p‖ over all samples, eq. (22).
     pub ratio: f64,
-    /// By channel.
+    /// Residual of each channel.
     pub channels: Vec<Share>,
     /// The mean of each channel's F_a/x_c (1/s) over a regime variable.
     pub curves: Vec<Curve>,
@@ -29,40 +29,40 @@ pub struct ResidualMap {
     pub map: Vec<Cell>,
 }
 
-/// What the residual adds to a channel.
+/// Magnitude of a channel's residual.
 #[derive(Clone, Debug, Serialize)]
 pub struct Share {
-    /// The channel.
+    /// Name of the channel.
     pub channel: &'static str,
     /// Root mean square of F_p/x_c, 1/s.
     pub prior: f64,
     /// Root mean square of F_a/x_c, 1/s.
     pub learned: f64,
-    /// The regime variable in one of whose bins it is strongest, with the bin's edges.
+    /// The regime variable with its strongest bin, and the bin's edges.
     pub strongest: Option<(&'static str, [f64; 2])>,
 }
 
 /// A channel's residual over a regime variable.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
-    /// The channel.
+    /// Name of the channel.
     pub channel: &'static str,
-    /// The variable.
+    /// Name of the variable.
     pub over: &'static str,
-    /// Bin's middle, mean of F_a/x_c, its root mean square; bins of few samples are left out.
+    /// Bin centre, mean of F_a/x_c, its root mean square; bins of few samples are left out.
     pub points: Vec<[f64; 3]>,
 }
 
 /// A cell of the map over flow angles.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cell {
-    /// Angle of attack in the middle, degrees.
+    /// Angle of attack at the centre, degrees.
     pub alpha_deg: f64,
-    /// Angle of sideslip in the middle, degrees.
+    /// Angle of sideslip at the centre, degrees.
     pub beta_deg: f64,
-    /// ‖F_a‖, 1/s.
+    /// Norm ‖F_a‖ in 1/s.
     pub norm: f64,
-    /// Samples in it.
+    /// Number of samples in the cell.
     pub samples: usize,
 }
 
@@ -70,7 +70,7 @@ pub struct Cell {
 const REGIMES: [(&str, [f64; 2]); 3] =
     [("alpha_deg", [-15.0, 35.0]), ("beta_deg", [-30.0, 30.0]), ("airspeed_mps", [8.0, 38.0])];
 
-/// Half the width of a cell of the map over α and over β, degrees.
+/// Half width of a cell over α and over β, degrees.
 pub const HALF_CELL_DEG: [f64; 2] = [25.0 / BINS as f64, 30.0 / BINS as f64];
 
 fn regime(state: &State) -> [f64; 3] {
@@ -152,8 +152,8 @@ fn curve(rows: &[Row], channel: usize, variable: usize) -> Curve {
     Curve { channel: CHANNELS[channel], over, points }
 }
 
-/// The variable and the edges of the bin in which a channel's residual stands out most against its
-/// mean over the variable's bins.
+/// The variable and the bin's edges at which a channel's residual deviates most from its mean over the variable's
+/// bins.
 fn strongest(curves: &[Curve]) -> Option<(&'static str, [f64; 2])> {
     let mut best: Option<(f64, &str, [f64; 2])> = None;
     for (curve, (over, [low, high])) in curves.iter().zip(REGIMES) {

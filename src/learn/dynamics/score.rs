@@ -1,33 +1,33 @@
-//! Free runs of a model over recorded tracks: how its error grows with the horizon.
+//! Free-run errors of a model over recorded tracks as a function of the horizon.
 
 use rayon::prelude::*;
 
 use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::{GreyBox, Memory};
 
-/// Steps between starts.
+/// Interval between starts, steps.
 const EVERY: usize = 50;
 
-/// Scaled error at which a run counts as lost, and is counted with.
+/// Scaled error at which a run counts as diverged, and to which it is clamped.
 const BOUND: f64 = 1.0;
 
-/// The error after a number of steps.
+/// The error at one horizon.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Horizon {
-    /// Steps.
+    /// Horizon in steps.
     pub steps: usize,
-    /// Runs that long.
+    /// Number of runs that long.
     pub runs: usize,
     /// Root mean square over runs of the error, itself the root mean square over the states of
     /// (ŝ − s)/x_c; a run counts 1 at most.
     pub rms: f64,
-    /// Median over runs of the same.
+    /// Median over runs of the same error.
     pub median: f64,
-    /// Part of the runs that reached the bound.
+    /// Fraction of the runs that reached the bound.
     pub lost: f64,
 }
 
-/// Errors of `model` flying freely over `tracks` under what acted, after each of `horizons` steps.
+/// Errors of `model` in free runs over `tracks` with the recorded inputs, after each of `horizons` steps.
 pub fn free_run(model: &GreyBox, tracks: &[Track], horizons: &[usize]) -> Vec<Horizon> {
     horizons.iter().map(|steps| horizon(model, tracks, *steps)).collect()
 }
@@ -58,7 +58,7 @@ pub(crate) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, step
     let advance = |k: usize, state, memory: &mut Memory| {
         model.step(&state, &track.controls[k], track.altitude[k], memory)
     };
-    // what the integrator remembers of the step before
+    // the integrator's memory of the step before
     advance(start - 1, track.states[start - 1], &mut memory);
     let mut state = track.states[start];
     for k in start..start + steps {
@@ -69,6 +69,6 @@ pub(crate) fn off_after(model: &GreyBox, tracks: &[Track], window: &Window, step
     let turn = std::f64::consts::TAU;
     error[0] = (error[0] + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
     let mean = (0..8).map(|i| (error[i] / scale[i]).powi(2)).sum::<f64>() / 8.0;
-    // a run that left the numbers is lost
+    // a run whose state is not finite has diverged
     if mean.is_finite() { mean.sqrt().min(BOUND) } else { BOUND }
 }

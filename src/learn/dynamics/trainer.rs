@@ -24,19 +24,18 @@ use greylag_model::{GreyBox, Residual};
 use greylag_num::{Dense, stream};
 use stage::Stage;
 
-/// Samples that the envelope of the data is made from, at most.
+/// Largest number of samples for the envelope of the data.
 const ENVELOPE_SAMPLES: usize = 40_000;
 
-/// Most updates in a row without a usable step before the training is given up ([`TrainError::Diverged`]).
+/// Consecutive failed updates after which the training ends with [`TrainError::Diverged`].
 const PATIENCE: u64 = 20;
 
-/// Updates between two projections.
+/// Interval between projections, updates.
 const PROJECT_EVERY: u64 = 500;
-/// Share of all updates after which there are no more projections: the residual then learns to leave out what has
-/// moved.
+/// Fraction of the updates after which projections end, so that the residual adapts to the final coefficients.
 const PROJECT_UNTIL: f64 = 0.75;
 
-/// Purposes of the random streams.
+/// Ids of the random streams.
 const START: u64 = 1;
 
 /// A training in progress.
@@ -45,25 +44,26 @@ pub struct Trainer {
     tracks: Vec<Track>,
     data: String,
     prior: GreyBox,
-    /// The prior with its coefficients as the training starts from.
+    /// The prior with its initial coefficients.
     begun: GreyBox,
     basis: Basis,
     subject: Subject,
     engine: Engine,
-    /// η, the prior's coordinates.
+    /// Coordinates η of the prior.
     coordinates: Vec<f64>,
     adam: Adam,
     lambda: f64,
     update: u64,
-    /// Rollouts of the present length, in the order of the present pass over the data.
+    /// Rollouts of the present length, in the order of the present epoch.
     stage: Stage,
 }
 
 impl Trainer {
-    /// A training of `prior` on `tracks` that has not begun.
+    /// A training of `prior` on `tracks` before its first update.
     ///
     /// # Errors
-    /// If recipe, prior and data do not fit.
+    ///
+    /// If recipe, prior and data are incompatible.
     pub fn new(recipe: Recipe, prior: &GreyBox, tracks: Vec<Track>) -> Result<Trainer, TrainError> {
         if let Some(fault) = recipe.fault() {
             return Err(TrainError::Recipe(fault));
@@ -111,11 +111,11 @@ impl Trainer {
         })
     }
 
-    /// Goes on from `checkpoint` of the same training: what comes is the same to the bit as without
-    /// the interruption.
+    /// Resumes from `checkpoint` of the same training: the result equals an uninterrupted one to the bit.
     ///
     /// # Errors
-    /// If it is of another recipe, prior or data.
+    ///
+    /// If it belongs to another recipe, prior or data.
     pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<(), TrainError> {
         checkpoint.fits(&self.identity(), self.adam.mean.len(), self.coordinates.len())?;
         self.subject.network.update(|p| p.copy_from_slice(&checkpoint.network));
@@ -127,7 +127,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// Where the training stands.
+    /// The present state of the training.
     pub fn checkpoint(&self) -> Checkpoint {
         Checkpoint {
             identity: self.identity(),
@@ -139,7 +139,7 @@ impl Trainer {
         }
     }
 
-    /// Hash of all that decides the result.
+    /// Hash of everything that determines the result.
     fn identity(&self) -> String {
         let recipe = serde_json::to_string(&self.recipe).unwrap_or_default();
         let prior = format!(
@@ -153,7 +153,7 @@ impl Trainer {
         hash(format!("{recipe} {prior} {airframe} {}", self.data).as_bytes())
     }
 
-    /// Updates made.
+    /// Number of updates made.
     pub fn update(&self) -> u64 {
         self.update
     }
@@ -168,12 +168,12 @@ impl Trainer {
         &self.data
     }
 
-    /// The recipe.
+    /// Settings of the training.
     pub fn recipe(&self) -> &Recipe {
         &self.recipe
     }
 
-    /// Coefficients that were to be trained and that the data does not see: they stay.
+    /// Coefficients that the data does not identify: they stay constant.
     pub fn unseen(&self) -> &[String] {
         &self.basis.unseen
     }
@@ -190,7 +190,7 @@ impl Trainer {
         self.basis.places.iter().map(learned).collect()
     }
 
-    /// How the training stands after `progress`.
+    /// State of the training after `progress`.
     pub fn moment(&self, progress: &Progress) -> Moment {
         Moment {
             update: progress.update,
@@ -201,10 +201,11 @@ impl Trainer {
         }
     }
 
-    /// The model as it is now.
+    /// The present model.
     ///
     /// # Errors
-    /// Not for a network that was trained here.
+    ///
+    /// None for a network that was trained here.
     pub fn model(&self) -> Result<GreyBox, TrainError> {
         let mut model = self.subject.prior.clone();
         let network = self.subject.network.network().clone();
@@ -217,10 +218,11 @@ impl Trainer {
         Ok(model)
     }
 
-    /// Makes up to `count` updates; the means over them.
+    /// Makes up to `count` updates; returns their means.
     ///
     /// # Errors
-    /// If the loss leaves the numbers.
+    ///
+    /// If the loss is not finite.
     pub fn run(&mut self, count: u64) -> Result<Progress, TrainError> {
         let mut sum = Progress::default();
         let (mut made, mut failed) = (0.0_f64, 0);
@@ -259,7 +261,7 @@ impl Trainer {
         })
     }
 
-    /// Moves what of the residual the prior can say into its coefficients, where it is time for that.
+    /// Moves the part of the residual in the prior's span into its coefficients, when it is due.
     fn project(&mut self) -> Result<(), TrainError> {
         let weighting = match self.recipe.joint {
             Joint::Gradient => return Ok(()),
@@ -282,7 +284,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// One update; `None` if it came to nothing, its gradient being no number.
+    /// One update; `None` if the gradient is not finite.
     fn one(&mut self) -> Result<Option<(Loss, f64)>, TrainError> {
         let steps = self.recipe.steps_at(self.update);
         if steps != self.stage.steps {

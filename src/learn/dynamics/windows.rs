@@ -1,4 +1,4 @@
-//! Recorded flights as training data: tracks of states under controls, cut into windows.
+//! Recorded flights as training data: tracks of states and controls, cut into windows.
 
 use sha2::{Digest, Sha256};
 
@@ -9,22 +9,22 @@ use greylag_model::GreyBox;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Controls, State};
 
-/// A stretch of flight without gaps, a sample every 0.01 s.
+/// A section of flight without gaps, a sample every 0.01 s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
-    /// The states.
+    /// States at each sample.
     pub states: Vec<State>,
-    /// The controls that acted from each sample to the next.
+    /// The effective controls from each sample to the next.
     pub controls: Vec<Controls>,
     /// Altitude at each sample, m.
     pub altitude: Vec<f64>,
-    /// Air density at each sample as the model has it, kg/m³.
+    /// Air density at each sample by the model's atmosphere, kg/m³.
     pub density: Vec<f64>,
 }
 
 impl Track {
-    /// A track of `samples` (state, measured controls, altitude in m): what acts, and in which air,
-    /// is what `model` says.
+    /// A track of `samples` (state, measured controls, altitude in m); effective controls and air density follow from
+    /// `model`.
     pub fn new(model: &GreyBox, samples: impl Iterator<Item = (State, Controls, f64)>) -> Track {
         let mut track = Track::default();
         let mut memory: Option<InputMemory> = None;
@@ -38,7 +38,7 @@ impl Track {
         track
     }
 
-    /// The track of a recorded flight whose states are known as they are, as `greylag collect` writes it.
+    /// The track of a recorded flight with exact states, as `greylag collect` writes it.
     pub fn of(model: &GreyBox, flight: &Flight) -> Track {
         let rows = flight.samples.iter().map(|s| {
             let [roll, pitch, _] = s.attitude_rad;
@@ -65,7 +65,7 @@ impl Track {
         [part(0..at), part(at..self.states.len())]
     }
 
-    /// Where rollouts of `steps` steps can start: one sample is kept before, `steps` after.
+    /// Starts of rollouts of `steps` steps: one sample is kept before, `steps` after.
     pub fn starts(&self, steps: usize) -> std::ops::Range<usize> {
         1..self.states.len().saturating_sub(steps).max(1)
     }
@@ -74,26 +74,25 @@ impl Track {
 /// The start of a rollout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// The track's number.
+    /// Number of the track.
     pub track: u32,
     /// The sample's number in it, 1 at least.
     pub start: u32,
-    /// What it counts in the loss; 1 in the paper's.
+    /// Weight in the loss; 1 in the paper.
     pub weight: f64,
 }
 
-/// Steepest pitch at which Euler angles still move slowly, rad: beyond it they have a pole.
+/// Largest |pitch| for training, rad: Euler angles are singular near the vertical.
 const STEEPEST: f64 = 1.4;
-/// Airspeed under which flow angles mean nothing, m/s.
+/// Airspeed below which flow angles are undefined, m/s.
 const SLOWEST: f64 = 5.0;
 
-/// Whether the eight variables describe the flight well there.
+/// Whether the eight variables describe the flight there.
 pub(crate) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 
-/// Every window of `steps` steps, in order, in which the aircraft flies and does not point at the
-/// zenith or the nadir.
+/// Every window of `steps` steps, in order, in which the aircraft flies and is not near the vertical.
 pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
     let mut all = Vec::new();
     for (track, t) in tracks.iter().enumerate() {
@@ -126,7 +125,7 @@ pub fn hash(tracks: &[Track]) -> String {
         for k in 0..track.states.len() {
             let Controls { aileron, elevator, throttle, rudder, .. } = track.controls[k];
             let rest = [aileron, elevator, throttle, track.altitude[k]];
-            // tracks without a rudder keep the hash that they had before there was one
+            // tracks without a rudder keep their former hash
             let rudder = Some(&rudder).filter(|x| **x != 0.0);
             for x in track.states[k].to_array().iter().chain(&rest).chain(rudder) {
                 hash.update(x.to_le_bytes());
@@ -137,10 +136,10 @@ pub fn hash(tracks: &[Track]) -> String {
 }
 
 impl<R: Packet> Recorded<R> {
-    /// Takes over the windows of a block, `steps` long; lanes beyond `windows` repeat the first and
-    /// do not count.
+    /// Loads the windows of a block, `steps` long; lanes beyond `windows` repeat the first with weight zero.
     ///
     /// # Panics
+    ///
     /// If there is no window, or more than lanes.
     pub fn fill(&mut self, tracks: &[Track], windows: &[Window], steps: usize) {
         assert!((1..=R::WIDTH).contains(&windows.len()), "a window for each lane");

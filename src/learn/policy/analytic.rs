@@ -1,10 +1,10 @@
-//! The analytic policy gradient: the slope of the reward through the model, over short windows.
+//! The analytic policy gradient: the gradient of the reward through the model, over short windows.
 //!
 //! The short-horizon actor-critic of Xu et al. (2022) without its critic: the windows are longer than
-//! the aircraft takes to answer, so that what lies behind them adds little. The model's slopes are
-//! differences between the lanes of one block: the point itself in the first, one number moved a little in
-//! each of the others. The actuators are those that the five observed numbers and the last commands
-//! explain, which is exact but for the first step off a stop.
+//! the aircraft's response, so that rewards after them matter little. The model's derivatives are finite
+//! differences between the lanes of one block: the point itself in the first, one variable perturbed in
+//! each of the others. The actuator states are reconstructed from the five observed values and the last
+//! commands, which is exact except for the first step off a stop.
 
 mod slopes;
 
@@ -21,33 +21,32 @@ use greylag_physics::{ActuatorState, Command, Controls, State};
 use greylag_sim::targets::Stratified;
 use slopes::{Aircraft, Flyer, INPUTS, NUMBERS, Step, observation_slopes};
 
-/// What an actor is trained by.
+/// Settings of the training.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AnalyticRecipe {
     /// Units of the actor's hidden layers.
     pub actor: Vec<usize>,
-    /// Aircraft at once.
+    /// Number of simulated aircraft.
     pub instances: usize,
-    /// Steps of a window.
+    /// Steps per window.
     pub window: usize,
-    /// Steps of an episode.
+    /// Steps per episode.
     pub episode: usize,
-    /// Updates in all.
+    /// Total number of updates.
     pub updates: u64,
-    /// Learning rate at the start; it falls with a cosine to a hundredth.
+    /// Initial learning rate; it falls with a cosine to a hundredth.
     pub rate: f64,
-    /// Error of roll and pitch (rad) below which the reward is rounded off: its corner has no slope.
+    /// Error of roll and pitch (rad) below which the reward is smoothed: it is not differentiable at zero.
     pub rounding: f64,
-    /// Price (≥ 0) of a change of the command from step to step: this times the square of the change, in units of the
-    /// action, counts against the reward in the slope.
+    /// Weight (≥ 0) of the squared change of the command per step, in units of the action, in the objective.
     pub effort: f64,
-    /// Part of the targets that lie in the hard corners.
+    /// Fraction of the targets in the hard corners.
     pub corners: f64,
     /// Models, drawn from the widths of the coefficients, over which the aircraft are spread (domain randomisation);
     /// none: the model itself.
     #[serde(default, skip_serializing_if = "is_none")]
     pub draws: u64,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -73,7 +72,7 @@ impl Default for AnalyticRecipe {
     }
 }
 
-/// An instance: an aircraft with its target, in an episode.
+/// A simulated aircraft with its target, in an episode.
 #[derive(Clone, Debug)]
 struct Instance {
     aircraft: Aircraft,
@@ -81,21 +80,21 @@ struct Instance {
     left: usize,
 }
 
-/// What an update saw.
+/// Progress of an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnalyticProgress {
-    /// Updates made.
+    /// Number of updates made.
     pub update: u64,
-    /// Mean reward of a step.
+    /// Mean reward per step.
     pub reward: f64,
-    /// Aircraft lost so far.
+    /// Number of aircraft lost so far.
     pub lost: u64,
 }
 
-/// A training under way.
+/// State of a training.
 pub struct AnalyticTrainer {
     recipe: AnalyticRecipe,
-    /// The model of each aircraft, in turn.
+    /// The models of the aircraft, in turn.
     models: Vec<GreyBox>,
     device: Device,
     actor: Mlp,
@@ -111,6 +110,7 @@ impl AnalyticTrainer {
     /// A training in `model`.
     ///
     /// # Errors
+    ///
     /// If the actor's layers cannot be evaluated.
     pub fn new(recipe: AnalyticRecipe, model: GreyBox) -> Result<Self, DenseError> {
         let device = Device::flex();
@@ -133,7 +133,7 @@ impl AnalyticTrainer {
             Stratified::new(recipe.seed, 0, recipe.corners).at_airspeeds_of(&model.airframe);
         let instances = (0..recipe.instances)
             .map(|k| {
-                // ends spread over time, so that no window holds all starts
+                // episode ends are spread over time, so that no window holds all starts
                 let left = recipe.episode * (k + 1) / recipe.instances;
                 Instance { aircraft: neutral, target: targets.next_target(), left }
             })
@@ -156,9 +156,10 @@ impl AnalyticTrainer {
         })
     }
 
-    /// The same training from the weights of `actor`, whose layers must be those of the recipe.
+    /// A training from the weights of `actor`, whose layers must be those of the recipe.
     ///
     /// # Errors
+    ///
     /// If they are not.
     pub fn starting_from(mut self, actor: &Actor) -> Result<Self, DenseError> {
         let sizes = actor.network().sizes();
@@ -170,19 +171,21 @@ impl AnalyticTrainer {
         Ok(self)
     }
 
-    /// The actor as it is now.
+    /// The present actor.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn actor(&self) -> Result<Actor, DenseError> {
         let sizes = self.actor.sizes().to_vec();
         Actor::new(self.actor.to_dense()?).map_err(|_| DenseError::Sizes(sizes))
     }
 
-    /// One window of every instance and one update.
+    /// One window of every aircraft and one update.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn update(&mut self) -> Result<AnalyticProgress, DenseError> {
         let actor = self.actor()?;
         let (count, window) = (self.instances.len(), self.recipe.window);
@@ -219,7 +222,7 @@ impl AnalyticTrainer {
         Ok(AnalyticProgress { update: self.update, reward, lost: self.lost })
     }
 
-    /// Puts an instance into its next step; `false` if its episode ended there.
+    /// Advances an aircraft to its next step; `false` if its episode ended there.
     fn advance(&mut self, k: usize, next: Aircraft) -> bool {
         let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
         let inside = pitch.abs() < 1.4
@@ -239,7 +242,7 @@ impl AnalyticTrainer {
         false
     }
 
-    /// Backward through the windows: the slope of the sum of rewards by every action.
+    /// Backward pass: the slope of the sum of rewards over every action.
     fn reverse(&self, seen: &[[f32; OBSERVATIONS]], steps: &[Option<Step>]) -> Vec<f32> {
         let count = self.instances.len();
         let actor = self.actor.passed();
@@ -280,7 +283,7 @@ impl AnalyticTrainer {
         slopes
     }
 
-    /// Moves the actor up the slopes.
+    /// Gradient ascent on the actor.
     fn climb(&mut self, seen: &[[f32; OBSERVATIONS]], slopes: &[f32]) {
         let followed = self.actor.followed();
         let rows = self.rows(seen.as_flattened(), OBSERVATIONS).autodiff();

@@ -1,4 +1,4 @@
-//! The checkpoint of a policy's training, in a file that is there whole or not at all.
+//! The checkpoint of a policy training, in a file that is replaced atomically.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -18,7 +18,7 @@ const NAMES: [&str; 3] = ["actor", "critic1", "critic2"];
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Said {
+struct Header {
     schema: String,
     identity: String,
     steps: u64,
@@ -29,10 +29,11 @@ struct Said {
 }
 
 impl PolicyStanding {
-    /// Writes it in place of any file at `path`; a reader sees the old one or the new one.
+    /// Writes the file `path` atomically; a reader sees the old version or the new one.
     ///
     /// # Errors
-    /// If the disk refuses.
+    ///
+    /// If it cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
         let bytes =
             to_bytes(self).map_err(|why| CheckpointError::Content { path: path.into(), why })?;
@@ -43,10 +44,11 @@ impl PolicyStanding {
         })
     }
 
-    /// Reads one.
+    /// Reads a checkpoint.
     ///
     /// # Errors
-    /// If the file cannot be read or is none.
+    ///
+    /// If the file cannot be read or is not a checkpoint.
     pub fn load(path: &Path) -> Result<PolicyStanding, CheckpointError> {
         let bytes = std::fs::read(path).map_err(|why| CheckpointError::File {
             doing: "read",
@@ -57,7 +59,7 @@ impl PolicyStanding {
     }
 }
 
-/// The lists of a standing, each with its name.
+/// Arrays of a state, each with its name.
 fn lists(standing: &PolicyStanding) -> Vec<(String, &[f32])> {
     let mut lists = vec![("replay".to_owned(), &standing.replay[..])];
     for (name, (own, target, moments)) in NAMES.iter().zip(&standing.td3.networks) {
@@ -80,7 +82,7 @@ fn to_bytes(standing: &PolicyStanding) -> Result<Vec<u8>, String> {
         })
         .collect::<Result<Vec<_>, _>>()
         .map_err(|e| e.to_string())?;
-    let said = Said {
+    let header = Header {
         schema: SCHEMA.into(),
         identity: standing.identity.clone(),
         steps: standing.steps,
@@ -89,18 +91,18 @@ fn to_bytes(standing: &PolicyStanding) -> Result<Vec<u8>, String> {
         updates: standing.td3.updates,
         adam_steps: standing.td3.networks.each_ref().map(|(_, _, moments)| moments.steps),
     };
-    let said = serde_json::to_string(&said).map_err(|e| e.to_string())?;
-    let metadata = HashMap::from([(METADATA.to_owned(), said)]);
+    let header = serde_json::to_string(&header).map_err(|e| e.to_string())?;
+    let metadata = HashMap::from([(METADATA.to_owned(), header)]);
     safetensors::serialize(views, Some(metadata)).map_err(|e| e.to_string())
 }
 
 fn from_bytes(bytes: &[u8]) -> Result<PolicyStanding, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let said: Said = serde_json::from_str(said.ok_or("it has no metadata of ours")?)
+    let header = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let header: Header = serde_json::from_str(header.ok_or("it has no metadata of ours")?)
         .map_err(|e| e.to_string())?;
-    if said.schema != SCHEMA {
-        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", said.schema));
+    if header.schema != SCHEMA {
+        return Err(format!("its schema is {:?}, this program reads {SCHEMA}", header.schema));
     }
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let list = |name: String| -> Result<Vec<f32>, String> {
@@ -115,14 +117,17 @@ fn from_bytes(bytes: &[u8]) -> Result<PolicyStanding, String> {
     let network = |k: usize| -> Result<(Vec<f32>, Vec<f32>, Moments), String> {
         let part = |what: &str| list(format!("{}.{what}", NAMES[k]));
         let (mean, square) = (part("mean")?, part("square")?);
-        Ok((part("own")?, part("target")?, Moments { steps: said.adam_steps[k], mean, square }))
+        Ok((part("own")?, part("target")?, Moments { steps: header.adam_steps[k], mean, square }))
     };
     Ok(PolicyStanding {
-        identity: said.identity,
-        steps: said.steps,
-        targets: said.targets,
-        remembered: said.remembered,
+        identity: header.identity,
+        steps: header.steps,
+        targets: header.targets,
+        remembered: header.remembered,
         replay: list("replay".into())?,
-        td3: Standing { updates: said.updates, networks: [network(0)?, network(1)?, network(2)?] },
+        td3: Standing {
+            updates: header.updates,
+            networks: [network(0)?, network(1)?, network(2)?],
+        },
     })
 }

@@ -1,10 +1,10 @@
-//! What an actor is worth: twin critics learned from the returns of its own flights in the model.
+//! Twin critics of a fixed actor, learned from the returns of its simulated flights.
 //!
-//! Critics for a search, which asks what a state is worth that the actor alone would never reach. So every
-//! flight here begins off the actor's path, with random actions for some steps; then the actor flies on,
-//! and each state on its way back is worth what was earned from there, with the critic's own value of the
-//! last: TD(1) over a window, eq. (11) of \[GSFM26\] for the actor held. The loss is relative to the
-//! return: next to the target, where returns are small, so are the differences that a search lives on.
+//! They are critics for a search, which values states off the actor's own path. Therefore each flight starts with
+//! random actions for some steps; then the actor flies, and each state on its way is valued by the rewards from
+//! there, with the critic's own value of the last state: TD(1) over a window, eq. (11) of \[GSFM26\] for a fixed
+//! actor. The loss is relative to the return: near the target returns are small, and so are the differences that a
+//! search must resolve.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;
@@ -20,46 +20,46 @@ use greylag_sim::Trouble;
 use greylag_sim::imagined::{Block, Ended, Stepped, WIDTH};
 use greylag_sim::world::World;
 
-/// Purposes of the random streams.
+/// Ids of the random streams.
 const START: u64 = 40;
 const FLY: u64 = 41;
 const UPDATE: u64 = 42;
 
 /// Inputs of a critic.
 const INPUTS: usize = OBSERVATIONS + ACTIONS;
-/// Numbers remembered of a step: a critic's inputs, what was earned over the rest of the window, and
-/// the discount of what follows it, with the inputs there.
+/// Numbers stored per step: a critic's inputs, the rewards over the rest of the window, and the discount of what
+/// follows it, with the inputs there.
 const ROW: usize = INPUTS + 2 + INPUTS;
 
-/// Return (of the reward of eq. 30) below which errors count absolutely.
+/// Return (of the reward of eq. 30) below which errors are absolute.
 const SMALL: f32 = 0.1;
 
-/// What critics are learned by.
+/// Settings of learning critics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValuationRecipe {
     /// Units of a critic's hidden layers.
     pub critic: Vec<usize>,
-    /// Updates in all.
+    /// Total number of updates.
     pub updates: u64,
-    /// Rows of a minibatch.
+    /// Rows per minibatch.
     pub batch: usize,
-    /// Learning rate at the start; it falls with a cosine to a hundredth.
+    /// Initial learning rate; it falls with a cosine to a hundredth.
     pub rate: f64,
-    /// Aircraft at once.
+    /// Number of simulated aircraft.
     pub instances: usize,
-    /// Most steps of random actions before the actor flies on.
+    /// Largest number of steps with random actions before the actor flies.
     pub burst: u64,
-    /// Steps that it flies on.
+    /// Number of steps that it flies.
     pub window: usize,
-    /// Windows before all episodes begin anew with other targets.
+    /// Windows after which all episodes are reset with other targets.
     pub windows: u64,
-    /// Updates between two windows.
+    /// Updates between windows.
     pub between: u64,
-    /// Steps remembered.
+    /// Capacity of the memory, steps.
     pub remembered: usize,
-    /// Discount γ per step.
+    /// Discount factor γ per step.
     pub discount: f64,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -82,35 +82,35 @@ impl Default for ValuationRecipe {
     }
 }
 
-/// Why critics cannot be learned.
+/// Critics cannot be learned.
 #[derive(Debug, thiserror::Error)]
 pub enum ValuationError {
-    /// A loss is no number.
+    /// The loss is not finite.
     #[error("the loss of the critics is no longer a number after {0} updates; lower --rate")]
     Loss(u64),
     /// A network cannot be used.
     #[error("the critics: {0}")]
     Network(#[from] DenseError),
-    /// A network has another shape than a critic's.
+    /// A network does not have a critic's shape.
     #[error(transparent)]
     Shape(#[from] ShapeError),
-    /// The world cannot go on.
+    /// The environment cannot continue.
     #[error("the world that the actor is valued in: {0}")]
     World(#[from] Trouble),
 }
 
-/// How it went since it was last asked.
+/// Progress since the last query.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ValuationProgress {
-    /// Updates made.
+    /// Number of updates made.
     pub updates: u64,
     /// Root of the mean square of the critics' relative errors.
     pub error: f64,
-    /// Steps flown.
+    /// Number of steps flown.
     pub steps: u64,
 }
 
-/// A valuation under way.
+/// State of learning critics.
 pub struct Valuation<W> {
     recipe: ValuationRecipe,
     world: W,
@@ -126,9 +126,10 @@ pub struct Valuation<W> {
 }
 
 impl<W: World> Valuation<W> {
-    /// A valuation of `actor` in `world`, whose instances are the recipe's.
+    /// Starts learning critics of `actor` in `world`, whose instances are the recipe's.
     ///
     /// # Errors
+    ///
     /// If the critics' layers cannot be evaluated.
     pub fn new(recipe: ValuationRecipe, world: W, actor: Actor) -> Result<Self, ValuationError> {
         let device = Device::flex();
@@ -154,10 +155,11 @@ impl<W: World> Valuation<W> {
         })
     }
 
-    /// Makes `updates` updates more, up to the recipe's.
+    /// Makes `updates` further updates, up to the recipe's.
     ///
     /// # Errors
-    /// If a loss is no number or the world fails.
+    ///
+    /// If a loss is not finite or the environment fails.
     pub fn run(&mut self, updates: u64) -> Result<ValuationProgress, ValuationError> {
         let until = self.updates.saturating_add(updates).min(self.recipe.updates);
         let (mut sum, from) = (0.0, self.updates);
@@ -188,10 +190,11 @@ impl<W: World> Valuation<W> {
         })
     }
 
-    /// The critics as they are now.
+    /// The present critics.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn critics(&self) -> Result<[Critic; 2], ValuationError> {
         let critic = |(network, _): &(Mlp, Optimiser)| -> Result<Critic, ValuationError> {
             Ok(Critic::new(network.to_dense()?)?)
@@ -199,7 +202,7 @@ impl<W: World> Valuation<W> {
         Ok([critic(&self.critics[0])?, critic(&self.critics[1])?])
     }
 
-    /// Random actions, each held for some steps, then the actor's: one window of a block.
+    /// One window of a block: random actions, each held for some steps, then the actor's.
     fn fly(&mut self, block: usize) -> Result<(), ValuationError> {
         let mut rng = stream::stream(self.recipe.seed, &[FLY, self.flown, block as u64]);
         let count = WIDTH.min(self.world.instances() - block * WIDTH);
@@ -214,7 +217,7 @@ impl<W: World> Valuation<W> {
         let mut way = Vec::with_capacity(self.recipe.window);
         for step in 0..self.recipe.window {
             let observed = self.world.observe(block);
-            // the first action of the window is anyone's, the others are the actor's
+            // the first action of the window is arbitrary, the others are the actor's
             if step > 0 {
                 action = self.actor.act_block(&mut self.units, &observed);
             }
@@ -230,7 +233,7 @@ impl<W: World> Valuation<W> {
         Ok(())
     }
 
-    /// Returns along a lane's way, from the end to the start; each end of an episode on it is one.
+    /// Returns along a lane's path, from its end to its start; each end of an episode on it is an end.
     fn remember(
         &mut self,
         lane: usize,
@@ -242,7 +245,7 @@ impl<W: World> Valuation<W> {
         let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap) as f32;
         let of = |numbers: &[Block; INPUTS]| numbers.map(|x| x.0[lane]);
         let (mut earned, mut weight, mut end) = (0.0, 1.0, of(beyond));
-        // what follows an episode that is out of time is not known: nothing before is remembered
+        // the value after a time limit is unknown: no earlier step is stored
         let mut known = true;
         for (at, stepped) in way.iter().rev() {
             match stepped.ended[lane] {
@@ -251,7 +254,7 @@ impl<W: World> Valuation<W> {
                         (stepped.reward.0[lane] + discount * earned, discount * weight)
                 }
                 Ended::Time => known = false,
-                // a lost aircraft earns the worst for ever
+                // a lost aircraft has the smallest reward for ever
                 Ended::Lost => {
                     (earned, weight, known) = (worst / (1.0 - discount), 0.0, true);
                     end = of(at);
@@ -279,7 +282,7 @@ impl<W: World> Valuation<W> {
         self.next = (self.next + 1) % self.recipe.remembered;
     }
 
-    /// One update of both critics; gives the mean square of their relative errors.
+    /// One update of both critics; returns the mean square of their relative errors.
     fn update(&mut self) -> Result<f64, ValuationError> {
         let mut rng = stream::stream(self.recipe.seed, &[UPDATE, self.updates]);
         let batch = self.recipe.batch;
@@ -331,7 +334,7 @@ fn inputs(observed: &[Block; OBSERVATIONS], action: &[Block; ACTIONS]) -> [Block
     all
 }
 
-/// Actions from −1 to 1.
+/// Random actions from −1 to 1.
 fn random(rng: &mut Stream) -> [Block; ACTIONS] {
     let mut action = [Block::zero(); ACTIONS];
     action.iter_mut().flat_map(|a| &mut a.0).for_each(|a| *a = rng.random_range(-1.0..1.0));

@@ -1,4 +1,4 @@
-//! The learning curve of a policy: what it reached in what it is trained in, as a table on disk.
+//! The learning curve of a policy: evaluations in its training environment, as a table on disk.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -8,41 +8,41 @@ use serde::{Deserialize, Serialize};
 
 use greylag_num::statistics::{interquartile_mean, quantile};
 
-/// The name of a curve's file.
+/// File name of a curve.
 pub const CURVE: &str = "curve.csv";
-/// The names of its columns.
+/// Column names.
 pub const COLUMNS: &str =
     "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
-/// Part of the way from the first error to the least at which a curve has its knee.
+/// Fraction of the way from the first to the smallest error that defines the knee.
 const KNEE: f64 = 0.9;
 
-/// One evaluation; what was not measured is NaN.
+/// One evaluation; unmeasured values are NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
-    /// Steps of the environment so far, all aircraft together.
+    /// Environment steps so far, all aircraft together.
     pub steps: u64,
-    /// Updates so far.
+    /// Number of updates so far.
     pub updates: u64,
     /// Time so far, over all sessions, s.
     pub seconds: f64,
     /// Mean settled error on easy targets, degrees.
     pub easy_deg: f64,
-    /// Mean settled error on hard ones, degrees.
+    /// Mean settled error on hard targets, degrees.
     pub hard_deg: f64,
-    /// Share of the targets that diverged (settled error over 10°).
+    /// Fraction of the targets that diverged (settled error over 10°).
     pub divergence_rate: f64,
     /// Mean loss of the critics.
     pub loss: f64,
     /// Mean reward of a step of the training; with TD3 as in `PolicyProgress::reward`.
     pub reward: f64,
-    /// Episodes begun so far.
+    /// Number of episodes started.
     pub episodes: u64,
-    /// Of them, ended outside the envelope of a believable state.
+    /// Number of episodes that ended outside the model's validity limits.
     pub lost: u64,
 }
 
 impl CurvePoint {
-    /// Its line of the table.
+    /// Its row of the table.
     pub fn line(&self) -> String {
         format!(
             "{},{},{:.0},{:.3},{:.3},{:.3},{:.4},{:.5},{},{}",
@@ -59,14 +59,14 @@ impl CurvePoint {
         )
     }
 
-    /// Both errors together, by which the best is chosen; where there is none, what it failed to earn.
+    /// Sum of both errors, by which the best point is chosen; the negative reward where there is no evaluation.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
         if error.is_nan() { -self.reward } else { error }
     }
 }
 
-/// Why a curve cannot be read.
+/// A curve cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("reading the learning curve {path}: {source}")]
 pub struct CurveError {
@@ -77,36 +77,37 @@ pub struct CurveError {
 /// The points of the curve in `path`.
 ///
 /// # Errors
-/// If there is no such file, or a line of it is not a point.
+///
+/// If the file does not exist, or a row is not a point.
 pub fn read(path: &Path) -> Result<Vec<CurvePoint>, CurveError> {
     let rows = csv::Reader::from_path(path).and_then(|mut file| file.deserialize().collect());
     rows.map_err(|source| CurveError { path: path.display().to_string(), source })
 }
 
-/// Index of the best point; of equals, the last.
+/// Index of the best point; the last among equal ones.
 pub fn best(points: &[CurvePoint]) -> Option<usize> {
     (0..points.len()).rev().min_by(|a, b| points[*a].badness().total_cmp(&points[*b].badness()))
 }
 
-/// The first point that has made nine tenths of the way from the first error to the best.
+/// The knee: the first point after nine tenths of the way from the first error to the smallest.
 pub fn knee(points: &[CurvePoint]) -> Option<&CurvePoint> {
     let (first, best) = (points.first()?.badness(), points[best(points)?].badness());
     points.iter().find(|p| p.badness() <= first - KNEE * (first - best))
 }
 
-/// A quantity of several curves over another: its interquartile mean (Agarwal et al. 2021), least and most.
+/// Spread of a quantity over several curves: interquartile mean (Agarwal et al. 2021), smallest and largest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spread {
-    /// The middle of the seeds.
+    /// Interquartile mean over the seeds.
     pub middle: Vec<f64>,
-    /// The least of them.
+    /// Smallest value of the seeds.
     pub low: Vec<f64>,
-    /// The most.
+    /// Largest value of the seeds.
     pub high: Vec<f64>,
 }
 
-/// The spread over `curves` of what `get` says of a point, at each of the places `at` of the quantity
-/// `over`, linear between two points; NaN where a curve has not begun or has ended.
+/// The spread over `curves` of the quantity `get`, at each of the values `at` of the quantity `over`,
+/// interpolated linearly; NaN where a curve has not begun or has ended.
 pub fn spread(
     curves: &[&[CurvePoint]],
     over: impl Fn(&CurvePoint) -> f64,
@@ -136,16 +137,17 @@ pub fn spread(
     spread
 }
 
-/// A curve on disk that grows.
+/// A curve on disk that is extended.
 pub struct CurveFile {
     file: File,
     points: Vec<CurvePoint>,
 }
 
 impl CurveFile {
-    /// The curve in `path` up to `steps`, to be gone on with; begun if there is none.
+    /// The curve in `path` up to `steps`, to be continued; a new one if there is none.
     ///
     /// # Errors
+    ///
     /// If the file cannot be written.
     pub fn open(path: &Path, steps: u64) -> std::io::Result<CurveFile> {
         let mut points = read(path).unwrap_or_default();
@@ -158,24 +160,25 @@ impl CurveFile {
         Ok(CurveFile { file, points })
     }
 
-    /// Its points.
+    /// Points of the curve.
     pub fn points(&self) -> &[CurvePoint] {
         &self.points
     }
 
-    /// The least badness so far; infinite before the first.
+    /// The smallest error so far; infinite before the first.
     pub fn best(&self) -> f64 {
         best(&self.points).map_or(f64::INFINITY, |i| self.points[i].badness())
     }
 
-    /// Seconds that the sessions before this one took.
+    /// Time of the earlier sessions, s.
     pub fn seconds(&self) -> f64 {
         self.points.last().map_or(0.0, |p| p.seconds)
     }
 
-    /// Adds a point.
+    /// Appends a point.
     ///
     /// # Errors
+    ///
     /// If the file cannot be written.
     pub fn add(&mut self, point: CurvePoint) -> std::io::Result<()> {
         self.points.push(point);

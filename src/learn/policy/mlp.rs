@@ -14,14 +14,14 @@ pub struct Mlp {
 
 /// Adam for one network, in one pass over each of its tensors.
 ///
-/// burn's own makes a dozen passes, each into memory that it takes anew, which at the sizes of Table VII is
-/// a tenth of an update of TD3. The operations here are burn's in burn's order, so that the numbers are
-/// the same to the bit; a test holds them to that.
+/// burn's own makes a dozen passes, each with a new allocation, which at the sizes of Table VII takes a tenth
+/// of an update of TD3. The operations are burn's in burn's order, so that the results are equal to the bit,
+/// which a test checks.
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     rate: f64,
     steps: u64,
-    /// Mean and square for the weights and the biases of each layer.
+    /// First and second moments for the weights and the biases of each layer.
     layers: Vec<[Moment; 2]>,
 }
 
@@ -32,10 +32,10 @@ struct Moment {
     square: Vec<f32>,
 }
 
-/// What all parameters of a step share.
+/// Constants of a step, common to all parameters.
 struct Pace {
     rate: f32,
-    /// Correction of the mean over that of the root of the square.
+    /// Bias correction of the mean over that of the root of the square.
     ahead: f32,
     epsilon: f32,
 }
@@ -43,15 +43,14 @@ struct Pace {
 const BETA: [f32; 2] = [0.9, 0.999];
 const EPSILON: f32 = 1e-8;
 
-/// What an optimiser remembers: its steps, then mean and square of the gradient in the order of a
-/// network's parameters.
+/// State of an optimiser: its steps, then first and second moments in the order of a network's parameters.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Moments {
-    /// Steps made.
+    /// Number of steps made.
     pub steps: u64,
-    /// Running means of the gradient; none before the first step.
+    /// Running means of the gradient; `None` before the first step.
     pub mean: Vec<f32>,
-    /// Running means of its square.
+    /// Running means of the squared gradient.
     pub square: Vec<f32>,
 }
 
@@ -85,12 +84,13 @@ impl Mlp {
     /// The network for flight.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn to_dense(&self) -> Result<Dense, DenseError> {
         Dense::new(&self.sizes, self.parameters())
     }
 
-    /// The answers to the rows of `input`.
+    /// The outputs for the rows of `input`.
     pub fn forward(&self, input: Tensor<2>) -> Tensor<2> {
         let last = self.layers.len() - 1;
         self.layers.iter().enumerate().fold(input, |x, (k, (weights, bias))| {
@@ -99,7 +99,7 @@ impl Mlp {
         })
     }
 
-    /// The same network with its parameters' gradients followed.
+    /// A copy whose parameters' gradients are tracked.
     pub fn followed(&self) -> Mlp {
         let follow = |(w, b): &(Tensor<2>, Tensor<1>)| {
             (w.clone().autodiff().require_grad(), b.clone().autodiff().require_grad())
@@ -107,13 +107,13 @@ impl Mlp {
         Mlp { sizes: self.sizes.clone(), layers: self.layers.iter().map(follow).collect() }
     }
 
-    /// The same network for gradients that go through it and stop at it.
+    /// A copy that passes gradients through without tracking its parameters.
     pub fn passed(&self) -> Mlp {
         let pass = |(w, b): &(Tensor<2>, Tensor<1>)| (w.clone().autodiff(), b.clone().autodiff());
         Mlp { sizes: self.sizes.clone(), layers: self.layers.iter().map(pass).collect() }
     }
 
-    /// Moves each parameter the part `tau` of the way to `other`'s.
+    /// Moves each parameter by the fraction `tau` towards `other`'s (soft update).
     pub fn approach(&mut self, other: &Mlp, tau: f64) {
         let [stay, go] = [(1.0 - tau) as f32, tau as f32];
         let layers = std::mem::take(&mut self.layers).into_iter().zip(&other.layers);
@@ -128,7 +128,7 @@ impl Mlp {
     }
 }
 
-/// A tensor after `change` has seen its numbers with those of another of its shape.
+/// A tensor after `change` has combined its numbers with those of another of the same shape.
 fn changed<const D: usize>(
     tensor: Tensor<D>,
     other: Tensor<D>,
@@ -157,7 +157,7 @@ impl Optimiser {
         Optimiser { rate, steps: 0, layers: layers.collect() }
     }
 
-    /// Moves `network` against the gradients that its `followed` copy has in `gradients`.
+    /// Updates `network` with the gradients of its `followed` copy in `gradients`.
     pub fn step(&mut self, network: &mut Mlp, followed: Mlp, gradients: &mut Gradients) {
         self.steps += 1;
         let pace = Pace::of(self.steps, self.rate);
@@ -176,12 +176,12 @@ impl Optimiser {
             .collect();
     }
 
-    /// The learning rate from now on.
+    /// Sets the learning rate.
     pub fn set_rate(&mut self, rate: f64) {
         self.rate = rate;
     }
 
-    /// What it remembers.
+    /// The present moments.
     pub fn moments(&self) -> Moments {
         if self.steps == 0 {
             return Moments::default();
@@ -194,7 +194,7 @@ impl Optimiser {
         }
     }
 
-    /// Remembers what `moments` says; `false` if it is of another network.
+    /// Restores `moments`; `false` if they belong to another network.
     pub fn remember(&mut self, moments: Moments) -> bool {
         if moments.steps == 0 {
             return moments.mean.is_empty() && moments.square.is_empty();
@@ -228,7 +228,7 @@ impl Pace {
 }
 
 impl Moment {
-    /// `parameter` moved against its `slope`.
+    /// `parameter` after a step against its `slope`.
     fn step<const D: usize>(
         &mut self,
         parameter: Tensor<D>,

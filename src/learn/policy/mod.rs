@@ -1,4 +1,4 @@
-//! Policies and critics, learned in an imagined environment.
+//! Policies and critics, learned by reinforcement learning in a model or in JSBSim.
 
 pub(super) mod analytic;
 pub(super) mod checkpoint;

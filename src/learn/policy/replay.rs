@@ -1,82 +1,82 @@
-//! The replay memory: the last transitions, from which minibatches are drawn.
+//! The replay buffer: the last transitions, from which minibatches are sampled.
 
 use rand::{Rng, RngExt};
 
 use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
-/// A step of an aircraft: what was observed, done, earned and observed then.
+/// One transition of an aircraft: observation, action, reward, next observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transition {
-    /// o.
+    /// Observation o of the step.
     pub observed: [f32; OBSERVATIONS],
-    /// a.
+    /// Action a of the step.
     pub action: [f32; ACTIONS],
-    /// r.
+    /// Reward r of the step.
     pub reward: f32,
-    /// o'.
+    /// Next observation, o'.
     pub next: [f32; OBSERVATIONS],
-    /// 1 where what follows is worth anything, 0 where the aircraft was lost.
+    /// 1 where the next state is bootstrapped, 0 where the aircraft was lost (terminal).
     pub goes_on: f32,
 }
 
-/// Numbers of a transition.
+/// Length of a transition.
 const NUMBERS: usize = 2 * OBSERVATIONS + ACTIONS + 2;
 
 /// A minibatch, row after row.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Rows.
+    /// Number of rows.
     pub size: usize,
-    /// o, `[size, OBSERVATIONS]`.
+    /// Observations o, `[size, OBSERVATIONS]`.
     pub observed: Vec<f32>,
-    /// a, `[size, ACTIONS]`.
+    /// Actions a, `[size, ACTIONS]`.
     pub action: Vec<f32>,
-    /// r.
+    /// Rewards r, `[size]`.
     pub reward: Vec<f32>,
-    /// o', `[size, OBSERVATIONS]`.
+    /// Next observations o', `[size, OBSERVATIONS]`.
     pub next: Vec<f32>,
-    /// See [`Transition::goes_on`].
+    /// Bootstrap factors, see [`Transition::goes_on`].
     pub goes_on: Vec<f32>,
 }
 
-/// The memory. When it is full the oldest transition gives way.
+/// The replay buffer. When it is full the oldest transition is overwritten.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Replay {
     capacity: usize,
     numbers: Vec<f32>,
-    /// Transitions ever added.
+    /// Number of transitions ever added.
     added: u64,
 }
 
 impl Replay {
-    /// Room for `capacity` transitions, taken as they come.
+    /// A buffer of `capacity` transitions, allocated as they are added.
     pub fn new(capacity: usize) -> Replay {
         Replay { capacity, numbers: Vec::new(), added: 0 }
     }
 
-    /// The memory that [`numbers`](Replay::numbers) and [`added`](Replay::added) tell of; `None` if they
-    /// are of another capacity.
+    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added); `None` if they are of
+    /// another capacity.
     pub fn restore(capacity: usize, numbers: Vec<f32>, added: u64) -> Option<Replay> {
         let held = (capacity as u64).min(added) as usize;
         (numbers.len() == held * NUMBERS).then_some(Replay { capacity, numbers, added })
     }
 
-    /// Transitions held.
+    /// Number of transitions stored.
     pub fn held(&self) -> usize {
         self.numbers.len() / NUMBERS
     }
 
-    /// Transitions ever added.
+    /// Number of transitions ever added.
     pub fn added(&self) -> u64 {
         self.added
     }
 
-    /// All numbers, for a checkpoint.
+    /// The stored numbers, for a checkpoint.
     pub fn numbers(&self) -> &[f32] {
         &self.numbers
     }
 
-    /// Adds a transition.
+    /// Adds a transition to the buffer.
     pub fn add(&mut self, t: &Transition) {
         let mut row = [0.0; NUMBERS];
         let mut place = 0;
@@ -94,10 +94,11 @@ impl Replay {
         self.added += 1;
     }
 
-    /// Draws `size` transitions, each as likely as any other, into `batch`.
+    /// Samples `size` transitions uniformly, with replacement, into `batch`.
     ///
     /// # Panics
-    /// If none is held.
+    ///
+    /// If the buffer is empty.
     pub fn draw(&self, rng: &mut impl Rng, size: usize, batch: &mut Batch) {
         let Batch { observed, action, reward, next, goes_on, .. } = batch;
         [&mut *observed, action, reward, next, goes_on].into_iter().for_each(|part| part.clear());

@@ -1,12 +1,12 @@
 //! TD3 (Fujimoto et al. 2018), Table VII of \[GSFM26\], in the order of the algorithm.
 //!
-//! What departs from the paper:
-//! - Observations are scaled, and targets observed as what is left to them
-//!   ([`greylag_control::policy::observe`]): the same information.
-//! - An aircraft that leaves the model's envelope earns the worst reward for ever,
-//!   −(κ_φ + κ_θ + κ_v)/(1 − γ), and nothing follows. The end of an episode's time is no end: what
-//!   follows is valued as ever. The paper says nothing of either.
-//! - The actor's last layer starts small, so that it starts at neutral surfaces and half throttle.
+//! Departures from the paper:
+//! - Observations are scaled, and contain the errors instead of the targets
+//!   ([`greylag_control::policy::observe`]): the information is the same.
+//! - Leaving the model's validity limits is terminal, with the smallest reward for ever,
+//!   −(κ_φ + κ_θ + κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next
+//!   state is bootstrapped. The paper specifies neither.
+//! - The actor's last layer is initialised near zero: neutral surfaces and half throttle.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
@@ -25,23 +25,23 @@ pub struct Hyperparameters {
     pub actor: Vec<usize>,
     /// Units of a critic's hidden layers.
     pub critic: Vec<usize>,
-    /// Discount γ.
+    /// Discount factor γ per step.
     pub discount: f64,
-    /// Rate τ at which the target networks follow.
+    /// Rate τ of the target networks' soft update.
     pub tau: f64,
     /// Learning rate of the actor.
     pub actor_rate: f64,
     /// Learning rate of the critics.
     pub critic_rate: f64,
-    /// Updates of the critics for one of the actor, d.
+    /// Critic updates per actor update, d.
     pub delay: u64,
-    /// Standard deviation of the noise that smooths the target policy, σ.
+    /// Standard deviation of the target policy's smoothing noise, σ.
     pub smoothing: f64,
-    /// Where that noise is clipped, c.
+    /// Clipping limit of that noise, c.
     pub smoothing_clip: f64,
-    /// Standard deviation of the noise that explores.
+    /// Standard deviation of the exploration noise.
     pub exploration: f64,
-    /// Rows of a minibatch.
+    /// Rows per minibatch.
     pub batch: usize,
 }
 
@@ -63,7 +63,7 @@ impl Default for Hyperparameters {
     }
 }
 
-/// The six networks with their optimisers.
+/// The six networks and their optimisers.
 #[derive(Clone)]
 pub struct Td3 {
     settings: Hyperparameters,
@@ -73,7 +73,7 @@ pub struct Td3 {
     updates: u64,
 }
 
-/// A network, the target network that follows it, and its optimiser.
+/// A network, its target network and its optimiser.
 #[derive(Clone)]
 struct Learner {
     network: Mlp,
@@ -81,20 +81,20 @@ struct Learner {
     optimiser: Optimiser,
 }
 
-/// What an update saw.
+/// Progress of an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Losses {
     /// Mean squared error of both critics, eq. (2).
     pub critics: f32,
 }
 
-/// Where a [`Td3`] stands: for actor, first and second critic the parameters, those of the target
-/// network, and what the optimiser remembers.
+/// State of a [`Td3`]: for actor, first and second critic the parameters, those of the target network, and the
+/// optimiser's moments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
-    /// Updates made.
+    /// Number of updates made.
     pub updates: u64,
-    /// The networks.
+    /// State of the networks.
     pub networks: [(Vec<f32>, Vec<f32>, Moments); 3],
 }
 
@@ -111,9 +111,10 @@ impl Learner {
 }
 
 impl Td3 {
-    /// Networks drawn from `rng`.
+    /// Networks initialised from `rng`.
     ///
     /// # Errors
+    ///
     /// If a layer cannot be evaluated.
     pub fn new(settings: Hyperparameters, rng: &mut impl Rng) -> Result<Td3, DenseError> {
         let device = Device::flex();
@@ -139,7 +140,7 @@ impl Td3 {
             Tensor::from_data(data, &self.device)
         };
         let observed = rows(&batch.observed, OBSERVATIONS);
-        // what the next step is worth: eq. (1)
+        // target value of the next step: eq. (1)
         let next = rows(&batch.next, OBSERVATIONS);
         let noise = rows(&self.noise(batch.size, rng), ACTIONS);
         let action = (self.actor.target.forward(next.clone()).tanh() + noise).clamp(-1.0, 1.0);
@@ -159,7 +160,7 @@ impl Td3 {
             critic.optimiser.step(&mut critic.network, followed, &mut gradients);
         }
         self.updates += 1;
-        // the actor, eq. (3), and the target networks, once in a while
+        // actor, eq. (3), and target networks, every d updates
         if self.updates.is_multiple_of(self.settings.delay) {
             self.improve(observed);
         }
@@ -177,14 +178,14 @@ impl Td3 {
         self.follow();
     }
 
-    /// The target networks follow the others.
+    /// Soft update of the target networks.
     fn follow(&mut self) {
         for learner in self.critics.iter_mut().chain([&mut self.actor]) {
             learner.target.approach(&learner.network, self.settings.tau);
         }
     }
 
-    /// Clipped noise for the target policy.
+    /// Clipped smoothing noise for the target policy.
     fn noise(&self, rows: usize, rng: &mut impl Rng) -> Vec<f32> {
         let (deviation, clip) =
             (self.settings.smoothing as f32, self.settings.smoothing_clip as f32);
@@ -195,12 +196,12 @@ impl Td3 {
         (0..rows * ACTIONS).map(draw).collect()
     }
 
-    /// Updates made.
+    /// Number of updates made.
     pub fn updates(&self) -> u64 {
         self.updates
     }
 
-    /// The hyperparameters.
+    /// Hyperparameters of the training.
     pub fn settings(&self) -> &Hyperparameters {
         &self.settings
     }
@@ -208,7 +209,8 @@ impl Td3 {
     /// The actor's network.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn actor(&self) -> Result<Dense, DenseError> {
         self.actor.network.to_dense()
     }
@@ -216,23 +218,25 @@ impl Td3 {
     /// The critics' networks.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn critics(&self) -> Result<[Dense; 2], DenseError> {
         let [one, two] = &self.critics;
         Ok([one.network.to_dense()?, two.network.to_dense()?])
     }
 
-    /// Where it stands.
+    /// State for a checkpoint.
     pub fn standing(&self) -> Standing {
         let [one, two] = &self.critics;
         let networks = [self.actor.standing(), one.standing(), two.standing()];
         Standing { updates: self.updates, networks }
     }
 
-    /// Goes on from where another of the same hyperparameters stood.
+    /// Restores the state of a training with the same hyperparameters.
     ///
     /// # Errors
-    /// If the numbers are of other networks.
+    ///
+    /// If it belongs to other networks.
     pub fn resume(&mut self, standing: Standing) -> Result<(), DenseError> {
         let Standing { updates, networks } = standing;
         let [actor, critic] = [self.settings.actor_sizes(), self.settings.critic_sizes()];
@@ -255,12 +259,12 @@ impl Td3 {
 }
 
 impl Hyperparameters {
-    /// Layers of the actor.
+    /// Layer sizes of the actor.
     pub fn actor_sizes(&self) -> Vec<usize> {
         [&[OBSERVATIONS], &self.actor[..], &[ACTIONS]].concat()
     }
 
-    /// Layers of a critic.
+    /// Layer sizes of a critic.
     pub fn critic_sizes(&self) -> Vec<usize> {
         [&[OBSERVATIONS + ACTIONS], &self.critic[..], &[1]].concat()
     }

@@ -1,4 +1,4 @@
-//! Training a policy: TD3 in a world, at the same number of updates for a step in each of them.
+//! Training of a policy: TD3 in an environment, with the same number of updates per step in each.
 
 use std::sync::Arc;
 
@@ -17,30 +17,30 @@ use greylag_sim::Trouble;
 use greylag_sim::imagined::{Block, Ended, Stepped, WIDTH};
 use greylag_sim::world::World;
 
-/// Purposes of the random streams.
+/// Ids of the random streams.
 const START: u64 = 20;
 const ACT: u64 = 21;
 const UPDATE: u64 = 22;
 
-/// What a policy is trained by. [`PolicyRecipe::default`] is the paper's.
+/// Settings of a policy training. [`PolicyRecipe::default`] is the paper's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PolicyRecipe {
-    /// TD3's.
+    /// Hyperparameters of TD3.
     pub td3: Hyperparameters,
-    /// Steps of the environment, all aircraft together.
+    /// Environment steps, all aircraft together.
     pub steps: u64,
-    /// Steps of random actions, without updates, at the start.
+    /// Warm-up steps with random actions and without updates.
     pub warmup: u64,
-    /// Transitions remembered.
+    /// Capacity of the replay buffer.
     pub replay: usize,
-    /// Aircraft at once.
+    /// Number of simulated aircraft.
     pub instances: usize,
-    /// Part of the targets that lie in the hard corners.
+    /// Fraction of the targets in the hard corners.
     pub corners: f64,
-    /// Steps between two checkpoints; all episodes begin anew there, so that a training that is resumed
-    /// ends as one that was not interrupted.
+    /// Steps between checkpoints; all episodes are reset there, so that a resumed training equals an uninterrupted
+    /// one.
     pub checkpoint: u64,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -59,10 +59,10 @@ impl Default for PolicyRecipe {
     }
 }
 
-/// Why a training cannot go on.
+/// A training cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
-    /// A loss is no number.
+    /// The loss is not finite.
     #[error(
         "the loss of the critics is no longer a number after {0} steps; lower the learning rates"
     )]
@@ -70,10 +70,10 @@ pub enum PolicyError {
     /// A network cannot be used.
     #[error("the networks: {0}")]
     Network(#[from] DenseError),
-    /// A network has another shape than a policy's.
+    /// A network does not have a policy's shape.
     #[error(transparent)]
     Shape(#[from] ShapeError),
-    /// The world cannot go on.
+    /// The environment cannot continue.
     #[error("the world it is trained in: {0}")]
     World(#[from] Trouble),
     /// A checkpoint belongs to another training.
@@ -83,7 +83,7 @@ pub enum PolicyError {
     Other,
 }
 
-/// A training under way.
+/// State of a training.
 pub struct PolicyTrainer<W: World> {
     recipe: PolicyRecipe,
     identity: String,
@@ -98,46 +98,47 @@ pub struct PolicyTrainer<W: World> {
     rewards: Vec<f64>,
 }
 
-/// How it went since it was last asked.
+/// Progress since the last query.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PolicyProgress {
-    /// Steps made.
+    /// Number of steps made.
     pub steps: u64,
-    /// Updates made.
+    /// Number of updates made.
     pub updates: u64,
     /// Mean loss of the critics; NaN before the first update.
     pub loss: f64,
-    /// Mean reward of a step. A step that loses the aircraft counts as the worst of a single step here (−1.1, see
-    /// `Task::worst`), while the critics learn from what it costs for ever (−110, `Task::of_loss`).
+    /// Mean reward per step. A step that loses the aircraft counts as the smallest of a single step here (−1.1, see
+    /// `Task::worst`), while the critics learn from its cost for ever (−110, `Task::of_loss`).
     pub reward: f64,
-    /// Episodes begun so far.
+    /// Number of episodes started.
     pub episodes: u64,
-    /// Episodes that ended outside the envelope so far.
+    /// Number of episodes that ended outside the limits.
     pub lost: u64,
 }
 
-/// Where a training stands.
+/// State of a training for a checkpoint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolicyStanding {
-    /// What identifies recipe and world.
+    /// Identity of recipe and environment.
     pub identity: String,
-    /// Steps made.
+    /// Number of steps made.
     pub steps: u64,
-    /// Targets given.
+    /// Number of targets given.
     pub targets: u64,
-    /// Transitions ever remembered.
+    /// Number of transitions ever added.
     pub remembered: u64,
-    /// The replay memory.
+    /// Contents of the replay buffer.
     pub replay: Vec<f32>,
-    /// The networks.
+    /// State of the networks.
     pub td3: Standing,
 }
 
 impl<W: World> PolicyTrainer<W> {
-    /// A training in `world`, whose instances are the recipe's; `identity` tells it from others.
+    /// A training in `world`, whose instances are the recipe's; `identity` distinguishes it from others.
     ///
     /// # Errors
-    /// If the networks cannot be made.
+    ///
+    /// If the networks cannot be built.
     pub fn new(recipe: PolicyRecipe, world: W, identity: String) -> Result<Self, PolicyError> {
         let td3 = Td3::new(recipe.td3.clone(), &mut stream::stream(recipe.seed, &[START]))?;
         let actor = Actor::new(td3.actor()?)?;
@@ -156,10 +157,11 @@ impl<W: World> PolicyTrainer<W> {
         })
     }
 
-    /// Trains for about `steps` steps more, up to the recipe's; stops at every checkpoint.
+    /// Trains for about `steps` further steps, up to the recipe's; stops at every checkpoint.
     ///
     /// # Errors
-    /// If a loss is no number or the world fails.
+    ///
+    /// If a loss is not finite or the environment fails.
     pub fn run(&mut self, steps: u64) -> Result<PolicyProgress, PolicyError> {
         let until = (self.steps + steps).min(self.recipe.steps).min(self.next_checkpoint());
         while self.steps < until {
@@ -184,7 +186,7 @@ impl<W: World> PolicyTrainer<W> {
         (self.steps / self.recipe.checkpoint + 1) * self.recipe.checkpoint
     }
 
-    /// Whether the last step crossed into a new stretch between checkpoints.
+    /// Whether the last step crossed a checkpoint.
     pub fn at_checkpoint(&self) -> bool {
         let stretch = |steps: u64| steps / self.recipe.checkpoint;
         let before = self.steps.saturating_sub(self.world.instances() as u64);
@@ -245,7 +247,7 @@ impl<W: World> PolicyTrainer<W> {
         let lost = stepped.ended[lane] == Ended::Lost;
         let of = |numbers: &[Block; OBSERVATIONS]| numbers.map(|x| x.0[lane]);
         let task = Task { discount: self.recipe.td3.discount, ..Task::PAPER };
-        // where a lost aircraft is may be no number
+        // the state of a lost aircraft may not be finite
         let reward = match lost {
             true => task.of_loss() as f32,
             false => stepped.reward.0[lane],
@@ -261,31 +263,32 @@ impl<W: World> PolicyTrainer<W> {
         });
     }
 
-    /// Steps made.
+    /// Number of steps made.
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// The recipe.
+    /// Settings of the training.
     pub fn recipe(&self) -> &PolicyRecipe {
         &self.recipe
     }
 
-    /// The actor as it is now.
+    /// The present actor.
     pub fn actor(&self) -> Arc<Actor> {
         Arc::new(self.actor.clone())
     }
 
-    /// The critics as they are now.
+    /// The present critics.
     ///
     /// # Errors
-    /// If a parameter is no longer finite.
+    ///
+    /// If a parameter is not finite.
     pub fn critics(&self) -> Result<Arc<[Critic; 2]>, PolicyError> {
         let [one, two] = self.td3.critics()?;
         Ok(Arc::new([Critic::new(one)?, Critic::new(two)?]))
     }
 
-    /// Where it stands; to be kept at a checkpoint only.
+    /// State for a checkpoint; valid only at one.
     pub fn standing(&self) -> PolicyStanding {
         PolicyStanding {
             identity: self.identity.clone(),
@@ -297,9 +300,10 @@ impl<W: World> PolicyTrainer<W> {
         }
     }
 
-    /// Goes on from where a training of the same identity stood at a checkpoint.
+    /// Resumes from the checkpoint of a training with the same identity.
     ///
     /// # Errors
+    ///
     /// If it was another training.
     pub fn resume(&mut self, standing: PolicyStanding) -> Result<(), PolicyError> {
         if standing.identity != self.identity {
@@ -311,7 +315,7 @@ impl<W: World> PolicyTrainer<W> {
         self.td3.resume(standing.td3)?;
         self.actor = Actor::new(self.td3.actor()?)?;
         self.steps = standing.steps;
-        // the first targets of the episodes that begin now were given before the checkpoint was kept
+        // the first targets of the new episodes were given before the checkpoint was written
         let begun = self.world.instances() as u64;
         Ok(self.world.restart(standing.targets.saturating_sub(begun))?)
     }

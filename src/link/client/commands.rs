@@ -1,4 +1,4 @@
-//! The command protocol: every command addressed to us is answered, known or not.
+//! The command protocol: every command addressed to this component is acknowledged, unknown ones included.
 
 use super::{Clients, Now};
 use crate::autopilot::{Autopilot, Mode, Verdict};
@@ -9,7 +9,7 @@ use crate::wire::mode::{self, ModeRequest};
 use crate::wire::request::CommandRequest;
 use crate::wire::telemetry;
 
-/// The number in param2 of an arming command that skips the checks.
+/// Value of param2 that forces arming or disarming.
 const FORCE: f64 = 21196.0;
 const HEARTBEAT: u32 = 0;
 const AUTOPILOT_VERSION: u32 = 148;
@@ -17,11 +17,11 @@ const HOME_POSITION: u32 = 242;
 const MESSAGE_INTERVAL: u32 = 244;
 const PROTOCOL_VERSION: u32 = 300;
 const AVAILABLE_MODES: u32 = 435;
-/// Commands that change something: NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE,
-/// COMPONENT_ARM_DISARM. The others only ask, and a question may be asked again.
+/// Commands with a side effect: NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE, COMPONENT_ARM_DISARM. The others
+/// are queries, which may be repeated.
 const CHANGING: [u16; 4] = [17, 20, 176, 400];
 
-/// What a command comes to: the acknowledgement, then perhaps messages, then perhaps a reason.
+/// Result of a command: the acknowledgement, then optional messages and an optional reason.
 struct Outcome {
     result: CommandResult,
     messages: Vec<Message>,
@@ -60,15 +60,15 @@ impl Outcome {
     }
 }
 
-/// A message number in a float parameter.
+/// A message id in a float parameter.
 fn message_number(parameter: f64) -> Option<u32> {
     (parameter.fract() == 0.0 && (0.0..16_777_216.0).contains(&parameter))
         .then_some(parameter as u32)
 }
 
 impl Clients {
-    /// Answers a command. One that was carried out and is sent again (its confirmation counts up)
-    /// because our answer was lost gets the same answer and is not carried out twice.
+    /// Acknowledges a command. A retransmission (its confirmation counts up) of one that was carried out gets the
+    /// same result and is not carried out again.
     pub(super) fn command(
         &mut self,
         now: Now,
@@ -82,7 +82,7 @@ impl Clients {
             return;
         }
         let outcome = self.carry_out(now, at, &command, autopilot);
-        // One that was refused has changed nothing and may be tried again.
+        // a refused command had no effect and may be retried
         if outcome.result == CommandResult::Accepted && CHANGING.contains(&command.number) {
             self.sessions[at].remember(now.host, command, outcome.result);
         }
@@ -93,8 +93,8 @@ impl Clients {
         }
     }
 
-    /// PROTOCOL_VERSION goes out in MAVLink 2 even to a peer that has only shown MAVLink 1: that
-    /// is how it learns that it may speak 2.
+    /// Sends a requested message. PROTOCOL_VERSION is sent in MAVLink 2 even to a peer that has only sent MAVLink 1:
+    /// this is how MAVLink 2 is negotiated.
     fn send_requested(&mut self, at: usize, message: &Message) {
         match message.id() {
             PROTOCOL_VERSION => {
@@ -104,7 +104,7 @@ impl Clients {
         }
     }
 
-    /// Only the parameters that a command uses are looked at: the others are often NaN.
+    /// Carries out a command. Only the parameters that it defines are read: the others are often NaN.
     fn carry_out(
         &mut self,
         now: Now,
@@ -181,7 +181,7 @@ impl Clients {
         }
     }
 
-    /// µs between messages; −1 when off, 0 when the message is not sent here.
+    /// Interval in µs; −1 when the message is off, 0 when it is not available.
     fn interval_us(&self, at: usize, id: u32) -> i32 {
         match (id, telemetry::position(id)) {
             (HEARTBEAT, _) => 1_000_000,

@@ -1,36 +1,36 @@
-//! What clients sent, counted, with a word about it in the program's log now and then.
+//! Counters of client traffic, with a rate-limited summary in the program's log.
 
 use std::time::Duration;
 
 use super::{Clients, Now};
 use crate::framing::FrameCounts;
 
-/// Between lines in the program's own log about what could not be used.
+/// Least interval between summaries in the log.
 const SUMMARY: Duration = Duration::from_secs(10);
 
-/// What clients sent, counted.
+/// Counters of what clients sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClientCounts {
-    /// Frames of MAVLink.
+    /// MAVLink frames, valid and invalid.
     pub frames: FrameCounts,
-    /// Frames that carried our own ids.
+    /// Frames with this program's own ids.
     pub echoes: u64,
-    /// Requests for another system or component.
+    /// Requests addressed to another system or component.
     pub for_others: u64,
     /// Frames from new peers while all sessions were taken.
     pub turned_away: u64,
-    /// Setpoints and stick positions that were garbage or of a kind that is not flown.
+    /// Setpoints and stick positions that were invalid or of an unsupported kind.
     pub refused_setpoints: u64,
-    /// Setpoints and stick positions from a peer while another one has control authority.
+    /// Setpoints and stick positions from a peer without control authority.
     pub contested_setpoints: u64,
-    /// Commands with a number that is not known here.
+    /// Commands with an unsupported number.
     pub unknown_commands: u64,
-    /// Messages dropped because nobody fetched them.
+    /// Messages dropped because the outbox was full.
     pub dropped: u64,
 }
 
 impl Clients {
-    /// One line in the program's log when something could not be used, at a bounded rate.
+    /// Logs one line when frames were unusable, at a bounded rate.
     pub(super) fn summarise(&mut self, now: Now) {
         let c = self.counts;
         let bad = c.frames.bad() + c.refused_setpoints + c.contested_setpoints + c.turned_away;

@@ -1,4 +1,4 @@
-//! What is sent without being asked: heartbeats and streams.
+//! Messages sent periodically: heartbeats and telemetry streams.
 
 use std::time::Duration;
 
@@ -7,11 +7,11 @@ use crate::autopilot::Status;
 use crate::wire::mode::{self, Pulse};
 use crate::wire::telemetry::{self, Home, NAMED_VALUE_FLOAT, STREAMS, Scene};
 
-/// Between heartbeats.
+/// Interval of heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 impl Clients {
-    /// The home position is where the vehicle was first seen, then where it was armed.
+    /// Sets the home position: where the vehicle was first seen, then where it was armed.
     pub(super) fn note_home(&mut self, status: &Status) {
         let armed_now = status.armed && !self.was_armed;
         let known = status.position.iter().chain([&status.altitude]).all(|x| x.is_finite());
@@ -21,8 +21,7 @@ impl Clients {
         self.was_armed = status.armed;
     }
 
-    /// A heartbeat every second, one to everybody when it says something new, and one to each
-    /// newcomer.
+    /// Sends a heartbeat every second, one to everyone when its content changes, and one to each new peer.
     pub(super) fn beat(&mut self, now: Now, status: &Status) {
         let pulse = Some(Pulse::of(status));
         let everybody = now.host >= self.next_heartbeat || self.pulse != pulse;

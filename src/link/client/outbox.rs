@@ -1,11 +1,11 @@
-//! Frames waiting to be fetched by whoever owns the sockets.
+//! A bounded queue of frames to be sent by the owner of the sockets.
 
 use crate::peer::PeerId;
 
-/// Frames held at most; a caller that drains after every call stays far below.
+/// Capacity in frames; a caller that drains after every call stays far below.
 const CAPACITY: usize = 4096;
 
-/// A bounded queue: what does not fit is dropped and counted.
+/// A bounded queue: frames that do not fit are dropped and counted.
 #[derive(Debug, Default)]
 pub struct Outbox {
     frames: Vec<(PeerId, Vec<u8>)>,
@@ -13,7 +13,7 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Adds a frame.
+    /// Appends a frame, or drops it when the queue is full.
     pub fn push(&mut self, peer: PeerId, frame: Vec<u8>) {
         match self.frames.len() < CAPACITY {
             true => self.frames.push((peer, frame)),
@@ -21,12 +21,12 @@ impl Outbox {
         }
     }
 
-    /// Takes everything out, oldest first.
+    /// Removes all frames, oldest first.
     pub fn drain(&mut self) -> impl Iterator<Item = (PeerId, Vec<u8>)> + '_ {
         self.frames.drain(..)
     }
 
-    /// Frames that did not fit.
+    /// Number of frames dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

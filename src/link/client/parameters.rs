@@ -1,4 +1,4 @@
-//! The parameter protocol.
+//! The MAVLink parameter protocol.
 
 use super::{Clients, Now};
 use crate::autopilot::{Autopilot, Parameter, ParameterValue, Verdict};
@@ -6,15 +6,15 @@ use crate::framing::Source;
 use crate::wire::answer::{self, ParameterFault};
 use crate::wire::request::{ParameterKey, ParameterName};
 
-/// The greatest whole number below which every other one is exact in a float.
+/// 2²⁴: all integers up to it are exact in a 32-bit float.
 const EXACT: f32 = 16_777_216.0;
 
 fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
     table.iter().position(|parameter| parameter.name.as_bytes() == name.bytes())
 }
 
-/// The value in the table's type. A whole number sent as REAL32 is taken for an INT32, because
-/// pymavlink's `param_set_send` sends everything so unless asked otherwise.
+/// The value converted to the table's type. An integer sent as REAL32 is accepted for an INT32, because pymavlink's
+/// `param_set_send` sends REAL32 by default.
 fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<ParameterValue> {
     match (table, sent?) {
         (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),
@@ -29,8 +29,8 @@ fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<Parame
 }
 
 impl Clients {
-    /// Sends the next parameters to everyone who asked for the list: a few at a time, so that a
-    /// slow link does not drop the rest.
+    /// Sends the next parameters to every peer that requested the list, a few per call, so that a slow link does not
+    /// drop the rest.
     pub(super) fn list_parameters(&mut self, now: Now, table: &[Parameter]) {
         for session in &mut self.sessions {
             for index in session.parameters_due(now.host, table.len()) {
@@ -69,8 +69,8 @@ impl Clients {
         self.reply(at, &message);
     }
 
-    /// Sets a parameter. Whatever comes of it, the value in force is echoed, to everybody when it
-    /// has changed; a refusal comes with PARAM_ERROR for those who know it, and in words.
+    /// Sets a parameter. The value in force is always echoed, to everyone when it has changed; a refusal is also
+    /// reported by PARAM_ERROR and as text.
     pub(super) fn set_parameter(
         &mut self,
         now: Now,

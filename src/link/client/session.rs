@@ -1,4 +1,4 @@
-//! One client: the version it speaks, its sequence counter, its streams, what it is being sent.
+//! Session of one client: MAVLink version, sequence counter, streams, parameter transfer.
 
 use std::time::Duration;
 
@@ -11,41 +11,41 @@ use crate::wire::Message;
 use crate::wire::answer::{self, CommandResult, TEXT_CHUNK};
 use crate::wire::request::CommandRequest;
 
-/// After this silence a peer may have been replaced by one that speaks the other version.
+/// After this silence a peer's MAVLink version is determined again: another program may use its address.
 const VERSION_MEMORY: Duration = Duration::from_secs(5);
-/// A command sent again within this time gets its old answer.
+/// Time within which a repeated command counts as a retransmission.
 const COMMAND_MEMORY: Duration = Duration::from_secs(3);
-/// Warnings that may come at once, with the time that earns one more.
+/// Burst limit of warnings to one peer, and the interval that allows one more.
 const COMPLAINTS: u32 = 10;
 const COMPLAINT_EVERY: Duration = Duration::from_millis(500);
-/// Parameters per call, with the time between calls: 200 a second.
+/// Parameters per call and the interval between calls: 200 per second.
 const PARAMETERS_AT_ONCE: usize = 2;
 const PARAMETERS_EVERY: Duration = Duration::from_millis(10);
 
-/// How long a session lasts.
+/// Lifetime of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stay {
-    /// While the peer is heard now and then.
+    /// The session ends after a silence of the peer.
     WhileHeard,
-    /// Until the peer is forgotten: a connection, or the target of a `udpout:` link.
+    /// The session lasts until the peer is removed: a connection, or the target of a `udpout:` link.
     UntilForgotten,
 }
 
-/// One client.
+/// Session state of one client.
 #[derive(Debug)]
 pub struct Session {
-    /// Where it is.
+    /// Link and address of the peer.
     pub peer: PeerId,
-    /// How long it stays.
+    /// Lifetime of the session.
     pub stay: Stay,
-    /// When it was last heard (or first met), host clock.
+    /// Time of the last frame, or of the session's start, host clock.
     pub heard: Duration,
-    /// Whether it has had its first heartbeat.
+    /// Whether the first heartbeat was sent.
     pub greeted: bool,
-    /// What it is sent by itself.
+    /// Message intervals of the peer's streams.
     pub streams: StreamTable,
     version: Version,
-    /// Whether `version` comes from the peer itself.
+    /// Whether `version` was observed from the peer.
     spoken: bool,
     sequence: u8,
     last_command: Option<(CommandRequest, CommandResult, Duration)>,
@@ -56,7 +56,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session that begins now.
+    /// A session that starts at `host`.
     pub fn new(peer: PeerId, stay: Stay, host: Duration) -> Self {
         Session {
             peer,
@@ -75,8 +75,8 @@ impl Session {
         }
     }
 
-    /// Learns from a frame: a peer that has shown MAVLink 2 is answered in it, one that has only
-    /// shown MAVLink 1 in that.
+    /// Notes the version of a received frame: a peer that has sent MAVLink 2 is answered in it, one that has only
+    /// sent MAVLink 1 in that.
     pub fn note_frame(&mut self, host: Duration, frame: &Frame<'_>) {
         let stale = host.saturating_sub(self.heard) > VERSION_MEMORY;
         if !self.spoken || stale || frame.version == Version::V2 {
@@ -86,12 +86,12 @@ impl Session {
         self.heard = host;
     }
 
-    /// Sends a message in the peer's version; one that MAVLink 1 has no room for is not sent.
+    /// Sends a message in the peer's version; a message id that MAVLink 1 cannot carry is dropped.
     pub fn send(&mut self, message: &Message, from: Source, outbox: &mut Outbox) {
         self.send_as(self.version, message, from, outbox);
     }
 
-    /// Sends a message in a given version: the handshake to MAVLink 2 needs it.
+    /// Sends a message in a given version, as the MAVLink 2 handshake requires.
     pub fn send_as(
         &mut self,
         version: Version,
@@ -105,7 +105,7 @@ impl Session {
         }
     }
 
-    /// Sends a line of any length: in chunks that MAVLink 2 joins, or as lines of their own.
+    /// Sends a text of any length: in chunks that MAVLink 2 receivers join, or as separate texts in MAVLink 1.
     pub fn say(
         &mut self,
         severity: Severity,
@@ -126,7 +126,7 @@ impl Session {
         lines.iter().for_each(|line| self.send(line, from, outbox));
     }
 
-    /// Whether one more warning may be sent now.
+    /// Whether the rate limit allows one more warning; counts it if so.
     pub fn may_complain(&mut self, host: Duration) -> bool {
         let earned =
             host.saturating_sub(self.next_complaint).as_millis() / COMPLAINT_EVERY.as_millis();
@@ -140,7 +140,7 @@ impl Session {
         allowed
     }
 
-    /// The answer that this very command got a moment ago, if it is a retransmission.
+    /// The result given to `command` if this is its retransmission.
     pub fn answered(&self, host: Duration, command: &CommandRequest) -> Option<CommandResult> {
         let (known, result, when) = self.last_command.as_ref()?;
         let same_bits = known.params.map(f64::to_bits) == command.params.map(f64::to_bits);
@@ -148,17 +148,17 @@ impl Session {
         (again && host.saturating_sub(*when) < COMMAND_MEMORY).then_some(*result)
     }
 
-    /// Remembers a command's answer for its retransmissions.
+    /// Stores the result of a command for its retransmissions.
     pub fn remember(&mut self, host: Duration, command: CommandRequest, result: CommandResult) {
         self.last_command = Some((command, result, host));
     }
 
-    /// Starts sending the whole parameter table.
+    /// Starts sending the parameter table.
     pub fn list_parameters(&mut self) {
         self.listing = Some(0);
     }
 
-    /// The indices of the parameters that are due now, of a table of `count`.
+    /// Indices of the parameters to send now, from a table of `count`.
     pub fn parameters_due(&mut self, host: Duration, count: usize) -> std::ops::Range<usize> {
         let Some(next) = self.listing.filter(|_| host >= self.next_parameters) else {
             return 0..0;

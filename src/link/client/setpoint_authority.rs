@@ -1,21 +1,22 @@
-//! Who steers: one client at a time, until it falls silent.
+//! Control authority: setpoints are accepted from one client at a time, until its stream stops.
 
 use std::time::Duration;
 
 use crate::peer::PeerId;
 
-/// After this silence another client may take control authority. It equals the time after which a lost
-/// setpoint stream ends OFFBOARD, so that a restarted client waits no longer than the aircraft.
+/// Silence after which another client may take control authority. It equals the timeout that ends OFFBOARD, so that a
+/// restarted client waits no longer than the aircraft does.
 const RELEASE: Duration = Duration::from_secs(1);
 
-/// Who may send one kind of setpoint: two clients that send at once must not shake the surfaces.
+/// Holder of control authority for one kind of setpoint, so that two simultaneous streams do not alternate on the
+/// surfaces.
 #[derive(Debug, Default)]
 pub struct SetpointAuthority {
     holder: Option<(PeerId, Duration)>,
 }
 
 impl SetpointAuthority {
-    /// Whether a setpoint from `peer` is to be followed; if so it has control authority from now on.
+    /// Whether a setpoint from `peer` is accepted; if so, `peer` holds control authority from now on.
     pub fn takes(&mut self, peer: PeerId, host: Duration) -> bool {
         match self.holder {
             Some((holder, heard)) if holder != peer && host.saturating_sub(heard) < RELEASE => {
@@ -28,7 +29,7 @@ impl SetpointAuthority {
         }
     }
 
-    /// Leaves control authority to the next one, as when the holder's connection has closed.
+    /// Releases control authority held by `peer`, as when its connection is closed.
     pub fn release(&mut self, peer: PeerId) {
         if self.holder.is_some_and(|(holder, _)| holder == peer) {
             self.holder = None;

@@ -1,10 +1,10 @@
-//! Setpoints: followed, refused or contested.
+//! Setpoints from clients: accepted, refused or contested.
 
 use super::{Clients, Now};
 use crate::autopilot::{AttitudeSetpoint, Autopilot, Sticks};
 use crate::wire::setpoint::SetpointFault;
 
-/// What a client hears that sends positions, velocities or raw actuators.
+/// Refusal of setpoints of position, velocity or raw actuators.
 pub const OTHER_SETPOINT: &str = "Setpoint refused: only attitudes (SET_ATTITUDE_TARGET) are flown";
 
 fn refusal(fault: SetpointFault) -> &'static str {
@@ -18,8 +18,7 @@ fn refusal(fault: SetpointFault) -> &'static str {
 }
 
 impl Clients {
-    /// A setpoint that is refused does not reach the autopilot, so it does not count as a sign of
-    /// life either.
+    /// Takes an attitude setpoint. A refused setpoint does not reach the autopilot, and does not restart its timeout.
     pub(super) fn attitude(
         &mut self,
         now: Now,

@@ -1,16 +1,16 @@
-//! How often a client gets each message by itself, and how it changes that. The list of messages with their default
-//! rates is [`STREAMS`] in `link/wire/telemetry.rs`.
+//! Message intervals of a client's streams. Messages and default rates are in [`STREAMS`] in
+//! `link/wire/telemetry.rs`.
 
 use std::time::Duration;
 
 use crate::wire::telemetry::STREAMS;
 
-/// The fastest stream: one message per control cycle.
+/// Shortest interval: one message per control cycle.
 const SHORTEST: Duration = Duration::from_millis(10);
-/// The slowest stream.
+/// Longest interval of a stream.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// One row per entry of [`STREAMS`].
+/// Intervals of one client, a row per entry of [`STREAMS`].
 #[derive(Clone, Debug)]
 pub struct StreamTable {
     rows: [Row; STREAMS.len()],
@@ -23,7 +23,7 @@ struct Row {
 }
 
 impl StreamTable {
-    /// The default rates.
+    /// A table with the default rates.
     pub fn new(host: Duration) -> Self {
         StreamTable {
             rows: STREAMS
@@ -31,8 +31,7 @@ impl StreamTable {
         }
     }
 
-    /// Whether row `at` is to be sent now; the next one is then due an interval later. A caller
-    /// that was late is not made to catch up.
+    /// Whether row `at` is due; its next due time is then one interval later. Missed messages are not sent later.
     pub fn is_due(&mut self, at: usize, host: Duration) -> bool {
         let row = &mut self.rows[at];
         let Some(interval) = row.interval.filter(|_| host >= row.due) else {
@@ -45,13 +44,13 @@ impl StreamTable {
         true
     }
 
-    /// The interval of row `at` in µs; −1 when off.
+    /// Interval of row `at`, µs; −1 when off.
     pub fn interval_us(&self, at: usize) -> i32 {
         self.rows[at].interval.map_or(-1, |interval| interval.as_micros() as i32)
     }
 
-    /// Sets row `at` as SET_MESSAGE_INTERVAL means it: µs, 0 for the default, −1 for off. What is
-    /// too fast or too slow is limited. `Err` when the number means nothing.
+    /// Sets row `at` as in SET_MESSAGE_INTERVAL: µs, 0 for the default, −1 for off. The interval is clamped to the
+    /// supported range. `Err` if the value is invalid.
     pub fn set_interval(&mut self, at: usize, us: f64, host: Duration) -> Result<(), ()> {
         let interval = match us {
             -1.0 => None,
@@ -63,8 +62,7 @@ impl StreamTable {
         Ok(())
     }
 
-    /// Sets a group of REQUEST_DATA_STREAM (0 is every stream that is on by default) to a rate in
-    /// Hz, or off.
+    /// Sets a REQUEST_DATA_STREAM group (0: every stream that is on by default) to a rate in Hz, or off.
     pub fn set_group(&mut self, group: u8, rate: Option<u16>, host: Duration) {
         for (row, stream) in self.rows.iter_mut().zip(STREAMS) {
             let meant = stream.group == group || (group == 0 && stream.default_hz > 0.0);

@@ -1,4 +1,4 @@
-//! The key that signs, from a file that only its owner may read.
+//! The signing key, from a file readable by its owner only.
 
 use std::fmt;
 use std::fs::File;
@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// A key's bytes.
+/// Length of a key in bytes.
 const LENGTH: usize = 32;
-/// A file of more bytes than this is no key file.
+/// Largest size of a key file, bytes.
 const LONGEST: u64 = 4096;
 
-/// A secret key. It shows itself to nobody.
+/// A secret key. `Debug` does not print it.
 #[derive(Clone)]
 pub struct Key([u8; LENGTH]);
 
@@ -22,59 +22,60 @@ impl fmt::Debug for Key {
     }
 }
 
-/// Why a key cannot be used.
+/// A key file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file cannot be read.
     #[error("cannot read key file {}: {why}; make one: greylag link key FILE", path.display())]
     Read {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// Others may read the file.
+    /// The file is readable by other users.
     #[error("key file {} may be read by others (mode {mode:03o}): chmod 600 it, then choose a new key", path.display())]
     Open {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// Its permissions.
+        /// Permission bits of the file.
         mode: u32,
     },
-    /// It cannot be written.
+    /// The file cannot be written.
     #[error("cannot write key file {}: {why}; give the name of a file that does not exist", path.display())]
     Write {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// It holds something else.
+    /// The file does not hold a key.
     #[error(
         "key file {} does not hold 64 hexadecimal digits: make one with `greylag link key FILE`, or, of a \
          passphrase as MAVProxy does, with `greylag link key --passphrase FILE`",
         path.display()
     )]
     Content {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
     },
 }
 
 impl Key {
-    /// A key of these bytes.
+    /// A key from its bytes.
     pub fn from_bytes(bytes: [u8; LENGTH]) -> Self {
         Key(bytes)
     }
 
-    /// The key that QGroundControl and MAVProxy make of a passphrase: its SHA-256.
+    /// The SHA-256 of a passphrase, as QGroundControl and MAVProxy derive it.
     pub fn of_passphrase(passphrase: &str) -> Self {
         Key(Sha256::digest(passphrase.as_bytes()).into())
     }
 
-    /// Writes it to a new file that its owner alone may read.
+    /// Writes the key to a new file that only its owner can read.
     ///
     /// # Errors
+    ///
     /// If the file exists, or cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), KeyError> {
         let failed = |why| KeyError::Write { path: path.into(), why };
@@ -94,7 +95,8 @@ impl Key {
     /// Reads a key file: 64 hexadecimal digits, mode 0600 or less.
     ///
     /// # Errors
-    /// If it cannot be read, may be read by others, or holds something else.
+    ///
+    /// If it cannot be read, is readable by others, or does not hold a key.
     pub fn load(path: &Path) -> Result<Self, KeyError> {
         let failed = |why| KeyError::Read { path: path.into(), why };
         let file = File::open(path).map_err(failed)?;
@@ -109,7 +111,7 @@ impl Key {
     }
 }
 
-/// 64 hexadecimal digits as bytes.
+/// Decodes 64 hexadecimal digits.
 fn digits(text: &str) -> Option<[u8; LENGTH]> {
     if text.len() != 2 * LENGTH || !text.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;
@@ -131,7 +133,7 @@ fn check_mode(file: &File, path: &Path) -> Result<(), KeyError> {
     }
 }
 
-/// Elsewhere there are no such permissions to look at.
+/// Without Unix permissions there is nothing to check.
 #[cfg(not(unix))]
 fn check_mode(_: &File, _: &Path) -> Result<(), KeyError> {
     Ok(())

@@ -1,4 +1,4 @@
-//! The timestamp that outlives the program: beside the key, written every second by a thread.
+//! Persistent signing timestamp: stored beside the key, written every second by a thread.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -9,31 +9,31 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Between two writings.
+/// Interval between writes.
 const EVERY: Duration = Duration::from_secs(1);
-/// What may have been used since the last writing: two seconds, in units of 10 µs.
+/// Timestamp range that may have been used since the last write: two seconds, in units of 10 µs.
 const MARGIN: u64 = 200_000;
 
-/// Why the timestamp cannot be kept.
+/// The timestamp cannot be stored.
 #[derive(Debug, thiserror::Error)]
 pub enum StampError {
     /// The file cannot be read or written.
     #[error("keeping the timestamp of signatures in {}: {why}; make its folder writable", path.display())]
     File {
-        /// The file.
+        /// Path of the timestamp file.
         path: PathBuf,
-        /// The system's words.
+        /// The operating system's error.
         why: std::io::Error,
     },
-    /// It holds something else.
+    /// The file does not hold a timestamp.
     #[error("{} does not hold a timestamp of signatures: remove it, then choose a new key", path.display())]
     Content {
-        /// The file.
+        /// Path of the timestamp file.
         path: PathBuf,
     },
 }
 
-/// The file, with the thread that writes it.
+/// The timestamp file and the thread that writes it.
 #[derive(Debug)]
 pub struct StampFile {
     shown: Arc<AtomicU64>,
@@ -42,10 +42,11 @@ pub struct StampFile {
 }
 
 impl StampFile {
-    /// Opens the file beside a key file, and gives the timestamp to go on from.
+    /// Opens the file beside a key file; also returns the timestamp to start from.
     ///
     /// # Errors
-    /// If it cannot be read or written, or holds something else.
+    ///
+    /// If it cannot be read or written, or does not hold a timestamp.
     pub fn open(key: &Path) -> Result<(Self, u64), StampError> {
         let mut name = key.as_os_str().to_owned();
         name.push(".stamp");
@@ -70,7 +71,7 @@ impl StampFile {
                 loop {
                     let ends = stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout);
                     let now = seen.load(Ordering::Relaxed);
-                    // A disk that is full for a while costs nothing: the next writing has it all.
+                    // a disk that is full for a while does no harm: the next write holds the newest timestamp
                     if now != written && write(&place, now).is_ok() {
                         written = now;
                     }
@@ -83,7 +84,7 @@ impl StampFile {
         Ok((StampFile { shown, stop: Some(stop), thread: Some(thread) }, next))
     }
 
-    /// Tells the newest timestamp, which is written within a second.
+    /// Passes the newest timestamp to the thread, which writes it within a second.
     pub fn show(&self, stamp: u64) {
         self.shown.store(stamp, Ordering::Relaxed);
     }
@@ -99,7 +100,7 @@ impl Drop for StampFile {
     }
 }
 
-/// Writes the file anew, whole or not at all.
+/// Replaces the file atomically.
 fn write(path: &Path, stamp: u64) -> std::io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder)?;

@@ -1,28 +1,28 @@
-//! How much one sender of datagrams is listened to: a flood costs its sender's packets, nobody else's.
+//! Rate limit per sender of datagrams, so that a flood loses its sender's packets only.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// Datagrams a second of one sender that are taken: a flight controller that packs each message by itself sends 500, a
-/// parameter list or a log at full speed 1000.
+/// Datagrams per second that are accepted from one sender: a flight controller that sends each message by itself
+/// sends 500, a parameter list or a log at full speed 1000.
 const PER_SECOND: f64 = 4000.0;
-/// Datagrams in a row: what piles up while this computer stands still for some seconds.
+/// Burst in datagrams: what accumulates while this computer stalls for some seconds.
 const BURST: f64 = 1000.0;
-/// Senders that are told apart; all others share one allowance.
+/// Number of senders tracked; all others share one limit.
 const SENDERS: usize = 64;
-/// A sender that was silent for this long gives its place up.
+/// Silence after which a sender's entry is reused.
 const GONE: Duration = Duration::from_secs(1);
 
-/// What each sender may still send.
+/// Token buckets of the senders.
 #[derive(Debug, Default)]
 pub(super) struct Senders {
     known: Vec<(SocketAddr, Allowance)>,
-    /// The one that sent last, most probably the next one too.
+    /// Index of the last sender, probably the next one too.
     last: usize,
     strangers: Allowance,
 }
 
-/// What may still be sent, and when that was so.
+/// A token bucket: tokens left and when they were counted.
 #[derive(Clone, Copy, Debug)]
 struct Allowance {
     left: f64,
@@ -36,7 +36,7 @@ impl Default for Allowance {
 }
 
 impl Allowance {
-    /// Takes a datagram at `now`, if there is anything left.
+    /// Takes one token at `now`, if there is one.
     fn take(&mut self, now: Instant) -> bool {
         let passed =
             self.at.replace(now).map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
@@ -50,7 +50,7 @@ impl Allowance {
 }
 
 impl Senders {
-    /// Whether a datagram of `sender` that came at `now` is taken.
+    /// Whether a datagram from `sender` at `now` is accepted.
     pub(super) fn may(&mut self, sender: SocketAddr, now: Instant) -> bool {
         let known = self.known.get(self.last).is_some_and(|(known, _)| *known == sender);
         let place = if known { Some(self.last) } else { self.place(sender, now) };
@@ -63,7 +63,7 @@ impl Senders {
         }
     }
 
-    /// The place of `sender`: its own, a free one, or that of one that is gone.
+    /// Index of the bucket of `sender`: its own, a free one, or an expired one.
     fn place(&mut self, sender: SocketAddr, now: Instant) -> Option<usize> {
         let own = self.known.iter().position(|(known, _)| *known == sender);
         if own.is_some() {

@@ -1,4 +1,4 @@
-//! Serial links: one peer at the other end of a wire that may be pulled at any time.
+//! Serial links: one peer, on a wire that may be disconnected at any time.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -12,57 +12,57 @@ use super::{Arrival, Port, Remark, count};
 use crate::framing::StreamCutter;
 use crate::peer::{self, PeerId};
 
-/// Bytes read at once.
+/// Largest number of bytes per read.
 const CHUNK: usize = 1024;
-/// A frame that is not whole after this pause is given up.
-const PAUSE: Duration = Duration::from_millis(50);
-/// Between attempts to open a port that is gone.
+/// An incomplete frame is dropped after this silence.
+const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(50);
+/// Interval between attempts to reopen a port.
 const RETRY: Duration = Duration::from_millis(200);
-/// A frame that the wire has not taken after this time is given up: the wire is stuck.
+/// A frame that cannot be written within this time is dropped: the wire is stuck.
 const STALLED: Duration = Duration::from_secs(1);
-/// Frames that wait behind the one being written: older ones are of no use to an aircraft.
+/// Frames that may wait behind the one being written: older ones are obsolete.
 const BACKLOG: usize = 16;
-/// So many bytes without one valid frame, over at least this time, are a wrong baud rate.
+/// Bytes without a valid frame, and the least time they span, that indicate a wrong baud rate.
 const NOISE: (u64, Duration) = (400, Duration::from_secs(1));
 
-/// A serial port by name, at a baud rate.
+/// A serial port and its baud rate.
 #[derive(Clone, Debug)]
 pub(super) struct Wire {
     pub(super) port: String,
     pub(super) baud: u32,
 }
 
-/// Why a port cannot be opened, with what to do about it.
+/// A serial port cannot be opened; the message names the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SerialFault {
-    /// There is no such device.
+    /// The device does not exist.
     #[error("there is no such device; plug it in, or choose one of: {0}")]
     Missing(String),
-    /// The user may not open it.
+    /// The user lacks permission.
     #[error(
         "permission denied; add your user to the group that owns the device \
          (`sudo usermod -aG dialout $USER`, on Arch `uucp`), then log in again"
     )]
     Permission,
-    /// Another program has it.
+    /// The port is in use by another program.
     #[error(
         "another program has it open; stop that program (often ModemManager or a ground station)"
     )]
     Busy,
-    /// The port does not do this rate.
+    /// The port does not support this baud rate.
     #[error(
         "it does not work at {0} baud; give a rate that it knows, such as 921600, 115200 or 57600"
     )]
     Baud(u32),
-    /// It is a file of another kind.
+    /// The file is not a serial port.
     #[error("it is not a serial port; choose one of: {0}")]
     NoPort(String),
-    /// Anything else.
+    /// Any other error of the operating system.
     #[error("{0}; check the cable, then the name of the device")]
     Other(String),
 }
 
-/// The ports that the system lists, for an error's remedy.
+/// Serial ports known to the system, for an error's remedy.
 fn listed() -> String {
     let names: Vec<String> = tokio_serial::available_ports()
         .unwrap_or_default()
@@ -74,7 +74,7 @@ fn listed() -> String {
 }
 
 impl Wire {
-    /// Opens the port.
+    /// Opens the serial port.
     pub(super) fn open(&self) -> Result<SerialStream, SerialFault> {
         let stream = tokio_serial::new(&self.port, self.baud)
             .open_native_async()
@@ -102,7 +102,7 @@ impl Wire {
     }
 }
 
-/// Serves the port, and opens it again whenever it goes.
+/// Serves the port and reopens it when it is lost.
 pub(super) fn serve(
     port: Port,
     wire: Wire,
@@ -126,8 +126,7 @@ pub(super) fn serve(
     });
 }
 
-/// Tries until the port is there again; `None` when the link has ended. What is to be sent
-/// meanwhile is lost, with a count.
+/// Retries until the port opens; `None` when the link has ended. Frames sent meanwhile are dropped and counted.
 async fn wait_for(
     port: &Port,
     wire: &Wire,
@@ -149,25 +148,25 @@ async fn wait_for(
     }
 }
 
-/// Tells noise from frames.
-struct Ear {
+/// Detects a stream of bytes without valid frames.
+struct NoiseDetector {
     since: Instant,
     bytes: u64,
     frames: u64,
     reported: bool,
 }
 
-impl Ear {
+impl NoiseDetector {
     fn new() -> Self {
-        Ear { since: Instant::now(), bytes: 0, frames: 0, reported: false }
+        NoiseDetector { since: Instant::now(), bytes: 0, frames: 0, reported: false }
     }
 
-    /// Whether it is time to say that only noise comes.
-    fn hears_noise(&mut self, bytes: usize, frames: usize) -> bool {
+    /// Counts received bytes and frames; whether a wrong baud rate is to be reported now, at most once.
+    fn is_noise(&mut self, bytes: usize, frames: usize) -> bool {
         self.bytes += bytes as u64;
         self.frames += frames as u64;
         if self.frames > 0 {
-            *self = Ear { reported: self.reported, ..Ear::new() };
+            *self = NoiseDetector { reported: self.reported, ..NoiseDetector::new() };
             return false;
         }
         let noise = self.bytes >= NOISE.0 && self.since.elapsed() >= NOISE.1 && !self.reported;
@@ -176,20 +175,22 @@ impl Ear {
     }
 }
 
-/// Reads until the port goes.
+/// Reads until the port is lost.
 async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wire: &Wire) {
     let mut cutter = StreamCutter::default();
     let mut chunk = [0; CHUNK];
-    let mut ear = Ear::new();
+    let mut noise = NoiseDetector::new();
     loop {
         let mut whole = Vec::new();
         let mut keep = |frame: &[u8]| whole.extend_from_slice(frame);
         let good = cutter.counts.good;
         let len = match cutter.is_waiting() {
-            true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
-                cutter.flush_pieces(&mut keep);
-                Err(std::io::ErrorKind::TimedOut.into())
-            }),
+            true => {
+                timeout(PARTIAL_FRAME_TIMEOUT, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
+                    cutter.flush_pieces(&mut keep);
+                    Err(std::io::ErrorKind::TimedOut.into())
+                })
+            }
             false => stream.read(&mut chunk).await,
         };
         let len = match len {
@@ -202,7 +203,7 @@ async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wir
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => 0,
             Err(_) => return,
         };
-        if ear.hears_noise(len, (cutter.counts.good - good) as usize) {
+        if noise.is_noise(len, (cutter.counts.good - good) as usize) {
             let remark = Remark::Noise { port: wire.port.clone(), baud: wire.baud };
             port.announce(Arrival::Remark(remark)).await;
         }
@@ -212,8 +213,7 @@ async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wir
     }
 }
 
-/// Writes frames as they come, whole ones; `true` when the link's last sender is gone, `false`
-/// when the port is.
+/// Writes whole frames; `true` when the link's last sender is gone, `false` when the port is lost.
 async fn write(
     port: &Port,
     mut stream: WriteHalf<SerialStream>,
@@ -233,7 +233,7 @@ async fn write(
                 count(&port.counters.send_failed);
                 return false;
             }
-            // Nobody takes bytes: a cut frame is on the wire, which its reader will drop.
+            // the write is blocked: a truncated frame is on the wire, which its reader will drop
             Err(_) => count(&port.counters.send_failed),
         }
     }

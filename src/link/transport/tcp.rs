@@ -1,4 +1,4 @@
-//! TCP links: listening for several peers, or connecting to one again and again.
+//! TCP links: listening for several peers, or connecting to one and reconnecting.
 
 use std::collections::HashMap;
 use std::io;
@@ -15,23 +15,25 @@ use tokio::time::{sleep, timeout};
 use super::{Arrival, Port, count};
 use crate::framing::StreamCutter;
 
-/// Connections on one listening link.
+/// Largest number of connections of a listening link.
 const MAX_CONNECTIONS: usize = 16;
-/// Frames that may wait for one connection: one that reads slower loses frames, whole ones.
+/// Frames that may wait for one connection: a slower reader loses whole frames.
 const QUEUE: usize = 256;
-/// Bytes read at once: their frames make one packet.
+/// Largest number of bytes per read: their frames form one packet.
 const CHUNK: usize = 1024;
-/// A frame that is not whole after this pause is given up.
-const PAUSE: Duration = Duration::from_millis(100);
-/// A peer that takes no byte for this long is dead.
+/// An incomplete frame is dropped after this silence.
+const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(100);
+/// Delay after a failed `accept`, as when no file descriptors are left.
+const ACCEPT_RETRY: Duration = Duration::from_millis(100);
+/// A peer that accepts no byte for this long is disconnected.
 const STALLED: Duration = Duration::from_secs(5);
-/// Between attempts to connect, doubling from the first to the second.
+/// Interval between connection attempts, doubling from the first value to the second.
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
 
-/// The connections that are up, by the peer's address.
+/// Open connections by the peer's address.
 type Connections = Arc<Mutex<HashMap<SocketAddr, Sender<Vec<u8>>>>>;
 
-/// Listens for peers; gives the address it is bound to.
+/// Listens for peers; returns the bound address.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,
@@ -47,7 +49,7 @@ pub(super) fn listen(
     Ok(local)
 }
 
-/// Connects, and again with a growing pause whenever the connection is lost.
+/// Connects, and reconnects with exponential back-off whenever the connection is lost.
 pub(super) fn connect(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr, Vec<u8>)>) {
     let connections = Connections::default();
     tokio::spawn(dispatch(port.clone(), connections.clone(), outgoing));
@@ -67,13 +69,12 @@ pub(super) fn connect(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr
 async fn accept(port: Port, connections: Connections, listener: TcpListener) {
     loop {
         match listener.accept().await {
-            // One too many is closed at once, which tells it.
+            // a connection beyond the limit is closed, which its peer notices
             Ok(_) if count_of(&connections) >= MAX_CONNECTIONS => {}
             Ok((stream, from)) => {
                 tokio::spawn(serve(port.clone(), connections.clone(), stream, from));
             }
-            // Out of file descriptors, say: wait for some to be freed.
-            Err(_) => sleep(PAUSE).await,
+            Err(_) => sleep(ACCEPT_RETRY).await,
         }
     }
 }
@@ -82,7 +83,7 @@ fn count_of(connections: &Connections) -> usize {
     connections.lock().unwrap_or_else(PoisonError::into_inner).len()
 }
 
-/// Serves one connection until it ends, either way.
+/// Serves one connection, reading and writing, until it ends.
 async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: SocketAddr) {
     // A command must not wait for more bytes to fill a segment; without this it is only slower.
     let _ = stream.set_nodelay(true);
@@ -98,17 +99,19 @@ async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: So
     port.announce(Arrival::Closed(port.peer(peer))).await;
 }
 
-/// Reads chunks and passes on the whole frames in each.
+/// Reads chunks and passes on the complete frames.
 async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     let mut cutter = StreamCutter::default();
     let mut chunk = [0; CHUNK];
     loop {
         let mut whole = Vec::new();
         let len = match cutter.is_waiting() {
-            true => timeout(PAUSE, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
-                cutter.flush_pieces(|frame| whole.extend_from_slice(frame));
-                Err(io::ErrorKind::TimedOut.into())
-            }),
+            true => {
+                timeout(PARTIAL_FRAME_TIMEOUT, stream.read(&mut chunk)).await.unwrap_or_else(|_| {
+                    cutter.flush_pieces(|frame| whole.extend_from_slice(frame));
+                    Err(io::ErrorKind::TimedOut.into())
+                })
+            }
             false => stream.read(&mut chunk).await,
         };
         match len {
@@ -123,7 +126,7 @@ async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     }
 }
 
-/// Writes frames as they come; ends when the peer takes none any more.
+/// Writes frames; ends when the peer stops reading.
 async fn write(port: &Port, mut stream: OwnedWriteHalf, mut frames: Receiver<Vec<u8>>) {
     while let Some(frame) = frames.recv().await {
         match timeout(STALLED, stream.write_all(&frame)).await {
@@ -133,7 +136,7 @@ async fn write(port: &Port, mut stream: OwnedWriteHalf, mut frames: Receiver<Vec
     }
 }
 
-/// Hands each frame to its connection. Ends when the link's last sender is gone.
+/// Distributes frames to their connections. Ends when the link's last sender is gone.
 async fn dispatch(
     port: Port,
     connections: Connections,

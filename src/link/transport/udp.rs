@@ -1,7 +1,7 @@
 //! UDP links: one socket, any number of peers.
 //!
-//! The socket is never connected, so a peer that is gone (ICMP port unreachable) disturbs nobody
-//! else, and a peer may answer from another port than the one it is reached at.
+//! The socket is never connected: an unreachable peer (ICMP port unreachable) does not disturb the others, and a peer
+//! may reply from another port than the one it is reached at.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -14,12 +14,12 @@ use tokio::sync::mpsc::Receiver;
 use super::flood::Senders;
 use super::{Port, count};
 
-/// MAVLink senders stay within an Ethernet frame; this leaves room for jumbo frames.
+/// Largest datagram in bytes: MAVLink senders stay within an Ethernet frame; this allows jumbo frames.
 const MAX_DATAGRAM: usize = 9000;
-/// After an error of the socket, so that a lasting one does not spin.
-const PAUSE: Duration = Duration::from_millis(5);
+/// Delay after a socket error, so that a persistent one does not busy-loop.
+const ERROR_DELAY: Duration = Duration::from_millis(5);
 
-/// Listens at an address and answers from it; gives the address it is bound to.
+/// Listens at an address and sends from it; returns the bound address.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,
@@ -28,7 +28,7 @@ pub(super) fn listen(
     serve(port, std::net::UdpSocket::bind(at)?, outgoing)
 }
 
-/// Opens a socket from which `to` can be reached.
+/// Binds a socket from which `to` can be reached.
 pub(super) fn reach(
     port: Port,
     to: SocketAddr,
@@ -60,7 +60,7 @@ fn serve(
 }
 
 async fn receive(port: Port, socket: Arc<UdpSocket>) {
-    // One byte more than the longest that is taken, to tell a longer one.
+    // one byte more than the largest accepted, to detect longer ones
     let mut buffer = vec![0; MAX_DATAGRAM + 1];
     let mut senders = Senders::default();
     loop {
@@ -70,7 +70,7 @@ async fn receive(port: Port, socket: Arc<UdpSocket>) {
             }
             Ok((len, _)) if len > MAX_DATAGRAM => count(&port.counters.oversize),
             Ok((len, from)) => port.deliver(from, buffer[..len].to_vec()),
-            Err(_) => tokio::time::sleep(PAUSE).await,
+            Err(_) => tokio::time::sleep(ERROR_DELAY).await,
         }
     }
 }

@@ -1,35 +1,35 @@
-//! Why a pilot gives the aircraft back to its controller.
+//! Faults for which the pilot returns control authority to the flight controller.
 
 use super::real::profile::Stack;
 
-/// An axis of the aircraft that a surface turns it about.
+/// A body axis with the surface that controls it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// By the aileron.
+    /// Roll, controlled by the aileron.
     Roll,
-    /// By the elevator.
+    /// Pitch, controlled by the elevator.
     Pitch,
 }
 
-/// What is wrong.
+/// A fault for which control authority is returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// There is no state to fly on.
+    /// The state cannot be used.
     State,
-    /// A failsafe is in force.
+    /// A failsafe is active.
     Lost,
-    /// The aircraft turns against its surface.
+    /// The aircraft's response has the opposite sign of the model's.
     Reversed(Axis),
-    /// The aircraft does not turn with its surface.
+    /// The aircraft does not respond to the surface.
     Unanswered(Axis),
-    /// How it turns with its surfaces could not be determined.
+    /// The signs of the surfaces could not be determined.
     SignsUnknown,
-    /// The loop swings about this axis by itself, its surface at its limits.
+    /// A limit cycle about this axis, with its surface at its limits.
     Oscillation(Axis),
 }
 
 impl Fault {
-    /// The line for the ground stations, with the remedy at a controller of `stack`.
+    /// The text for the ground stations, with the remedy for a controller of `stack`.
     pub fn words(self, stack: Stack) -> String {
         match self {
             Fault::State => "the state of the vehicle cannot be flown on".into(),
@@ -74,7 +74,7 @@ impl Fault {
     }
 }
 
-/// What shortens the delay at a controller of `stack`.
+/// Settings of a `stack` that reduce the delay.
 fn faster(stack: Stack) -> &'static str {
     match stack {
         Stack::Ardupilot => "; raise SCHED_LOOP_RATE and INS_GYRO_FILTER",
@@ -82,7 +82,7 @@ fn faster(stack: Stack) -> &'static str {
     }
 }
 
-/// What can reverse an axis between a stick and its surface.
+/// Settings of a `stack` that can reverse an axis.
 fn setting(axis: Axis, stack: Stack) -> &'static str {
     match (stack, axis) {
         (Stack::Ardupilot, Axis::Roll) => "RC1_REVERSED or SERVOn_REVERSED",

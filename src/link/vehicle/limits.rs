@@ -1,30 +1,30 @@
-//! What a vehicle can plausibly report: everything beyond is a fault of a sensor or of the link.
+//! Plausibility limits of telemetry: values outside indicate a fault of a sensor or of the link.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 
 use greylag_physics::servos::Travels;
 
-/// Parts of a state frame that were not believable, as a set.
+/// A set of implausible parts of a state frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Faults(u8);
 
 impl Faults {
-    /// Nothing is wrong.
+    /// The empty set.
     pub const NONE: Faults = Faults(0);
-    /// The attitude.
+    /// The attitude is implausible.
     pub const ATTITUDE: Faults = Faults(1);
-    /// The body rates.
+    /// The body rates are implausible.
     pub const RATES: Faults = Faults(2);
-    /// The airspeed or the altitude.
+    /// The airspeed or the altitude is implausible.
     pub const AIR: Faults = Faults(4);
-    /// A flow angle: the angle of attack or the sideslip.
+    /// The angle of attack or the sideslip is implausible.
     pub const INCIDENCE: Faults = Faults(8);
-    /// The specific force.
+    /// The specific force is implausible.
     pub const SPECIFIC_FORCE: Faults = Faults(16);
-    /// The actuators.
+    /// The actuator state is implausible.
     pub const ACTUATORS: Faults = Faults(32);
-    /// Airspeed and altitude, which are old: right or wrong, nobody knows.
+    /// Airspeed and altitude are outdated.
     pub const LATE_AIR: Faults = Faults(64);
 
     const NAMES: [(Faults, &'static str); 7] = [
@@ -37,17 +37,17 @@ impl Faults {
         (Faults::LATE_AIR, "airspeed and altitude late"),
     ];
 
-    /// Whether nothing is wrong.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether one of `other` is among them.
+    /// Whether it contains any fault of `other`.
     pub fn contains(self, other: Faults) -> bool {
         self.0 & other.0 != 0
     }
 
-    /// Adds faults.
+    /// Adds the faults of `other`.
     pub fn insert(&mut self, other: Faults) {
         self.0 |= other.0;
     }
@@ -85,24 +85,23 @@ const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
 
 // A range contains no NaN, so each of these is false for one.
 
-/// Whether body rates, rad/s, are believable.
+/// Whether body rates, rad/s, are plausible.
 pub fn rates(values: [f64; 3]) -> bool {
     values.iter().all(|x| RATE.contains(x))
 }
-/// Whether airspeed, m/s, and altitude, m, are believable.
+/// Whether airspeed, m/s, and altitude, m, are plausible.
 pub fn air(airspeed: f64, altitude: f64) -> bool {
     AIRSPEED.contains(&airspeed) && ALTITUDE.contains(&altitude)
 }
-/// Whether α and β, rad, are believable.
+/// Whether α and β, rad, are plausible.
 pub fn incidence(alpha: f64, beta: f64) -> bool {
     INCIDENCE.contains(&alpha) && INCIDENCE.contains(&beta)
 }
-/// Whether specific force, m/s², is believable.
+/// Whether specific force, m/s², is plausible.
 pub fn specific_force(values: [f64; 3]) -> bool {
     values.iter().all(|x| FORCE.contains(x))
 }
-/// Whether normalised aileron, elevator, throttle, aileron rate, elevator rate, rudder and rudder rate
-/// are believable.
+/// Whether normalised aileron, elevator, throttle, aileron rate, elevator rate, rudder and rudder rate are plausible.
 pub fn actuators(
     [aileron, elevator, throttle, aileron_rate, elevator_rate, rudder, rudder_rate]: [f64; 7],
 ) -> bool {
@@ -110,17 +109,17 @@ pub fn actuators(
         && THROTTLE.contains(&throttle)
         && [aileron_rate, elevator_rate, rudder_rate].iter().all(|x| DEFLECTION_RATE.contains(x))
 }
-/// Whether the travel of the surfaces is believable.
+/// Whether the travel of the surfaces is plausible.
 pub fn travels(travels: &Travels) -> bool {
     let Travels { aileron, elevator, rudder } = travels;
     let mut all = [Some(*aileron), Some(*elevator), *rudder].into_iter().flatten();
     all.all(|travel| TRAVEL.contains(&travel.most) && TRAVEL.contains(&-travel.least))
 }
-/// Whether latitude and longitude, degrees, are believable.
+/// Whether latitude and longitude, degrees, are plausible.
 pub fn position([latitude, longitude]: [f64; 2]) -> bool {
     latitude.abs() <= 90.0 && longitude.abs() <= 180.0
 }
-/// Whether a wind, m/s, is believable.
+/// Whether a wind velocity, m/s, is plausible.
 pub fn wind(values: [f64; 3]) -> bool {
     values.iter().all(|x| x.abs() <= 100.0)
 }

@@ -1,8 +1,7 @@
-//! The `px4` and `ardupilot` profiles: a real flight controller that has the last word.
+//! The `px4` and `ardupilot` profiles: a real flight controller, which has priority.
 //!
-//! The controller flies until a client engages us; we steer through what its stack accepts from a
-//! companion, and give it back at the first fault. What it accepts, stack by stack, stands in
-//! `profile`.
+//! The controller flies until a client requests engagement; the companion then commands it through the interface of
+//! its stack, and returns control authority at the first fault. The interfaces of the stacks are in `profile`.
 
 pub mod air_data;
 mod assembly;
@@ -44,44 +43,44 @@ use survey::Survey;
 pub const ONBOARD: u8 = 191;
 /// The controller's component id: MAV_COMP_ID_AUTOPILOT1.
 const AUTOPILOT: u8 = 1;
-/// A controller that is silent for this long is gone.
+/// Silence after which a controller counts as disconnected.
 const GONE: Duration = Duration::from_secs(3);
-/// A stream below this share of its rate is asked for again, and engaging is refused.
+/// Fraction of its nominal rate below which a stream is requested again and engaging is refused.
 const ENOUGH: f64 = 0.8;
 
-/// The controller that is spoken to.
+/// The connected controller.
 #[derive(Clone, Copy, Debug)]
 struct Controller {
     system: u8,
     peer: PeerId,
     autopilot: u8,
     armed: bool,
-    /// Last heartbeat, host clock.
+    /// Time of the last heartbeat, host clock.
     heard: Duration,
 }
 
-/// The vehicle side of a real flight controller.
+/// Connection to a real flight controller.
 #[derive(Clone, Debug)]
 pub struct Real {
     profile: Profile,
     controller: Option<Controller>,
-    /// Another autopilot on the same link, or another companion with our ids.
+    /// Another autopilot on the link, or another companion with our ids.
     intruder: Option<Source>,
     parameters: Parameters,
     survey: Survey,
     requests: Requests,
-    /// Whether the controller's frames carry a signature.
+    /// Whether the controller's frames are signed.
     signs: bool,
-    /// Whether the controller hears a radio, as far as it has shown while it flew itself.
+    /// Whether the controller receives a radio, as observed while it flew itself.
     radio: Option<bool>,
-    /// The delay at which the loop through the surfaces swings by itself, where it is known.
+    /// Delay margin of the loop through the surfaces, where known.
     bears: Option<Duration>,
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
     ramp: AttitudeRamp,
     trim: AttitudeTrim,
-    /// The command that the actuators got last.
+    /// The last command sent to the actuators.
     sent: Command,
     last_state: Option<Duration>,
     pulse: Pulse,
@@ -96,7 +95,7 @@ pub struct Real {
 }
 
 impl Real {
-    /// A controller of `profile`, not heard yet.
+    /// A connection by `profile` before any frame is received.
     pub fn new(profile: Profile) -> Self {
         Real {
             profile,
@@ -128,19 +127,19 @@ impl Real {
     }
 
     fn say(&mut self, severity: Severity, words: String) {
-        // Nobody fetching them is no reason to fill the memory.
+        // the queue stays bounded if nobody fetches notices
         if self.notices.len() < 64 {
             self.notices.push_back(Notice::Text(severity, words));
         }
     }
 
-    /// Asks the controller to take the aircraft; that it has is reported when it shows so.
+    /// Returns control authority; completion is reported when the controller's mode shows it.
     fn hand_back(&mut self, reason: String) {
         self.engagement.hand_back();
         self.notices.push_back(Notice::Released(reason));
     }
 
-    /// The answer to the state of `time`: what makes the actuators do as demanded, or nothing.
+    /// The frames that answer the state of `time`: they command the actuators as demanded, or are empty.
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         let Outputs::Armed(command) = demand.outputs else {
             self.engagement.rest();
@@ -188,11 +187,11 @@ impl Real {
         self.write(&message)
     }
 
-    /// The attitude to command where `wanted` (rad) is wanted: on a ramp, and trimmed while the controller flies it.
+    /// The attitude to command for `wanted` (rad): rate-limited, and trimmed while the controller flies it.
     fn commanded(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
         let seen = self.assembly.attitude();
         if !self.flies() {
-            // until then what is sent is the attitude that the aircraft has
+            // until then the aircraft's own attitude is sent
             self.ramp.rest();
             self.trim.rest();
             return self.ramp.command(time, wanted, seen);
@@ -201,52 +200,52 @@ impl Real {
         self.trim.command(time, on_the_way, seen)
     }
 
-    /// The oldest notice that was not fetched.
+    /// Removes and returns the oldest notice.
     pub fn take_notice(&mut self) -> Option<Notice> {
         self.notices.pop_front()
     }
 
-    /// Whether the controller was seen to fly what it is commanded.
+    /// Whether the controller's mode shows that it executes the commands.
     pub fn flies(&self) -> bool {
         self.engagement.is_engaged()
     }
 
-    /// Whether we steer, or are about to.
+    /// Whether the companion has control authority, or is taking it.
     pub fn is_engaged(&self) -> bool {
         self.engagement.steers()
     }
 
-    /// See [`super::Vehicle::peer`].
+    /// Peer of the controller, see [`super::Vehicle::peer`].
     pub fn peer(&self) -> Option<PeerId> {
         self.controller.map(|c| c.peer)
     }
 
-    /// The controller's system id, once heard.
+    /// System id of the controller, once received.
     pub fn system(&self) -> Option<u8> {
         self.controller.map(|c| c.system)
     }
 
-    /// The stack that the controller says it is, and whether it is armed.
+    /// The controller's MAV_AUTOPILOT, and whether it is armed.
     pub fn controller(&self) -> Option<(u8, bool)> {
         self.controller.map(|c| (c.autopilot, c.armed))
     }
 
-    /// What the link carries.
+    /// Statistics of the link.
     pub fn survey(&self) -> &Survey {
         &self.survey
     }
 
-    /// How each parameter stands.
+    /// Check result of each parameter.
     pub fn parameter_report(&self) -> Vec<(&'static str, Standing, String)> {
         self.parameters.report(self.system().unwrap_or(1), self.radio == Some(true))
     }
 
-    /// The profile it is flown by.
+    /// The profile in use.
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
 
-    /// See [`super::Vehicle::counts`].
+    /// Traffic counters, see [`super::Vehicle::counts`].
     pub fn counts(&self) -> VehicleCounts {
         VehicleCounts {
             frames: self.counts,
@@ -261,7 +260,7 @@ impl Real {
     }
 
     fn write(&mut self, message: &Message) -> Vec<u8> {
-        // Before a controller is heard the system is the one that nearly all have.
+        // until a controller is received its system id is assumed to be the usual one
         let source = Source { system: self.system().unwrap_or(1), component: ONBOARD };
         self.sequence = self.sequence.wrapping_add(1);
         message.encode(Version::V2, self.sequence, source).unwrap_or_default()

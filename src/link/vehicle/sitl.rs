@@ -13,46 +13,46 @@ use greylag_physics::mixer::Mixer;
 use greylag_physics::servos::{Travel, Travels};
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// The shim's component id.
+/// Component id of the shim.
 const SHIM: u8 = 200;
-/// The companion's component id.
+/// Component id of the companion.
 const COMPANION: u8 = 1;
 /// Time between state frames, µs.
 const PERIOD_US: u64 = 10_000;
-/// A clock that falls back by more than this has started anew, µs; less is a late datagram.
+/// A step back of the clock by more than this is a restart, µs; less is a late datagram.
 const RESTART_US: u64 = 1_000_000;
-/// After this silence another peer may take the link over.
+/// Silence after which another peer may take over the link.
 const TAKEOVER: Duration = Duration::from_secs(1);
-/// Share by which the travel of airframe and vehicle may differ: a file holds four digits of it.
+/// Relative tolerance between the travels of airframe and vehicle: the file has four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// What came over the vehicle link.
+/// Counters of the vehicle link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VehicleCounts {
-    /// Frames of MAVLink.
+    /// MAVLink frames, valid and invalid.
     pub frames: FrameCounts,
     /// State frames delivered as new.
     pub states: u64,
-    /// State frames that never came, by the gaps in their times.
+    /// State frames lost, from gaps in their times.
     pub lost: u64,
-    /// State frames that came again.
+    /// State frames received again.
     pub repeated: u64,
-    /// State frames that came after a newer one.
+    /// State frames that arrived after a newer one.
     pub late: u64,
-    /// State frames of which a message was missing.
+    /// State frames with a missing message.
     pub incomplete: u64,
     /// State frames with at least one fault.
     pub faulty: u64,
-    /// Starts of the vehicle's clock, the first included.
+    /// Starts of the vehicle's clock, including the first.
     pub starts: u64,
-    /// MAVLink frames from anyone else than the vehicle.
+    /// MAVLink frames from other senders than the vehicle.
     pub foreign: u64,
-    /// Commands that were not finite, sent as the last finite one.
+    /// Commands that were not finite, replaced by the last finite one.
     pub bad_commands: u64,
 }
 
-/// The messages of the state frame that is being received.
+/// Messages of the state frame in reception.
 #[derive(Clone, Copy, Debug, Default)]
 struct Parts {
     imu: Option<(Time, [f64; 3])>,
@@ -61,15 +61,15 @@ struct Parts {
     actuators: Option<(Time, [f64; 7], Travels)>,
 }
 
-/// The vehicle side of the `sitl` profile.
+/// Connection to a vehicle with the `sitl` profile.
 #[derive(Clone, Debug)]
 pub struct Sitl {
     system: u8,
-    /// Deflections at full command by the airframe.
+    /// Deflections at full command from the airframe file.
     travels: Travels,
     /// Surfaces and motors of the airframe, where it names them.
     mixer: Option<Mixer>,
-    /// Travel of the vehicle's surfaces when it is not the airframe's.
+    /// The vehicle's travel when it differs from the airframe's.
     foreign_travel: Option<Travels>,
     told_foreign_travel: bool,
     parts: Parts,
@@ -83,8 +83,8 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// A vehicle of system id `system` whose surfaces have these `travels` by its airframe. Positions are those that the vehicle reports by its own travel; a
-    /// vehicle of another travel cannot be engaged.
+    /// A connection to the vehicle with system id `system`; `travels` are those of its airframe. The vehicle
+    /// normalises positions by its own travel; if that differs, it cannot be engaged.
     pub fn new(system: u8, travels: Travels) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {
@@ -118,12 +118,12 @@ impl Sitl {
         }
     }
 
-    /// The same with the commands of the airframe's surfaces and motors behind those of the controls.
+    /// Also sends the individual commands of the airframe's surfaces and motors, after the four controls.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Self {
         Sitl { mixer, ..self }
     }
 
-    /// See [`super::Vehicle::handle`].
+    /// Handles received bytes, see [`super::Vehicle::handle`].
     pub fn handle(
         &mut self,
         host: Duration,
@@ -144,8 +144,8 @@ impl Sitl {
         self.counts.frames.add(counts);
     }
 
-    /// Whether the frame comes from the vehicle: the right ids, on the peer that the link belongs
-    /// to. Two shims at once would otherwise mix their states.
+    /// Whether the frame is the vehicle's: the right ids, from the peer that owns the link. This keeps the states of
+    /// two simultaneous shims apart.
     fn is_vehicle(&mut self, host: Duration, peer: PeerId, frame: &Frame<'_>) -> bool {
         if frame.source != (Source { system: self.system, component: SHIM }) {
             return false;
@@ -188,7 +188,7 @@ impl Sitl {
         None
     }
 
-    /// Puts a frame together; nothing when its messages are missing or of different times.
+    /// Assembles a state frame; nothing when messages are missing or of different times.
     fn complete(
         &mut self,
         parts: Parts,
@@ -226,7 +226,7 @@ impl Sitl {
         self.foreign_travel = (!alike(&found, &self.travels)).then_some(found);
     }
 
-    /// See [`super::Vehicle::obstacle`].
+    /// Why it cannot be engaged, see [`super::Vehicle::obstacle`].
     pub fn obstacle(&self) -> Option<String> {
         self.foreign_travel.map(|found| {
             format!(
@@ -238,7 +238,7 @@ impl Sitl {
         })
     }
 
-    /// See [`super::Vehicle::take_notice`]: another travel is reported once.
+    /// The oldest notice, see [`super::Vehicle::take_notice`]: a differing travel is reported once.
     pub fn take_notice(&mut self) -> Option<Notice> {
         if self.told_foreign_travel {
             return None;
@@ -248,7 +248,7 @@ impl Sitl {
         Some(Notice::Text(Severity::Error, format!("cannot be engaged: {obstacle}")))
     }
 
-    /// Counts a frame by its time.
+    /// Updates the counters from the frame's time.
     fn order(&mut self, time: Time) -> Order {
         let (now, before) = (time.as_micros(), self.last.time.as_micros());
         if self.counts.starts == 0 || now.saturating_add(RESTART_US) < before {
@@ -275,8 +275,8 @@ impl Sitl {
         }
     }
 
-    /// See [`super::Vehicle::answer`]. A command that is not finite never leaves: the last finite
-    /// one does.
+    /// The reply to a state, see [`super::Vehicle::answer`]. A command that is not finite is replaced by the last
+    /// finite one.
     pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
         let outputs = match outputs {
             Outputs::Armed(command) if !command.is_finite() => {
@@ -295,7 +295,7 @@ impl Sitl {
         self.write(&wire::actuator_controls(time, outputs, self.mixer.as_ref()))
     }
 
-    /// See [`super::Vehicle::due`].
+    /// Frames due, see [`super::Vehicle::due`].
     pub fn heartbeat(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
         if host < self.next_heartbeat {
             return None;
@@ -304,12 +304,12 @@ impl Sitl {
         Some(self.write(&wire::heartbeat(outputs)))
     }
 
-    /// See [`super::Vehicle::peer`].
+    /// Peer of the vehicle, see [`super::Vehicle::peer`].
     pub fn peer(&self) -> Option<PeerId> {
         self.peer.map(|(peer, _)| peer)
     }
 
-    /// See [`super::Vehicle::counts`].
+    /// Traffic counters, see [`super::Vehicle::counts`].
     pub fn counts(&self) -> VehicleCounts {
         self.counts
     }
@@ -354,8 +354,7 @@ fn fill_air(
     }
 }
 
-/// Whether two aircraft have surfaces of the same travel. A vehicle's rudder that the airframe does not
-/// have is left centred.
+/// Whether two aircraft have the same travel. A rudder that only the vehicle has stays centred.
 fn alike(found: &Travels, wanted: &Travels) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= TRAVEL_TOLERANCE * b.abs();
     let same = |a: Travel, b: Travel| close(a.least, b.least) && close(a.most, b.most);
@@ -364,7 +363,7 @@ fn alike(found: &Travels, wanted: &Travels) -> bool {
         && wanted.rudder.is_none_or(|wanted| found.rudder.is_some_and(|found| same(found, wanted)))
 }
 
-/// The travel of the surfaces, in words.
+/// The travel of the surfaces as text.
 fn described(travels: &Travels) -> String {
     let one = |travel: Travel| match travel.is_symmetric() {
         true => format!("{:.4} rad", travel.most),

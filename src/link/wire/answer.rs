@@ -1,4 +1,4 @@
-//! Answers to what clients ask.
+//! Replies to requests of clients.
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, FILE_TRANSFER_PROTOCOL_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA,
@@ -14,23 +14,23 @@ use crate::autopilot::{Parameter, ParameterValue, Severity};
 use crate::framing::Source;
 use greylag_physics::Time;
 
-/// The length of one STATUSTEXT.
+/// Characters of one STATUSTEXT message.
 pub const TEXT_CHUNK: usize = 50;
 
 /// The result of a command, MAV_RESULT.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandResult {
-    /// Done.
+    /// The command was carried out.
     Accepted = 0,
-    /// Not now.
+    /// The command is refused in the present state.
     TemporarilyRejected = 1,
-    /// Never like this.
+    /// The command is refused in any state.
     Denied = 2,
-    /// Not known here.
+    /// The command is not supported.
     Unsupported = 3,
 }
 
-/// COMMAND_ACK to the sender of a command; written by hand since `number` may be unknown.
+/// COMMAND_ACK to the sender of a command; encoded by hand since `number` may be unknown.
 pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
     let [low, high] = number.to_le_bytes();
     // command, result, then the extensions: progress, result_param2, target system and component.
@@ -39,8 +39,7 @@ pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
 
 /// PARAM_VALUE of one table entry.
 pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
-    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. By hand, so that no bit pattern passes through a
-    // float on its way.
+    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. Encoded by hand, so that no bit pattern passes through a
     let (value, kind) = match parameter.value {
         ParameterValue::Real(x) => (x.to_le_bytes(), 9),
         ParameterValue::Int(n) => (n.to_le_bytes(), 6),
@@ -53,14 +52,14 @@ pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Mes
     Message::raw(22, payload, 25)
 }
 
-/// Why a parameter request failed.
+/// Reason why a parameter request failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterFault {
-    /// No such name or index.
+    /// The name or index does not exist.
     DoesNotExist,
-    /// The value is refused.
+    /// The value is out of range.
     OutOfRange,
-    /// The type is not the table's.
+    /// The type differs from the table's.
     TypeMismatch,
 }
 
@@ -87,8 +86,8 @@ pub fn parameter_error(
 
 /// STATUSTEXT messages that together carry `words`, in chunks that share `id`.
 ///
-/// MAVLink 1 has no field for chunks, so `chunks` there are texts of their own. Letters outside
-/// ASCII become `?`: receivers disagree about them.
+/// MAVLink 1 has no field for chunks, so that `chunks` are separate texts there. Characters
+/// outside ASCII become `?`: receivers differ in their encoding.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
     let bytes: Vec<u8> =
         words.chars().map(|c| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' }).collect();
@@ -124,7 +123,7 @@ fn text(severity: Severity, chunk: &[u8], id: u16, chunk_seq: u8) -> Message {
     }))
 }
 
-/// AUTOPILOT_VERSION: what this program can do.
+/// AUTOPILOT_VERSION with this program's capabilities.
 pub fn autopilot_version() -> Message {
     Message::coded(MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
@@ -160,7 +159,7 @@ pub fn message_interval(id: u32, interval_us: i32) -> Message {
     }))
 }
 
-/// HOME_POSITION.
+/// HOME_POSITION in the wire's units.
 pub fn home_position(home: Home, now: Time) -> Message {
     Message::coded(MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude: (home.position[0] * 1e7).round() as i32,
@@ -180,11 +179,11 @@ pub fn empty_mission(kind: u8, to: Source) -> Message {
 /// The result of a mission step, MAV_MISSION_RESULT.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionResult {
-    /// Done.
+    /// The step was carried out.
     Accepted = 0,
-    /// Missions are not flown here.
+    /// Missions are not supported.
     Unsupported = 3,
-    /// There is no such item.
+    /// The item does not exist.
     InvalidSequence = 13,
 }
 

@@ -12,13 +12,13 @@ use super::{Frame, Message, decode, setpoint};
 use crate::framing::Source;
 use greylag_physics::Time;
 
-/// MAV_CMD_DO_SET_MODE.
+/// Command number of MAV_CMD_DO_SET_MODE.
 pub const SET_MODE: u16 = 176;
-/// MAV_CMD_SET_MESSAGE_INTERVAL.
+/// Command number of MAV_CMD_SET_MESSAGE_INTERVAL.
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
-/// What the wind of WIND_COV and of WIND is worth. PX4's was right to 0.1 m/s in calm air; ArduPlane's, which it sends at
-/// 2 Hz and which wanders by 0.9 m/s, made a sideslip of 1.3° (sd) with 0.5 and one of 0.3° with 4
+/// Standard deviations of the wind in WIND_COV and in WIND, m/s. PX4's wind was accurate to 0.1 m/s in calm air;
+/// ArduPlane's, sent at 2 Hz and drifting by 0.9 m/s, caused a sideslip error of 1.3° (sd) with 0.5 and of 0.3° with 4
 /// (`tests/firmware/angles.py`).
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;
@@ -26,107 +26,107 @@ const WIND_SD: f64 = 4.0;
 /// A message from a flight controller, in SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ControllerMessage {
-    /// HEARTBEAT.
+    /// HEARTBEAT of the flight controller.
     Heartbeat {
-        /// MAV_AUTOPILOT: 12 is PX4, 3 ArduPilot, 8 nobody.
+        /// MAV_AUTOPILOT: 12 is PX4, 3 ArduPilot, 8 no flight controller.
         autopilot: u8,
         /// Whether MAV_MODE_FLAG_SAFETY_ARMED is set.
         armed: bool,
-        /// The stack's own number of its mode.
+        /// Mode number of the flight stack.
         custom_mode: u32,
     },
-    /// ATTITUDE_QUATERNION.
+    /// Attitude and rates from ATTITUDE_QUATERNION.
     Attitude {
         /// Time since boot, ms, modulo 2³².
         boot_ms: u32,
-        /// NED→FRD, w first.
+        /// Attitude quaternion NED→FRD, w first.
         quaternion: [f64; 4],
         /// p, q, r, rad/s.
         rates: [f64; 3],
     },
-    /// HIGHRES_IMU.
+    /// Accelerometers and air density from HIGHRES_IMU.
     Imu {
         /// Time of the measurement.
         time: Time,
         /// Specific force, m/s², FRD.
         specific_force: [f64; 3],
-        /// Air density by static pressure and temperature, kg/m³; NaN when they are not given.
+        /// Air density from static pressure and temperature, kg/m³; NaN when they are not reported.
         density: f64,
     },
-    /// VFR_HUD.
+    /// Airspeed, altitude and climb rate from VFR_HUD.
     Air {
         /// Equivalent airspeed (calibrated, on PX4), m/s.
         airspeed: f64,
         /// Altitude above mean sea level, m.
         altitude: f64,
-        /// Climb rate, m/s.
+        /// Climb rate, m/s, positive upward.
         climb: f64,
     },
-    /// AOA_SSA: angle of attack, sideslip, rad.
+    /// AOA_SSA: angle of attack and sideslip, rad.
     Incidence([f64; 2]),
-    /// GLOBAL_POSITION_INT.
+    /// Position and velocity from GLOBAL_POSITION_INT.
     Position {
         /// Latitude and longitude, degrees.
         position: [f64; 2],
         /// Velocity over ground, NED, m/s.
         velocity: [f64; 3],
     },
-    /// WIND_COV, or ArduPilot's WIND.
+    /// Wind from WIND_COV, or from ArduPilot's WIND.
     Wind {
-        /// The air's velocity, NED, m/s.
+        /// Velocity of the air, NED, m/s.
         velocity: [f64; 3],
-        /// Standard deviation of its horizontal components as one of many measurements that err alike, m/s.
+        /// Standard deviation of its horizontal components, as one of many measurements with correlated errors, m/s.
         sd: f64,
     },
-    /// COMMAND_ACK.
+    /// Result of a command, COMMAND_ACK.
     Ack {
-        /// MAV_CMD.
+        /// Number of the MAV_CMD.
         command: u16,
-        /// MAV_RESULT, 0 is accepted.
+        /// MAV_RESULT; 0 is ACCEPTED.
         result: u8,
-        /// Whom it answers: zeros from firmware that does not say.
+        /// Target of the reply: zeros from firmware that leaves it out.
         to: Source,
     },
-    /// SYS_STATUS: the radio's receiver.
+    /// Radio receiver status from SYS_STATUS.
     Receiver {
-        /// Whether it is there and healthy.
+        /// Whether it is present and healthy.
         alive: bool,
     },
-    /// CURRENT_MODE.
+    /// Mode from CURRENT_MODE.
     CurrentMode {
-        /// The stack's own number of its mode.
+        /// Mode number of the flight stack.
         custom_mode: u32,
     },
-    /// PARAM_VALUE, its value read as its type and the sender's habit say.
+    /// PARAM_VALUE with both readings of its value.
     Parameter {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
-        /// The field as a number: how ArduPilot sends integers.
+        /// The float field as a number: ArduPilot's encoding of integers.
         cast: f64,
-        /// The field as the bytes of its type: how PX4 sends them.
+        /// The float field's bytes in the parameter's type: PX4's encoding.
         bytewise: f64,
     },
-    /// STATUSTEXT.
+    /// One chunk of a STATUSTEXT.
     Text {
-        /// MAV_SEVERITY, 0 is the worst.
+        /// MAV_SEVERITY; 0 is the most severe.
         severity: u8,
-        /// The words of one chunk.
+        /// Text of the chunk.
         words: String,
     },
-    /// A reply to TIMESYNC: our own time, ns, as we sent it.
+    /// TIMESYNC reply with our own time, ns.
     TimeSync {
-        /// What we sent.
+        /// The time that we sent, ns.
         ours: i64,
     },
 }
 
-/// MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
+/// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
 const RECEIVER: u32 = 1 << 16;
 
 /// Gas constant of dry air, J/(kg K).
 const AIR: f64 = 287.053;
 
-/// Decodes a frame from a flight controller; `None` for what no profile uses.
+/// Decodes a frame from a flight controller; `None` for messages that no profile uses.
 pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
     let fields = Fields(frame.payload);
     match frame.id {
@@ -209,7 +209,7 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
             ControllerMessage::Wind { velocity, sd: WIND_COV_SD }
         }
         MavMessage::WIND(m) => {
-            // The direction that it comes from.
+            // the direction that the wind comes from
             let (sin, cos) = wide(m.direction).to_radians().sin_cos();
             let speed = wide(m.speed);
             let velocity = [-speed * cos, -speed * sin, wide(m.speed_z)];
@@ -221,28 +221,28 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
     })
 }
 
-/// Air density by pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message
-/// gives hPa; PX4 of 2025 sends Pa, which no hPa of this atmosphere can be mistaken for.
+/// Air density from pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message specifies
+/// hPa; PX4 of 2025 sends Pa, which is distinguishable in this atmosphere.
 fn density(pressure: f64, temperature: f64) -> f64 {
     let pressure = if pressure > 10_000.0 { pressure / 100.0 } else { pressure };
     let believable = (200.0..=1100.0).contains(&pressure) && (-80.0..=85.0).contains(&temperature);
     if believable { 100.0 * pressure / (AIR * (temperature + 273.15)) } else { f64::NAN }
 }
 
-/// Whom a frame is for, as far as its message tells: system and component, 0 for all.
+/// Target system and component of a frame; 0 is a broadcast or a message without a target.
 pub fn recipient(frame: &Frame<'_>) -> (u8, u8) {
     decode(frame).map_or((0, 0), |message| {
         (message.target_system_id().unwrap_or(0), message.target_component_id().unwrap_or(0))
     })
 }
 
-/// Whether a message steers: while we have control authority, others must not reach the controller.
+/// Whether a message commands the aircraft, so that it is blocked while the companion has control authority:
 /// MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, SET_ATTITUDE_TARGET, SET_POSITION_TARGET_*.
 pub fn steers(id: u32) -> bool {
     matches!(id, 69 | 70 | 82 | 84 | 86 | 139)
 }
 
-/// SETUP_SIGNING, which holds a secret key and is never passed on.
+/// SETUP_SIGNING, which holds a secret key and is never forwarded.
 pub const SETUP_SIGNING: u32 = 256;
 
 /// HEARTBEAT of an onboard computer.
@@ -260,7 +260,7 @@ pub fn heartbeat(engaged: bool) -> Message {
     }))
 }
 
-/// COMMAND_LONG, written by hand so that no enumeration limits its number.
+/// COMMAND_LONG, encoded by hand so that no enumeration limits its number.
 fn command(to: Source, number: u16, params: [f32; 3]) -> Message {
     let mut payload = Vec::with_capacity(33);
     params.iter().for_each(|p| payload.extend(p.to_le_bytes()));
@@ -270,18 +270,18 @@ fn command(to: Source, number: u16, params: [f32; 3]) -> Message {
     Message::raw(76, payload, 33)
 }
 
-/// Asks for a message every `interval_us` microseconds.
+/// Requests a message every `interval_us` microseconds.
 pub fn message_interval(to: Source, id: u32, interval_us: f32) -> Message {
     command(to, SET_MESSAGE_INTERVAL, [id as f32, interval_us, 0.0])
 }
 
-/// Asks for a mode: the stack's own number, and its sub mode where it has them.
+/// Requests a mode: the stack's mode number, and its sub mode where it has one.
 pub fn set_mode(to: Source, main: u8, sub: u8) -> Message {
     // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
     command(to, SET_MODE, [1.0, f32::from(main), f32::from(sub)])
 }
 
-/// PARAM_REQUEST_READ by name.
+/// PARAM_REQUEST_READ of a parameter by name.
 pub fn parameter_request(to: Source, name: &str) -> Message {
     Message::coded(MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
         param_index: -1,
@@ -302,9 +302,9 @@ pub fn manual_control(to: Source, [x, y, z]: [i16; 3]) -> Message {
     }))
 }
 
-/// RC_CHANNELS_OVERRIDE of the first three channels, µs; 0 gives a channel back to the radio.
+/// RC_CHANNELS_OVERRIDE of the first three channels, µs; 0 returns a channel to the radio.
 pub fn channels_override(to: Source, [one, two, three]: [u16; 3]) -> Message {
-    // 65535 leaves a channel alone.
+    // 65535 leaves a channel unchanged
     let rest = u16::MAX;
     Message::coded(MavMessage::RC_CHANNELS_OVERRIDE(RC_CHANNELS_OVERRIDE_DATA {
         chan1_raw: one,

@@ -1,35 +1,35 @@
 //! Payload fields read by their offset, for messages whose enumerations must not reject a frame.
 
-/// A payload whose cut-off end reads as zeros, as MAVLink 2 means it.
+/// A payload whose truncated end reads as zeros, as in MAVLink 2.
 #[derive(Clone, Copy)]
 pub struct Fields<'a>(pub &'a [u8]);
 
 impl Fields<'_> {
-    /// `N` bytes from `offset` on.
+    /// Reads `N` bytes from `offset` on.
     pub fn bytes<const N: usize>(self, offset: usize) -> [u8; N] {
         std::array::from_fn(|i| self.0.get(offset + i).copied().unwrap_or(0))
     }
-    /// An unsigned byte.
+    /// Reads an unsigned byte.
     pub fn u8(self, offset: usize) -> u8 {
         self.bytes::<1>(offset)[0]
     }
-    /// A little-endian 16-bit number.
+    /// Reads a little-endian 16-bit number.
     pub fn u16(self, offset: usize) -> u16 {
         u16::from_le_bytes(self.bytes(offset))
     }
-    /// A little-endian 32-bit number.
+    /// Reads a little-endian 32-bit number.
     pub fn u32(self, offset: usize) -> u32 {
         u32::from_le_bytes(self.bytes(offset))
     }
-    /// A little-endian 64-bit number.
+    /// Reads a little-endian 64-bit number.
     pub fn u64(self, offset: usize) -> u64 {
         u64::from_le_bytes(self.bytes(offset))
     }
-    /// A little-endian signed 32-bit number.
+    /// Reads a little-endian signed 32-bit number.
     pub fn i32(self, offset: usize) -> i32 {
         i32::from_le_bytes(self.bytes(offset))
     }
-    /// A little-endian float.
+    /// Reads a little-endian 32-bit float.
     pub fn f32(self, offset: usize) -> f32 {
         f32::from_le_bytes(self.bytes(offset))
     }

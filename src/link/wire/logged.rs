@@ -1,30 +1,30 @@
-//! The messages of a telemetry log as named numbers, in the units of the wire.
+//! Messages of a telemetry log as named numbers, in the units of the wire.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 
 use super::{Frame, decode};
 
-/// The time that a message carries itself.
+/// Timestamp inside a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Own {
     /// Milliseconds since the sender started, modulo 2³².
     BootMs(u32),
     /// Microseconds since the sender started, or since 1970.
     Micros(u64),
-    /// The message carries none.
+    /// The message has no timestamp.
     None,
 }
 
 /// A message as named numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Values {
-    /// The message's name.
+    /// Name of the message.
     pub topic: &'static str,
-    /// Its own time.
+    /// Timestamp inside the message.
     pub own: Own,
     /// Names of its fields.
     pub fields: &'static [&'static str],
-    /// Their values in the units of the wire; those beyond `fields` mean nothing.
+    /// Their values in the units of the wire; those beyond `fields` are unused.
     pub values: [f64; 16],
 }
 
@@ -33,11 +33,11 @@ pub struct Values {
 pub enum Logged {
     /// A message of numbers.
     Values(Values),
-    /// PARAM_VALUE.
+    /// A parameter from PARAM_VALUE.
     Parameter {
-        /// The parameter's name.
+        /// Name of the parameter.
         name: String,
-        /// Its value.
+        /// Value of the parameter.
         value: f64,
     },
 }
@@ -81,7 +81,7 @@ const SERVOS: [&str; 16] = [
     "servo16_raw",
 ];
 
-/// Decodes a frame; `None` for messages that say nothing about the flight's states or commands.
+/// Decodes a frame; `None` for messages without the flight's states or commands.
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
     Some(Logged::Values(match decode(frame)? {
         MavMessage::PARAM_VALUE(m) => {

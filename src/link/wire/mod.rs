@@ -1,4 +1,4 @@
-//! The one place that names MAVLink messages: from rust-mavlink's types to ours, never beyond.
+//! The only module that uses rust-mavlink's message types; all others use this project's.
 
 pub mod answer;
 pub mod controller;
@@ -17,15 +17,15 @@ use mavlink::{MavlinkVersion, Message as _};
 
 use super::framing::{self, Frame, Source, Version};
 
-/// A message ready to be written in either version for any peer.
+/// A message to be encoded in either version for any peer.
 #[derive(Clone, Debug)]
 pub struct Message(Content);
 
 #[derive(Clone, Debug)]
 enum Content {
-    /// Written by the codec.
+    /// Encoded by the codec.
     Coded(Box<MavMessage>),
-    /// Written by hand, because the codec's enumerations cannot carry every number.
+    /// Encoded by hand, because the codec's enumerations cannot carry every number.
     Raw {
         id: u32,
         payload: Vec<u8>,
@@ -43,7 +43,7 @@ impl Message {
         Message(Content::Raw { id, payload, base })
     }
 
-    /// The message's number.
+    /// Message id.
     pub fn id(&self) -> u32 {
         match &self.0 {
             Content::Coded(message) => message.message_id(),
@@ -51,7 +51,7 @@ impl Message {
         }
     }
 
-    /// The frame's bytes; `None` when MAVLink 1 has no room for the message's number.
+    /// The encoded frame; `None` when MAVLink 1 cannot carry the message id.
     pub fn encode(&self, version: Version, sequence: u8, source: Source) -> Option<Vec<u8>> {
         match &self.0 {
             Content::Coded(message) => {
@@ -74,12 +74,12 @@ fn codec_version(version: Version) -> MavlinkVersion {
     }
 }
 
-/// The codec's reading of a frame; `None` when an enumeration holds a number it does not know.
+/// Decodes a frame by the codec; `None` when an enumeration holds an unknown number.
 fn decode(frame: &Frame<'_>) -> Option<MavMessage> {
     MavMessage::parse(codec_version(frame.version), frame.id, frame.payload).ok()
 }
 
-/// The message's contribution to its CRC; `None` for a message that the dialect does not know.
+/// CRC_EXTRA of a message; `None` outside the dialect.
 pub fn crc_extra(id: u32) -> Option<u8> {
     match MavMessage::extra_crc(id) {
         // The codec answers 0 for what it does not know, and one known message has 0 too.

@@ -1,4 +1,4 @@
-//! Flight modes as PX4 writes them into `custom_mode`, with the heartbeat that carries them.
+//! Flight modes in PX4's `custom_mode` encoding, and the heartbeat that carries them.
 
 use mavlink::dialects::ardupilotmega::{
     AVAILABLE_MODES_DATA, CURRENT_MODE_DATA, HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag,
@@ -8,15 +8,15 @@ use mavlink::dialects::ardupilotmega::{
 use super::Message;
 use crate::autopilot::{Mode, Status};
 
-/// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+/// Flag MAV_MODE_FLAG_CUSTOM_MODE_ENABLED of the base mode.
 const CUSTOM: u8 = 1;
-/// MAV_MODE_FLAG_SAFETY_ARMED.
+/// Flag MAV_MODE_FLAG_SAFETY_ARMED of the base mode.
 const ARMED: u8 = 128;
 
 /// A request for a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModeRequest {
-    /// One of ours.
+    /// A mode of this autopilot.
     Known(Mode),
     /// A mode that this autopilot does not have.
     Unknown,
@@ -39,7 +39,7 @@ pub fn custom_mode(mode: Mode) -> u32 {
     u32::from(main) << 16 | u32::from(sub) << 24
 }
 
-/// The mode that SET_MODE asks for.
+/// The mode requested by SET_MODE.
 pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     match base & CUSTOM {
         0 => from_base(base),
@@ -47,8 +47,8 @@ pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     }
 }
 
-/// The mode that DO_SET_MODE asks for: main and sub mode in two parameters as PX4's clients send
-/// them, or the whole `custom_mode` in one as others do. NaN counts as zero.
+/// The mode requested by DO_SET_MODE: main and sub mode in two parameters as PX4's clients send them, or the whole
+/// `custom_mode` in one. NaN counts as zero.
 pub fn from_do_set_mode(base: f64, main: f64, sub: f64) -> ModeRequest {
     let base = base as u32 as u8;
     match base & CUSTOM {
@@ -66,7 +66,7 @@ fn from_numbers(main: u8, sub: u8) -> ModeRequest {
     }
 }
 
-/// The mode that the base mode alone means: its most automatic flag wins.
+/// The mode of a base mode alone: its most automatic flag has priority.
 fn from_base(base: u8) -> ModeRequest {
     match base {
         b if b & 0b1100 != 0 => ModeRequest::Known(Mode::Hold),
@@ -86,7 +86,7 @@ fn base_mode(status: &Status) -> u8 {
     flags | CUSTOM | if status.armed { ARMED } else { 0 }
 }
 
-/// What a heartbeat says: it is sent at once when this changes.
+/// Content of a heartbeat: one is sent immediately when it changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulse {
     base: u8,
@@ -95,7 +95,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// What the heartbeat says of this status.
+    /// The heartbeat's content for this status.
     pub fn of(status: &Status) -> Self {
         let state = match (status.failsafe || !status.vehicle_alive, status.armed) {
             (true, _) => MavState::MAV_STATE_CRITICAL,
@@ -106,12 +106,12 @@ impl Pulse {
     }
 }
 
-/// As what we appear.
+/// Role of this program on the MAVLink network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The aircraft's autopilot.
+    /// Autopilot of the aircraft.
     Autopilot,
-    /// A computer beside the autopilot.
+    /// Onboard computer beside an autopilot.
     Onboard,
 }
 
@@ -139,7 +139,7 @@ pub fn heartbeat(status: &Status, role: Role) -> Message {
     }))
 }
 
-/// AVAILABLE_MODES, counted from 1; 0 is all of them. Empty when there is no such entry.
+/// AVAILABLE_MODES, counted from 1; 0 requests all. Empty when the index does not exist.
 pub fn available_modes(index: usize) -> Vec<Message> {
     const AUTOMATIC: u32 = 4;
     let modes = [
@@ -163,7 +163,7 @@ pub fn available_modes(index: usize) -> Vec<Message> {
     (0..modes.len()).filter(wanted).map(message).collect()
 }
 
-/// CURRENT_MODE.
+/// CURRENT_MODE of this autopilot.
 pub fn current_mode(status: &Status) -> Message {
     let custom = custom_mode(status.mode);
     Message::coded(MavMessage::CURRENT_MODE(CURRENT_MODE_DATA {

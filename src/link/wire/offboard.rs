@@ -1,4 +1,4 @@
-//! What an offboard client says to an autopilot, with what it hears from it.
+//! Messages of an offboard client: sent to, and received from, an autopilot.
 
 use mavlink::dialects::ardupilotmega::{
     AttitudeTargetTypemask, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage,
@@ -10,37 +10,37 @@ use super::{Message, decode, setpoint};
 use crate::autopilot::Mode;
 use crate::framing::{Frame, Source};
 
-/// What an autopilot was heard to say.
+/// A message received from an autopilot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
-    /// Its heartbeat: whether it is armed, in a mode that is `None` if unknown here.
+    /// HEARTBEAT: armed state, and the mode or `None` if unknown.
     Heartbeat {
         /// Actuator outputs are live.
         armed: bool,
-        /// The mode in force.
+        /// The active mode.
         mode: Option<Mode>,
     },
-    /// Roll and pitch, rad, at `time_s` of its clock.
+    /// Roll and pitch, rad, with the autopilot's time.
     Attitude {
-        /// Its time since boot, s.
+        /// Time since its boot, s.
         time_s: f64,
-        /// Roll, rad.
+        /// Roll angle φ, rad.
         roll: f64,
-        /// Pitch, rad.
+        /// Pitch angle θ, rad.
         pitch: f64,
     },
     /// True airspeed in m/s, altitude in m.
     Speed {
-        /// Airspeed, m/s.
+        /// True airspeed V_a, m/s.
         airspeed: f64,
         /// Altitude above mean sea level, m.
         altitude: f64,
     },
-    /// Whether it accepted a command.
+    /// Result of a command.
     Ack {
-        /// MAV_CMD number.
+        /// Number of the MAV_CMD.
         command: u32,
-        /// MAV_RESULT_ACCEPTED.
+        /// Whether the result is MAV_RESULT_ACCEPTED.
         accepted: bool,
     },
     /// A line of text (a chunk of at most 50 characters).
@@ -59,7 +59,7 @@ pub fn heartbeat() -> Message {
     }))
 }
 
-/// SET_ATTITUDE_TARGET with roll and pitch (rad) alone: rates and thrust are masked.
+/// SET_ATTITUDE_TARGET with roll and pitch (rad); rates and thrust are masked.
 pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Message {
     Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
         time_boot_ms: time_ms,
@@ -71,7 +71,7 @@ pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Messa
     }))
 }
 
-/// MAV_CMD_COMPONENT_ARM_DISARM.
+/// Command MAV_CMD_COMPONENT_ARM_DISARM that arms.
 pub fn arm(to: Source) -> Message {
     command(to, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0])
 }
@@ -95,7 +95,7 @@ fn command(to: Source, command: MavCmd, [param1, param2, param3]: [f32; 3]) -> M
     }))
 }
 
-/// Reads what an autopilot sent; `None` for what a client of this kind does not need.
+/// Decodes a message of an autopilot; `None` for messages that this client does not use.
 pub fn read(frame: &Frame<'_>) -> Option<Heard> {
     Some(match decode(frame)? {
         MavMessage::HEARTBEAT(h) => Heard::Heartbeat {

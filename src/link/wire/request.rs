@@ -1,4 +1,4 @@
-//! What a client can ask for, decoded from a frame.
+//! Requests of clients, decoded from frames.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 
@@ -7,7 +7,7 @@ use super::setpoint::{self, SetpointFault};
 use super::{Frame, decode};
 use crate::autopilot::{AttitudeSetpoint, ParameterValue, Sticks};
 
-/// Whom a message is for; 0 stands for everybody.
+/// Target of a message; 0 is a broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipient {
     /// System id, 0 for all.
@@ -16,7 +16,7 @@ pub struct Recipient {
     pub component: u8,
 }
 
-/// A parameter's name as sent: up to 16 bytes, ended by a zero if shorter.
+/// A parameter's name as sent: up to 16 bytes, zero-terminated if shorter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParameterName(pub [u8; 16]);
 
@@ -27,53 +27,53 @@ impl ParameterName {
     }
 }
 
-/// Which parameter is meant.
+/// Key of a requested parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKey {
-    /// By its place in the table (which may not exist).
+    /// By its index in the table (which may not exist).
     Index(usize),
     /// By its name.
     Name(ParameterName),
 }
 
-/// A command, from COMMAND_LONG or COMMAND_INT; the number may be one that nobody knows.
+/// A command from COMMAND_LONG or COMMAND_INT; its number may be unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandRequest {
-    /// MAV_CMD.
+    /// Number of the MAV_CMD.
     pub number: u16,
     /// Parameters 1 to 7; those a command does not use are often NaN.
     pub params: [f64; 7],
-    /// 0 when sent for the first time, then counting.
+    /// 0 on the first transmission, then counting up.
     pub confirmation: u8,
 }
 
-/// Steps of the mission protocol, as far as refusing it needs them.
+/// Steps of the mission protocol that are answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionStep {
-    /// The client asks how many items there are.
+    /// Request for the number of items.
     List,
-    /// The client asks for an item.
+    /// Request for an item.
     Item,
-    /// The client offers items.
+    /// Offer of items to upload.
     Upload,
-    /// The client asks to forget all items.
+    /// Request to delete all items.
     Clear,
 }
 
-/// A decoded request.
+/// A decoded request of a client.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// A command.
+    /// COMMAND_LONG or COMMAND_INT.
     Command(CommandRequest),
     /// SET_MODE: base mode and custom mode.
     SetMode { base: u8, custom: u32 },
-    /// SET_ATTITUDE_TARGET.
+    /// SET_ATTITUDE_TARGET, or why it is invalid.
     Attitude(Result<AttitudeSetpoint, SetpointFault>),
-    /// A setpoint of a kind that is not flown (positions, velocities, raw actuators).
+    /// A setpoint of an unsupported kind (positions, velocities, raw actuators).
     OtherSetpoint,
     /// MANUAL_CONTROL; `None` when an axis is missing.
     Sticks(Option<Sticks>),
-    /// PARAM_REQUEST_LIST.
+    /// Request for the whole table, PARAM_REQUEST_LIST.
     ParameterList,
     /// PARAM_REQUEST_READ.
     ParameterRead(ParameterKey),
@@ -85,13 +85,13 @@ pub enum Request {
     File { sequence: u16, session: u8, opcode: u8 },
     /// TIMESYNC request with the client's time, ns.
     TimeSync { theirs: i64 },
-    /// PING request.
+    /// PING with its time and sequence number.
     Ping { time_usec: u64, sequence: u32 },
     /// REQUEST_DATA_STREAM: the group, and its rate in Hz or `None` to stop it.
     DataStream { group: u8, rate: Option<u16> },
 }
 
-/// Decodes a frame into whom it is for and what it asks; `None` for everything else.
+/// Decodes a frame into its target and request; `None` for other messages.
 pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     let fields = Fields(frame.payload);
     let at =
@@ -103,7 +103,7 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
             let to = Recipient { system: fields.u8(4), component: 0 };
             (to, Request::SetMode { base: fields.u8(5), custom: fields.u32(0) })
         }
-        // A request is for everybody (0/0), a reply for one.
+        // a request is broadcast (0/0), a reply has one target
         4 if fields.bytes(12) == [0, 0] => {
             (at(12), Request::Ping { time_usec: fields.u64(0), sequence: fields.u32(8) })
         }
@@ -124,7 +124,7 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     Some(found)
 }
 
-/// The messages that hold no enumeration, so that the codec never rejects them.
+/// Decodes the messages without enumerations, which the codec never rejects.
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {

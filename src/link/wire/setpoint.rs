@@ -1,4 +1,4 @@
-//! Setpoints as clients send them, decoded and checked.
+//! Decoding and validation of clients' setpoints.
 
 use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 
@@ -8,25 +8,25 @@ use crate::autopilot::{AttitudeSetpoint, Sticks};
 const IGNORE_THRUST: u8 = 64;
 /// Mask bit: the attitude is to be ignored.
 const IGNORE_ATTITUDE: u8 = 128;
-/// Norms of a quaternion that are taken for a badly scaled unit one; beyond, it is garbage.
+/// Range of a quaternion's norm that is normalised; outside it the quaternion is invalid.
 const NORM: std::ops::RangeInclusive<f64> = 0.1..=10.0;
-/// Thrust values beyond this are garbage; between, they are limited to 0..1.
+/// Thrust above this is invalid; below it, thrust is clamped to 0..1.
 const MAX_THRUST: f64 = 1.5;
-/// INT16_MAX marks an axis of MANUAL_CONTROL as not there.
+/// INT16_MAX marks an axis of MANUAL_CONTROL as invalid.
 const NO_AXIS: i16 = i16::MAX;
 
-/// Why a setpoint is not followed (it does not prove its sender alive either).
+/// Why a setpoint is refused; it does not restart the offboard timeout either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetpointFault {
-    /// A number is NaN, infinite, or absurdly large.
+    /// A value is NaN, infinite or out of range.
     NotFinite,
-    /// The quaternion has no direction.
+    /// The quaternion has a zero norm.
     NoAttitude,
-    /// Body rates or thrust alone: only attitudes are flown.
+    /// Only body rates or thrust are commanded: an attitude is required.
     AttitudeMasked,
 }
 
-/// The attitude asked for. Rates and yaw are ignored: a fixed wing turns by banking.
+/// The commanded attitude. Rates and yaw are ignored: a fixed-wing aircraft turns by banking.
 pub(super) fn attitude(data: &SET_ATTITUDE_TARGET_DATA) -> Result<AttitudeSetpoint, SetpointFault> {
     let mask = data.type_mask.bits();
     if mask & IGNORE_ATTITUDE != 0 {
@@ -79,7 +79,7 @@ pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     ]
 }
 
-/// Stick positions; `None` when one of the three axes in use is marked as not there.
+/// Stick positions; `None` when one of the three axes in use is marked as invalid.
 pub(super) fn sticks(data: &MANUAL_CONTROL_DATA) -> Option<Sticks> {
     if [data.x, data.y, data.z].contains(&NO_AXIS) {
         return None;

@@ -10,48 +10,47 @@ use greylag_physics::mixer::Mixer;
 use greylag_physics::servos::{Travel, Travels};
 use greylag_physics::{Command, Time};
 
-/// MAV_MODE_FLAG_SAFETY_ARMED.
+/// Flag MAV_MODE_FLAG_SAFETY_ARMED of the base mode.
 const ARMED: u8 = 128;
 
-/// Outputs of a vehicle that describes every surface.
+/// Bit mask of outputs of a vehicle that reports every surface.
 const ALL: u32 = 15;
 
-/// Deflection at normalised 1 of a vehicle that does not send its travel, rad: the X8's.
+/// Default deflection at normalised 1, rad, of a vehicle that does not send its travel: the X8's.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const TRAVEL: f64 = 0.5235;
 
-/// A message from the vehicle, in SI units but for the normalised actuators.
+/// A message from the vehicle, in SI units except for the normalised actuators.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VehicleMessage {
     /// HIGHRES_IMU: the frame's time and the specific force, m/s², FRD.
     Imu {
-        /// The frame's time.
+        /// Time of the state frame.
         time: Time,
         /// Specific force, m/s², FRD.
         specific_force: [f64; 3],
     },
-    /// VFR_HUD.
+    /// Airspeed and altitude from VFR_HUD.
     Air {
-        /// True airspeed, m/s.
+        /// True airspeed V_a, m/s.
         airspeed: f64,
-        /// Altitude, m AMSL.
+        /// Altitude above mean sea level, m.
         altitude: f64,
     },
-    /// AOA_SSA.
+    /// Flow angles from AOA_SSA.
     Incidence {
-        /// The frame's time.
+        /// Time of the state frame.
         time: Time,
         /// Angle of attack, rad.
         alpha: f64,
-        /// Sideslip, rad.
+        /// Sideslip angle, rad.
         beta: f64,
     },
-    /// ACTUATOR_OUTPUT_STATUS: positions and rates of the surfaces in parts of their travel, the
-    /// larger of both sides.
+    /// ACTUATOR_OUTPUT_STATUS: positions and rates of the surfaces as fractions of the larger of their two travels.
     Actuators {
-        /// The frame's time.
+        /// Time of the state frame.
         time: Time,
-        /// How many outputs the message says are in use.
+        /// Number of outputs in use.
         active: u32,
         /// Aileron, elevator and throttle positions, aileron and elevator rates in 1/s, rudder
         /// position and rate.
@@ -61,23 +60,23 @@ pub enum VehicleMessage {
     },
     /// ATTITUDE_QUATERNION, which completes a state frame.
     Attitude {
-        /// The frame's time in whole ms, modulo 2³².
+        /// Time of the state frame in ms, modulo 2³².
         boot_ms: u32,
-        /// NED→FRD, w first.
+        /// Attitude quaternion NED→FRD, w first.
         quaternion: [f64; 4],
         /// p, q, r, rad/s.
         rates: [f64; 3],
     },
-    /// GLOBAL_POSITION_INT.
+    /// Position and velocity from GLOBAL_POSITION_INT.
     Position {
         /// Latitude and longitude, degrees.
         position: [f64; 2],
         /// Velocity over ground, NED, m/s.
         velocity: [f64; 3],
     },
-    /// WIND_COV: the air's velocity, NED, m/s.
+    /// WIND_COV: velocity of the air, NED, m/s.
     Wind([f64; 3]),
-    /// HEARTBEAT.
+    /// HEARTBEAT of the vehicle.
     Heartbeat,
 }
 
@@ -125,7 +124,7 @@ fn outputs(active: u32, actuator: &[f64; 32]) -> [f64; 7] {
     [a, e, t, ar, er, rudder[0], rudder[1]]
 }
 
-/// The travel that the vehicle says its surfaces have.
+/// The travel of the surfaces that the vehicle reports.
 fn travels(active: u32, actuator: &[f64; 32]) -> Travels {
     let side = |at: usize| Travel { least: actuator[at + 3], most: actuator[at] };
     match active {
@@ -143,20 +142,20 @@ fn travels(active: u32, actuator: &[f64; 32]) -> Travels {
     }
 }
 
-/// What goes to the actuators.
+/// Actuator outputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outputs {
-    /// All zero.
+    /// Disarmed: all outputs are zero.
     Disarmed,
-    /// This command.
+    /// Armed, with this command.
     Armed(Command),
 }
 
-/// First place of a surface's or motor's own command.
+/// Index of the first individual surface or motor command.
 const OWN: usize = 4;
 
-/// HIL_ACTUATOR_CONTROLS in answer to the state frame of `time`; behind the four controls the commands of the surfaces
-/// and motors of `mixer`.
+/// HIL_ACTUATOR_CONTROLS in reply to the state frame of `time`; after the four controls come the individual commands
+/// of the surfaces and motors of `mixer`.
 pub fn actuator_controls(time: Time, outputs: Outputs, mixer: Option<&Mixer>) -> Message {
     let mut controls = [0.0; 16];
     let mut mode = 0;

@@ -1,4 +1,4 @@
-//! The streams to a client, each built from the autopilot's status.
+//! Telemetry streams to a client, built from the autopilot's status.
 
 use mavlink::dialects::ardupilotmega::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AttitudeTargetTypemask,
@@ -14,9 +14,9 @@ use greylag_physics::Time;
 /// A message that can be streamed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stream {
-    /// Its number.
+    /// Message id.
     pub id: u32,
-    /// How often a client that has not asked gets it, Hz; 0 is not at all.
+    /// Default rate, Hz; 0 is off.
     pub default_hz: f64,
     /// The group of REQUEST_DATA_STREAM it belongs to (MAV_DATA_STREAM).
     pub group: u8,
@@ -26,7 +26,7 @@ const fn stream(id: u32, default_hz: f64, group: u8) -> Stream {
     Stream { id, default_hz, group }
 }
 
-/// Every stream, with its default rate.
+/// All streams with their default rates.
 pub const STREAMS: [Stream; 14] = [
     stream(30, 10.0, 10), // ATTITUDE
     stream(31, 10.0, 10), // ATTITUDE_QUATERNION
@@ -44,31 +44,31 @@ pub const STREAMS: [Stream; 14] = [
     stream(NAMED_VALUE_FLOAT, 1.0, 12),
 ];
 
-/// The message of the residuals, one for each that is known.
+/// Message id of the residuals, one message for each known residual.
 pub const NAMED_VALUE_FLOAT: u32 = 251;
 
-/// The place of a message in [`STREAMS`].
+/// Index of a message in [`STREAMS`].
 pub fn position(id: u32) -> Option<usize> {
     STREAMS.iter().position(|stream| stream.id == id)
 }
 
-/// A home position.
+/// A home position (HOME_POSITION).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Home {
     /// Latitude and longitude, degrees.
     pub position: [f64; 2],
-    /// Altitude, m AMSL.
+    /// Altitude above mean sea level, m.
     pub altitude: f64,
 }
 
-/// What the streams need besides the status.
+/// Inputs of the streams other than the status.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scene {
-    /// Vehicle time.
+    /// Time of the vehicle's clock.
     pub now: Time,
-    /// The home position, once known.
+    /// The home position; `None` until it is known.
     pub home: Option<Home>,
-    /// Frames from clients that could not be used, counted.
+    /// Number of invalid frames from clients.
     pub bad_frames: u64,
 }
 
@@ -85,7 +85,7 @@ pub fn residuals(status: &Status, scene: &Scene) -> impl Iterator<Item = Message
     })
 }
 
-/// One streamed message; `None` when it is not a stream or its content is not known (yet).
+/// One stream message; `None` when `id` is no stream or its content is unknown.
 pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
     let built = match id {
         1 => sys_status(status, scene),
@@ -152,7 +152,7 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// Where there is no target, the mask says so: attitude and rates are to be ignored.
+/// ATTITUDE_TARGET; without a target the mask marks attitude and rates as ignored.
 fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
     let (attitude, mask) = match finite(status.target) {
@@ -168,7 +168,7 @@ fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// Bits of ATTITUDE_TARGET_TYPEMASK.
+/// Ignore bits of body rates, ATTITUDE_TARGET_TYPEMASK.
 const RATES_IGNORED: u8 = 0b111;
 const ATTITUDE_IGNORED: u8 = 1 << 7;
 
@@ -201,7 +201,7 @@ fn global_position(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// An angle of the compass in 0.01°, 65535 when unknown.
+/// A compass angle in 0.01°, 65535 when unknown.
 fn centidegrees(degrees: f64) -> u16 {
     match degrees.is_finite() {
         true => (degrees.rem_euclid(360.0) * 100.0) as u16 % 36000,
@@ -249,8 +249,7 @@ fn servo_output(status: &Status, scene: &Scene) -> MavMessage {
 
 fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     type S = MavSysStatusSensor;
-    // What stands behind the vehicle's own estimate, all or nothing. The compass is among them:
-    // MAVSDK's `health_all_ok` waits for it.
+    // sensors behind the vehicle's own estimate, all or none; the compass is included because
     let sensors = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
         | S::MAV_SYS_STATUS_SENSOR_3D_MAG
@@ -278,7 +277,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// Everything about the battery is unknown: the flight controller's own link will tell it.
+/// BATTERY_STATUS with all values unknown: the flight controller reports the battery on its own link.
 fn battery() -> MavMessage {
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
         current_consumed: -1,
@@ -291,7 +290,7 @@ fn battery() -> MavMessage {
     })
 }
 
-/// There is no weight on wheels to feel: armed counts as flying.
+/// The landed state: armed counts as in air, since there is no weight-on-wheels sensor.
 fn landed(status: &Status) -> MavLandedState {
     match (status.vehicle_alive, status.armed) {
         (_, true) => MavLandedState::MAV_LANDED_STATE_IN_AIR,

@@ -1,4 +1,4 @@
-//! What is at the other end of the vehicle's link: the shim, or a played flight controller.
+//! The vehicle's end of the link: the shim, or a simulated flight controller.
 
 use greylag_sitl::plant::{Inputs, PlantOptions, Truth};
 use greylag_sitl::shim::bench::Bench;
@@ -12,24 +12,24 @@ use super::scenario::{ControllerSetting, Scenario};
 use greylag_link::vehicle::{Authority, Profile, Real, Sitl, Stack, Vehicle};
 use greylag_model::GreyBox;
 
-/// What is at the other end.
+/// Kind of vehicle at the other end of the link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Counterpart {
-    /// The simulator's shim.
+    /// The shim of the simulator.
     Sitl,
-    /// PX4 by surfaces.
+    /// PX4, commanded surfaces.
     Px4,
-    /// PX4 by attitude.
+    /// PX4, commanded attitudes.
     Px4Attitude,
-    /// ArduPilot by channels.
+    /// ArduPilot, commanded surfaces by channels.
     Ardupilot,
-    /// ArduPilot by attitude.
+    /// ArduPilot, commanded attitudes.
     ArdupilotAttitude,
 }
 
 impl Counterpart {
-    /// All of them.
+    /// Every kind of vehicle.
     pub const ALL: [Counterpart; 5] = [
         Counterpart::Sitl,
         Counterpart::Px4,
@@ -38,7 +38,7 @@ impl Counterpart {
         Counterpart::ArdupilotAttitude,
     ];
 
-    /// Its name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Counterpart::Sitl => "sitl",
@@ -49,7 +49,7 @@ impl Counterpart {
         }
     }
 
-    /// The stack of its flight controller as its users call it; `None` for the simulator, which has none.
+    /// Name of the flight stack for users; `None` for the simulator.
     pub fn stack(self) -> Option<&'static str> {
         self.personality().map(|(personality, _)| match personality {
             Personality::Px4 => "PX4",
@@ -57,7 +57,7 @@ impl Counterpart {
         })
     }
 
-    /// What its flight controller calls `mode`.
+    /// The flight stack's name of `mode`.
     pub fn mode_name(self, mode: ControllerMode) -> &'static str {
         let px4 = matches!(self, Counterpart::Px4 | Counterpart::Px4Attitude);
         match mode {
@@ -82,14 +82,14 @@ impl Counterpart {
     }
 }
 
-/// The aircraft with what flies it.
+/// The simulated aircraft with its flight controller or shim.
 pub(super) enum Aircraft {
     Sitl(Box<Bench>),
     Real(Box<FlightController>),
 }
 
 impl Aircraft {
-    /// The aircraft `plant` in the scenario's air, with its noise and its counterpart.
+    /// The aircraft `plant` in the scenario's air, with sensor noise and flight controller or shim.
     pub(super) fn new(plant: &PlantOptions, scenario: &Scenario) -> Result<Self, ShimError> {
         let mut options = ShimOptions::new(scenario.air(plant), plant.start);
         options.seed = scenario.seed;
@@ -135,7 +135,7 @@ impl Aircraft {
         }
     }
 
-    /// The command that the actuators get.
+    /// The command that reaches the actuators.
     pub(super) fn inputs(&self) -> Inputs {
         match self {
             Aircraft::Sitl(bench) => bench.inputs(),
@@ -150,7 +150,7 @@ impl Aircraft {
         }
     }
 
-    /// A ground station sets the flight controller's loiter mode; whether there is a flight controller.
+    /// Sets the flight controller's loiter mode as a ground station does; whether there is a flight controller.
     pub(super) fn take_over(&mut self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,
@@ -161,7 +161,7 @@ impl Aircraft {
         }
     }
 
-    /// Flies a step; `false` when the flight has ended on the ground or outside the numbers.
+    /// Advances a step; `false` when the flight has ended on the ground or with a state that is not finite.
     pub(super) fn fly(&mut self) -> bool {
         let flown = match self {
             Aircraft::Sitl(bench) => bench.fly(),
@@ -170,7 +170,7 @@ impl Aircraft {
         matches!(flown, Ok(None))
     }
 
-    /// The flight controller's mode, where there is one.
+    /// The flight controller's mode; `None` for the shim.
     pub(super) fn mode(&self) -> Option<ControllerMode> {
         match self {
             Aircraft::Sitl(_) => None,
@@ -178,7 +178,7 @@ impl Aircraft {
         }
     }
 
-    /// Whether the flight controller flies by itself in the companion's mode, for want of targets.
+    /// Whether the flight controller holds its own attitude in the companion's mode, as targets are missing.
     pub(super) fn turns_back(&self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,
@@ -186,14 +186,14 @@ impl Aircraft {
         }
     }
 
-    /// Whether the companion has the surfaces, or the attitude.
+    /// Whether the companion has control authority.
     pub(super) fn is_steered(&self) -> bool {
         self.mode()
             .is_none_or(|mode| matches!(mode, ControllerMode::Manual | ControllerMode::Guided))
     }
 }
 
-/// The companion's side of the vehicle's link for `counterpart`.
+/// The companion's link to `counterpart`.
 pub(super) fn vehicle(counterpart: Counterpart, model: &GreyBox) -> Vehicle {
     let actuators = model.airframe.actuators;
     match counterpart.personality() {

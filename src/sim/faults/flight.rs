@@ -1,4 +1,4 @@
-//! One flight of 60 s under faults, in lockstep in this process.
+//! One flight of 60 s under faults, in lockstep within this process.
 
 mod client;
 mod disk;
@@ -34,52 +34,52 @@ use greylag_physics::airframe::Envelope;
 pub use monitored::{ATTITUDE_DEG, FAILS_S, Failure, Watched};
 use traced::Follower;
 
-/// Steps of a flight: 60 s.
+/// Number of steps of a flight: 60 s.
 const STEPS: u64 = 6000;
-/// A dead link must have handed the aircraft back after this time, s.
+/// Time within which control must be returned on a dead link, s.
 const HAND_BACK_S: f64 = 0.5;
 
-/// Stream of the random numbers of a starved processor.
+/// Random stream of an overloaded processor.
 const STARVED: u64 = 20;
 
-/// A flight to be flown.
+/// Conditions of a flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// Its number, from which everything random follows.
+    /// Seed of all its random numbers.
     pub seed: u64,
-    /// Who steers.
+    /// Name of the controller.
     pub controller: ControllerKind,
-    /// Whom it steers through.
+    /// The vehicle's end of the link.
     pub counterpart: Counterpart,
 }
 
-/// What came of it.
+/// Result of a flight.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// The flight.
+    /// Conditions of the flight.
     pub case: Case,
-    /// The faults that it met.
+    /// The faults that occurred.
     pub faults: Vec<Fault>,
-    /// What was found wrong.
+    /// The findings of the judge.
     pub findings: Vec<Found>,
-    /// What was said to the ground stations, with nothing left out: when, s, and what.
+    /// Texts to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
 }
 
-/// A flight with all that was seen and heard of it.
+/// A flight with its samples, texts and replies.
 #[derive(Clone, Debug)]
 pub struct Witnessed {
-    /// The flight, every 10 ms; it ends with a panic or on the ground.
+    /// Samples of every 10 ms; they end with a panic or on the ground.
     pub samples: Vec<Sample>,
-    /// What the judge of a flight found.
+    /// The findings of the judge.
     pub findings: Vec<Found>,
-    /// What the companion said to the ground stations: when, s, and what.
+    /// Texts of the companion to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
-    /// What the client asked the companion for besides setpoints, and the answers: when, s.
+    /// Requests of the client other than setpoints, with the replies and times, s.
     pub answers: Vec<(f64, Asking, Verdict)>,
 }
 
-/// A companion fresh from the factory: the design of its controller is not made again.
+/// Builds companions without repeating the controller design.
 pub struct CompanionFactory {
     companion: Companion,
     fallback: Box<dyn Controller>,
@@ -88,11 +88,11 @@ pub struct CompanionFactory {
 }
 
 impl CompanionFactory {
-    /// The factory that builds companions with `companion`, for the aircraft of `model`; as in flight, the
-    /// fallback is an LQI.
+    /// A factory of companions with `companion`, for the aircraft of `model`; the fallback is an LQI, as in flight.
     ///
     /// # Errors
-    /// If the model has no LQI.
+    ///
+    /// If no LQI can be designed from the model.
     pub fn new(companion: Companion, model: &GreyBox) -> Result<Self, FaultsError> {
         let fallback = match companion.controller.name() == ControllerKind::Lqi.name() {
             true => companion.controller.boxed_clone(),
@@ -102,12 +102,12 @@ impl CompanionFactory {
         Ok(CompanionFactory { companion, fallback, model: model.clone(), plant })
     }
 
-    /// The same with the simulator's aircraft `plant`, from its start.
+    /// A factory with the simulator's aircraft `plant`, from its start.
     pub fn with_aircraft(self, plant: PlantOptions) -> Self {
         CompanionFactory { plant, ..self }
     }
 
-    /// The envelope of its aircraft.
+    /// Envelope of its aircraft.
     pub fn envelope(&self) -> Envelope {
         self.model.airframe.envelope
     }
@@ -120,11 +120,12 @@ impl CompanionFactory {
         Ok(Desk::new(companion, vehicle(counterpart, &self.model)))
     }
 
-    /// Flies `case`; a panic of the companion is a finding. What an aircraft did is laid to a cause if it
-    /// was exposed to it, and does not do it when the same flight is flown without the faults of that kind; to none
-    /// of them if it does it without any.
+    /// Flies `case`; a panic of the companion is a finding. A finding on the aircraft is attributed to a cause if the
+    /// aircraft was exposed to it, and if the finding vanishes in the same flight without the faults of that kind; to
+    /// no cause if it remains without any faults.
     ///
     /// # Errors
+    ///
     /// If the aircraft cannot be loaded.
     pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
         let scenario = Scenario::of_seed(case.counterpart, case.seed);
@@ -158,17 +159,19 @@ impl CompanionFactory {
         Ok(Report { case, faults: scenario.faults, findings, texts: flight.texts })
     }
 
-    /// Flies `scenario` for its samples, every 10 ms, and what the judge of a flight found. The samples end with a panic.
+    /// Flies `scenario`; its samples of every 10 ms and the findings of the judge. The samples end with a panic.
     ///
     /// # Errors
+    ///
     /// If the aircraft cannot be loaded.
     pub fn trace(&self, scenario: &Scenario) -> Result<(Vec<Sample>, Vec<Found>), FaultsError> {
         self.witness(scenario).map(|flown| (flown.samples, flown.findings))
     }
 
-    /// The same with what was said and answered.
+    /// Flies `scenario`, also with texts and replies.
     ///
     /// # Errors
+    ///
     /// If the aircraft cannot be loaded.
     pub fn witness(&self, scenario: &Scenario) -> Result<Witnessed, FaultsError> {
         let mut flight = self.flown(scenario, Some(Vec::with_capacity(STEPS as usize)))?;
@@ -217,7 +220,7 @@ impl CompanionFactory {
             texts: Vec::new(),
             answers: Vec::new(),
         };
-        // What a panic leaves behind is only read, to be judged.
+        // after a panic the state is only read, to be judged
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
             flight.judge.note(0.0, Finding::Panic);
         }
@@ -244,7 +247,7 @@ fn set(desk: &mut Desk, Setting { name, times }: &Setting) -> Result<(), FaultsE
     }
 }
 
-/// A flight under way.
+/// State of a running flight.
 struct Flight {
     aircraft: Aircraft,
     desk: Desk,
@@ -252,26 +255,26 @@ struct Flight {
     up: Wire,
     judge: Judge,
     scenario: Scenario,
-    /// The samples so far, where they are wanted.
+    /// Samples so far, where requested.
     trace: Option<Vec<Sample>>,
     follower: Follower,
-    /// Airspeed at which the aircraft cruises, m/s.
+    /// Cruise airspeed of the aircraft, m/s.
     cruise: f64,
     random: ChaCha8Rng,
     disk: Option<Disk>,
-    /// The companion gets no processor before this step.
+    /// The companion is not scheduled before this step.
     asleep_until: u64,
-    /// What has arrived meanwhile.
+    /// Bytes that have arrived meanwhile.
     unread: Vec<Vec<u8>>,
-    /// The command that the actuators got at the last step.
+    /// The actuators' command at the last step.
     flown: Inputs,
-    /// What jumps have added to the vehicle's clock, µs.
+    /// Sum of the jumps of the vehicle's clock, µs.
     clock_us: i64,
     armed: bool,
-    /// Whether the companion is killed, and the companions that start after it.
+    /// Whether the companion has ended, and its successors.
     killed: bool,
     spares: Vec<Desk>,
-    /// Since when nothing has come, while steering through a real controller.
+    /// Time of the last arrival, while controlling through a real controller.
     dead_since: Option<f64>,
     texts: Vec<(f64, String)>,
     answers: Vec<(f64, Asking, Verdict)>,
@@ -287,13 +290,13 @@ impl Flight {
         }
         let end = STEPS as f64 * 0.01;
         let truth = self.aircraft.truth();
-        // Who was handed back flies level; who was not flies the client's last leg, or level.
+        // after a return the aircraft flies level; otherwise it flies the client's last leg, or level
         let pitch = truth.pitch_rad.to_degrees().clamp(-2.0, 6.0);
         self.judge.end(end, &truth, [0.0, pitch]);
         self.hear_of_the_disk(end);
     }
 
-    /// One step of 10 ms; `false` when the aircraft is lost.
+    /// Advances a step of 10 ms; `false` when the aircraft is lost.
     fn step(&mut self, step: u64, now_s: f64) -> bool {
         let acting: Vec<Fault> =
             self.scenario.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
@@ -322,13 +325,13 @@ impl Flight {
         flies
     }
 
-    /// What the companion does when it has the processor.
+    /// Runs the companion's step when it is scheduled.
     fn companion(&mut self, step: u64, now_s: f64, acting: &[Fault]) {
         let host = Duration::from_secs(1) + Duration::from_millis(10 * step);
         let mut up = Vec::new();
         for batch in std::mem::take(&mut self.unread) {
             let (judge, follower) = (&mut self.judge, &mut self.follower);
-            self.desk.hear(host, &batch, &mut up, |_, decision| {
+            self.desk.receive(host, &batch, &mut up, |_, decision| {
                 judge.decision(now_s, decision);
                 follower.decided(decision);
             });
@@ -345,7 +348,7 @@ impl Flight {
         self.texts.extend(self.desk.texts.drain(..).map(|text| (now_s, text.words)));
     }
 
-    /// A link that is dead hands the aircraft back within half a second.
+    /// Checks that control is returned within half a second on a dead link.
     fn watch_link(&mut self, now_s: f64, heard: bool) {
         let real = matches!(self.aircraft, Aircraft::Real(_));
         let engaged = match self.desk.vehicle() {

@@ -1,4 +1,4 @@
-//! The judge of a flight under faults: what must hold at every step, and at the end.
+//! The judge of a flight under faults: requirements at every step and at the end.
 
 use greylag_sitl::plant::Truth;
 
@@ -7,86 +7,85 @@ use greylag_flight::pilot::{Decision, Source};
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Overshoot of bank and pitch beyond the envelope that is still no violation, degrees: a gust of
-/// the surfaces' full slew takes about so far.
+/// Transient of bank and pitch outside the envelope that is accepted, degrees: about that of a gust against the
+/// surfaces' full slew.
 pub(super) const OVERSHOOT_DEG: f64 = 15.0;
-/// The least airspeed of the envelope over that at which an airspeed is a finding: half the dynamic pressure, about the
-/// stall.
+/// Airspeed that is a finding, as a fraction of the envelope's smallest: half the dynamic pressure, about the stall.
 pub(super) const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
-/// Altitude that a flight of turns, climbs and descents may lose, m, of the 600 it begins at.
+/// Altitude loss that is accepted in a flight of turns, climbs and descents, m, of the initial 600.
 const ALTITUDE_LOSS_M: f64 = 200.0;
-/// Attitude error at the end that counts as recovered, degrees.
+/// Attitude error at the end that is accepted, degrees.
 const RECOVERED_DEG: f64 = 3.0;
-/// Rounding of a step of the surfaces.
+/// Tolerance for rounding of a surface step.
 const ROUNDING: f64 = 1e-9;
-/// Steps of the actuators standing still that are a stretch in which nobody steers: 0.2 s.
+/// Steps of constant actuators that count as uncommanded: 0.2 s.
 const UNSTEERED: u32 = 20;
-/// An exposure that ended so many steps ago no longer explains anything. Bank and pitch are arrested within half a
-/// second once somebody steers again; airspeed and altitude take longer to come back.
+/// Steps after which an exposure no longer explains a finding. Bank and pitch recover within half a second of
+/// regained control; airspeed and altitude take longer.
 const MEMORY: u64 = 300;
 const MEMORY_OF_ATTITUDE: u64 = 100;
 
-/// What was found wrong. Those of the companion itself are never excused.
+/// A violated requirement. Those on the companion itself are never excused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Finding {
-    /// The program panicked.
+    /// The companion panicked.
     Panic,
     /// A command was not finite, or out of range.
     Command,
-    /// A surface moved faster than the slew limit.
+    /// A surface command exceeded the slew limit.
     Slew,
-    /// The aircraft was not handed back within 0.5 s of a dead link.
+    /// Control was not returned within 0.5 s of a dead link.
     SlowHandBack,
-    /// The aircraft came to the ground, or left the numbers.
+    /// The aircraft hit the ground, or a state was not finite.
     Crash,
-    /// Bank or pitch beyond the envelope.
+    /// Bank or pitch was outside the envelope.
     Attitude,
-    /// Below the stall speed, or above the maximum airspeed.
+    /// Airspeed was below the stall, or above the maximum.
     Airspeed,
-    /// More altitude lost than allowed.
+    /// The altitude loss was too large.
     Altitude,
-    /// Not level, or not at its target, at the end.
+    /// The attitude at the end was neither level nor the target.
     NotRecovered,
-    /// A disk was full, and it was not reported.
+    /// A full disk was not reported.
     Unreported,
 }
 
-/// What an aircraft suffers that its companion cannot help.
+/// An exposure of the aircraft that its companion cannot prevent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposure {
-    /// The actuators stand where they stood, since nothing new has arrived, and nobody else flies.
+    /// The actuators hold their position, since no command arrives and no other pilot flies.
     pub unsteered: bool,
-    /// There is no state to fly on, and nobody else to hand the aircraft to.
+    /// The state is unusable, and there is no other pilot.
     pub blind: bool,
-    /// A sensor lies within what an aircraft may show.
+    /// A sensor shows a plausible wrong value.
     pub misled: bool,
 }
 
-/// What explains that an aircraft left its envelope.
+/// Explanation of a violated envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// No command reached it for 0.2 s or more, a moment ago.
+    /// No command arrived for 0.2 s or more, recently.
     Unsteered,
-    /// Without a state to fly on a moment ago, at a vehicle that cannot fly by itself.
+    /// The state was unusable recently, at a vehicle that cannot fly by itself.
     Blind,
-    /// A sensor showed a believable wrong value a moment ago.
+    /// A sensor showed a plausible wrong value recently.
     Misled,
-    /// None of the faults: the same flight without any has it too.
+    /// No fault: the same flight without faults has the finding too.
     Itself,
 }
 
 impl Found {
-    /// Whether `cause` might explain it, and nothing else does yet.
+    /// Whether `cause` is a possible explanation, and none is established yet.
     pub(super) fn is_open_to(&self, cause: Cause) -> bool {
         self.cause.is_none() && self.suspects.contains(&Some(cause))
     }
 }
 
 impl Cause {
-    /// Those that faults bring about.
+    /// The causes that faults produce.
     pub const OF_FAULTS: [Cause; 3] = [Cause::Unsteered, Cause::Blind, Cause::Misled];
 
-    /// Its name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Cause::Unsteered => "unsteered",
@@ -96,7 +95,7 @@ impl Cause {
         }
     }
 
-    /// Whether it is the doing of faults of `kind`.
+    /// Whether faults of `kind` produce it.
     pub fn is_of(self, kind: FaultKind) -> bool {
         let lie = matches!(kind, FaultKind::Airspeed | FaultKind::Alpha);
         match self {
@@ -112,18 +111,18 @@ impl Cause {
 /// A finding with its circumstances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// When, s.
+    /// Time of the finding, s.
     pub at_s: f64,
-    /// What.
+    /// The violated requirement.
     pub finding: Finding,
-    /// What explains it, of those that may be explained: the aircraft's, not the companion's.
+    /// Established explanation, for findings on the aircraft.
     pub cause: Option<Cause>,
-    /// What might have, by the moment alone.
+    /// Possible explanations by the time alone.
     pub suspects: [Option<Cause>; 3],
 }
 
 impl Finding {
-    /// All of them.
+    /// All requirements.
     pub const ALL: [Finding; 10] = [
         Finding::Panic,
         Finding::Command,
@@ -137,13 +136,13 @@ impl Finding {
         Finding::Unreported,
     ];
 
-    /// Whether it is the companion's own, which nothing excuses.
+    /// Whether it concerns the companion itself, which nothing excuses.
     pub fn is_own(self) -> bool {
         use Finding::*;
         matches!(self, Panic | Command | Slew | SlowHandBack | Unreported)
     }
 
-    /// Its name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Finding::Panic => "panic",
@@ -160,7 +159,7 @@ impl Finding {
     }
 }
 
-/// The judge.
+/// The judge of one flight.
 #[derive(Clone, Debug)]
 pub struct Judge {
     envelope: Envelope,
@@ -168,15 +167,15 @@ pub struct Judge {
     start_m: Option<f64>,
     findings: Vec<Found>,
     steps: u64,
-    /// Steps for which nobody has steered by now.
+    /// Number of uncommanded steps so far.
     unsteered: u32,
     blind: bool,
-    /// The last step of each cause.
+    /// Last step of each cause.
     causes: [(Cause, Option<u64>); 3],
 }
 
 impl Judge {
-    /// A judge by an envelope.
+    /// A judge for an envelope.
     pub fn new(envelope: Envelope) -> Self {
         Judge {
             envelope,
@@ -190,7 +189,7 @@ impl Judge {
         }
     }
 
-    /// Notes a finding; the first of each kind counts.
+    /// Records a finding; only the first of each kind counts.
     pub fn note(&mut self, at_s: f64, finding: Finding) {
         if !self.findings.iter().any(|known| known.finding == finding) {
             let suspects = if finding.is_own() { [None; 3] } else { self.suspects(finding) };
@@ -198,19 +197,19 @@ impl Judge {
         }
     }
 
-    /// The causes in force, or of a moment ago.
+    /// The causes active now or recently.
     fn suspects(&self, finding: Finding) -> [Option<Cause>; 3] {
         let memory = if finding == Finding::Attitude { MEMORY_OF_ATTITUDE } else { MEMORY };
         let recent = |at: u64| self.steps - at < memory;
         self.causes.map(|(cause, at)| at.is_some_and(recent).then_some(cause))
     }
 
-    /// Whether the last decision was made without a state to fly on.
+    /// Whether the last decision was made without a usable state.
     pub fn is_blind(&self) -> bool {
         self.blind
     }
 
-    /// Whether the last step exposed the aircraft to what its companion cannot help.
+    /// Whether the last step exposed the aircraft to a condition that its companion cannot prevent.
     pub fn is_exposed(&self) -> bool {
         self.causes.iter().any(|(_, at)| *at == Some(self.steps))
     }
@@ -226,7 +225,7 @@ impl Judge {
         }
     }
 
-    /// Judges a decision.
+    /// Judges a decision of the pilot.
     pub fn decision(&mut self, now_s: f64, decision: &Decision) {
         let c = decision.command;
         self.blind = decision.source == Source::Level;
@@ -247,7 +246,7 @@ impl Judge {
         self.last = decision.armed.then_some(c);
     }
 
-    /// Judges the aircraft.
+    /// Judges the aircraft's state.
     pub fn aircraft(&mut self, now_s: f64, truth: &Truth, exposure: Exposure) {
         self.suffer(exposure);
         let start = *self.start_m.get_or_insert(truth.altitude_m);
@@ -268,7 +267,7 @@ impl Judge {
         }
     }
 
-    /// Judges the end: where the aircraft is against where it should be, degrees.
+    /// Judges the end: final against required attitude, degrees.
     pub fn end(&mut self, now_s: f64, truth: &Truth, [roll, pitch]: [f64; 2]) {
         let roll_off = (truth.roll_rad.to_degrees() - roll).abs();
         let pitch_off = (truth.pitch_rad.to_degrees() - pitch).abs();
@@ -277,7 +276,7 @@ impl Judge {
         }
     }
 
-    /// What was found.
+    /// All findings so far.
     pub fn findings(self) -> Vec<Found> {
         self.findings
     }

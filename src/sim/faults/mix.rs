@@ -1,59 +1,59 @@
-//! The seeded mixture of faults of one flight: what befalls it, when, how badly.
+//! Random faults of one flight: kinds, times and severities from a seed.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Flight before the first fault, s: a real controller is found and engaged meanwhile.
+/// Time before the first fault, s: a real controller is found and engaged meanwhile.
 pub const FIRST_S: f64 = 12.0;
-/// The last fault is over by then, s.
+/// Time by which the last fault has ended, s.
 pub const LAST_S: f64 = 42.0;
 
-/// Something that can go wrong.
+/// Kinds of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// Datagrams, or stretches of the stream, are lost.
+    /// Loss of datagrams, or of stretches of the stream.
     Loss,
-    /// They come twice.
+    /// Datagrams are duplicated.
     Duplication,
-    /// They overtake one another.
+    /// Datagrams are reordered.
     Reordering,
-    /// They come late, in spikes.
+    /// Datagrams are delayed, in spikes.
     Delay,
-    /// Bits are flipped.
+    /// Bits are flipped in datagrams.
     Corruption,
-    /// They are cut off.
+    /// Datagrams are truncated.
     Truncation,
-    /// Garbage and strange frames come ten times as often.
+    /// Noise and frames of other systems come ten times as often.
     Flood,
-    /// Nothing comes: the plug is pulled.
+    /// The link is down.
     Unplug,
-    /// Sensors show what they showed.
+    /// Sensors are frozen.
     Frozen,
-    /// The airspeed tube is blocked.
+    /// The pitot tube is blocked.
     Airspeed,
     /// The angle of attack jumps.
     Alpha,
-    /// The pitch rate is not a number.
+    /// The pitch rate is NaN.
     NotANumber,
     /// The vehicle's clock jumps forward.
     Clock,
-    /// The vehicle starts again: its clock begins anew.
+    /// The vehicle restarts: its clock starts again.
     Reboot,
-    /// The client dies.
+    /// The client ends.
     Client,
-    /// The companion gets no processor for stretches of up to 0.3 s: ticks come late, in bursts.
+    /// The companion is not scheduled for stretches of up to 0.3 s: ticks come late, in bursts.
     Starvation,
-    /// The disk is full: recording ends.
+    /// The disk is full, so that recording ends.
     Disk,
-    /// The companion is killed; it starts again, remembering nothing, when the fault ends.
+    /// The companion is killed; another one starts without its state when the fault ends.
     Killed,
 }
 
 impl FaultKind {
-    /// Those that campaigns and searches draw. A killed companion is not among them: with it every seed would draw another
-    /// flight.
+    /// The kinds that campaigns and searches draw. A killed companion is excluded: including it would change the
+    /// flight of every seed.
     pub const DRAWN: [FaultKind; 17] = [
         FaultKind::Loss,
         FaultKind::Duplication,
@@ -74,7 +74,7 @@ impl FaultKind {
         FaultKind::Disk,
     ];
 
-    /// Its name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             FaultKind::Loss => "loss",
@@ -98,13 +98,13 @@ impl FaultKind {
         }
     }
 
-    /// Whether it can be weaker or stronger.
+    /// Whether it has a severity.
     pub fn has_strength(self) -> bool {
         use FaultKind::*;
         !matches!(self, Flood | Unplug | Frozen | NotANumber | Reboot | Client | Disk | Killed)
     }
 
-    /// Whether it lasts: what it does at its beginning is not undone at its end otherwise.
+    /// Whether it has a duration: otherwise its effect is not undone at its end.
     pub fn has_length(self) -> bool {
         !matches!(self, FaultKind::Clock | FaultKind::Disk)
     }
@@ -114,25 +114,24 @@ impl FaultKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// What.
+    /// Kind of fault.
     pub kind: FaultKind,
-    /// From when, s.
+    /// Start of the fault, s.
     pub from_s: f64,
-    /// Until when, s.
+    /// End of the fault, s.
     pub to_s: f64,
-    /// How badly, 0..1.
+    /// Severity of the fault, 0..1.
     pub strength: f64,
 }
 
 impl Fault {
-    /// Whether it is in force at `now_s`.
+    /// Whether it is active at `now_s`.
     pub fn acts(&self, now_s: f64) -> bool {
         (self.from_s..self.to_s).contains(&now_s)
     }
 }
 
-/// The faults of flight `seed`: one to three of them, at any time, so that they may overlap; every
-/// kind comes first in its turn.
+/// The faults of flight `seed`: one to three, at any time, possibly overlapping; the first cycles through all kinds.
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let count = random.random_range(1..=3);
@@ -148,7 +147,7 @@ pub fn draw(seed: u64) -> Vec<Fault> {
         .collect()
 }
 
-/// A fault of that kind at any time.
+/// A fault of that kind at a random time.
 pub(super) fn one(kind: FaultKind, random: &mut impl Rng) -> Fault {
     let from_s = random.random_range(FIRST_S..LAST_S - 8.0);
     let length = match kind {

@@ -1,7 +1,7 @@
-//! Flights under faults of link, sensors, clocks, processor, disk: drawn by seed, judged automatically.
+//! Flights under faults of link, sensors, clocks, processor and disk: drawn by seed, judged automatically.
 //!
-//! A case is a seed, a controller, a counterpart; [`CompanionFactory::fly`] flies it for 60 s in lockstep in this
-//! process, with the companion's own pilot and vehicle session and the shim's own aircraft.
+//! A case is a seed, a controller and a vehicle; [`CompanionFactory::fly`] flies it for 60 s in lockstep in this
+//! process, with the companion's own pilot and vehicle link and the shim's own aircraft.
 
 mod counterpart;
 mod flight;

@@ -1,4 +1,4 @@
-//! The rules of flight: what must hold in every flight, whatever befalls it, in signal temporal logic.
+//! The flight rules: requirements on every flight under any faults, in signal temporal logic.
 
 use super::counterpart::ControllerMode;
 use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
@@ -9,90 +9,91 @@ use greylag_link::autopilot::Mode;
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Angle that is one unit of distance, degrees; likewise altitude (m), time (s).
+/// Units of robustness: angle (degrees), altitude (m), time (s).
 const UNIT_DEG: f64 = 30.0;
 const UNIT_M: f64 = 100.0;
 const UNIT_S: f64 = 5.0;
-/// Altitude that a flight of turns, climbs and descents may lose, m.
+/// Altitude loss that is accepted in a flight of turns, climbs and descents, m.
 const ALTITUDE_LOSS_M: f64 = 400.0;
-/// What an aircraft was exposed to so long ago no longer explains anything, s.
+/// Time after which an exposure no longer explains a violation, s.
 const MEMORY_S: f64 = 3.0;
-/// Root mean square of a surface's fast movement, of its travel, that is an oscillation.
+/// Root mean square of a surface's fast movement, as a fraction of its travel, that counts as an oscillation.
 const SWING: f64 = 0.5;
-/// Longest time that a command is held, s: 50 ms, and half a step for the moments at which states come.
+/// Longest time for which a command is held, s: 50 ms, plus half a step for the arrival times of states.
 const HELD_S: f64 = 0.055;
-/// Time in which an attitude must be reached, s.
+/// Time within which an attitude must be reached, s.
 const REACHED_S: f64 = 5.0;
-/// Age of a decision beyond which it says nothing of now, s: longer than a starved processor sleeps.
+/// Age of a decision after which it is disregarded, s: longer than an overloaded processor suspends the companion.
 const STALE_S: f64 = 0.5;
-/// A complaint that comes again within this time is not repeated, s.
+/// Interval in which a repeated report is suppressed, s.
 const COMPLAINED_S: f64 = 5.0;
-/// Time within which an oscillation ends: the guard needs a second to see it, and hands back.
+/// Time within which an oscillation must end: the guard needs a second to detect it, and then returns control.
 const SWING_S: f64 = 2.5;
-/// Rounding of a step of the surfaces, and of a limit of the envelope (degrees).
+/// Tolerance for rounding of a surface step, and of an envelope limit (degrees).
 const ROUNDING: f64 = 1e-9;
 
-/// A flight at one step.
+/// Sample of a flight at one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// The last decision of the pilot; `None` before the first.
+    /// The pilot's last decision; `None` before the first.
     pub decision: Option<Decision>,
-    /// How old it is, s.
+    /// Age of that decision, s.
     pub age_s: f64,
-    /// For how long the command has been held over a gap of states, vehicle clock, s.
+    /// Time for which the command has been held over a gap of states, vehicle clock, s.
     pub held_s: f64,
-    /// Largest change of a surface's command by that decision, −1..1 being the travel; 0 where it is no new one.
+    /// Largest change of a surface command by that decision, −1..1 being the travel; 0 where it is not new.
     pub moved: f64,
-    /// Whether the flight controller flies what the companion sends; at the simulator's own link always.
+    /// Whether the flight controller executes the companion's commands; always true for the shim.
     pub steered: bool,
-    /// Whether the companion means to steer.
+    /// Whether the companion intends to control.
     pub engaged: bool,
-    /// Whether the flight controller has shown the companion that it flies what it is sent.
+    /// Whether the flight controller's mode has shown the companion that it executes its commands.
     pub confirmed: bool,
-    /// For how long nothing has come from the vehicle, s.
+    /// Time since the last arrival from the vehicle, s.
     pub silent_s: f64,
-    /// For how long the client has sent no setpoint, s.
+    /// Time since the client's last setpoint, s.
     pub client_silent_s: f64,
-    /// For how long the same attitude has been asked for and flown, in air without turbulence and without a fault of link,
+    /// Time for which the same attitude has been commanded and flown, without turbulence and without faults of link,
     /// sensors, clock or processor, s.
     pub steady_s: f64,
-    /// Roll and pitch, degrees.
+    /// Roll and pitch angle, degrees.
     pub attitude_deg: [f64; 2],
-    /// True airspeed, m/s.
+    /// True airspeed V_a, m/s.
     pub airspeed_mps: f64,
-    /// Altitude lost since the start, m.
+    /// Altitude loss since the start, m.
     pub lost_m: f64,
-    /// Root mean square of the fast movement of the surface that moves most, over about a second, of its travel; of surfaces
-    /// that the companion flies.
+    /// Root mean square of the fast movement of the most active surface, over about a second, as a fraction of its
+    /// travel; only for surfaces that the companion commands.
     pub swing: f64,
-    /// Whether the aircraft is exposed to what its companion cannot help: unsteered, blind, misled.
+    /// Whether the aircraft is exposed to a condition that its companion cannot prevent: uncommanded, without a
+    /// state, with a wrong sensor.
     pub exposed: bool,
-    /// Whether a fault acts on link, sensors, clock or processor.
+    /// Whether a fault of link, sensors, clock or processor is active.
     pub disturbed: bool,
-    /// Whether something was said to the ground stations.
+    /// Whether a text was sent to the ground stations.
     pub spoke: bool,
-    /// Whether somebody has asked for the companion to steer, and nobody has taken the aircraft since.
+    /// Whether the companion is requested to fly, and no other pilot has taken control since.
     pub asked: bool,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
-    /// What the companion shows to its clients; `None` while it is killed.
+    /// The companion's status for its clients; `None` while it is killed.
     pub shown: Option<Shown>,
-    /// The flight controller's mode; `None` at the simulator's own link.
+    /// The flight controller's mode; `None` for the shim.
     pub controller: Option<ControllerMode>,
-    /// The envelope as the companion's parameters have it.
+    /// The envelope in the companion's parameters.
     pub envelope: Envelope,
-    /// Silence of the client after which OFFBOARD ends, s; likewise.
+    /// The companion's offboard timeout, s.
     pub offboard_loss_s: f64,
 }
 
-/// What the companion shows to its clients.
+/// The companion's status for its clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shown {
-    /// Its mode.
+    /// The active mode.
     pub mode: Mode,
-    /// Whether its outputs are live.
+    /// Whether outputs are enabled.
     pub armed: bool,
-    /// Whether a failsafe is in force.
+    /// Whether a failsafe is active.
     pub failsafe: bool,
 }
 
@@ -101,7 +102,7 @@ impl Sample {
         self.decision.as_ref().is_some_and(holds)
     }
 
-    /// Attitude error, degrees, where an attitude is flown.
+    /// Attitude error, degrees, where an attitude is commanded.
     fn error_deg(&self) -> Option<f64> {
         let target = self.decision.as_ref()?.target;
         let off = (self.attitude_deg[0] - target.roll.to_degrees()).abs();
@@ -109,15 +110,15 @@ impl Sample {
     }
 }
 
-/// A rule.
+/// A flight rule.
 pub struct Policy {
-    /// Its name.
+    /// Name of the rule.
     pub id: &'static str,
-    /// What it asks, in words.
+    /// Its requirement as text.
     pub asks: &'static str,
-    /// It speaks of a flight controller: not judged at the simulator's own link.
+    /// Whether it applies to flight controllers only, not to the shim.
     pub of_controllers: bool,
-    /// What must always hold.
+    /// The formula that must always hold.
     pub always: Formula<Sample>,
 }
 
@@ -131,12 +132,12 @@ fn decided(holds: impl Fn(&Decision) -> bool + Send + Sync + 'static) -> Rule {
     is(move |s| s.decided(&holds))
 }
 
-/// Holds unless the aircraft was exposed a moment ago.
+/// Holds unless the aircraft was exposed recently.
 fn unless_exposed(rule: Rule) -> Rule {
     is(|s| s.exposed).once(MEMORY_S).or(rule)
 }
 
-/// The attitude error is below `most` degrees, where an attitude is flown.
+/// The attitude error is below `most` degrees, where an attitude is commanded.
 fn near(most: f64) -> Rule {
     Formula::atom(move |s: &Sample| s.error_deg().map_or(1.0, |e| (most - e) / most))
 }
@@ -146,18 +147,18 @@ fn steady_for_less(seconds: f64) -> Rule {
     Formula::atom(move |s: &Sample| (seconds - s.steady_s) / UNIT_S)
 }
 
-/// Whatever begins is reported within a second, or was a moment ago.
+/// The start of `event` is reported within a second, or was reported recently.
 fn reported(event: Rule) -> Rule {
     let spoke = || is(|s| s.spoke);
     event.rises().implies(spoke().eventually(1.0).or(spoke().once(COMPLAINED_S)))
 }
 
-/// What the pilot has decided ends within `seconds`, or it decides nothing any more.
+/// The condition on the pilot's decision ends within `seconds`, or the decisions end.
 fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds: f64) -> Rule {
     is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
 }
 
-/// The angle `of` a target lies between two of the envelope, degrees, where an attitude is flown.
+/// The angle `of` a target is between two limits of the envelope, degrees, where an attitude is commanded.
 fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rule {
     Formula::atom(move |s: &Sample| {
         let [least, most] = ends(&s.envelope);
@@ -166,7 +167,7 @@ fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rul
     })
 }
 
-/// Every rule for an aircraft of this envelope.
+/// All rules for an aircraft with this envelope.
 pub fn policies(envelope: &Envelope) -> Vec<Policy> {
     let mut all = of_commands();
     all.extend(of_the_aircraft(envelope));

@@ -1,4 +1,4 @@
-//! A flight under faults as data: what befalls it, what is asked for, in which air.
+//! A flight under faults as data: faults, requests, air.
 
 use greylag_sitl::air::Turbulence;
 use greylag_sitl::plant::PlantOptions;
@@ -9,47 +9,47 @@ use super::counterpart::Counterpart;
 use super::mix::{FIRST_S, Fault, FaultKind, LAST_S, draw, one};
 use greylag_link::autopilot::Mode;
 
-/// Fewest and most faults, requests and legs of a scenario that is varied.
+/// Smallest and largest numbers of faults, requests and legs of a random scenario.
 const MOST: usize = 4;
-/// Strongest steady wind, m/s, and turbulence (curve of MIL-F-8785C) of a scenario.
+/// Largest steady wind, m/s, and turbulence (curve of MIL-F-8785C) of a scenario.
 const WIND_MPS: f64 = 8.0;
 const TURBULENCE: u8 = 4;
 
-/// An attitude that the client asks for from a moment on.
+/// An attitude that the client commands from a given time on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Leg {
-    /// From when, s.
+    /// Start of the leg, s.
     pub from_s: f64,
-    /// Roll, degrees.
+    /// Commanded roll, degrees.
     pub roll_deg: f64,
-    /// Pitch, degrees.
+    /// Commanded pitch, degrees.
     pub pitch_deg: f64,
 }
 
-/// Something that a client or a ground station asks for.
+/// A request of a client or a ground station.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Asked {
-    /// When, s.
+    /// Time of the request, s.
     pub at_s: f64,
-    /// What.
+    /// The kind of request.
     pub what: Asking,
 }
 
-/// What is asked for.
+/// Requests of clients and ground stations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Asking {
-    /// The client asks the companion for OFFBOARD.
+    /// The client requests OFFBOARD.
     Offboard,
-    /// The client asks the companion for HOLD.
+    /// The client requests HOLD.
     Hold,
-    /// The client asks the companion to disarm; in the air it refuses.
+    /// The client requests disarming, which is refused in flight.
     Disarm,
-    /// The client asks the companion to arm.
+    /// The client requests arming.
     Arm,
-    /// A ground station takes the aircraft: it sets the flight controller's own loiter mode. Nothing at the simulator's link.
+    /// A ground station sets the flight controller's own loiter mode. No effect at the shim.
     TakeOver,
 }
 
@@ -58,18 +58,18 @@ impl Asking {
         [Asking::Offboard, Asking::Hold, Asking::Disarm, Asking::Arm, Asking::TakeOver];
 }
 
-/// A parameter of the companion with another value than its own, set before the flight.
+/// A parameter of the companion that differs from its default, set before the flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Setting {
-    /// Its name: `GL_` and so on.
+    /// Name of the parameter: `GL_` and so on.
     pub name: String,
     /// Its value as a multiple of the default.
     pub times: f64,
 }
 
-/// The parameters that are varied, with the least and the most multiple of the default. The envelope gets narrower, never
-/// wider: what lies outside it nobody promises.
+/// The parameters that are varied, with the smallest and largest multiple of the default. The envelope is only
+/// narrowed: wider ones carry no guarantee.
 const SETTINGS: [(&str, [f64; 2]); 9] = [
     ("GL_OFFB_LOSS_S", [0.3, 3.0]),
     ("GL_VEH_LOSS_S", [0.3, 3.0]),
@@ -82,21 +82,21 @@ const SETTINGS: [(&str, [f64; 2]); 9] = [
     ("GL_SLEW_THR", [0.2, 4.0]),
 ];
 
-/// A parameter of the flight controller with another value than the played one has.
+/// A parameter of the flight controller that differs from the simulated default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControllerSetting {
-    /// Its name, of PX4 or ArduPilot.
+    /// Name of the parameter in PX4 or ArduPilot.
     pub name: String,
-    /// Its value, in the stack's unit.
+    /// Its value in the stack's unit.
     pub value: f64,
 }
 
-/// Values of parameters.
+/// Values of flight-controller parameters.
 type Values = [(&'static str, &'static [f64])];
 
-/// PX4's parameters that are varied, with the values that are tried: right ones, wrong ones, and the stack's own defaults. What the
-/// companion cannot fly safely with it has to refuse.
+/// PX4 parameters that are varied, with their values: right ones, wrong ones, and the stack's own defaults. The
+/// companion must refuse those with which it cannot fly safely.
 const PX4_SETTINGS: &Values = &[
     ("COM_RC_IN_MODE", &[0.0, 1.0, 2.0, 3.0, 4.0]),
     ("COM_RC_LOSS_T", &[0.1, 0.5, 1.0, 5.0]),
@@ -111,7 +111,7 @@ const PX4_SETTINGS: &Values = &[
     ("IMU_GYRO_CUTOFF", &[5.0, 20.0, 40.0, 80.0]),
 ];
 
-/// ArduPilot's, likewise.
+/// ArduPilot parameters that are varied, with their values.
 const ARDUPILOT_SETTINGS: &Values = &[
     ("SERVO1_REVERSED", &[0.0, 1.0]),
     ("SERVO2_REVERSED", &[0.0, 1.0]),
@@ -132,33 +132,33 @@ const ARDUPILOT_SETTINGS: &Values = &[
     ("RC2_TRIM", &[1400.0, 1500.0, 1600.0]),
 ];
 
-/// A flight of 60 s.
+/// Conditions of a flight of 60 s.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// What is at the other end of the vehicle's link.
+    /// The vehicle's end of the link.
     pub counterpart: Counterpart,
-    /// From which everything random follows that is not written here: noise, what a wire loses.
+    /// Seed of the random numbers that are not part of the scenario: noise, losses of a link.
     pub seed: u64,
     /// Steady wind, the velocity of the air over the ground, north-east-down, m/s.
     pub wind_ned_mps: [f64; 3],
     /// Turbulence: a probability-of-exceedance curve of MIL-F-8785C, 1 to 7; 0 for none.
     pub turbulence: u8,
-    /// What goes wrong.
+    /// The faults of the flight.
     pub faults: Vec<Fault>,
-    /// What the client wants flown, by time.
+    /// Attitudes commanded by the client, in order of time.
     pub legs: Vec<Leg>,
-    /// What is asked for besides.
+    /// Other requests, in order of time.
     pub asked: Vec<Asked>,
-    /// Parameters of the companion that are not their defaults.
+    /// Parameters of the companion that differ from their defaults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Setting>,
-    /// Parameters of the flight controller that are not as the played one has them.
+    /// Parameters of the flight controller that differ from the simulated defaults.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub controller_parameters: Vec<ControllerSetting>,
 }
 
-/// What the client asks for unless a scenario says otherwise: turns both ways, a climb, a descent.
+/// Default legs of the client: turns both ways, a climb, a descent.
 const LEGS: [(f64, f64, f64); 6] = [
     (0.0, 0.0, 3.0),
     (12.0, 35.0, 5.0),
@@ -169,7 +169,7 @@ const LEGS: [(f64, f64, f64); 6] = [
 ];
 
 impl Scenario {
-    /// The flight of a seed in the campaign of faults: still air, six legs, nothing else asked for.
+    /// The flight of a seed in the fault campaign: still air, six legs, no other requests.
     pub fn of_seed(counterpart: Counterpart, seed: u64) -> Scenario {
         let leg = |(from_s, roll_deg, pitch_deg)| Leg { from_s, roll_deg, pitch_deg };
         Scenario {
@@ -185,7 +185,7 @@ impl Scenario {
         }
     }
 
-    /// A flight drawn at random.
+    /// A random scenario.
     pub fn drawn(counterpart: Counterpart, random: &mut impl Rng) -> Scenario {
         let mut scenario = Scenario::of_seed(counterpart, random.random_range(0..1_000_000));
         for _ in 0..4 {
@@ -194,7 +194,7 @@ impl Scenario {
         scenario
     }
 
-    /// The same with one thing changed.
+    /// A copy with one random change.
     pub fn varied(&self, random: &mut impl Rng) -> Scenario {
         let mut changed = self.clone();
         match random.random_range(0..14) {
@@ -228,7 +228,7 @@ impl Scenario {
                 fault.strength = (fault.strength + random.random_range(-0.3..0.3)).clamp(0.0, 1.0);
             }
             7 if changed.legs.len() > 1 => {
-                // the last is level, which is what the end is judged by
+                // the last leg is level, which the end is judged by
                 let place = random.random_range(0..changed.legs.len() - 1);
                 let leg = &mut changed.legs[place];
                 leg.roll_deg = random.random_range(-60.0..60.0);
@@ -260,7 +260,7 @@ impl Scenario {
         self.controller_parameters.push(ControllerSetting { name: name.into(), value });
     }
 
-    /// Each scenario with less in it.
+    /// All scenarios with one element less.
     pub fn smaller(&self) -> Vec<Scenario> {
         let mut all = Vec::new();
         let mut with = |change: &dyn Fn(&mut Scenario)| {
@@ -305,7 +305,7 @@ impl Scenario {
             plant.air.wind_ned_mps = self.wind_ned_mps;
         }
         if self.turbulence > 0 {
-            // twenty feet above ground plays no part at the altitude of these flights
+            // the wind at twenty feet has no effect at the altitude of these flights
             let turbulence = Turbulence { wind_20ft_mps: 7.6, severity: self.turbulence };
             plant.air.turbulence = Some(turbulence);
             plant.seed = self.seed as u32;
@@ -314,7 +314,7 @@ impl Scenario {
     }
 }
 
-/// The mode that the client asks the companion for, if it is one.
+/// The requested mode of the companion, if it is one.
 pub(super) fn mode_of(asking: Asking) -> Option<Mode> {
     match asking {
         Asking::Offboard => Some(Mode::Offboard),

@@ -1,5 +1,5 @@
-//! A search for flights that break a rule: each step varies the flight that came nearest to it (PGFuzz, Kim et al., NDSS
-//! 2021), and what breaks a rule is made smaller.
+//! Search for flights that violate a rule: each step varies the flight closest to a violation (PGFuzz, Kim et al.,
+//! NDSS 2021), and violating flights are reduced.
 
 use std::ops::ControlFlow;
 
@@ -15,37 +15,38 @@ use super::scenario::Scenario;
 use greylag_flight::pilot::TICK_S;
 use greylag_num::stream::stream;
 
-/// Flights that are flown side by side; the search is the same on any number of cores.
+/// Flights per round in parallel; the result is the same on any number of cores.
 const TOGETHER: u64 = 16;
-/// Share of the flights that are drawn afresh.
+/// Fraction of flights drawn at random.
 const FRESH: f64 = 0.25;
-/// Most rounds in which a flight is made smaller.
+/// Largest number of rounds of a reduction.
 const ROUNDS: usize = 8;
-/// Stream of the search.
+/// Random stream of the search.
 const SEARCH: u64 = 61;
 
-/// How near a flight came to breaking a rule.
+/// Closest approach to the violation of a rule.
 #[derive(Clone, Debug)]
 pub struct Nearest {
-    /// The rule's name.
+    /// Name of the rule.
     pub policy: &'static str,
-    /// What it asks.
+    /// Its requirement as text.
     pub asks: &'static str,
-    /// Flights that it was judged in.
+    /// Number of flights in which it was judged.
     pub flights: u64,
-    /// Flights that broke it.
+    /// Number of flights that violated it.
     pub broken: u64,
-    /// The least distance of all flights, 1 at most; below 0 the rule is broken.
+    /// Smallest robustness of all flights, 1 at most; negative when violated.
     pub distance: f64,
-    /// When, s.
+    /// Time of the minimum, s.
     pub at_s: f64,
-    /// That flight; made smaller if it breaks the rule.
+    /// That flight, reduced if it violates the rule.
     pub scenario: Option<Scenario>,
 }
 
-/// How near `scenario` comes to each of `rules` that applies: distance and moment (s). A panic breaks all of them.
+/// Robustness and time (s) of its minimum of `scenario` for each applicable rule. A panic violates all.
 ///
 /// # Errors
+///
 /// If the aircraft cannot be loaded.
 pub fn distances(
     factory: &CompanionFactory,
@@ -56,7 +57,7 @@ pub fn distances(
     Ok(judged(rules, scenario.counterpart, &samples, &found))
 }
 
-/// The same of a flight that was flown with `counterpart`: its samples, and what the judge of a flight found.
+/// Robustness of a flight with `counterpart` from its samples and findings.
 pub fn judged(
     rules: &[Policy],
     counterpart: Counterpart,
@@ -79,10 +80,11 @@ fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
     (distance, place as f64 * TICK_S)
 }
 
-/// Flies `flights` flights with the companions of `factory` at the `counterparts`, always nearer to breaking a rule of
-/// `rules`; `heard` hears of the flights flown and the rules broken by then, and ends the search.
+/// Flies `flights` flights with companions of `factory` at the `counterparts`, steering towards violations of
+/// `rules`; `heard` is called with the numbers of flights and violations so far, and can cancel the search.
 ///
 /// # Errors
+///
 /// If the aircraft cannot be loaded.
 pub fn search(
     factory: &CompanionFactory,
@@ -149,7 +151,7 @@ impl Nearest {
         }
     }
 
-    /// Takes out of the flight what it does not need to break the rule `k`.
+    /// Removes from the flight what the violation of rule `k` does not need.
     fn shrink(
         &mut self,
         factory: &CompanionFactory,

@@ -1,8 +1,8 @@
-//! Signal temporal logic over sampled flights: how far a formula is from being violated.
+//! Signal temporal logic over sampled flights: the robustness of a formula.
 //!
-//! Robust semantics (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued Signals, FORMATS 2010): a
-//! formula is a number at each sample, positive where it holds, negative where it is violated, and the size says by how
-//! much. Windows that reach beyond the end of the flight are not held against it.
+//! Robust semantics (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued Signals, FORMATS 2010):
+//! a formula has a value at each sample, positive where it holds and negative where it is violated, whose magnitude
+//! is the margin. Windows that extend past the end of the flight are cut off there.
 
 use std::collections::VecDeque;
 
@@ -10,44 +10,44 @@ use greylag_flight::pilot::TICK_S;
 
 /// A formula over samples `S`, one every tick of 10 ms.
 pub enum Formula<S> {
-    /// A distance, −1..1: positive where the statement holds. What is not a number is −1.
+    /// A robustness value, −1..1: positive where the statement holds. NaN counts as −1.
     Atom(Box<dyn Fn(&S) -> f64 + Send + Sync>),
-    /// The formula does not hold.
+    /// Negation: the formula does not hold.
     Not(Box<Formula<S>>),
-    /// All hold.
+    /// Conjunction: all hold.
     All(Vec<Formula<S>>),
-    /// One of them holds.
+    /// Disjunction: one of them holds.
     Any(Vec<Formula<S>>),
-    /// It holds at some sample of the next so many seconds.
+    /// Eventually: it holds at some sample of the next so many seconds.
     Eventually(f64, Box<Formula<S>>),
-    /// It has held at some sample of the last so many seconds.
+    /// Once: it has held at some sample of the last so many seconds.
     Once(f64, Box<Formula<S>>),
-    /// It holds now and did not at the sample before.
+    /// Rise: it holds now and did not at the previous sample.
     Rises(Box<Formula<S>>),
 }
 
 impl<S> Formula<S> {
-    /// A distance in units in which 1 is as good or bad as it gets.
+    /// A robustness scaled and clamped to −1..1.
     pub fn atom(distance: impl Fn(&S) -> f64 + Send + Sync + 'static) -> Self {
         Formula::Atom(Box::new(distance))
     }
 
-    /// A statement that holds or does not.
+    /// A Boolean statement with robustness ±1.
     pub fn is(statement: impl Fn(&S) -> bool + Send + Sync + 'static) -> Self {
         Formula::atom(move |sample| if statement(sample) { 1.0 } else { -1.0 })
     }
 
-    /// `self` implies `then`.
+    /// Implication: `self` implies `then`.
     pub fn implies(self, then: Self) -> Self {
         Formula::Any(vec![Formula::Not(Box::new(self)), then])
     }
 
-    /// Or `other` holds.
+    /// Disjunction of `self` and `other`.
     pub fn or(self, other: Self) -> Self {
         Formula::Any(vec![self, other])
     }
 
-    /// And `other` holds.
+    /// Conjunction of `self` and `other`.
     pub fn and(self, other: Self) -> Self {
         Formula::All(vec![self, other])
     }
@@ -62,12 +62,12 @@ impl<S> Formula<S> {
         Formula::Once(seconds, Box::new(self))
     }
 
-    /// It holds now and did not at the sample before.
+    /// It holds now and did not at the previous sample.
     pub fn rises(self) -> Self {
         Formula::Rises(Box::new(self))
     }
 
-    /// The distance at each sample.
+    /// The robustness at each sample.
     pub fn distances(&self, samples: &[S]) -> Vec<f64> {
         match self {
             Formula::Atom(distance) => samples
@@ -96,8 +96,7 @@ impl<S> Formula<S> {
         }
     }
 
-    /// The least distance of the flight with its sample: how nearly the formula fails to hold always. `None` without
-    /// samples.
+    /// The smallest robustness of the flight, with its sample; `None` without samples.
     pub fn least(&self, samples: &[S]) -> Option<(usize, f64)> {
         self.distances(samples).into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -120,9 +119,9 @@ fn together<S>(
     sum
 }
 
-/// The largest of each value and the `before` ones before it; `beyond` stands for those before the first.
+/// Maximum of each value and the `before` values before it; `beyond` replaces those before the first.
 fn largest_of_the_last(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
-    // places whose values fall: the first is the largest of the window
+    // indices with falling values: the first is the maximum of the window
     let mut falling = VecDeque::<usize>::new();
     let mut largest = Vec::with_capacity(values.len());
     for (place, value) in values.iter().enumerate() {

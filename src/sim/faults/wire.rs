@@ -1,4 +1,4 @@
-//! A wire that suffers from the faults in force.
+//! A link with the active faults applied.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,19 +8,19 @@ use super::mix::{Fault, FaultKind};
 /// One direction of a link, step by step.
 pub struct Wire {
     random: ChaCha8Rng,
-    /// Batches under way: the step at which they arrive, their bytes.
+    /// Batches in transit: arrival step and bytes.
     under_way: Vec<(u64, Vec<u8>)>,
 }
 
 impl Wire {
-    /// A wire of flight `seed`; `direction` gives each its own random numbers.
+    /// A link of flight `seed`; each `direction` has its own random numbers.
     pub fn new(seed: u64, direction: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(10 + direction);
         Wire { random, under_way: Vec::new() }
     }
 
-    /// Puts a batch on the wire at `step`, under `faults` in force.
+    /// Sends a batch at `step` under the active `faults`.
     pub fn send(&mut self, step: u64, mut bytes: Vec<u8>, faults: &[Fault]) {
         let mut arrives = step;
         let mut copies = 1;
@@ -53,7 +53,7 @@ impl Wire {
         (0..copies).for_each(|_| self.under_way.push((arrives, bytes.clone())));
     }
 
-    /// The batches that arrive at `step`, in the order in which they do.
+    /// The batches that arrive at `step`, in order of arrival.
     pub fn receive(&mut self, step: u64) -> Vec<Vec<u8>> {
         let (now, later) =
             std::mem::take(&mut self.under_way).into_iter().partition(|(at, _)| *at <= step);
@@ -75,7 +75,7 @@ impl Wire {
         }
     }
 
-    /// Noise, half a frame, or a frame of another system.
+    /// Noise, an incomplete frame, or a frame of another system.
     fn garbage(&mut self, good: &[u8]) -> Vec<u8> {
         match self.random.random_range(0..3) {
             0 => (0..self.random.random_range(1..300)).map(|_| self.random.random()).collect(),

@@ -1,4 +1,4 @@
-//! The effects of the model with their coefficients, from slopes and polar.
+//! Effects of the imported model with their coefficients, from slopes and polar.
 
 use super::fits::line;
 use super::propeller::Propeller;
@@ -7,12 +7,12 @@ use greylag_model::textbook::Estimate;
 use greylag_physics::catalogue::describe;
 use greylag_physics::size::Size;
 
-/// An effect of the model file with its numbers.
+/// An effect of the model file with its coefficients.
 pub(super) type Effect = (&'static str, Vec<Estimate>);
 
 const SOURCE: &str = "central difference of JSBSim's loads";
 
-/// Keeps coefficients within what their effects take of an aircraft of that size; what is cut off is said.
+/// Clamps coefficients to the plausible range for an aircraft of that size; clamping is reported.
 fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut Vec<String>) {
     let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
     for estimate in estimates {
@@ -29,7 +29,7 @@ fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut
     }
 }
 
-/// The effects of the model with their coefficients.
+/// All effects of the model with their coefficients.
 pub(super) fn effects(
     polar: &Polar,
     slopes: &Slopes,
@@ -82,11 +82,11 @@ pub(super) fn effects(
     all
 }
 
-/// Rate derivatives of lift and pitching moment that are none.
+/// Rate derivatives of lift and pitching moment below which they count as zero.
 const NO_RATE: f64 = 1e-3;
 
 impl Beside {
-    /// Adds its effects, and takes from the linear coefficients what these now hold.
+    /// Adds its effects, and subtracts their contribution from the linear coefficients.
     fn put(&self, all: &mut Vec<Effect>) {
         let [lift, pitch] = [self.alpha_rate[2], self.alpha_rate[4]];
         if lift.abs() > NO_RATE || pitch.abs() > NO_RATE {
@@ -154,7 +154,7 @@ impl Propeller {
     }
 }
 
-/// Gives the coefficient `name` of `effect` another value.
+/// Sets the coefficient `name` of `effect`.
 fn set(all: &mut [Effect], effect: &str, name: &str, value: f64) {
     let own = all.iter_mut().filter(|(id, _)| *id == effect).flat_map(|(_, numbers)| numbers);
     own.filter(|number| number.0 == name).for_each(|number| number.1 = value);

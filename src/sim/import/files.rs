@@ -1,4 +1,4 @@
-//! The files of an imported aircraft.
+//! The files of an imported aircraft: airframe and model.
 
 use greylag_sitl::plant::{MassProperties, Stops, Travel};
 
@@ -10,10 +10,10 @@ use greylag_model::textbook::{Estimate, incidence_limits, numbers};
 use greylag_num::{Grid, Table};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
 
-/// Share of the pitching moment's variation below which it is a line over incidence.
+/// Deviation from linearity, as a fraction of the pitching moment's variation, below which it is written as a line.
 const STRAIGHT: f64 = 1e-3;
 
-/// The airframe file.
+/// Text of the airframe file.
 pub(super) fn airframe(
     subject: &Subject,
     name: &str,
@@ -54,7 +54,7 @@ pub(super) fn airframe(
     let incidence = polar.incidence(lift);
     let limits = incidence_limits(incidence, polar.incidence(lift_max));
     let descent = descent(subject, polar, thrust, [incidence, lift]);
-    // a glider's pitch angles lie about those of its descent
+    // a glider's pitch limits are relative to its descent
     let lowest = (5.0 * ((incidence - descent).to_degrees() / 5.0 - 2.0).floor()).min(-15.0);
     out += &format!(
         "[controls.throttle]\nlag_s = {{ value = {lag:.4}, source = \"step of the command\" }}\n\n{limits}\
@@ -67,8 +67,8 @@ pub(super) fn airframe(
     out
 }
 
-/// Angle below the horizon, rad, at which the aircraft descends at the reference airspeed with idle throttle if
-/// full throttle does not hold it level; else zero.
+/// Descent angle, rad, at the reference airspeed with idle throttle if full throttle does not hold level flight; else
+/// zero.
 fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]: [f64; 2]) -> f64 {
     let v = subject.start.airspeed_mps;
     let density = standard_density(subject.start.altitude_m);
@@ -81,7 +81,7 @@ fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]:
     if at(1.0) >= drag { 0.0 } else { ((drag - at(0.0)) / lift).atan().max(0.0) }
 }
 
-/// The model file.
+/// Text of the model file.
 pub(super) fn model_file(
     name: &str,
     mass: &MassProperties,
@@ -154,7 +154,7 @@ fn thrust_table(table: &Grid) -> String {
     )
 }
 
-/// The tables of lift and drag over incidence, and of what the pitching moment departs from a line if it does.
+/// Tables of lift and drag over incidence, and of the nonlinear part of the pitching moment where it has one.
 fn tables(polar: &Polar) -> String {
     let mut out = String::new();
     let [zero, slope, bent] = line(polar);

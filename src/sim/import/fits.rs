@@ -1,4 +1,4 @@
-//! Lines and filters through what was measured of an aircraft.
+//! Fits of lines and filters to the measured behaviour of an aircraft.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,10 +7,10 @@ use greylag_num::least_squares;
 use greylag_num::statistics::mean;
 use greylag_physics::servos::{Surface, Travel};
 
-/// Incidences over which the pitching moment is taken as a line, degrees.
+/// Incidence range of the line through the pitching moment, degrees.
 const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 
-/// Intercept and slope of the pitching moment over incidence, and the share of its variation beside.
+/// Intercept and slope of the pitching moment over incidence, and the fraction of its variation that is left.
 pub(super) fn line(polar: &Polar) -> [f64; 3] {
     let [low, high] = LINE_DEG;
     let inside = |a: &f64| (low - 1e-6..=high + 1e-6).contains(&a.to_degrees());
@@ -23,7 +23,7 @@ pub(super) fn line(polar: &Polar) -> [f64; 3] {
     [first, slope, (left / square(&|k| moments[k] - middle).max(1e-30)).sqrt()]
 }
 
-/// Frequency and damping of the filter whose step response is closest to `observed`.
+/// Frequency and damping of the second-order filter whose step response is closest to `observed`.
 pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     let miss = |frequency: f64, damping: f64| {
         let Surface { filter: [b, a1, a2], .. } =
@@ -41,17 +41,17 @@ pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     all.min_by(|a, b| miss(a[0], a[1]).total_cmp(&miss(b[0], b[1]))).unwrap_or([50.0, 0.7])
 }
 
-/// Part of a step below which a throttle does not answer: a glider has none.
+/// Fraction of a step below which a throttle has no effect: a glider has none.
 const NO_ANSWER: f64 = 0.01;
-/// Lag of a throttle that shows none, s.
+/// Lag of a throttle without a measurable one, s.
 const USUAL_LAG_S: f64 = 0.2;
 
-/// Time constant (s) by which `observed` follows a step, by the time to 63 % of its end.
+/// Time constant (s) of the step response `observed`, from the time to 63 % of its end.
 pub(super) fn first_order(observed: &[f64]) -> f64 {
     let end = 0.5;
     match observed.iter().position(|x| *x >= 0.632 * end) {
         Some(k) => (0.01 * k as f64).max(0.01),
-        // slower than was waited for: by what it has done
+        // slower than the observation time: from the part of the step reached
         None => {
             let last = observed.last().copied().unwrap_or(0.0) / end;
             if last < NO_ANSWER {
@@ -62,28 +62,28 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
     }
 }
 
-/// Time constants that are tried for the thrust, s: from one step to what the effect takes.
+/// Range of time constants for the thrust, s: from one step to the effect's largest.
 const THRUST_LAGS_S: [f64; 2] = [0.01, 10.0];
-/// Part of the answer to a step beyond which what a lag leaves shows that it is none.
+/// Remaining fraction of a step response above which a lag does not describe it.
 const NO_LAG: f64 = 0.5;
-/// What a lag must leave at most of what none leaves.
+/// Largest ratio of the residual with a lag to that without.
 const MUCH_BETTER: f64 = 0.8;
-/// Number of them, in equal ratios.
+/// Number of time constants, geometrically spaced.
 const THRUST_LAGS: usize = 400;
 
-/// The lag between throttle position and thrust.
+/// First-order lag between throttle position and thrust.
 pub(super) struct ThrustLag {
-    /// Time constant, s.
+    /// Time constant in s.
     pub lag: f64,
-    /// What it leaves of the answer to a step: rms as a share of the thrust's change.
+    /// Residual of the step response: rms as a fraction of the thrust's change.
     pub left: f64,
-    /// Whether it describes the answer to a step at all, and small movements better than none does.
+    /// Whether it describes the step response, and small movements better than no lag does.
     pub better: bool,
 }
 
-/// The lag that follows the answer to a step of the throttle best, judged by the answer to a wave; `answers` are thrust
-/// and throttle position after each `step` (s). The settled thrust is `slope` δ + `curve` δ² and a constant. `None` where the
-/// thrust does not change, or follows at once as well as with a lag.
+/// The lag with the best fit to a step response, validated on the response to a sine; `answers` are thrust and
+/// throttle position after each `step` (s). The settled thrust is `slope` δ + `curve` δ² and a constant. `None` where
+/// the thrust does not change, or no lag fits as well.
 pub(super) fn thrust_lag(
     [raised, waved]: [&[[f64; 2]]; 2],
     step: f64,
@@ -96,7 +96,7 @@ pub(super) fn thrust_lag(
     if (last[1] - first[1]).abs() < NO_ANSWER || rise.abs().min(expected.abs()) < 1e-3 * largest {
         return None;
     }
-    // rms of what a lag leaves of an answer, in parts of the step's rise
+    // rms residual of a lag, as a fraction of the step
     let misfit = |answer: &[[f64; 2]], lag: f64| {
         let [thrust, throttle] = answer.first().copied().unwrap_or_default();
         let (gain, keep) = (step / (2.0 * lag + step), (2.0 * lag - step) / (2.0 * lag + step));

@@ -1,22 +1,22 @@
-//! Lateral derivatives of the wing that grow with its lift.
+//! Lateral derivatives of the wing that depend on its lift coefficient.
 
 use greylag_sitl::plant::{Inputs, PlantError, Start};
 
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject};
 
-/// Change between the two incidences below which a derivative is constant, in parts of the largest of its kind.
+/// Relative change between two incidences below which a derivative is constant.
 const CONSTANT: f64 = 0.02;
 
-/// Derivatives by lift coefficient with what is left of them without lift.
+/// Derivatives linear in the lift coefficient.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WithLift {
-    /// Clr, Clβ, Cnp, Cnβ without lift.
+    /// Clr, Clβ, Cnp, Cnβ at zero lift.
     pub(super) without: [f64; 4],
-    /// What a unit of the lift coefficient adds to each.
+    /// Their slopes over the lift coefficient.
     pub(super) by_lift: [f64; 4],
 }
 
-/// Rolling and yawing moment of the aileron, 1/rad, without incidence, and what a radian of incidence adds, 1/rad².
+/// Rolling and yawing moment of the aileron at zero incidence, 1/rad, and their slopes over incidence, 1/rad².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AileronOverIncidence {
     pub(super) without: [f64; 2],
@@ -24,8 +24,8 @@ pub(super) struct AileronOverIncidence {
 }
 
 impl Subject<'_> {
-    /// Clδa and Cnδa at two incidences, where the aileron is at `unit` (rad) at [`COMMAND`]; `None` where they hardly
-    /// differ.
+    /// Clδa and Cnδa at two incidences, where the aileron is at `unit` (rad) at [`COMMAND`]; `None` where they are
+    /// nearly equal.
     pub(super) fn aileron_over_incidence(
         &mut self,
         unit: f64,
@@ -45,7 +45,7 @@ impl Subject<'_> {
         Ok(changes.then_some(AileronOverIncidence { without, by_incidence }))
     }
 
-    /// Clr, Clβ, Cnp and Cnβ at two incidences; `None` where they hardly differ.
+    /// Clr, Clβ, Cnp and Cnβ at two incidences; `None` where they are nearly equal.
     pub(super) fn lateral_with_lift(&mut self) -> Result<Option<WithLift>, PlantError> {
         let mut at = [[0.0; 5]; 2];
         for (own, sign) in at.iter_mut().zip([-1.0, 1.0]) {

@@ -1,4 +1,4 @@
-//! What a running propeller does beside its thrust: slipstream over the tail, gyroscopic moments, P-factor.
+//! Effects of a running propeller other than thrust: slipstream on the tail, gyroscopic moments, P-factor.
 
 use greylag_sitl::plant::{Inputs, PlantError, Start, Travel};
 
@@ -6,32 +6,32 @@ use super::propulsion::{LBF_FT, NO_ARM};
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
 use greylag_num::least_squares;
 
-/// Throttles at which the engines are settled.
+/// Throttle values at which the engines are settled.
 const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
-/// Share of what full throttle adds to a surface's moment, below which there is no slipstream.
+/// Fraction of a surface's moment that full throttle must add to count as slipstream.
 const NO_SLIPSTREAM: f64 = 0.01;
-/// Angular momentum that is none, in parts of mass · span² per second.
+/// Angular momentum that counts as zero, as a fraction of mass · span² per second.
 const NO_MOMENTUM: f64 = 1e-4;
-/// Distance of the thrust from the hub that is none, chords by radian.
+/// Distance of the thrust from the hub that counts as zero, chords per radian.
 const NO_OFFSET: f64 = 1e-2;
 
-/// What of it the aircraft has.
+/// Propeller effects of the aircraft.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Propeller {
-    /// Pitching moment due to elevator without thrust, 1/rad, and what thrust over dynamic pressure and area adds to it.
+    /// Elevator effectiveness without thrust, 1/rad, and its slope over thrust divided by dynamic pressure and area.
     pub(super) elevator: Option<[f64; 2]>,
-    /// The same of yawing moment and rudder.
+    /// The same two coefficients of yawing moment and rudder.
     pub(super) rudder: Option<[f64; 2]>,
-    /// Angular momentum without throttle and what full throttle adds, N m s.
+    /// Angular momentum at idle and its increase at full throttle, N m s.
     pub(super) gyro: Option<[f64; 2]>,
-    /// How far to the left of the centre of gravity the thrust acts, m.
+    /// Lateral offset of the thrust to the left of the centre of gravity, m.
     pub(super) sideways: Option<f64>,
-    /// Distance of the thrust from the hub by incidence, chords.
+    /// Slope of the thrust's distance from the hub over incidence, chords per rad.
     pub(super) p_factor: Option<f64>,
 }
 
 impl Subject<'_> {
-    /// Measures it about the reference state.
+    /// Measures the effects about the reference state.
     pub(super) fn propeller(&mut self, travel: &Travel) -> Result<Propeller, PlantError> {
         let base = Start { alpha_rad: ALPHA, ..self.start };
         let elevator =
@@ -70,7 +70,7 @@ impl Subject<'_> {
         })
     }
 
-    /// Thrust (N), and pitching and yawing moment of the engines (N m), settled in `state`.
+    /// Settled thrust (N), and pitching and yawing moment of the engines (N m), in `state`.
     fn engine_moments(
         &mut self,
         state: &Start,
@@ -82,8 +82,8 @@ impl Subject<'_> {
         Ok((thrust, [moment("moments/m-prop-lbsft"), moment("moments/n-prop-lbsft")]))
     }
 
-    /// Slope of the moment coefficient `of` by a surface that `set` commands to ± `unit` (rad): without thrust, and by thrust
-    /// over dynamic pressure and area.
+    /// Slope of the moment coefficient `of` over a surface that `set` commands to ± `unit` (rad): without thrust, and
+    /// over thrust divided by dynamic pressure and area.
     fn slipstream(
         &mut self,
         base: &Start,

@@ -1,4 +1,4 @@
-//! What the engines of an aircraft do: settled thrust, its lag, the moments it makes.
+//! Propulsion of an aircraft: settled thrust, its lag, its moments.
 
 use greylag_sitl::plant::{PlantError, Start};
 
@@ -8,43 +8,43 @@ use greylag_model::textbook::Estimate;
 use greylag_num::{Grid, least_squares};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Share of a channel's variation that is worth a word when it is left.
+/// Fraction of a channel's variation that is reported when it is left.
 const WORTH_SAYING: f64 = 0.02;
-/// Throttle before and after the step that shows the engine's lag.
+/// Throttle before and after the step that measures the engine's lag.
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
-/// Part of that step beyond which it is said that the engine's answer is no first-order lag.
+/// Fraction of that step above which the response is reported not to be a first-order lag.
 const LAG_WORTH_SAYING: f64 = 0.1;
-/// How long the answer to the step is watched, s.
+/// Observation time of the step response, s.
 const STEP_S: f64 = 20.0;
-/// Mean, amplitude and frequency (rad/s) of the throttle's wave that judges the lag, and how long it lasts, s.
+/// Mean, amplitude and frequency (rad/s) of the throttle sine that validates the lag, and its duration, s.
 const WAVE: [f64; 3] = [0.5, 0.1, 3.0];
 const WAVE_S: f64 = 10.0;
-/// Propeller torque that is none, in parts of weight times span.
+/// Propeller torque that counts as zero, as a fraction of weight times span.
 const NO_MOMENT: f64 = 1e-5;
-/// Distance of the thrust from the centre of gravity that is none, in chords.
+/// Offset of the thrust from the centre of gravity that counts as zero, chords.
 pub(super) const NO_ARM: f64 = 1e-3;
-/// Airspeeds of the table of thrust, in parts of the cruise's; throttles of it.
+/// Airspeeds of the thrust table as fractions of cruise, and its throttle values.
 const SPEEDS: [f64; 14] = [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7];
 const THROTTLES: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
-/// Newton metres per pound foot.
+/// Newton metres in a pound foot.
 pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 
-/// What the engines do.
+/// Propulsion parameters.
 pub(super) struct Propulsion {
-    /// The polynomial of the settled thrust over throttle and airspeed.
+    /// Polynomial of the settled thrust over throttle and airspeed.
     pub(super) thrust: Vec<Estimate>,
-    /// The settled thrust itself (N, at the density of sea level), where it is a function of throttle and airspeed.
+    /// Settled thrust (N, at sea-level density), where it is a function of throttle and airspeed.
     pub(super) table: Option<Grid>,
-    /// Time constant of the thrust behind the throttle's position, s.
+    /// Time constant from throttle position to thrust, s.
     pub(super) lag: Option<f64>,
     /// Rolling moment at full throttle, to the left, N m.
     pub(super) torque: Option<f64>,
-    /// How far below the centre of gravity the thrust acts, m.
+    /// Vertical offset of the thrust below the centre of gravity, m.
     pub(super) arm: Option<f64>,
 }
 
 impl Subject<'_> {
-    /// What the engines do, settled and after a step of the throttle.
+    /// Measures propulsion, settled and after a throttle step.
     pub(super) fn propulsion(
         &mut self,
         left_out: &mut Vec<String>,
@@ -100,8 +100,8 @@ impl Subject<'_> {
         })
     }
 
-    /// The settled thrust over throttle and airspeed, N at the density of sea level; `None` where the engines do not
-    /// leave them where they are asked to be.
+    /// Settled thrust over throttle and airspeed, N at sea-level density; `None` where the engines do not hold the
+    /// throttle commanded.
     fn thrust_table(&mut self) -> Result<Option<Grid>, PlantError> {
         let airspeeds = SPEEDS.map(|part| part * self.start.airspeed_mps);
         let mut rows = Vec::with_capacity(THROTTLES.len());
@@ -121,7 +121,7 @@ impl Subject<'_> {
         Ok(Grid::new(&THROTTLES, &airspeeds, &rows).ok())
     }
 
-    /// Time constant (s) of the thrust behind the throttle's position, if it has one; `thrust` is the settled thrust.
+    /// Time constant (s) from throttle position to thrust, if there is one; `thrust` is the settled thrust.
     fn thrust_lag(
         &mut self,
         thrust: &[Estimate],

@@ -5,7 +5,7 @@ use crate::disturbance;
 use greylag_physics::Time;
 use std::path::Path;
 
-/// The same candidates are worth the same in every instruction set.
+/// Candidates have the same returns in every instruction set.
 #[test]
 fn instruction_sets_agree() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");

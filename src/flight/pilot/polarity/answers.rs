@@ -1,16 +1,16 @@
-//! What the model answers to a small step of each surface.
+//! Modelled response to a small step of each surface.
 
 use greylag_model::{GreyBox, Trim, TrimError, Twin};
 use greylag_physics::Command;
 
-/// States for which an answer is known, the one on which the step is commanded included: 0.4 s, by
-/// when the roll has settled; the short period, which has nearly done so, goes on with the last.
+/// Length of a response in states, including the one on which the step is commanded: 0.4 s, by when the roll rate has
+/// settled; the short period nearly so, and its last value is continued.
 const SPAN: usize = 41;
-/// Step of a command, of −1..1: small enough to be linear, large beside the rounding.
+/// Size of the simulated step, of −1..1: small enough to be linear, large compared with rounding.
 const STEP: f64 = 0.01;
 
-/// Roll rate after a step of the aileron command by one, pitch rate after one of the elevator
-/// command, rad/s, state by state of 10 ms, from level flight.
+/// Roll-rate response to a unit step of the aileron command, and pitch-rate response to one of the elevator command,
+/// rad/s, per state of 10 ms, from level flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answers {
     roll: [f64; SPAN],
@@ -18,12 +18,13 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// The answers of `model` in straight flight at `airspeed` (m/s).
+    /// The responses of `model` in straight flight at `airspeed` (m/s).
     ///
     /// # Errors
-    /// If the model cannot fly straight there.
+    ///
+    /// If the model has no straight-flight trim there.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        // a thousand metres change an answer by a tenth
+        // a thousand metres change a response by a tenth
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
@@ -47,7 +48,7 @@ impl Answers {
         Ok(Answers { roll: answer(&rolled, 0), pitch: answer(&pitched, 1) })
     }
 
-    /// How much the rate of `axis` (0 roll, 1 pitch) has changed `states` after a step by one, rad/s.
+    /// Change of the rate of `axis` (0 roll, 1 pitch), `states` after a unit step, rad/s.
     pub(super) fn after(&self, axis: usize, states: isize) -> f64 {
         let answer = if axis == 0 { &self.roll } else { &self.pitch };
         match usize::try_from(states) {
@@ -66,7 +67,7 @@ mod tests {
     fn the_aileron_rolls_and_the_elevator_pitches_as_the_simulator_has_it() {
         let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
         let answers = Answers::of(&model, 20.0).unwrap();
-        // A command shows in the surfaces of the next state, in the rates of the one after.
+        // a command appears in the surfaces of the next state, in the rates of the one after
         assert_eq!([answers.after(0, -1), answers.after(0, 0), answers.after(0, 1)], [0.0; 3]);
         // Steady roll: Clδa δa · 2 V / (b |Clp|) = 0.1202 · 0.5235 · 40 / (2.1 · 0.4042) = 2.97 rad/s,
         // of which sideslip, the product of inertia, the yaw rate take half back.

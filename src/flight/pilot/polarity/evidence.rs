@@ -1,4 +1,4 @@
-//! What the rates say of the surfaces: the record of a check, with the fit of answers to it.
+//! Evidence on surface signs: recorded rates and commands, and the regression on modelled responses.
 
 use std::ops::RangeInclusive;
 
@@ -7,45 +7,45 @@ use nalgebra::{Matrix3, Vector3};
 use super::LONGEST;
 use super::answers::Answers;
 
-/// States by which the way through link and controller may be longer than through the simulator's.
+/// Largest additional delay of link and controller relative to the simulator, states.
 const LATENESS: isize = 9;
-/// Fewer changes of a rate than this say nothing.
+/// Smallest number of rate changes for a regression.
 const LEAST: usize = 14;
-/// Correlation of one leftover with the next that is believed at most.
-const LIKENESS: f64 = 0.9;
-/// States by which the surfaces had been taken over before the first state of the check: its telling comes
-/// down the same wire as the states; when the controller looks at its channels makes it sooner or later.
+/// Largest lag-one autocorrelation of the regression residuals that is accounted for.
+const MAX_AUTOCORRELATION: f64 = 0.9;
+/// Range of states by which control authority was given before the first state of the check: its notice shares the
+/// link with the states, and the controller samples its channels at its own time.
 const TAKEN: RangeInclusive<isize> = -1..=2;
 
-/// The answer that fits best: a multiple of the model's, with its standard error.
+/// Estimated gain on the modelled response, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
-    /// 1 is the model's answer, −1 its opposite.
+    /// 1 is the modelled response, −1 its opposite.
     pub gain: f64,
-    /// Standard error of the gain.
+    /// Standard error of the gain estimate.
     pub error: f64,
-    /// Mean square of what is left of the changes of the rate, (rad/s)².
+    /// Mean square of the regression residual, (rad/s)².
     misfit: f64,
 }
 
 impl Fit {
-    /// How sure the sign is, in standard errors.
+    /// The gain in standard errors.
     pub(super) fn certainty(&self) -> f64 {
         self.gain / self.error
     }
 }
 
-/// The record of a check, state by state of 10 ms from its beginning.
+/// Record of a check, per state of 10 ms from its start.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Evidence {
-    /// Roll and pitch rate, rad/s; none of a state that did not come.
+    /// Roll and pitch rate, rad/s; `None` for a lost state.
     rates: Vec<Option<[f64; 2]>>,
-    /// Changes of aileron and elevator command: the state on which they were commanded, by how much.
+    /// Changes of aileron and elevator command: the state on which they were commanded, and by how much.
     changes: [Vec<(isize, f64)>; 2],
 }
 
 impl Evidence {
-    /// Notes the rates of the state `index`; one of after the check is none of it, and takes no memory.
+    /// Stores the rates of the state `index`; states after the check are ignored.
     pub(super) fn rates(&mut self, index: usize, rates: [f64; 2]) {
         if (self.rates.len()..=LONGEST).contains(&index) {
             self.rates.resize(index + 1, None);
@@ -53,14 +53,14 @@ impl Evidence {
         }
     }
 
-    /// Notes that the command of `axis` was changed on the state `index`.
+    /// Stores a change of the command of `axis` on the state `index`.
     pub(super) fn change(&mut self, axis: usize, index: usize, by: f64) {
         if by != 0.0 {
             self.changes[axis].push((index as isize, by));
         }
     }
 
-    /// What fits roll and pitch best, with the same lateness and the same handing over for both.
+    /// Best estimates for roll and pitch with a common delay and handover time.
     pub(super) fn fit(&self, answers: &Answers) -> Option<[Fit; 2]> {
         let both = (0..=LATENESS).flat_map(|late| {
             let answered = [0, 1].map(|axis| self.answered(answers, axis, late));
@@ -74,7 +74,7 @@ impl Evidence {
         both.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
     }
 
-    /// By how much the rate of `axis` changes from each state to the next, answering to what was commanded.
+    /// Modelled change of the rate of `axis` from each state to the next.
     fn answered(&self, answers: &Answers, axis: usize, late: isize) -> Vec<f64> {
         let at = |state: isize| -> f64 {
             let terms = self.changes[axis].iter();
@@ -84,10 +84,10 @@ impl Evidence {
         states.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
 
-    /// Least squares of the changes of a rate from state to state: gusts, which wander, are nearly
-    /// white in them; by how much they are not, the standard error is made larger. Beside the answer to
-    /// what was commanded there is one to the step that the surfaces made when control authority went over,
-    /// of unknown size, `taken` states before the first, and a constant.
+    /// Least squares of the rate's changes between states: gusts are a random walk, so that their changes are nearly
+    /// white; the standard error is enlarged by the remaining autocorrelation. Regressors: the modelled response to
+    /// the commands, the response to a step of unknown size at the handover, `taken` states before the first, and a
+    /// constant.
     fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {
         let to_step = |state: isize| answers.after(axis, state + taken);
         let rows = || {
@@ -118,8 +118,9 @@ impl Evidence {
             last = left;
         }
         let misfit = square / (count - 3) as f64;
-        let likeness = (product / square).clamp(0.0, LIKENESS);
-        let error = (misfit * inverse[(0, 0)] * (1.0 + likeness) / (1.0 - likeness)).sqrt();
+        let autocorrelation = (product / square).clamp(0.0, MAX_AUTOCORRELATION);
+        let error =
+            (misfit * inverse[(0, 0)] * (1.0 + autocorrelation) / (1.0 - autocorrelation)).sqrt();
         let fit = Fit { gain: solution[0], error, misfit };
         (fit.gain.is_finite() && error.is_finite() && error > 0.0).then_some(fit)
     }
@@ -133,7 +134,7 @@ mod tests {
     use greylag_model::GreyBox;
     use std::path::Path;
 
-    /// A gain that is certain by so many standard errors.
+    /// A gain estimate with a given ratio to its standard error.
     fn fit(gain: f64, certainty: f64) -> Fit {
         Fit { gain, error: gain.abs() / certainty, misfit: 0.0 }
     }

@@ -1,11 +1,10 @@
-//! The gentle check of signs: does the aircraft answer to the surfaces as the model does?
+//! The check of surface signs: whether the aircraft responds to the surfaces as the model predicts.
 //!
-//! A real controller's own loops may be right, and yet a channel, a reversal or a mixer between our
-//! commands and the surfaces be wrong. So nobody steers at first when a controller gives control authority over: the
-//! surfaces stand at level trim, with small pulses of aileron and elevator on them, at different
-//! times. Rates are compared with what the model answers to these pulses, with its sign and without;
-//! pulses are not made by what the air does, so that gusts cannot be taken for an answer for long.
-//! It ends as soon as both answers are certain, commonly in 0.3 s; pulses grow as long as they are not.
+//! A real controller's own loops may be right while a channel, a reversal or a mixer between our commands and the
+//! surfaces is wrong. Therefore, when control authority is given, the surfaces first stay at level trim with small
+//! pulses of aileron and elevator, at different times. Rates are regressed on the modelled responses to these pulses;
+//! gusts are uncorrelated with them. The check ends when both signs are certain, usually after 0.3 s; the pulses grow
+//! until then.
 
 mod answers;
 mod evidence;
@@ -16,63 +15,63 @@ use evidence::{Evidence, Fit};
 use greylag_link::vehicle::{Axis, Fault};
 use greylag_physics::{Command, State, Time};
 
-/// Pulses of each round, normalised deflection: 0.06 is 1.9° for the X8, which rolls it at 9 °/s.
+/// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8, which rolls it at 9 °/s.
 const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
-/// The pulses of a round, each of [`LENGTH`]: what they do to the attitude they undo again.
+/// Signs of a round's pulses, each of [`LENGTH`]: their effect on the attitude cancels.
 const PATTERN: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
-/// States that a pulse lasts.
+/// Length of a pulse in states.
 const LENGTH: usize = 12;
-/// The elevator's pulses begin by so many states later than the aileron's.
+/// Delay of the elevator's pulses relative to the aileron's, states.
 const OFFSET: usize = 6;
-/// States of a round.
+/// Length of a round in states.
 const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
-/// The state by which a check has ended.
+/// Number of states after which a check ends.
 const LONGEST: usize = PULSES.len() * ROUND;
-/// A sign is certain from so many standard errors on: it is asked anew at every state.
+/// Standard errors from which a sign is certain; tested at every state.
 const CERTAIN: f64 = 7.0;
-/// A sign is not judged before its surface has gone the other way and been answered: one edge may
-/// meet one gust.
+/// States before a sign is judged: its surface has moved both ways and been responded to, since one edge may coincide
+/// with one gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
-/// States after the edge of a pulse by which the aircraft has answered it.
+/// States after a pulse edge by which the response has appeared.
 const ANSWERED: usize = 7;
-/// An answer is at least this share of the model's: a model may be wrong by much, but not so.
+/// Smallest gain that counts as a response: a model may be wrong, but not by a factor of ten.
 const ANSWER: f64 = 0.1;
-/// Change of bank or pitch during the check beyond which it is given up, rad: 20°.
+/// Change of bank or pitch that aborts the check, rad: 20°.
 const DEPARTED: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
-/// What came of a state.
+/// Result after a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// It goes on.
+    /// The check continues.
     Open,
-    /// Both surfaces do what they should: multiples of the model's answers.
+    /// Both signs are right: gains on the modelled responses.
     Right([f64; 2]),
-    /// The aircraft has to go back.
+    /// Control must be returned.
     Wrong(Fault),
 }
 
-/// How a check began.
+/// Start of a check.
 #[derive(Clone, Copy, Debug)]
 struct Begun {
     at: Time,
     /// Roll and pitch, rad.
     attitude: [f64; 2],
-    /// What the pulses are added to.
+    /// Command to which pulses are added.
     level: Command,
 }
 
-/// Where a check stands.
+/// Phase of a check.
 #[derive(Clone, Debug)]
 enum Stage {
-    /// Nothing is to be checked: nobody steers, or it has passed.
+    /// No check is due: control authority is not demanded, or the check has passed.
     Rest,
-    /// Somebody wants to steer; control authority has not been given over.
+    /// Control authority is demanded and not yet given.
     Waiting,
-    /// We have control authority; the first state since may be still to come.
+    /// Control authority was given; the first state since may still be outstanding.
     Running { begun: Option<Begun>, evidence: Evidence, last: Command },
 }
 
-/// The check of one aircraft, made anew whenever control authority is taken.
+/// The check of one aircraft, repeated at every engagement.
 #[derive(Clone, Debug)]
 pub(super) struct Check {
     answers: Answers,
@@ -80,22 +79,22 @@ pub(super) struct Check {
 }
 
 impl Check {
-    /// A check against the model's `answers`.
+    /// A check against the modelled responses `answers`.
     pub(super) fn new(answers: Answers) -> Self {
         Check { answers, stage: Stage::Rest }
     }
 
-    /// Somebody wants to steer.
+    /// Waits for control authority, which is demanded.
     pub(super) fn await_authority(&mut self) {
         self.stage = Stage::Waiting;
     }
 
-    /// Nobody steers any more.
+    /// Ends the check: control authority is no longer demanded.
     pub(super) fn rest(&mut self) {
         self.stage = Stage::Rest;
     }
 
-    /// We have control authority: `in_force` is what was last commanded to the surfaces.
+    /// Starts the check on control authority: `in_force` is the last command to the surfaces.
     pub(super) fn begin(&mut self, in_force: Command) {
         if matches!(self.stage, Stage::Waiting) {
             let evidence = Evidence::default();
@@ -103,12 +102,12 @@ impl Check {
         }
     }
 
-    /// Whether nobody may steer yet.
+    /// Whether controllers must not fly yet.
     pub(super) fn is_open(&self) -> bool {
         !matches!(self.stage, Stage::Rest)
     }
 
-    /// Takes in the state of `now`; `level` is what holds the aircraft level.
+    /// Takes the state of `now`; `level` is the level-trim command.
     pub(super) fn see(&mut self, now: Time, state: &State, level: Command) -> Verdict {
         let Stage::Running { begun, evidence, .. } = &mut self.stage else { return Verdict::Open };
         let attitude = [state.roll, state.pitch];
@@ -132,7 +131,7 @@ impl Check {
         verdict
     }
 
-    /// The command on the state of `now`, if control authority is ours: level, with pulses.
+    /// The command on the state of `now` during the check: level trim with pulses.
     pub(super) fn command(&self, now: Time) -> Option<Command> {
         let Stage::Running { begun: Some(begun), .. } = &self.stage else { return None };
         let index = begun.index(now) as isize;
@@ -143,7 +142,7 @@ impl Check {
         })
     }
 
-    /// Records what is commanded to the surfaces on the state of `now`.
+    /// Records the command sent on the state of `now`.
     pub(super) fn commanded(&mut self, now: Time, command: Command) {
         let Stage::Running { begun: Some(begun), evidence, last } = &mut self.stage else { return };
         let index = begun.index(now);
@@ -154,13 +153,13 @@ impl Check {
 }
 
 impl Begun {
-    /// States of 10 ms since then.
+    /// States of 10 ms since the start.
     fn index(&self, now: Time) -> usize {
         ((now.since(self.at).as_micros() as usize) + 5000) / 10_000
     }
 }
 
-/// The pulse on a state, counted from where the pulses of its surface begin.
+/// The pulse on a state, counted from the start of its surface's pulses.
 fn pulse(index: isize) -> f64 {
     let Ok(index) = usize::try_from(index) else { return 0.0 };
     let (round, within) = (index / ROUND, index % ROUND);
@@ -170,7 +169,7 @@ fn pulse(index: isize) -> f64 {
     }
 }
 
-/// The verdict on the fits after the state `index`.
+/// The verdict on the estimates after the state `index`.
 fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
     let certain = |axis: usize| {
         let fit = &fits[axis];
@@ -187,7 +186,7 @@ fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
     if index < LONGEST {
         return Verdict::Open;
     }
-    // What was not certain after all rounds: too little of an answer, or too much of the air's.
+    // not certain after all rounds: too small a response, or too much turbulence
     let dead = |fit: &Fit| fit.gain + 3.0 * fit.error < 0.5;
     match (dead(&fits[0]), dead(&fits[1])) {
         (true, _) => Verdict::Wrong(Fault::Unanswered(Axis::Roll)),
@@ -203,15 +202,15 @@ mod tests {
     use std::collections::VecDeque;
     use std::path::Path;
 
-    /// The verdict on the model itself, `late` states away, when `wired` lies between commands and
-    /// surfaces; with the states it took.
+    /// The verdict on the model itself, delayed by `late` states, with `wired` between commands and surfaces; also
+    /// the number of states it took.
     fn verdict(late: usize, wired: impl Fn([f64; 2]) -> [f64; 2]) -> (Verdict, u64) {
         verdict_after(2, late, wired)
     }
 
-    /// The same when control authority went over `unheard` states before that is heard.
+    /// The verdict when control authority was given `early` states before its notice arrives.
     fn verdict_after(
-        unheard: usize,
+        early: usize,
         late: usize,
         wired: impl Fn([f64; 2]) -> [f64; 2],
     ) -> (Verdict, u64) {
@@ -226,7 +225,7 @@ mod tests {
         check.await_authority();
         assert_eq!(check.command(Time::default()), None);
         check.begin(level);
-        for _ in 0..unheard {
+        for _ in 0..early {
             let [aileron, elevator] = wired([level.aileron, level.elevator]);
             twin.step(&model, &Command { aileron, elevator, throttle, rudder: 0.0 });
         }
@@ -264,11 +263,11 @@ mod tests {
             let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
             assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
             // A reversed trim throws the nose up before any pulse, sooner or later.
-            for unheard in 0..=4 {
+            for early in 0..=4 {
                 let (pitch, _) =
-                    verdict_after(unheard, late, |[aileron, elevator]| [aileron, -elevator]);
+                    verdict_after(early, late, |[aileron, elevator]| [aileron, -elevator]);
                 let named = pitch == Verdict::Wrong(Fault::Reversed(Axis::Pitch));
-                assert!(named, "{late}, {unheard}: {pitch:?}");
+                assert!(named, "{late}, {early}: {pitch:?}");
             }
         }
     }
@@ -285,8 +284,8 @@ mod tests {
         assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
     }
 
-    /// A clock that jumps, at the first states or later, ends the check; it neither lasts for ever at level
-    /// trim nor takes memory for the states that never were.
+    /// A clock that jumps, at the first states or later, ends the check; it neither lasts for ever nor takes memory
+    /// for the states that never were.
     #[test]
     fn a_clock_that_jumps_ahead_ends_the_check() {
         let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();

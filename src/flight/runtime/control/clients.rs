@@ -1,4 +1,4 @@
-//! The side of the clients: what they send, what is sent to them, what of it goes on to the vehicle.
+//! Client side of the control thread: requests, telemetry, forwarding to the vehicle.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use greylag_link::transport::{Arrival, Packet};
 use greylag_link::vehicle::Outputs;
 
 impl Control {
-    /// Passes on to the controller what a client has sent it.
+    /// Forwards a client's frames to the controller.
     fn route(&mut self, host: Duration, packet: &Packet) {
         let Some(router) = &mut self.router else { return };
         router.learn(host, packet.peer, &packet.bytes);
@@ -27,7 +27,7 @@ impl Control {
         match arrival {
             Arrival::Packet(mut packet) => {
                 self.ports.sift(unix_us(), &mut packet);
-                self.tell_of_refusals();
+                self.report_refusals();
                 self.route(now.host, &packet);
                 let mut pilot = RecordingAutopilot {
                     pilot: &mut self.pilot,
@@ -48,14 +48,14 @@ impl Control {
         self.send_to_clients();
     }
 
-    /// Says once that somebody does not sign, or not with our key.
-    fn tell_of_refusals(&mut self) {
+    /// Reports once that a peer does not sign, or not with our key.
+    fn report_refusals(&mut self) {
         let refused = self.ports.signing().map_or(0, |counts| counts.refused());
         if refused > 0 && !self.told_refusals {
             self.told_refusals = true;
             let words =
                 "frames without a right signature are refused: sign them with the key of --sign";
-            self.pilot.tell(Severity::Warning, words);
+            self.pilot.send_text(Severity::Warning, words);
         }
     }
 

@@ -1,4 +1,4 @@
-//! The side of the vehicle: the newest state is flown on, those that it has overtaken are history.
+//! Vehicle side of the control thread: the newest state is answered, overtaken ones only recorded.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ use greylag_link::peer::PeerId;
 use greylag_link::transport::Arrival;
 use greylag_link::vehicle::{Notice, Order, Telemetry};
 
-/// States in one packet at most: a TCP chunk of 1024 bytes holds four.
+/// Largest number of states per packet: a TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;
 
 /// A state with the packet that completed it.
@@ -25,12 +25,12 @@ struct Heard {
 }
 
 impl Control {
-    /// Takes `arrival` and all that waits behind it. In real time only the newest state is answered: what an aircraft did
-    /// before it is history. In lockstep the vehicle waits for each answer.
+    /// Takes `arrival` and all that is queued behind it. In real time only the newest state is answered; in lockstep
+    /// the vehicle waits for each reply.
     pub(super) fn take_vehicles(&mut self, arrival: Arrival) {
         let mut newest = self.take_vehicle(arrival, None);
         if self.clock.pace() == Pace::RealTime {
-            // What comes meanwhile is for the next turn.
+            // later arrivals are handled in the next round
             for _ in 0..self.ports.from_vehicle.len() {
                 let Ok(arrival) = self.ports.from_vehicle.try_recv() else { break };
                 newest = self.take_vehicle(arrival, newest);
@@ -39,10 +39,10 @@ impl Control {
         if let Some(heard) = newest {
             self.tick(&heard);
         }
-        self.heed_vehicle();
+        self.take_notices();
     }
 
-    /// Takes one arrival; the newest state now, `newest` or one that came with it.
+    /// Takes one arrival; returns the newest state, `newest` or one that it completed.
     fn take_vehicle(&mut self, arrival: Arrival, newest: Option<Heard>) -> Option<Heard> {
         let packet = match arrival {
             Arrival::Packet(mut packet) => {
@@ -117,7 +117,7 @@ impl Control {
         self.account(heard, &decision, plan, latency);
     }
 
-    /// Notes timing and the row of a tick, after its command is out.
+    /// Records timing and row of a tick, after its command is out.
     fn account(&mut self, heard: &Heard, decision: &Decision, plan: Plan, latency: Duration) {
         let Heard { state, peer, arrived } = heard;
         if self.last_arrival.is_none() {
@@ -134,7 +134,7 @@ impl Control {
         self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
-        // What surfaces do that were not commanded by us is not known.
+        // the positions of surfaces that we did not command are unknown
         match self.vehicle.moves_surfaces() {
             true => self.pilot.monitor(state),
             false => self.pilot.forget_residuals(),
@@ -148,18 +148,18 @@ impl Control {
         }
     }
 
-    /// Does what the vehicle has to tell.
-    pub(super) fn heed_vehicle(&mut self) {
+    /// Handles the vehicle's notices.
+    pub(super) fn take_notices(&mut self) {
         while let Some(notice) = self.vehicle.take_notice() {
             if let Some(words) = notice.ending() {
                 let now = self.clock.at(Instant::now());
                 self.note(Call::Disarm(now, true));
-                // Its verdict cannot be a refusal: it is forced.
+                // forced arming is never refused
                 let _ = self.pilot.disarm(now, true);
-                self.pilot.tell(Severity::Critical, &words);
+                self.pilot.send_text(Severity::Critical, &words);
             }
             match notice {
-                Notice::Text(severity, words) => self.pilot.tell(severity, &words),
+                Notice::Text(severity, words) => self.pilot.send_text(severity, &words),
                 Notice::System(system) => self.clients.adopt(system),
                 Notice::Engaged => {
                     let now = self.clock.at(Instant::now());
@@ -171,8 +171,8 @@ impl Control {
         }
     }
 
-    /// Sends what is due on the vehicle's link, when there is somebody to hear it.
-    pub(super) fn greet_vehicle(&mut self, host: Duration) {
+    /// Sends frames due on the vehicle's link, when there is a peer.
+    pub(super) fn send_due(&mut self, host: Duration) {
         let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
             return;
         };

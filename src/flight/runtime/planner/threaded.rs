@@ -1,4 +1,4 @@
-//! A controller on a thread of its own: its plan is used at its tick or not at all.
+//! A controller on its own thread: its plan is used at its tick or not at all.
 
 use std::time::{Duration, Instant};
 
@@ -25,15 +25,14 @@ pub struct Threaded {
     pub(super) plans: Receiver<(u64, Command)>,
     thread: Option<JoinHandle<()>>,
     tick: u64,
-    /// An engagement that the planner has not heard of, because it was busy.
+    /// A reset that the planner has not received, because it was busy.
     owed: bool,
     pub(super) deadline: Duration,
     pace: Pace,
 }
 
 impl Threaded {
-    /// Starts the thread. A plan must be there `deadline` after its state frame; in lockstep it
-    /// is waited for.
+    /// Starts the thread. A plan is due `deadline` after its state frame; in lockstep it is waited for.
     pub fn start(
         mut controller: Box<dyn Controller>,
         deadline: Duration,
@@ -61,10 +60,10 @@ impl Threaded {
         })
     }
 
-    /// The plan for `request`, which `arrived` then.
+    /// The plan for `request`, whose state arrived at `arrived`.
     pub fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         self.tick += 1;
-        // Plans of earlier ticks are of no use any more.
+        // plans of earlier ticks are obsolete
         while self.plans.try_recv().is_ok() {}
         let engage = request.engage || self.owed;
         let Some(requests) = &self.requests else {
@@ -88,7 +87,7 @@ impl Threaded {
                 Ok((tick, command)) if tick == self.tick => return Plan::Ready(command),
                 Ok(_) => {}
                 Err(RecvTimeoutError::Timeout) => return Plan::Late,
-                // The controller has died; the fallback flies.
+                // the controller's thread has ended; the fallback flies
                 Err(RecvTimeoutError::Disconnected) => return Plan::None,
             }
         }
@@ -98,7 +97,7 @@ impl Threaded {
 impl Drop for Threaded {
     fn drop(&mut self) {
         self.requests = None;
-        // The thread may be at its last plan, with nobody to take it.
+        // the thread may block on its last plan, which is not taken any more
         while self.plans.recv().is_ok() {}
         if let Some(thread) = self.thread.take() {
             // A panic there has been reported by its own thread.

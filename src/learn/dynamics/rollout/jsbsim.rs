@@ -1,8 +1,8 @@
-//! Rollouts by the scheme of JSBSim, which asks the model once a step and remembers the last time.
+//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the last one.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
-use crate::dynamics::prior::{ALOFT, At, Said, Sloped, Slopes, add, fixed, transposed};
+use crate::dynamics::prior::{ALOFT, At, PriorOutputs, Sloped, Slopes, add, fixed, transposed};
 use crate::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing, sum};
 use greylag_model::{STEP, advance_jsbsim};
 use greylag_num::{Dual, Real};
@@ -21,10 +21,10 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
             // this scheme knows accelerations only
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
-            let said = self.ask(&at);
+            let outputs = self.ask(&at);
             let air = at.air(&self.subject.prior);
-            let (acceleration, spin) = pushed(&said, &learned, &at.state, &air);
-            trace.rates[step] = [said.rate, learned];
+            let (acceleration, spin) = pushed(&outputs, &learned, &at.state, &air);
+            trace.rates[step] = [outputs.rate, learned];
             trace.memory[step] = [acceleration, last.unwrap_or([zero; 3])];
             let (next, remembered) = advance_jsbsim(&state, &air, acceleration, spin, last);
             last = Some(remembered);
@@ -70,8 +70,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
     }
 
-    /// Slopes through the scheme of JSBSim: of the state after the step and of what is remembered
-    /// then, with respect to what they are made of.
+    /// Slopes through JSBSim's scheme: of the state after the step and of the memory, over their inputs.
     #[inline(always)]
     fn advance_back(
         &self,
@@ -105,7 +104,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     }
 }
 
-/// Slopes with respect to what a step is made of.
+/// Slopes over the inputs of a step.
 struct Back<R> {
     state: State<R>,
     learned: State<R>,
@@ -114,17 +113,17 @@ struct Back<R> {
     memory: Vector<R>,
 }
 
-/// Acceleration and spin of the prior with those learned.
+/// Acceleration and spin of prior plus residual.
 #[inline(always)]
 fn pushed<R: Real>(
-    said: &Said<R>,
+    outputs: &PriorOutputs<R>,
     learned: &State<R>,
     state: &State<R>,
     air: &AirData<R>,
 ) -> (Vector<R>, Vector<R>) {
     let push = rigid_body::acceleration_of(state, air, learned);
     let turn = [learned.p, learned.q, learned.r];
-    let (mut acceleration, mut spin) = (said.acceleration, said.spin);
+    let (mut acceleration, mut spin) = (outputs.acceleration, outputs.spin);
     for i in 0..3 {
         acceleration[i] += push[i];
         spin[i] += turn[i];
@@ -132,8 +131,7 @@ fn pushed<R: Real>(
     (acceleration, spin)
 }
 
-/// [`advance_jsbsim`] as a function of state, acceleration and memory, with the slopes with respect to
-/// what it makes.
+/// [`advance_jsbsim`] as a function of state, acceleration and memory, with the slopes over its outputs.
 struct Scheme<'a, R> {
     geometry: &'a Geometry,
     density: R,
@@ -160,7 +158,7 @@ impl<R: Real> Sloped<R, 14> for Scheme<'_, R> {
     }
 }
 
-/// Slopes through [`pushed`], with respect to the state and to what was learned.
+/// Slopes through [`pushed`], over the state and the residual.
 #[inline(always)]
 fn push_back<R: Real>(
     state: &State<R>,

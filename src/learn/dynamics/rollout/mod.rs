@@ -6,7 +6,7 @@ mod rk4;
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::network::Passes;
 use crate::dynamics::packet::Packet;
-use crate::dynamics::prior::{At, Said, Slopes};
+use crate::dynamics::prior::{At, PriorOutputs, Slopes};
 use greylag_model::residual::Scales;
 use greylag_model::{GreyBox, Integrator};
 use greylag_num::Real;
@@ -15,7 +15,7 @@ use greylag_physics::effects::Needs;
 use greylag_physics::rigid_body::Vector;
 use greylag_physics::{Controls, State};
 
-/// Points whose weight gradients are summed at once, so that what they read stays in the cache.
+/// Points whose weight gradients are summed together, so that their data stays in the cache.
 const CHUNK: usize = 20;
 
 /// The model that is learned.
@@ -23,59 +23,59 @@ const CHUNK: usize = 20;
 pub struct Subject {
     /// The prior with its present coefficients; its own residual is not used.
     pub prior: GreyBox,
-    /// The residual's network.
+    /// Network of the residual.
     pub network: Passes,
-    /// Its scales.
+    /// Input and output scales of the residual.
     pub scales: Scales,
-    /// Whether the slopes with respect to the prior's coefficients are wanted.
+    /// Whether the slopes over the prior's coefficients are computed.
     pub prior_slopes: PriorSlopes,
 }
 
-/// Whether the prior's coefficients are learned.
+/// Whether the prior's coefficients are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorSlopes {
-    /// They stay.
+    /// They are frozen.
     None,
-    /// The slopes with respect to all of them, and to Jxz, are summed up.
+    /// The slopes over all of them, and over Jxz, are summed.
     All,
 }
 
-/// What was recorded of `Packet::WIDTH` rollouts.
+/// Recorded data of `Packet::WIDTH` rollouts.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded<R> {
     /// States before the start, at the start, and after each step; roll in −π..π.
     pub states: Vec<[R; 8]>,
-    /// Aileron, elevator, throttle, rudder that act, from the step before the start on.
+    /// Effective aileron, elevator, throttle and rudder, from the step before the start on.
     pub controls: Vec<[R; 4]>,
-    /// What the formulas lag or delay, likewise; empty for a model without lags.
+    /// Inputs of the formulas' lags and delays, from the step before the start on; empty for a model without lags.
     pub lagged: Vec<[R; LAGS]>,
     /// Air density from the step before the start on, kg/m³.
     pub density: Vec<R>,
-    /// What each rollout counts; 0 for one that fills the block up.
+    /// Weight of each rollout; 0 for one that pads the block.
     pub weight: Option<R>,
 }
 
-/// What a forward pass leaves for the reverse one. Step 0 is the one before the start, which
-/// [`Integrator::Jsbsim`] remembers; RK4 leaves it out.
+/// Data of a forward pass for the reverse pass. Step 0 is the one before the start, which [`Integrator::Jsbsim`]
+/// needs; RK4 leaves it out.
 #[derive(Clone, Debug)]
 pub struct Trace<R> {
-    /// The states at which the model was asked: one a step, four a step for RK4.
+    /// The states at which the model was evaluated: one per step, four per step for RK4.
     states: Vec<State<R>>,
-    /// The network's units at each of them.
+    /// The network's activations at each of them.
     units: Vec<R>,
     /// F_p and F_a at the start of each step.
     rates: Vec<[State<R>; 2]>,
     /// The states after each step.
     ends: Vec<State<R>>,
-    /// The acceleration in each step, and what is remembered before it.
+    /// The acceleration in each step, and the memory before it.
     memory: Vec<[Vector<R>; 2]>,
     /// The network's slopes of a chunk of points.
     slopes: Vec<R>,
-    /// Sums over points of the slopes with respect to the coefficients.
+    /// Sums over points of the slopes over the coefficients.
     coefficients: Vec<R>,
 }
 
-/// What a forward pass finds, summed over the rollouts that count.
+/// Results of a forward pass, summed over the rollouts that count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Σ over steps of ‖(ŝ − s)/x_c‖².
@@ -86,19 +86,19 @@ pub struct Sums {
     pub learned: f64,
 }
 
-/// Slopes of the objective with respect to the three of [`Sums`].
+/// Slopes of the objective over the three [`Sums`].
 pub type SumSlopes = Sums;
 
-/// Slopes of the objective with respect to what is learned.
+/// Slopes of the objective over the trained parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gradient {
-    /// With respect to the network's parameters.
+    /// Slopes over the network's parameters.
     pub network: Vec<f64>,
-    /// With respect to the prior's coefficients, then Jxz (kg m²).
+    /// Slopes over the prior's coefficients, then Jxz (kg m²).
     pub prior: Vec<f64>,
 }
 
-/// How often a step asks the model.
+/// Model evaluations per step.
 const fn stages(integrator: Integrator) -> usize {
     match integrator {
         Integrator::Rk4 => 4,
@@ -107,7 +107,7 @@ const fn stages(integrator: Integrator) -> usize {
 }
 
 impl<R: Packet> Trace<R> {
-    /// Room for rollouts of up to `steps` steps of `subject`.
+    /// Memory for rollouts of up to `steps` steps of `subject`.
     pub fn new(subject: &Subject, steps: usize) -> Self {
         let points = (steps + 1) * stages(subject.prior.integrator);
         let nothing = nothing();
@@ -135,11 +135,11 @@ fn sum<R: Real>(a: &State<R>, b: &State<R>) -> State<R> {
 
 /// A pass over one block.
 pub struct Pass<'a, S: InstructionSet> {
-    /// The instructions it is compiled for.
+    /// The instruction set it is compiled for.
     pub set: S,
-    /// The model.
+    /// The model under training.
     pub subject: &'a Subject,
-    /// What was recorded.
+    /// The recorded data.
     pub recorded: &'a Recorded<S::Number>,
     /// The scale of errors and rates, eq. (21) or ones.
     pub scale: &'a [f64; 8],
@@ -150,7 +150,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         self.recorded.controls.len() - 1
     }
 
-    /// Flies the block: the sums, and a number a lane that is finite where the path is.
+    /// Integrates the block: the sums, and a value per lane that is finite where the path is.
     #[inline(always)]
     pub fn forward(&self, trace: &mut Trace<R>) -> (Sums, R) {
         let totals = match self.subject.prior.integrator {
@@ -161,7 +161,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (Sums { error, prior, learned }, totals[0] + totals[1] + totals[2])
     }
 
-    /// Adds the slopes of what was flown to `gradient`, `of` being those with respect to the sums.
+    /// Adds the slopes of the forward pass to `gradient`; `of` are those over the sums.
     #[inline(always)]
     pub fn reverse(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
         trace.coefficients.fill(R::zero());
@@ -187,9 +187,9 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         At { state, controls, density: self.recorded.density[step] }
     }
 
-    /// What the prior says at a point.
+    /// The prior's outputs at a point.
     #[inline(always)]
-    fn ask(&self, at: &At<R>) -> Said<R> {
+    fn ask(&self, at: &At<R>) -> PriorOutputs<R> {
         let model = &self.subject.prior;
         match model.needs() {
             Needs::Point => self.set.ask::<false>(model, at),
@@ -221,7 +221,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (half_slope, square)
     }
 
-    /// ŝ − s weighted so after `step`; roll the short way round.
+    /// Weighted ŝ − s after `step`; roll wrapped to the shorter way round.
     #[inline(always)]
     fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
         use std::f64::consts::{PI, TAU};
@@ -244,8 +244,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         totals[2] += self.weighted(learned.to_array()).1;
     }
 
-    /// Slopes with respect to the state after a step, to F_p and to F_a that the step's part of the
-    /// sums has.
+    /// Slopes of the step's part of the sums over the state after it, over F_p and over F_a.
     #[inline(always)]
     fn direct(&self, step: usize, trace: &Trace<R>, of: &SumSlopes) -> [State<R>; 3] {
         let [prior, learned] = &trace.rates[step];
@@ -259,8 +258,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         ]
     }
 
-    /// Slopes through prior and residual at a point, to the state there; adds those to what is
-    /// learned. Points come in falling order.
+    /// Slopes through prior and residual at a point to the state there; adds those over the trained parameters.
+    /// Points come in falling order.
     #[inline(always)]
     fn point(
         &self,
@@ -313,7 +312,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
 struct Place {
     /// The step it belongs to.
     step: usize,
-    /// Its number.
+    /// Number of the point.
     point: usize,
     /// The number of the first point of the rollout.
     first: usize,

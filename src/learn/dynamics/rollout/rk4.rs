@@ -1,4 +1,4 @@
-//! Rollouts by the classical Runge–Kutta scheme.
+//! Rollouts by the classical Runge–Kutta method.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
@@ -9,7 +9,7 @@ use greylag_physics::State;
 
 /// Weights of the four slopes, in steps.
 const WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];
-/// How far before each of the slopes the state is moved along the one before, in steps.
+/// Offset of each stage's state along the previous slope, in steps.
 const AHEAD: [f64; 4] = [0.0, STEP / 2.0, STEP / 2.0, STEP];
 
 impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
@@ -49,7 +49,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
             let [error, norm_prior, norm_learned] = self.direct(step, trace, of);
             slope = sum(&slope, &error);
             let mut before = slope;
-            // the slope with respect to the state at which the stage after this one asked
+            // slope over the state at which the stage after this one was evaluated
             let mut later = nothing();
             for stage in (0..4).rev() {
                 let ahead = AHEAD.get(stage + 1).copied().unwrap_or(0.0);

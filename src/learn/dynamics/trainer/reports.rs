@@ -1,4 +1,4 @@
-//! What a training says of itself: why it failed, how an update went, what was learned.
+//! Reports of a training: errors, progress, trained coefficients.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,19 +8,19 @@ use crate::dynamics::loss::Loss;
 use greylag_model::residual::ResidualError;
 use greylag_num::dense::DenseError;
 
-/// Why a training cannot begin or go on.
+/// A training cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// The recipe makes no sense.
+    /// The recipe is invalid.
     #[error("the training's options: {0}")]
     Recipe(&'static str),
     /// A coefficient cannot be trained.
     #[error(transparent)]
     Trainable(#[from] TrainableError),
-    /// The network cannot be made.
+    /// The network cannot be built.
     #[error(transparent)]
     Network(#[from] DenseError),
-    /// Prior and network do not fit.
+    /// Prior and network are incompatible.
     #[error(transparent)]
     Residual(#[from] ResidualError),
     /// There is too little data.
@@ -28,62 +28,62 @@ pub enum TrainError {
         "the flights have no stretch of {0} samples without a gap, which one rollout takes; give longer logs, or shorter rollouts"
     )]
     Data(usize),
-    /// The bare prior cannot follow the flights at all.
+    /// The bare prior cannot predict the flights at all.
     #[error(
         "model {0} leaves the numbers on most rollouts before anything is learned: it is no model of this aircraft, or the logs are of another"
     )]
     Prior(String),
-    /// The loss has left the numbers.
+    /// The loss is not finite.
     #[error(
         "the loss left the numbers at update {update}; what was learned before is kept in the last checkpoint: go on from it with a smaller learning rate"
     )]
     Diverged {
-        /// The update.
+        /// Number of the update.
         update: u64,
     },
-    /// A checkpoint does not fit.
+    /// The checkpoint is incompatible.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
 }
 
-/// How an update, or several, went.
+/// Progress of one or several updates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
-    /// Updates made.
+    /// Number of updates made.
     pub update: u64,
-    /// Rollouts' length.
+    /// Length of the rollouts.
     pub steps: usize,
     /// Mean over the updates since the last report.
     pub loss: Loss,
-    /// L_pred/L_prior, eq. (23), likewise.
+    /// L_pred/L_prior, eq. (23), mean over the same updates.
     pub normalised: f64,
-    /// λ.
+    /// Penalty weight λ of eq. (24).
     pub lambda: f64,
 }
 
-/// How a training stood at a moment, as its report shows it.
+/// State of a training at a report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
-    /// Updates made.
+    /// Number of updates made.
     pub update: u64,
-    /// L_pred/L_prior, eq. (23).
+    /// Relative prediction loss L_pred/L_prior, eq. (23).
     pub normalised: f64,
-    /// ‖F_a‖/‖F_p‖.
+    /// Residual ratio ‖F_a‖/‖F_p‖, eq. (22).
     pub ratio: f64,
-    /// λ.
+    /// Penalty weight λ of eq. (24).
     pub lambda: f64,
     /// The trained coefficients, in the order of [`Trainer::coefficients`](super::Trainer::coefficients).
     pub coefficients: Vec<f64>,
 }
 
-/// A coefficient of the prior that was trained.
+/// A trained coefficient of the prior.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Learned {
-    /// Full name.
+    /// Full name of the coefficient.
     pub name: String,
     /// Value in the prior's file.
     pub start: f64,
-    /// Value now.
+    /// Its present value.
     pub value: f64,
     /// The true value, where it is known.
     pub truth: Option<f64>,

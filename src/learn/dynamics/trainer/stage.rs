@@ -1,4 +1,4 @@
-//! What holds while the rollouts have one length: the windows, their weights and order, the prior's error.
+//! Data of a training stage with one rollout length: windows, weights, order, the prior's error.
 
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
@@ -13,23 +13,23 @@ use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::GreyBox;
 use greylag_num::stream;
 
-/// Windows over which the bare prior's error is taken, L_prior of eq. (23).
+/// Number of windows for the bare prior's error, L_prior of eq. (23).
 const PRIOR_WINDOWS: usize = 4096;
 const SHUFFLE: u64 = 2;
 
-/// What holds while the rollouts have one length.
+/// State of a stage with one rollout length.
 pub(super) struct Stage {
     pub(super) steps: usize,
-    /// L_prior.
+    /// Prediction loss of the bare prior, L_prior.
     pub(super) prior_error: f64,
     pub(super) all: Vec<Window>,
-    /// The pass over the data for which `order` was shuffled.
+    /// The epoch for which `order` was shuffled.
     pass: u64,
     order: Vec<Window>,
 }
 
 impl Stage {
-    /// The rollouts of `steps` steps, and how far `bare`, the prior alone, is off on them.
+    /// The rollouts of `steps` steps, and the error of the prior alone, `bare`, on them.
     pub(super) fn new(
         bare: &Subject,
         recipe: &Recipe,
@@ -58,14 +58,14 @@ impl Stage {
             return Err(TrainError::Prior(bare.prior.name.clone()));
         }
         let prior_error = match recipe.criterion {
-            // a prior without any error has nothing to be measured by
+            // a prior without any error gives no scale
             Criterion::Scaled => loss.prediction.max(1e-12),
             Criterion::Plain => 1.0,
         };
         Ok(Stage { steps, prior_error, all, pass: u64::MAX, order: Vec::new() })
     }
 
-    /// The rollouts of an update: each pass over the data shuffles it anew.
+    /// The rollouts of an update; each epoch shuffles the data anew.
     pub(super) fn minibatch(&mut self, recipe: &Recipe, update: u64) -> &[Window] {
         let batch = recipe.batch.min(self.all.len());
         let passes = (self.all.len() / batch) as u64;
@@ -80,12 +80,12 @@ impl Stage {
     }
 }
 
-/// Weighs `all` as [`Recipe::floor`] says; the mean of the weights is 1.
+/// Weights of `all` by [`Recipe::floor`]; their mean is 1.
 fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
     let mut weights: Vec<f64> =
         all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // a prior without any error has nothing to be measured by
+    // a prior without any error gives no scale
     let unit = mean(&weights).max(f64::MIN_POSITIVE);
     weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
     let unit = mean(&weights);

@@ -1,4 +1,4 @@
-//! One step of an aircraft and its slopes: by what was, by the action, and of the reward.
+//! One step of an aircraft with its slopes over state and action, and the slope of the reward.
 
 use super::AnalyticRecipe;
 use greylag_control::Target;
@@ -10,12 +10,12 @@ use greylag_num::{Dual, Real};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{ActuatorState, Command, State};
 
-/// Numbers of an aircraft: state, actuators, last commands, the integrator's memory.
+/// Number of state variables: state, actuators, last commands, the integrator's memory.
 pub(super) const NUMBERS: usize = 8 + 5 + 5 + 3;
-/// Those with an action.
+/// Number of state variables and actions.
 pub(super) const INPUTS: usize = NUMBERS + ACTIONS;
 
-/// An aircraft with all that decides how it goes on.
+/// An aircraft with its complete state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Aircraft<R = f64> {
     pub(super) state: State<R>,
@@ -24,15 +24,14 @@ pub(super) struct Aircraft<R = f64> {
     pub(super) memory: Memory<R>,
 }
 
-/// One step of an instance as its slopes: of what comes next by what was, and of the reward by what comes
-/// next.
+/// Slopes of one step of an aircraft: of the next state over the present one, and of the reward over the next.
 pub(super) struct Step {
     pub(super) next: [[f32; INPUTS]; NUMBERS],
     pub(super) reward: [f32; NUMBERS],
 }
 
-/// What the model's step depends on with how far it is moved: the place among the numbers of an aircraft,
-/// and the distance (rad, m/s, rad/s, throttle, m/s²).
+/// Inputs of the model's step with their finite differences: index among the state variables, and difference (rad,
+/// m/s, rad/s, throttle, m/s²).
 const MOVED: [(usize, f32); 14] = [
     (0, 2e-3),
     (1, 2e-3),
@@ -50,7 +49,7 @@ const MOVED: [(usize, f32); 14] = [
     (20, 0.2),
 ];
 
-/// What the steps of all instances have in common; any core may fly them.
+/// Data common to all aircraft; shared by all threads.
 #[derive(Clone, Copy)]
 pub(super) struct Flyer<'a> {
     pub(super) model: &'a GreyBox,
@@ -85,7 +84,7 @@ impl<R: Real> Aircraft<R> {
         all
     }
 
-    /// Reads every number as another kind, with its place.
+    /// Converts every state variable to another number type, with its index.
     pub(super) fn map<S: Real>(self, mut f: impl FnMut(usize, R) -> S) -> Aircraft<S> {
         let all = self.to_array();
         let mut at = |k: usize| f(k, all[k]);
@@ -132,7 +131,7 @@ impl Flyer<'_> {
         (after, Step { next, reward: self.reward(&after, target) }, earned)
     }
 
-    /// State and memory a step later; their slopes go into `next`.
+    /// State and memory after a step; their slopes go into `next`.
     fn motion(&self, aircraft: &Aircraft, next: &mut [[f32; INPUTS]; NUMBERS]) -> Aircraft {
         let at: Aircraft<Block> = aircraft.map(|place, x| {
             let mut lanes = Block::from_f64(x);
@@ -159,7 +158,7 @@ impl Flyer<'_> {
         after.map(|_, x| x.0[0].into())
     }
 
-    /// Actuators and last commands a step later; their slopes go into `next`.
+    /// Actuators and last commands after a step; their slopes go into `next`.
     fn actuation(
         &self,
         aircraft: &Aircraft,
@@ -194,8 +193,8 @@ impl Flyer<'_> {
         (plain.actuators, plain.previous)
     }
 
-    /// The slope of the reward of eq. (30) by what came next, with two changes: it is rounded off next to
-    /// the target, and past a cap a tenth of the slope is left, so that there is a way back.
+    /// The slope of the reward of eq. (30) over the next state, with two changes: it is smoothed near the target, and
+    /// past a cap a tenth of the slope remains, so that the gradient does not vanish.
     pub(super) fn reward(&self, next: &Aircraft, target: &Target) -> [f32; NUMBERS] {
         let task = Task::PAPER;
         let slope = |x: f64, scale: f64, cap: f64| {
@@ -216,7 +215,7 @@ impl Flyer<'_> {
     }
 }
 
-/// Of each observation the number of the aircraft that it depends on, with its slope: each depends on one.
+/// For each observation, the index of its only state variable and the slope.
 pub(super) fn observation_slopes() -> [(usize, f32); OBSERVATIONS] {
     type D = Dual<13>;
     let at = |k: usize| D::variable(0.1, k);

@@ -16,26 +16,26 @@
 
 use greylag_physics::atmosphere::MIDDLE_GRAVITY;
 
-/// Standard deviation of what the accelerations do not explain (gusts, their own noise), m/s² in
-/// a step of 10 ms: light turbulence changes the air's velocity by about that.
+/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s² in a step of
+/// 10 ms: light turbulence changes the velocity of the air by about that.
 const PROCESS: f64 = 1.0;
 /// Standard deviation of the airspeed, m/s.
 const AIRSPEED: f64 = 0.5;
 /// Standard deviation of the climb rate as a measurement of the air-relative one, m/s.
 const CLIMB: f64 = 0.5;
-/// Standard deviation of a sideways velocity taken to be zero at every step, m/s: held against the
-/// process it draws the sideslip to zero within a few seconds, so that drifts end and turns show.
+/// Standard deviation of the pseudo-measurement v = 0 at every step, m/s: relative to the process
+/// noise it returns the sideslip to zero within a few seconds, so that drift is bounded and turns show.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviations of the angles that come out, angle of attack and sideslip, rad. Of a right attitude 0.5°: 0.2° and 0.3 to
+/// Standard deviations of the estimated angle of attack and sideslip, rad. With an exact attitude 0.2° and 0.3 to
 /// 0.5° beside real ArduPlane, 0.1° and 0.2° beside real PX4, in calm air (`tests/firmware/angles.py`); gusts add to it. An
 /// error of pitch is one of the angle of attack, an error of heading one of the sideslip: the attitude may be 1° off in pitch and 2° in
 /// heading (ArduPlane's own was by 0.7° and 0.9°, a compass may be by more), taken as two standard deviations.
 pub const DEVIATION: [f64; 2] = [0.71 * DEGREE, 1.12 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Slowest airspeed at which angles mean anything, m/s.
+/// Lowest airspeed at which the flow angles are estimated, m/s.
 const SLOWEST: f64 = 3.0;
 
-/// What the estimator is given at a state frame.
+/// Measurements of one state frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Roll, pitch, yaw, rad.
@@ -44,7 +44,7 @@ pub struct Measured {
     pub rates: [f64; 3],
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
-    /// True airspeed, m/s.
+    /// True airspeed V_a, m/s.
     pub airspeed: f64,
     /// Climb rate, m/s; NaN when not reported.
     pub climb: f64,
@@ -57,7 +57,7 @@ pub struct Measured {
     pub wind_sd: f64,
 }
 
-/// The estimator.
+/// Extended Kalman filter of the air-relative velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AirData {
     /// u, v, w, m/s; none before the first measurement.
@@ -72,8 +72,8 @@ impl Default for AirData {
 }
 
 impl AirData {
-    /// Takes the next measurement in, `step` seconds after the last, and gives α and β, rad;
-    /// `None` below flying speed or when the measurement is not finite.
+    /// Updates with a measurement `step` seconds after the last one; returns α and β, rad, or `None` below flying
+    /// speed or when the measurement is not finite.
     pub fn update(&mut self, m: &Measured, step: f64) -> Option<[f64; 2]> {
         let needed =
             m.attitude.iter().chain(&m.rates).chain(&m.specific_force).chain([&m.airspeed]);
@@ -81,7 +81,7 @@ impl AirData {
             *self = AirData::default();
             return None;
         }
-        // After a long gap, or one that is no number, the past means nothing.
+        // after a long gap, or one that is not finite, the estimate starts again
         let step = match (0.0..=0.5).contains(&step) {
             true => step,
             false => {
@@ -143,16 +143,16 @@ impl AirData {
         self.state.map_or(0.0, |x| row.iter().zip(x).map(|(a, b)| a * b).sum())
     }
 
-    /// One scalar measurement: its row, its innovation, its standard deviation.
+    /// Updates with one scalar measurement: its row, innovation and standard deviation.
     fn scalar(&mut self, row: [f64; 3], innovation: f64, deviation: f64) {
         let Some(state) = &mut self.state else { return };
         let p = self.covariance;
         let cross: [f64; 3] = [0, 1, 2].map(|i| (0..3).map(|j| p[i][j] * row[j]).sum());
         let spread: f64 =
             row.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>() + deviation * deviation;
-        // A glitch counts for no more than three of its standard deviations.
+        // an outlier counts for no more than three standard deviations
         let limit = 3.0 * spread.sqrt();
-        // a limit that is no number holds nothing back, and must not end the program
+        // a NaN limit must not panic in the clamp; it limits nothing
         let innovation = innovation.max(-limit).min(limit);
         for i in 0..3 {
             state[i] += cross[i] / spread * innovation;
@@ -163,7 +163,7 @@ impl AirData {
     }
 }
 
-/// Straight flight along the path that airspeed and climb rate make.
+/// Initial velocity: straight flight along the path given by airspeed and climb rate.
 fn beginning(m: &Measured) -> [f64; 3] {
     let climb = if m.climb.is_finite() { m.climb } else { 0.0 };
     let path = (climb / m.airspeed).clamp(-0.9, 0.9).asin();

@@ -1,4 +1,4 @@
-//! One state out of streams that come apart: each attitude completes one.
+//! Assembles state frames from separate streams: each attitude completes one.
 
 use std::time::Duration;
 
@@ -13,17 +13,17 @@ use greylag_physics::{Command, Controls, State, Time};
 
 /// Time between states, µs.
 const PERIOD_US: u64 = 10_000;
-/// A clock that falls back by more than this has started anew, ms; less is a late datagram.
+/// A step back of the clock by more than this is a restart, ms; less is a late datagram.
 const RESTART_MS: i32 = 1000;
-/// Age at which a part of the state is no longer of this moment.
+/// Age at which a part of the state is outdated.
 const STALE: Duration = Duration::from_millis(300);
-/// Steps of the actuators made up for after a gap: a fifth of a second, longer than any transient.
+/// Largest number of actuator-model steps run after a gap: a fifth of a second, longer than any transient.
 const CATCH_UP: u64 = 20;
 
-/// The last value of a stream with its arrival, host clock.
+/// The last value of a stream with its arrival time, host clock.
 type Heard<T> = Option<(Duration, T)>;
 
-/// The streams of a controller put together.
+/// The latest values of a controller's streams.
 #[derive(Clone, Debug)]
 pub(super) struct Assembly {
     figures: ActuatorFigures,
@@ -33,14 +33,14 @@ pub(super) struct Assembly {
     air: Heard<[f64; 3]>,
     incidence: Heard<[f64; 2]>,
     estimator: AirData,
-    /// Whether the velocity has been reported since the estimator last saw it.
+    /// Whether a velocity was received since the estimator's last update.
     new_velocity: bool,
     actuators: Actuators,
     boot_ms: Option<u32>,
     last: Telemetry,
-    /// Standard deviation of its wind, m/s.
+    /// Standard deviation of the reported wind, m/s.
     wind_sd: f64,
-    /// What the last state was made of, as bits: sensors that stand still give the same again.
+    /// Bit patterns of the last state's sensor values, to detect frozen sensors.
     shown: [u64; 13],
     pub(super) counts: VehicleCounts,
 }
@@ -79,7 +79,7 @@ impl Assembly {
         }
     }
 
-    /// Roll and pitch of the last state, rad; NaN where they cannot be believed.
+    /// Roll and pitch of the last state, rad; NaN where implausible.
     pub(super) fn attitude(&self) -> [f64; 2] {
         match self.last.faults.contains(Faults::ATTITUDE) {
             true => [f64::NAN; 2],
@@ -87,8 +87,7 @@ impl Assembly {
         }
     }
 
-    /// Takes a measurement; an attitude completes a state. `command` is what the actuators have
-    /// been commanded since the last state.
+    /// Takes a measurement; an attitude completes a state. `command` is the actuators' command since the last state.
     pub(super) fn take(
         &mut self,
         host: Duration,
@@ -149,9 +148,9 @@ impl Assembly {
         }
         self.fill_force(host, &mut next);
         let climb = self.fill_air(host, &mut next);
-        // what is stale says nothing of standing still, and is a fault already
+        // outdated parts do not count as frozen; they are a fault already
         if self.stands_still(quaternion, rates) && next.faults.is_empty() {
-            // The estimator would go on by itself, and hide from the pilot that nothing moves.
+            // the estimator would go on by itself, and hide from the pilot that all sensors are frozen
             (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
         } else {
             self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
@@ -166,7 +165,7 @@ impl Assembly {
         Some(next)
     }
 
-    /// Whether every sensor shows to the bit what it showed at the last state.
+    /// Whether every sensor value equals that of the last state bit by bit.
     fn stands_still(&mut self, quaternion: [f64; 4], rates: [f64; 3]) -> bool {
         let force = self.specific_force.map_or([0.0; 3], |(_, force)| force);
         let air = self.air.map_or([0.0; 3], |(_, air)| air);
@@ -183,7 +182,7 @@ impl Assembly {
         }
     }
 
-    /// True airspeed and altitude; gives the climb rate.
+    /// Fills true airspeed and altitude; returns the climb rate.
     fn fill_air(&self, host: Duration, next: &mut Telemetry) -> f64 {
         let Some([equivalent, altitude, climb]) = fresh(self.air, host) else {
             next.faults.insert(Faults::LATE_AIR);
@@ -225,7 +224,7 @@ impl Assembly {
         }
     }
 
-    /// Vehicle time past the wrap of its milliseconds after 49 days, and how it stands to the last.
+    /// Vehicle time, unwrapped after 49 days of milliseconds, and its order relative to the last.
     fn order(&mut self, boot_ms: u32) -> (Time, Order) {
         let first = Time::from_micros(1000 * u64::from(boot_ms));
         let Some(before) = self.boot_ms else {

@@ -1,36 +1,36 @@
-//! A limit on how fast the attitude moves that a controller is commanded.
+//! Rate limit on the attitude commanded to a controller.
 //!
-//! A step of the bank from one side to the other drives a controller's loops to their stops, and its pitch errs by 20° meanwhile.
-//! A ramp that the loops can follow keeps the attitude where the envelope wants it.
+//! A step of the bank from one side to the other saturates a controller's loops, and its pitch error reaches 20°
+//! meanwhile. A ramp that the loops can follow keeps the attitude inside the envelope.
 
 use greylag_physics::Time;
 
 /// Fastest change of the commanded roll and pitch, rad/s: below the limits that controllers set themselves (PX4's default is 70°/s in
 /// roll, 60°/s in pitch; ArduPilot's autotune takes 75°/s).
 const RATE: [f64; 2] = [45.0 * DEGREE, 20.0 * DEGREE];
-/// A longer gap between two states says nothing of what was commanded meanwhile, s.
+/// Gap between two states after which the ramp starts again, s.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The roll and pitch that were commanded last.
+/// The roll and pitch commanded last.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeRamp {
     last: Option<(Time, [f64; 2])>,
 }
 
 impl AttitudeRamp {
-    /// Forgets all: the controller flies by itself.
+    /// Resets the ramp: the controller flies by itself.
     pub(super) fn rest(&mut self) {
         self.last = None;
     }
 
-    /// The roll and pitch to command on the way to `wanted`, rad, at `now`; the way begins at `seen`.
+    /// The roll and pitch to command on the ramp to `wanted`, rad, at `now`; the ramp starts at `seen`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let (before, from) = self.last.unwrap_or((now, seen));
         let dt = now.since(before).as_secs_f64().min(GAP_S);
         let ramped = std::array::from_fn(|axis| {
             let most = RATE[axis] * dt;
-            // an attitude that is no number is no place to start from
+            // a NaN attitude is no start of a ramp
             if from[axis].is_finite() {
                 wanted[axis].clamp(from[axis] - most, from[axis] + most)
             } else {

@@ -1,46 +1,47 @@
-//! A slow trim on the attitude that a controller is commanded: its own loops leave 0.3° to 1.8°, and in steep turns, as
-//! played, up to 9° of pitch for half a minute, where the elevator that they feed forward to the turn does not fit the aircraft.
+//! Slow integral correction of the attitude commanded to a controller, whose loops leave a steady-state error of 0.3° to
+//! 1.8°, and in steep turns, as played, up to 9° of pitch for half a minute, where their elevator feed-forward does not fit
+//! the aircraft.
 //!
-//! The error that stays is integrated over seconds, within narrow bounds, and only while the wanted attitude has stood
-//! still and is nearly reached. So it takes away what is constant and leaves every transient to the controller.
+//! The error is integrated over seconds, within narrow bounds, and only while the wanted attitude is constant and nearly
+//! reached: constant errors are removed, transients are left to the controller.
 
 use greylag_physics::Time;
 
-/// An error is taken away within about this time, s: five times slower than a controller's attitude loop.
+/// Time constant of the integrator, s: five times slower than a controller's attitude loop.
 const TIME_S: f64 = 2.5;
-/// The most that is added, rad: what PX4's and ArduPlane's loops, as played, leave at 55° of bank and 20° nose down.
+/// Largest correction, rad: what PX4's and ArduPlane's loops, as played, leave at 55° of bank and 20° nose down.
 const MOST: f64 = 10.0 * DEGREE;
-/// A wanted attitude that moves by more begins anew to settle, rad.
+/// Change of the wanted attitude that restarts settling, rad.
 const STILL: f64 = 0.5 * DEGREE;
-/// How long the wanted attitude has stood before the error counts, s: after a step to the other bank PX4's roll rings for as
-/// long, with a period of 5 s.
+/// Time for which the wanted attitude must be constant before the error is integrated, s: after a step to the other
+/// bank PX4's roll rings this long, with a period of 5 s.
 const SETTLING_S: f64 = 4.0;
-/// An error beyond this is no error that stays, rad.
+/// Error above which nothing is integrated, rad: it is not a steady-state error.
 const NEAR: f64 = 12.0 * DEGREE;
-/// A wanted attitude that is farther from where the trim was found needs another one, rad.
+/// Change of the wanted attitude beyond which the correction is reset, rad.
 const ANOTHER: f64 = 4.0 * DEGREE;
-/// A longer gap between two states says nothing of what came between, s.
+/// Gap between two states after which nothing is integrated, s.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The trim of roll and pitch.
+/// Integral correction of roll and pitch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeTrim {
     added: [f64; 2],
-    /// The wanted attitude at which that was found, rad.
+    /// The wanted attitude at which it was found, rad.
     found_at: [f64; 2],
     last: Option<Time>,
-    /// The wanted attitude that stands, since when.
+    /// The constant wanted attitude, and since when.
     standing: Option<([f64; 2], Time)>,
 }
 
 impl AttitudeTrim {
-    /// Forgets all: the controller flies by itself.
+    /// Resets the correction: the controller flies by itself.
     pub(super) fn rest(&mut self) {
         *self = AttitudeTrim::default();
     }
 
-    /// The roll and pitch to command, rad, where `wanted` is wanted and `seen` is measured at `now`.
+    /// The roll and pitch to command, rad, for `wanted` and the measured attitude `seen` at `now`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let dt = self.last.replace(now).map_or(0.0, |last| now.since(last).as_secs_f64());
         let stands = self.standing.filter(|(stood, _)| !far(*stood, wanted, STILL));
@@ -49,11 +50,11 @@ impl AttitudeTrim {
         let settled = now.since(since).as_secs_f64() >= SETTLING_S;
         for axis in 0..2 {
             let added = &mut self.added[axis];
-            // what was found in a turn to the right is wrong in one to the left
+            // a correction found in a turn to the right is wrong in one to the left
             if (self.found_at[axis] - wanted[axis]).abs() > ANOTHER {
                 *added = 0.0;
             }
-            // what the controller leaves of what it is commanded, the trim included
+            // the controller's error with respect to its command, which includes the correction
             let left = (wanted[axis] + *added - seen[axis]).abs();
             if settled && dt <= GAP_S && left <= NEAR {
                 *added = (*added + (wanted[axis] - seen[axis]) * dt / TIME_S).clamp(-MOST, MOST);
@@ -64,7 +65,7 @@ impl AttitudeTrim {
     }
 }
 
-/// Whether two attitudes differ by more than `by` in an axis; true of what is no number.
+/// Whether two attitudes differ by more than `by` in an axis; true for NaN.
 fn far(a: [f64; 2], b: [f64; 2], by: f64) -> bool {
     !a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by)
 }
@@ -112,7 +113,7 @@ mod tests {
         }
     }
 
-    /// A controller that reaches 95 % of what it is commanded, in turns to both sides.
+    /// A controller that reaches 95 % of its command, in turns to both sides.
     #[test]
     fn a_turn_that_is_reversed_is_trimmed_anew() {
         for ramp_s in [0.01, 9.0] {

@@ -1,4 +1,4 @@
-//! How late the loop through the surfaces is by the controller's parameters, and how much of what it bears that leaves.
+//! Delay of the surface loop, estimated from the controller's parameters, and the remaining delay margin.
 
 use std::fmt;
 use std::time::Duration;
@@ -8,25 +8,26 @@ use super::profile::{Authority, Stack};
 
 /// Delay of a second-order Butterworth low-pass at low frequencies, in cycles of its cut-off: √2 / 2π.
 const LOW_PASS: f64 = 0.225;
-/// ArduPilot looks at its channels every 20 ms; PX4 at MANUAL_CONTROL as it comes, 10 ms apart.
+/// Sampling period of the sticks, s: ArduPilot samples its channels every 20 ms; PX4 takes each
+/// MANUAL_CONTROL, 10 ms apart.
 const CHANNELS_S: [f64; 2] = [0.02, 0.01];
-/// Link, states and what else is known roughly: less left than this is said, s.
+/// Remaining delay margin below which a warning is given, s; it covers the link and other delays known roughly.
 const SCARCE_S: f64 = 0.015;
 
-/// What makes the loop late, s.
+/// Contributions to the delay of the loop, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delays {
     stack: Stack,
-    /// Cut-off of the gyros' low-pass, Hz, and what it takes, s.
+    /// Cut-off of the gyros' low-pass, Hz, and its delay, s.
     gyros: (f64, f64),
-    /// Rate of the controller's loop, Hz, and one of its periods, s; none where it is as fast as the streams.
+    /// Rate of the controller's loop, Hz, and its period, s; `None` where it is as fast as the streams.
     cycle: Option<(f64, f64)>,
-    /// Between two looks at the channels, s.
+    /// Sampling period of the channels, s.
     channels_s: f64,
 }
 
 impl Delays {
-    /// All of it, s.
+    /// Sum of the contributions, s.
     pub fn sum_s(&self) -> f64 {
         self.gyros.1 + self.cycle.map_or(0.0, |(_, s)| s) + self.channels_s
     }
@@ -48,12 +49,12 @@ impl fmt::Display for Delays {
 }
 
 impl Real {
-    /// Says at which delay the loop through the surfaces swings by itself.
+    /// Sets the delay margin of the loop through the surfaces.
     pub fn bear(&mut self, least: Option<Duration>) {
         self.bears = least;
     }
 
-    /// What makes the loop through the surfaces late, once its parameters are read; nothing by attitude.
+    /// Delay contributions, once the parameters are read; `None` when attitudes are commanded.
     pub fn delays(&self) -> Option<Delays> {
         if self.profile.authority == Authority::Attitude {
             return None;
@@ -67,12 +68,12 @@ impl Real {
             Stack::Px4 => ("IMU_GYRO_CUTOFF", None, CHANNELS_S[1]),
         };
         let hz = self.parameters.get(filter)?;
-        // 0 switches the filter off.
+        // 0 disables the filter
         let low_pass = if hz > 0.0 { LOW_PASS / hz } else { 0.0 };
         Some(Delays { stack, gyros: (hz, low_pass), cycle, channels_s })
     }
 
-    /// What is left of the delay that the loop bears, s, with what takes the rest.
+    /// Remaining delay margin, s, with a text on the contributions.
     fn left(&self) -> Option<(f64, String)> {
         let (delays, bears) = (self.delays()?, self.bears?.as_secs_f64());
         let left = bears - delays.sum_s();
@@ -85,12 +86,12 @@ impl Real {
         Some((left, words))
     }
 
-    /// The delay that is left, in words; nothing where it is not known.
+    /// The remaining delay margin as text; `None` where it is unknown.
     pub fn delay_words(&self) -> Option<String> {
         self.left().map(|(_, words)| words)
     }
 
-    /// Why the controller cannot be flown by surfaces for its delay, with the remedy.
+    /// Why the delay forbids flight by surfaces, with the remedy.
     pub fn delay_obstacle(&self) -> Option<String> {
         let (left, words) = self.left()?;
         (left <= 0.0)

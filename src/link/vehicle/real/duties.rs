@@ -1,4 +1,4 @@
-//! What is due besides answers: heartbeat, watchdog, requests of streams and parameters, changes of mode.
+//! Periodic duties: heartbeat, watchdog, requests of streams, parameters and modes.
 
 use std::time::Duration;
 
@@ -9,15 +9,15 @@ use crate::framing::Source;
 use crate::wire::controller as wire;
 
 const HEARTBEAT: Duration = Duration::from_secs(1);
-/// Between two measurements of the latency.
+/// Interval of latency measurements.
 const TIME_SYNC: Duration = Duration::from_millis(200);
-/// Without a new state for this long the aircraft is handed back.
+/// Age of the last new state at which control authority is returned.
 const BLIND: Duration = Duration::from_millis(300);
-/// A companion that sends nothing for this long is dead to its controller (COM_RC_LOSS_T, RC_OVERRIDE_TIME, …).
+/// Silence after which a controller's own failsafe acts (COM_RC_LOSS_T, RC_OVERRIDE_TIME, …).
 const DEAD: Duration = Duration::from_millis(500);
 
 impl Real {
-    /// What is due at `host` besides answers: heartbeat, requests, the hand-back.
+    /// Frames due at `host`, other than replies to states: heartbeat, requests, the return of control authority.
     pub fn due(&mut self, host: Duration) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         if host >= self.next_heartbeat {
@@ -33,8 +33,8 @@ impl Real {
         (!bytes.is_empty()).then_some(bytes)
     }
 
-    /// See [`crate::vehicle::Vehicle::excuse`]. A controller that got nothing for longer than it waits has begun its own
-    /// failsafe: it keeps the aircraft.
+    /// See [`crate::vehicle::Vehicle::excuse`]. After a silence longer than its timeout the controller's own failsafe
+    /// is active, and it keeps the aircraft.
     pub fn excuse(&mut self, missed: Duration) {
         if self.engagement.steers() && missed > DEAD {
             self.hand_back(format!("this computer was late by {:.1} s", missed.as_secs_f64()));
@@ -46,13 +46,13 @@ impl Real {
         self.pulse.rest();
     }
 
-    /// The watchdog.
+    /// Returns control authority when states or cycles are missing.
     fn watch(&mut self, host: Duration) {
         if !self.engagement.steers() {
             self.pulse.rest();
             return self.remind(host);
         }
-        // A controller that tracks an attitude does not mind a slow companion.
+        // a controller that tracks an attitude tolerates a slow companion
         let surfaces = self.profile.authority == Authority::Surfaces;
         let scarce = self.pulse.cycle(host, self.survey.frames()).filter(|_| surfaces);
         let age = |at: Duration| host.saturating_sub(at);
@@ -72,7 +72,7 @@ impl Real {
         }
     }
 
-    /// Says that a hand-back is not confirmed.
+    /// Reports that a return of control authority is not confirmed.
     fn remind(&mut self, host: Duration) {
         if self.engagement.unconfirmed(host) {
             let (steered, hold) =
@@ -86,7 +86,7 @@ impl Real {
         }
     }
 
-    /// Streams, parameters, latency.
+    /// Requests streams and parameters, and measures the latency.
     fn ask(&mut self, host: Duration, to: Source, bytes: &mut Vec<u8>) {
         let first = self.survey.windows() == 0 && self.survey.messages().count() <= 1;
         if self.survey.turn(host) || first {
@@ -120,7 +120,7 @@ impl Real {
         let message = wire::set_mode(to, mode.main, mode.sub);
         bytes.extend(self.write(&message));
         if !steer && (stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces) {
-            // The channels go back to the radio.
+            // the channels return to the radio
             let message = wire::channels_override(to, [0; 3]);
             bytes.extend(self.write(&message));
         }

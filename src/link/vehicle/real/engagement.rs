@@ -1,61 +1,60 @@
-//! Who has the aircraft: from asking the controller for it to its handing back.
+//! Control authority: from the request to the flight controller to its return.
 //!
-//! What counts is the mode that the controller shows, in HEARTBEAT or CURRENT_MODE. Its COMMAND_ACK
-//! does not: PX4 sends two for a mode, the first always ACCEPTED, and a link may lose either.
+//! The mode in HEARTBEAT or CURRENT_MODE decides. COMMAND_ACK does not: PX4 sends two for a mode, the first always
+//! ACCEPTED, and a link may lose either.
 
 use std::time::Duration;
 
 use super::profile::{Authority, Stack};
 
-/// The controller is asked for a mode again after this time.
+/// Interval at which a mode request is repeated.
 pub(super) const ASK_AGAIN: Duration = Duration::from_millis(250);
-/// It has this long to show the mode after the first request.
+/// Timeout for the mode to be shown after the first request.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// A hand-back that no heartbeat has confirmed for so long is said again: two heartbeats are due.
+/// Time after which an unconfirmed return is reported: two heartbeats are due.
 const UNCONFIRMED: Duration = Duration::from_secs(2);
 /// HEARTBEAT and CURRENT_MODE may overtake one another by a datagram.
 const GRACE: Duration = Duration::from_millis(100);
 
-/// Where things stand.
+/// Phase of the engagement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Phase {
-    /// The controller flies, or its pilot.
+    /// The controller flies, or its pilot does.
     Idle,
-    /// It is being asked for the mode in which we steer; what we send it meanwhile is a stream of
-    /// commands that it wants to see first.
+    /// The steered mode is requested; meanwhile a stream of commands is sent, which the controller requires first.
     Entering { since: Duration, asked: Option<Duration> },
-    /// We steer.
+    /// The companion has control authority.
     Engaged { since: Duration },
-    /// It is being asked to fly by itself, until it shows that it does.
+    /// The controller's own mode is requested, until it is shown.
     Releasing { since: Option<Duration>, asked: Option<Duration> },
 }
 
-/// What a mode that the controller shows means.
+/// Event derived from a mode that the controller shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
-    /// Nothing new.
+    /// No change of the phase.
     Nothing,
-    /// We steer from now on.
+    /// The companion has control authority from now on.
     Engaged,
-    /// It, or its pilot, has taken the aircraft.
+    /// The controller or its pilot has taken control.
     Taken,
-    /// It has the aircraft back, as it was asked.
+    /// The controller has confirmed the return.
     Confirmed,
 }
 
-/// The phase with what the controller has answered.
+/// The phase with the controller's replies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Engagement {
     pub(super) phase: Phase,
-    /// Commands are streamed for so long before the mode is asked for.
+    /// Time for which commands are streamed before the mode is requested.
     lead: Duration,
-    /// The last MAV_RESULT that was no acceptance.
+    /// The last MAV_RESULT other than ACCEPTED.
     refused: Option<u8>,
     /// Whether any request was accepted.
     accepted: bool,
-    /// After a hand-back nothing is begun until the demand has ended once.
+    /// After a return, engaging is blocked until the demand has ended once.
     barred: bool,
-    /// Whether it was said that a hand-back is not confirmed.
+    /// Whether the unconfirmed return was reported.
     reminded: bool,
 }
 
@@ -71,17 +70,17 @@ impl Engagement {
         }
     }
 
-    /// Whether commands are to be sent.
+    /// Whether commands are sent.
     pub(super) fn steers(&self) -> bool {
         matches!(self.phase, Phase::Entering { .. } | Phase::Engaged { .. })
     }
 
-    /// Whether the controller flies what is commanded.
+    /// Whether the controller executes the commands.
     pub(super) fn is_engaged(&self) -> bool {
         matches!(self.phase, Phase::Engaged { .. })
     }
 
-    /// Somebody wants to steer; whether that is new.
+    /// Starts engaging on demand; whether this is new.
     pub(super) fn begin(&mut self, host: Duration) -> bool {
         let begins = !self.barred && !self.steers();
         if begins {
@@ -91,7 +90,7 @@ impl Engagement {
         begins
     }
 
-    /// Nobody wants to steer.
+    /// Ends the demand.
     pub(super) fn rest(&mut self) {
         self.barred = false;
         if self.steers() {
@@ -99,7 +98,7 @@ impl Engagement {
         }
     }
 
-    /// The aircraft goes back to the controller, and stays there until somebody asks again.
+    /// Returns control authority, until it is demanded again.
     pub(super) fn hand_back(&mut self) {
         self.barred = true;
         self.release();
@@ -110,20 +109,20 @@ impl Engagement {
         self.reminded = false;
     }
 
-    /// The controller has answered a request for a mode: no answer engages.
+    /// Takes the reply to a mode request: no reply engages by itself.
     pub(super) fn answered(&mut self, result: u8) {
         match (self.phase, result) {
             (Phase::Entering { .. }, 0) => self.accepted = true,
-            // 5 is in progress.
+            // 5 is MAV_RESULT_IN_PROGRESS
             (Phase::Entering { .. }, 1..=4 | 6..) => self.refused = Some(result),
             _ => {}
         }
     }
 
-    /// The controller shows its mode: whether it is the steered one.
+    /// Takes the mode that the controller shows: whether it is the steered one.
     pub(super) fn shown(&mut self, host: Duration, steered: bool) -> Shown {
         match self.phase {
-            // A mode that was on before the first request is its pilot's, who flies.
+            // a mode that was active before the first request was chosen by the controller's pilot
             Phase::Entering { asked: Some(_), .. } if steered => {
                 self.phase = Phase::Engaged { since: host };
                 Shown::Engaged
@@ -141,7 +140,7 @@ impl Engagement {
         }
     }
 
-    /// Why it takes too long, if it does.
+    /// Why engaging has timed out, if it has.
     pub(super) fn overdue(
         &self,
         host: Duration,
@@ -161,7 +160,7 @@ impl Engagement {
         })
     }
 
-    /// Whether a hand-back is unconfirmed for so long that it has to be said; it is said once.
+    /// Whether an unconfirmed return is to be reported now; at most once.
     pub(super) fn unconfirmed(&mut self, host: Duration) -> bool {
         let Phase::Releasing { since: Some(since), .. } = self.phase else { return false };
         let late = host.saturating_sub(since) > UNCONFIRMED && !self.reminded;
@@ -169,8 +168,7 @@ impl Engagement {
         late
     }
 
-    /// Whether a request is due at `host`: `true` in the answer is for the steered mode, `false`
-    /// for the one in which the controller flies.
+    /// The mode request due at `host`: `true` for the steered mode, `false` for the controller's own.
     pub(super) fn request(&mut self, host: Duration) -> Option<bool> {
         let due =
             |asked: Option<Duration>| asked.is_none_or(|at| host.saturating_sub(at) >= ASK_AGAIN);
@@ -191,7 +189,7 @@ impl Engagement {
     }
 }
 
-/// What a refusal of the steered mode commonly means.
+/// Likely cause of a refusal of the steered mode.
 fn refusal(result: u8, stack: Stack, authority: Authority) -> String {
     match (result, stack, authority) {
         (1, Stack::Px4, Authority::Surfaces) => {
@@ -275,7 +273,7 @@ mod tests {
             engagement.request(ms(0));
             assert_eq!(engagement.shown(ms(10), true), Shown::Engaged);
             assert_eq!(engagement.shown(ms(10 + late), false), shown);
-            // Its pilot has it: nothing is begun until the demand has ended once.
+            // its pilot has control: nothing is begun until the demand has ended once
             assert!(!engagement.begin(ms(200)));
             assert_eq!(engagement.is_engaged(), shown == Shown::Nothing);
             engagement.rest();

@@ -1,4 +1,4 @@
-//! What the controller says: whose frame it is, what it shows, which state it carries.
+//! Handling of frames from the controller: sender, mode, state.
 
 use std::time::Duration;
 
@@ -14,11 +14,11 @@ use crate::vehicle::{Notice, Telemetry};
 use crate::wire::controller as wire;
 use crate::wire::controller::ControllerMessage;
 
-/// MAV_AUTOPILOT_INVALID: whoever says this is no flight controller.
+/// MAV_AUTOPILOT_INVALID: the sender is not a flight controller.
 const NO_AUTOPILOT: u8 = 8;
 
 impl Real {
-    /// See [`crate::vehicle::Vehicle::handle`].
+    /// Handles received bytes, see [`crate::vehicle::Vehicle::handle`].
     pub fn handle(
         &mut self,
         host: Duration,
@@ -60,7 +60,7 @@ impl Real {
                     self.survey.restart(host, id);
                 }
             }
-            // Our own overrides may look like a radio.
+            // our own overrides may be reported as a radio
             ControllerMessage::Receiver { alive } if !self.engagement.steers() => {
                 self.radio = Some(alive);
             }
@@ -115,7 +115,7 @@ impl Real {
         }
     }
 
-    /// The controller shows its mode.
+    /// Takes the mode that the controller shows.
     fn shown(&mut self, host: Duration, custom_mode: u32) {
         let steered = self.profile.stack.steered(self.profile.authority);
         let name = steered.name;
@@ -135,15 +135,15 @@ impl Real {
         }
     }
 
-    /// Whether an answer is to us; old firmware names nobody.
+    /// Whether a reply is addressed to us; old firmware leaves the target zero.
     fn is_us(&self, to: Source) -> bool {
         let system = self.system().unwrap_or(0);
         matches!(to, Source { system: 0, component: 0 })
             || to == Source { system, component: ONBOARD }
     }
 
-    /// A controller is heard for the first time, or again: then nothing is known of it any more, not
-    /// even which way its channels run, and nobody steers by that.
+    /// Starts over with a controller that appears for the first time or again: parameters and channel directions are
+    /// unknown, and control authority is not taken before they are read.
     fn meet(&mut self, system: u8, autopilot: u8) {
         if self.engagement.steers() {
             self.hand_back("no heartbeat of the controller for 3 s".into());

@@ -1,16 +1,16 @@
-//! Why the aircraft cannot be engaged now, in words with the remedy.
+//! Conditions that prevent engaging, as texts with their remedies.
 
 use super::profile::{Authority, Stack};
 use super::{ENOUGH, Real};
 use crate::framing::Source;
 
-/// What a controller that signs means for a companion that does not.
+/// Text for a controller that requires signatures when this companion does not sign.
 const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which carry no right \
                         signature: give its key with --sign and add --sign-vehicle";
 
 impl Real {
-    /// What a radio means for a flight by surfaces. ArduPlane goes on with the radio's sticks when our overrides end, and
-    /// stays in MANUAL until its failsafe of the ground station acts, whose place the companion takes.
+    /// Warning about a radio in flight by surfaces. ArduPlane returns to the radio's sticks when the overrides end,
+    /// and stays in MANUAL until its ground-station failsafe acts, whose role the companion takes.
     pub fn radio_warning(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
@@ -23,17 +23,17 @@ impl Real {
         })
     }
 
-    /// Whether the controller signs what it sends and has answered nothing that we asked.
+    /// Whether the controller signs its frames and has not replied to any request.
     pub fn is_shut_out(&self) -> bool {
         self.signs && self.parameters.is_silent()
     }
 
-    /// Why a stream that was denied does not come, with the remedy.
+    /// Why a refused stream is missing, with the remedy.
     pub fn denial(&self, id: u32) -> Option<String> {
         self.requests.words(self.profile.stack).filter(|_| self.requests.is_denied(id))
     }
 
-    /// Why the aircraft cannot be engaged now, with the remedy.
+    /// Why control authority cannot be taken now, with the remedy.
     pub fn obstacle(&self) -> Option<String> {
         let Some(controller) = self.controller else {
             return Some(
@@ -60,7 +60,7 @@ impl Real {
         parameters.or_else(|| self.delay_obstacle()).or_else(|| self.thin_stream())
     }
 
-    /// A stream that comes too seldom.
+    /// A needed stream whose rate is too low.
     fn thin_stream(&self) -> Option<String> {
         let thin = self
             .profile

@@ -1,21 +1,21 @@
-//! The controller's parameters: read one by one, checked against what the profile needs.
+//! The controller's parameters: read one by one, checked against the profile.
 //!
-//! The rules themselves, which parameter must be what, are in `profile.rs`.
+//! The rules (which parameter must have which value) are in `profile.rs`.
 
 use std::time::Duration;
 
 use super::profile::{Matters, Need, Presence, Rule};
 
-/// Between two requests for the same parameter.
+/// Interval between requests for the same parameter.
 const AGAIN: Duration = Duration::from_millis(400);
-/// Requests in flight at once: a slow link is not flooded.
+/// Largest number of requests in flight, so that a slow link is not flooded.
 const AT_ONCE: usize = 4;
-/// Requests for one name before it counts as unknown to the controller.
+/// Requests for one name before the controller counts as not having it.
 const TRIES: u32 = 5;
-/// Pulse widths that a channel can have, µs.
+/// Valid pulse widths of a channel, µs.
 const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
 
-/// What is known of one rule's parameter.
+/// State of one rule's parameter.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     rule: &'static Rule,
@@ -24,24 +24,24 @@ struct Entry {
     asked: Option<Duration>,
 }
 
-/// The parameters of a profile, as far as the controller has reported them.
+/// The parameters of a profile, as reported by the controller.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     entries: Vec<Entry>,
 }
 
-/// How a parameter stands.
+/// Check result of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// Not reported yet.
+    /// Not yet reported.
     Unread,
-    /// The controller does not answer for it.
+    /// The controller does not reply for it.
     Unknown,
-    /// The firmware does not have it, and it may be missing.
+    /// The firmware lacks it, which is allowed.
     Absent,
-    /// As needed.
+    /// The value fits the rule.
     Good(f64),
-    /// Not as needed.
+    /// The value violates the rule.
     Bad(f64),
 }
 
@@ -51,14 +51,14 @@ impl Parameters {
         Parameters { entries: rules.iter().map(entry).collect() }
     }
 
-    /// Forgets what was reported, as when the controller has started anew.
+    /// Clears the reported values, as when the controller has restarted.
     pub(super) fn forget(&mut self) {
         for entry in &mut self.entries {
             (entry.value, entry.tries, entry.asked) = (None, 0, None);
         }
     }
 
-    /// The names to ask for at `host`.
+    /// Names to request at `host`.
     pub(super) fn due(&mut self, host: Duration) -> Vec<&'static str> {
         let mut names = Vec::new();
         for entry in &mut self.entries {
@@ -75,7 +75,7 @@ impl Parameters {
         names
     }
 
-    /// Takes a value; values of parameters that nobody asked for are of no interest.
+    /// Stores a reported value; parameters outside the rules are ignored.
     pub(super) fn take(&mut self, name: &str, value: f64) {
         for entry in &mut self.entries {
             if let Some(at) = entry.rule.names.iter().position(|known| *known == name) {
@@ -84,25 +84,25 @@ impl Parameters {
         }
     }
 
-    /// Whether none was answered, though all were asked for.
+    /// Whether none was reported although all were requested.
     pub(super) fn is_silent(&self) -> bool {
         self.entries.iter().all(|entry| entry.value.is_none() && entry.tries > 0)
     }
 
-    /// The value of a parameter, once read.
+    /// The value of a parameter, once reported.
     pub(super) fn get(&self, name: &str) -> Option<f64> {
         let entry = self.entries.iter().find(|entry| entry.rule.names.contains(&name))?;
         entry.value.map(|(_, value)| value)
     }
 
-    /// Each parameter that matters by the name that the controller knows it by, with how it stands and the words
-    /// that say what to do. `radio`: whether the controller hears one.
+    /// Each relevant parameter under the name that the controller uses, with its check result and the remedy.
+    /// `radio`: whether the controller receives one.
     pub fn report(&self, system: u8, radio: bool) -> Vec<(&'static str, Standing, String)> {
         let matters = |entry: &&Entry| radio || entry.rule.matters == Matters::Always;
         self.entries.iter().filter(matters).map(|entry| entry.report(system)).collect()
     }
 
-    /// Why the profile cannot be flown with these parameters, each mismatch with its remedy.
+    /// Why the profile cannot be flown with these parameters: each violation with its remedy.
     pub(super) fn obstacle(&self, system: u8, radio: bool) -> Option<String> {
         let report = self.report(system, radio);
         let unread = report.iter().filter(|(_, standing, _)| *standing == Standing::Unread).count();
@@ -154,7 +154,7 @@ impl Entry {
 }
 
 impl Need {
-    /// Whether a parameter may have this value at the controller of system `system`.
+    /// Whether the rule allows this value at a controller of system id `system`.
     pub fn allows(self, value: f64, system: u8) -> bool {
         match self {
             Need::OneOf(values) => values.contains(&value),

@@ -1,36 +1,36 @@
-//! What each flight stack accepts: modes, streams, parameters.
+//! Modes, streams and parameters of each flight stack.
 
 use std::fmt;
 use std::time::Duration;
 
 use greylag_physics::airframe::ActuatorFigures;
 
-/// A flight stack.
+/// A flight stack with a profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stack {
-    /// PX4, fixed wing.
+    /// PX4 for fixed-wing aircraft.
     Px4,
-    /// ArduPilot Plane.
+    /// ArduPilot Plane (ArduPlane).
     Ardupilot,
 }
 
-/// What the companion commands.
+/// What the companion commands to the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Authority {
     /// Surfaces and throttle, as sticks in MANUAL.
     Surfaces,
-    /// Attitude and thrust, in OFFBOARD or GUIDED: the controller's own loops move the surfaces.
+    /// Attitude and thrust, in OFFBOARD or GUIDED: the controller's own loops command the surfaces.
     Attitude,
 }
 
-/// How a real flight controller is flown.
+/// Flight stack and authority of a real flight controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// Its stack.
+    /// The flight stack it runs.
     pub stack: Stack,
-    /// What it is commanded.
+    /// The quantities it is commanded.
     pub authority: Authority,
-    /// The aircraft's actuators, which the controller does not report the state of.
+    /// Actuator dynamics of the aircraft, whose state the controller does not report.
     pub actuators: ActuatorFigures,
 }
 
@@ -49,18 +49,18 @@ const fn mode(name: &'static str, main: u8, sub: u8) -> StackMode {
     StackMode { name, main, sub }
 }
 
-/// A stream to be asked for.
+/// A telemetry stream to request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stream {
-    /// The message's number.
+    /// Message id of the stream.
     pub id: u32,
-    /// Its name, for the user.
+    /// Message name for texts.
     pub name: &'static str,
-    /// Its rate, Hz.
+    /// Requested rate, Hz.
     pub hz: f64,
-    /// Whether the flight cannot do without.
+    /// Whether the flight requires it.
     pub needed: bool,
-    /// Bytes of its frame, MAVLink 2 with nothing cut off.
+    /// Frame length in MAVLink 2 without truncation, bytes.
     pub bytes: u32,
 }
 
@@ -83,20 +83,20 @@ const ARDUPILOT_STREAMS: [Stream; 7] = [
     stream(11020, "AOA_SSA", 50.0, false, 16),
     stream(33, "GLOBAL_POSITION_INT", 10.0, false, 28),
     stream(168, "WIND", 2.0, false, 12),
-    // Whether a radio is bound.
+    // whether a radio is bound
     stream(1, "SYS_STATUS", 1.0, false, 43),
 ];
 
-/// What a parameter must be.
+/// Constraint on a parameter's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Need {
-    /// One of these.
+    /// One of these values.
     OneOf(&'static [f64]),
-    /// Within these, both included.
+    /// A value in this closed interval.
     Between(f64, f64),
     /// The companion's own system id.
     OurSystem,
-    /// Any number that makes sense for a channel's pulse width, µs: it is used.
+    /// A plausible pulse width of a channel, µs; the value is used.
     Pulse,
     /// A bit mask without any of these bits.
     Without(u32),
@@ -105,35 +105,35 @@ pub enum Need {
 /// Whether firmware may lack a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Presence {
-    /// Firmware without it is not one that the profile fits.
+    /// Firmware without it does not fit the profile.
     Required,
     /// Some releases do not have it.
     Optional,
 }
 
-/// A parameter that is read and checked before engaging.
+/// A parameter that is checked before engaging.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
-    /// Its names, newest release first: one of them is enough.
+    /// Its names, newest release first; one of them suffices.
     pub names: &'static [&'static str],
-    /// What it must be.
+    /// Constraint on its value.
     pub need: Need,
-    /// The value to set when it is not.
+    /// Value to set when the constraint is violated.
     pub remedy: f64,
-    /// What it is for.
+    /// Purpose of the parameter, as text.
     pub why: &'static str,
-    /// Whether it may be missing.
+    /// Whether firmware may lack it.
     pub presence: Presence,
-    /// When it matters.
+    /// Condition under which it is checked.
     pub matters: Matters,
 }
 
-/// When a parameter matters.
+/// Condition under which a parameter is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matters {
-    /// Always.
+    /// Under all conditions.
     Always,
-    /// While the controller hears a radio.
+    /// Only while the controller receives a radio.
     WithRadio,
 }
 
@@ -240,7 +240,7 @@ const STATION: &str =
     "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
 const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// 100 Hz of state are 0.8 of 125 Hz; below 200 Hz nothing was flown.
+/// Loop rate of the controller, Hz: state at 100 Hz needs 125 Hz; below 200 Hz there is no flight experience.
 const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [
@@ -254,7 +254,7 @@ const ARDUPILOT_ATTITUDE: [Rule; 2] = [
 ];
 
 impl Stack {
-    /// MAV_AUTOPILOT.
+    /// The MAV_AUTOPILOT of the stack.
     pub fn autopilot(self) -> u8 {
         match self {
             Stack::Px4 => 12,
@@ -267,7 +267,7 @@ impl Stack {
         [Stack::Px4, Stack::Ardupilot].into_iter().find(|stack| stack.autopilot() == autopilot)
     }
 
-    /// The mode in which the companion steers.
+    /// The mode in which the companion has control authority.
     pub fn steered(self, authority: Authority) -> StackMode {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => mode("MANUAL", 1, 0),
@@ -277,9 +277,9 @@ impl Stack {
         }
     }
 
-    /// For how long commands are streamed before the steered mode is asked for. PX4 looks at its
-    /// requirements every 100 ms and has sticks pass through another module first: it refused 2 of 3
-    /// at 150 ms, none at 300 ms. ArduPilot asks for no stream, and mixes early sticks into LOITER.
+    /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every
+    /// 100 ms, and its stick input passes through another module first: it refused 2 of 3 requests at 150 ms, none at
+    /// 300 ms. ArduPilot requires no stream, and early sticks would act in LOITER.
     pub fn lead(self) -> Duration {
         match self {
             Stack::Px4 => Duration::from_millis(500),
@@ -287,7 +287,7 @@ impl Stack {
         }
     }
 
-    /// The mode in which the controller flies by itself: it is handed back in it.
+    /// The controller's own mode, requested on return of control authority.
     pub fn hold(self) -> StackMode {
         match self {
             Stack::Px4 => mode("HOLD", 4, 3),
@@ -295,7 +295,7 @@ impl Stack {
         }
     }
 
-    /// What is asked for.
+    /// The streams to request.
     pub fn streams(self) -> &'static [Stream] {
         match self {
             Stack::Px4 => &PX4_STREAMS,
@@ -303,7 +303,7 @@ impl Stack {
         }
     }
 
-    /// What is checked.
+    /// The parameters to check.
     pub fn rules(self, authority: Authority) -> &'static [Rule] {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => &PX4_SURFACES,
@@ -313,7 +313,7 @@ impl Stack {
         }
     }
 
-    /// State frames for each command that is sent: ArduPilot samples the channels at 50 Hz.
+    /// State frames per command: ArduPilot samples the channels at 50 Hz.
     pub fn frames_per_command(self, authority: Authority) -> u64 {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => 1,
@@ -323,7 +323,7 @@ impl Stack {
 }
 
 impl StackMode {
-    /// The `custom_mode` of a heartbeat in this mode.
+    /// The `custom_mode` of this mode in a heartbeat.
     pub fn custom(self, stack: Stack) -> u32 {
         match stack {
             Stack::Px4 => u32::from(self.main) << 16 | u32::from(self.sub) << 24,

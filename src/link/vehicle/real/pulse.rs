@@ -1,44 +1,43 @@
-//! Whether there is enough of everything to steer by surfaces: states that arrive, frames that are not lost, cycles that
-//! run.
+//! Watchdog of flight by surfaces: rates of received states, lost frames and executed cycles.
 
 use std::time::Duration;
 
-/// Counted over windows of this length.
+/// Length of a counting window.
 const WINDOW: Duration = Duration::from_millis(500);
-/// States and cycles are due this often, Hz.
+/// Nominal rate of states and cycles, Hz.
 const RATE: f64 = 100.0;
-/// Below this share of them the controller flies better by itself.
+/// Fraction of the nominal rate below which control authority is returned.
 const LEAST: f64 = 0.4;
 
-/// Share of the frames whose loss in two windows one after the other is too much: what we send is then lost as often, and
-/// surfaces that follow every fourth command swing. A single gap of 0.2 s stays below it.
+/// Fraction of lost frames in two consecutive windows that is too high: commands are then lost as often, and surfaces
+/// that receive every fourth command oscillate. A single gap of 0.2 s stays below it.
 const LOSSY: f64 = 0.35;
 
-/// The watchdog of steering by surfaces: states and cycles counted in the window that is open.
+/// Counters of states and cycles in the open window.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pulse {
     since: Option<Duration>,
     states: u32,
     cycles: u32,
-    /// Frames received and lost when the window opened.
+    /// Frames received and lost at the window's start.
     before: Option<[u64; 2]>,
-    /// Whether the window before lost too many.
+    /// Whether the previous window lost too many frames.
     lossy: bool,
 }
 
 impl Pulse {
-    /// A new state has come.
+    /// Counts a new state.
     pub(super) fn state(&mut self) {
         self.states += 1;
     }
 
-    /// Nobody steers: what was counted does not matter.
+    /// Resets the counters while the companion has no control authority.
     pub(super) fn rest(&mut self) {
         *self = Pulse::default();
     }
 
-    /// A cycle at `host`; what there was too little of in the window that it closes. `frames`: all that were received and
-    /// all that were lost so far.
+    /// Counts a cycle at `host`; returns the shortage in the window that it closes. `frames`: totals received and
+    /// lost.
     pub(super) fn cycle(&mut self, host: Duration, frames: [u64; 2]) -> Option<String> {
         self.cycles += 1;
         let before = *self.before.get_or_insert(frames);
@@ -73,7 +72,7 @@ impl Pulse {
 mod tests {
     use super::*;
 
-    /// What a second of cycles every `cycle_ms` says, every `state`-th of them with a state.
+    /// The shortage reported in a second of cycles every `cycle_ms`, every `state`-th of them with a state.
     fn second(cycle_ms: u64, state: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         (0..1000 / cycle_ms).find_map(|i| {
@@ -84,7 +83,7 @@ mod tests {
         })
     }
 
-    /// What two seconds say in which `lost` of ten frames are lost from `from_ms` to `to_ms`.
+    /// The shortage reported in two seconds with `lost` of ten frames lost from `from_ms` to `to_ms`.
     fn lossy(lost: u64, from_ms: u64, to_ms: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         let mut frames = [0, 0];

@@ -1,22 +1,22 @@
-//! The streams that were asked for, with what the controller has answered.
+//! Stream requests and the controller's replies.
 
 use std::collections::{BTreeSet, VecDeque};
 
 use super::profile::{Stack, Stream};
 
-/// What an answer to a request for a stream means.
+/// Meaning of a reply to a stream request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// Nothing new.
+    /// The reply changes nothing.
     Nothing,
-    /// This message comes at its rate from now on.
+    /// The message is sent at its rate from now on.
     Granted(u32),
-    /// This message does not come at its rate: asking again is of no use.
+    /// The message is not sent at its rate; repeating the request is useless.
     Denied,
 }
 
-/// Requests for streams. An answer does not name its message: answers come in the order of the
-/// requests, and what was lost is forgotten with the next round.
+/// Pending stream requests. A reply does not name its message: replies come in the order of the requests, and lost
+/// ones are discarded with the next round.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Requests {
     waiting: VecDeque<u32>,
@@ -26,12 +26,12 @@ pub(super) struct Requests {
 }
 
 impl Requests {
-    /// A new round begins.
+    /// Starts a new round.
     pub(super) fn turn(&mut self) {
         self.waiting.clear();
     }
 
-    /// Whether a message may be asked for; notes that it is.
+    /// Whether a message may be requested; notes the request.
     pub(super) fn ask(&mut self, id: u32) -> bool {
         let may = !self.denied.contains(&id);
         if may {
@@ -40,7 +40,7 @@ impl Requests {
         may
     }
 
-    /// The controller has answered the oldest request with a MAV_RESULT.
+    /// Takes the MAV_RESULT for the oldest request.
     pub(super) fn answered(&mut self, result: u8) -> Answer {
         let Some(id) = self.waiting.pop_front() else { return Answer::Nothing };
         match result {
@@ -54,19 +54,19 @@ impl Requests {
         }
     }
 
-    /// Whether a message was denied.
+    /// Whether a message was refused.
     pub(super) fn is_denied(&self, id: u32) -> bool {
         self.denied.contains(&id)
     }
 
-    /// The streams that the flight needs and that were denied, in words; said once.
+    /// The refused streams that the flight requires, as text; returned once.
     pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
         let words = self.words(stack).filter(|_| !self.reported)?;
         self.reported = true;
         Some(words)
     }
 
-    /// The streams that the flight needs and that were denied, in words, with the remedy.
+    /// The refused streams that the flight requires, as text with the remedy.
     pub(super) fn words(&self, stack: Stack) -> Option<String> {
         let denied = |stream: &&Stream| stream.needed && self.denied.contains(&stream.id);
         let names: Vec<String> = stack

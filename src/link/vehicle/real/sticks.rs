@@ -1,27 +1,26 @@
-//! Commands as sticks: thousandths for PX4, pulse widths for ArduPilot.
+//! Conversion of commands to sticks: thousandths for PX4, pulse widths for ArduPilot.
 
 use super::parameters::Parameters;
 use greylag_physics::Command;
 
-/// Rounds to whole counts and carries what was cut off over to the next command, so that the mean
-/// of what is sent is what was meant.
+/// Rounds to integers and carries the remainder over to the next command, so that the mean is exact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Rounding(f64);
 
 impl Rounding {
     fn round(&mut self, wanted: f64, low: f64, high: f64) -> f64 {
         let whole = (wanted + self.0).round().clamp(low, high);
-        // What a stop cuts off is not owed.
+        // what a stop cuts off is not carried over
         self.0 = (wanted + self.0 - whole).clamp(-0.5, 0.5);
         whole
     }
 }
 
-/// The roundings of aileron, elevator, throttle.
+/// Rounding remainders of aileron, elevator, throttle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sticks([Rounding; 3]);
 
-/// A channel's pulse widths, µs.
+/// Pulse widths of a channel, µs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Channel {
     low: f64,
@@ -31,14 +30,14 @@ struct Channel {
 }
 
 impl Channel {
-    /// The pulse for a deflection of −1..1, before rounding.
+    /// Pulse width for a deflection of −1..1, before rounding.
     fn pulse(&self, deflection: f64) -> f64 {
         let x = if self.reversed { -deflection } else { deflection };
         let half = if x > 0.0 { self.high - self.centre } else { self.centre - self.low };
         self.centre + half * x
     }
 
-    /// The pulse for a throttle of 0..1, before rounding.
+    /// Pulse width for a throttle of 0..1, before rounding.
     fn range(&self, throttle: f64) -> f64 {
         let share = if self.reversed { 1.0 - throttle } else { throttle };
         self.low + (self.high - self.low) * share
@@ -64,7 +63,7 @@ impl Sticks {
 
     /// Pulse widths of channels 1 to 3, µs, by RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
     ///
-    /// ArduPilot's pitch stick is positive nose up, against our elevator.
+    /// ArduPilot's pitch stick is positive nose up, opposite to our elevator.
     pub(super) fn pulses(&mut self, command: &Command, parameters: &Parameters) -> [u16; 3] {
         let [one, two, three] = [1, 2, 3].map(|n| channel(n, parameters));
         let wanted = [

@@ -1,30 +1,30 @@
-//! What a link really carries: rates, gaps, jitter, latency.
+//! Measured quality of a link: rates, gaps, jitter, latency.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// Rates are taken over windows of this length.
+/// Length of the window for rates.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Frames by which one may come late: further back is a new start.
+/// Largest lateness of a frame in sequence numbers: further back is a restart.
 const LATE: u32 = 32;
-/// Round trips that are kept.
+/// Number of round-trip times kept.
 const TRIPS: usize = 256;
 
-/// One message's traffic.
+/// Statistics of one message.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traffic {
-    /// Frames so far.
+    /// Number of frames received.
     pub frames: u64,
-    /// Bytes so far, headers included.
+    /// Number of bytes received, headers included.
     pub bytes: u64,
-    /// Rate over the last whole window, Hz.
+    /// Rate in the last complete window, Hz.
     pub hz: f64,
-    /// Since when they are counted.
+    /// Start of counting, host clock.
     since: Duration,
-    /// When the last came.
+    /// Arrival of the last frame, host clock.
     last: Duration,
     in_window: u32,
-    /// Sum of the squared deviations of the interval from its mean (Welford), with the mean, s.
+    /// Mean interval and sum of squared deviations from it (Welford), s.
     mean: f64,
     squares: f64,
 }
@@ -52,11 +52,11 @@ impl Traffic {
     }
 }
 
-/// The survey of one controller's traffic.
+/// Statistics of one controller's traffic.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     messages: BTreeMap<u32, Traffic>,
-    /// When the first frame came, and the last.
+    /// Arrival of the first and the last frame.
     span: Option<(Duration, Duration)>,
     sequence: Option<u8>,
     received: u64,
@@ -67,7 +67,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Notes a frame of the controller.
+    /// Counts a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
         match self.sequence.map(|before| sequence.wrapping_sub(before)) {
             // twice the same
@@ -88,7 +88,7 @@ impl Survey {
         self.messages.entry(id).or_insert(fresh).note(host, bytes);
     }
 
-    /// Counts a message anew, as when its rate has been granted.
+    /// Restarts a message's statistics, as when its rate was granted.
     pub(super) fn restart(&mut self, host: Duration, id: u32) {
         if let Some(traffic) = self.messages.get_mut(&id) {
             let Traffic { hz, in_window, .. } = *traffic;
@@ -96,13 +96,13 @@ impl Survey {
         }
     }
 
-    /// A message's mean rate over the time in which it was counted, a second at least, Hz.
+    /// A message's mean rate over its counting time, one second at least, Hz.
     pub fn mean_hz(&self, traffic: &Traffic) -> f64 {
         let last = self.span.map_or(Duration::ZERO, |(_, last)| last);
         traffic.frames as f64 / last.saturating_sub(traffic.since).max(WINDOW).as_secs_f64()
     }
 
-    /// Closes windows that are over at `host`; whether one has closed.
+    /// Closes windows that are over at `host`; whether one was closed.
     pub(super) fn turn(&mut self, host: Duration) -> bool {
         let ends = *self.window_ends.get_or_insert(host + WINDOW);
         if host < ends {
@@ -117,7 +117,7 @@ impl Survey {
         true
     }
 
-    /// Notes a round trip.
+    /// Stores a round-trip time.
     pub(super) fn trip(&mut self, time: Duration) {
         if self.trips.len() == TRIPS {
             self.trips.pop_front();
@@ -125,33 +125,33 @@ impl Survey {
         self.trips.push_back(time);
     }
 
-    /// A message's rate over the last whole second, Hz; 0 when it does not come.
+    /// A message's rate in the last window, Hz; 0 when it was not received.
     pub fn hz(&self, id: u32) -> f64 {
         self.messages.get(&id).map_or(0.0, |traffic| traffic.hz)
     }
 
-    /// Whole seconds surveyed.
+    /// Number of complete windows.
     pub fn windows(&self) -> u32 {
         self.windows
     }
 
-    /// Every message that came, by number.
+    /// All received messages with their id.
     pub fn messages(&self) -> impl Iterator<Item = (u32, &Traffic)> {
         self.messages.iter().map(|(id, traffic)| (*id, traffic))
     }
 
-    /// Frames that came, and that never did, by the gaps in their sequence numbers.
+    /// Frames received and lost, from gaps in the sequence numbers.
     pub(super) fn frames(&self) -> [u64; 2] {
         [self.received, self.lost]
     }
 
-    /// Share of frames that never came, by the gaps in their sequence numbers.
+    /// Fraction of frames lost, from gaps in the sequence numbers.
     pub fn loss(&self) -> f64 {
         let all = self.received + self.lost;
         if all == 0 { 0.0 } else { self.lost as f64 / all as f64 }
     }
 
-    /// Round trips by TIMESYNC, shortest first.
+    /// Round-trip times from TIMESYNC, shortest first.
     pub fn round_trips(&self) -> Vec<Duration> {
         let mut trips: Vec<_> = self.trips.iter().copied().collect();
         trips.sort_unstable();

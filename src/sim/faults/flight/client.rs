@@ -1,4 +1,4 @@
-//! What the client and a ground station ask for while the flight goes on.
+//! Requests of the client and of a ground station during the flight.
 
 use std::time::Duration;
 
@@ -7,11 +7,11 @@ use crate::faults::mix::{Fault, FaultKind};
 use crate::faults::scenario::{Asking, mode_of};
 use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
-/// Setpoints come at 10 Hz.
+/// Setpoint interval in steps: 10 Hz.
 const SETPOINT_EVERY: u64 = 10;
 
 impl Flight {
-    /// The client: arms when it can, then sends its legs.
+    /// The client: arms when possible, then sends its legs.
     pub(super) fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
         if acting.iter().any(|fault| fault.kind == FaultKind::Client) {
             return;
@@ -37,14 +37,14 @@ impl Flight {
             if self.armed {
                 self.follower.asked = true;
                 self.desk.pilot().attitude_setpoint(now, setpoint);
-                // Refused at most because something is lost at this very moment: HOLD is flown.
+                // a refusal means that the link is lost at this moment: HOLD is flown
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
         self.desk.pilot().attitude_setpoint(now, setpoint);
     }
 
-    /// What the client asks for beside its setpoints.
+    /// Requests of the client other than setpoints.
     fn ask(&mut self, now_s: f64, host: Duration, what: Asking) {
         let now = self.desk.now(host);
         let verdict = match (what, mode_of(what)) {
@@ -59,11 +59,11 @@ impl Flight {
         self.hear_texts(now_s);
     }
 
-    /// A ground station takes the aircraft, over a link of its own.
+    /// Commands of a ground station over its own link to take control.
     pub(super) fn take_over(&mut self, step: u64) {
         let asked = &self.scenario.asked;
         let taken = asked.iter().any(|a| a.what == Asking::TakeOver && at_step(a.at_s) == step);
-        // in the controller's own mode already, it changes nothing that the companion could see
+        // in the controller's own mode already, it changes nothing that is visible to the companion
         let steered = self.aircraft.is_steered();
         if taken && self.aircraft.take_over() && steered {
             self.follower.asked = false;
@@ -71,7 +71,7 @@ impl Flight {
     }
 }
 
-/// The step of a moment, s.
+/// The step of a time, s.
 fn at_step(at_s: f64) -> u64 {
     (100.0 * at_s) as u64
 }

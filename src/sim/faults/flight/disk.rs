@@ -1,10 +1,10 @@
-//! A disk that is full from some moment on.
+//! A writer that becomes a full disk at a given time.
 
 use std::io::{Error, ErrorKind, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A disk that is full from some moment on.
+/// A writer that fails as a full disk from a given time on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Disk {
     pub(super) full: Arc<AtomicBool>,

@@ -1,33 +1,33 @@
-//! Why a flight of a campaign cannot be flown.
+//! Errors of setting up a flight under faults.
 
 use greylag_sitl::shim::ShimError;
 
 use greylag_control::SetupError;
 use greylag_flight::pilot::ConfigError;
 
-/// Why a flight cannot be flown.
+/// A flight under faults cannot be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum FaultsError {
-    /// The aircraft cannot be made.
+    /// The aircraft cannot be built.
     #[error(transparent)]
     Aircraft(#[from] ShimError),
-    /// The simulator's effect that makes a failure cannot be made.
+    /// The simulator's effect that represents a failure cannot be built.
     #[error(transparent)]
     Hidden(#[from] greylag_sitl::hidden::HiddenError),
-    /// The fallback cannot be built.
+    /// The fallback controller cannot be built.
     #[error(transparent)]
     Fallback(#[from] SetupError),
     /// The pilot refuses its settings.
     #[error(transparent)]
     Pilot(#[from] ConfigError),
-    /// A scenario has a parameter that the companion refuses.
+    /// The companion refuses a parameter of the scenario.
     #[error("setting {name} to {times} times its default: {why}")]
     Parameter {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
         /// Its value as a multiple of the default.
         times: f64,
-        /// Why.
+        /// Reason of the refusal.
         why: String,
     },
     /// The recorder's thread cannot be started.

@@ -1,4 +1,4 @@
-//! What the faults do to companion, sensors, clock and disk while the flight goes on.
+//! Effects of the active faults on companion, sensors, clock and disk.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -13,24 +13,24 @@ use crate::faults::judge::{Exposure, Finding};
 use crate::faults::mix::{Fault, FaultKind};
 
 impl Flight {
-    /// Steps until the companion has the processor again.
+    /// Steps until the companion is scheduled again.
     pub(super) fn nap(&mut self, acting: &[Fault]) -> u64 {
         let starved = acting.iter().find(|fault| fault.kind == FaultKind::Starvation);
         let Some(Fault { strength, .. }) = starved else { return 0 };
         match self.random.random::<f64>() < 0.05 + 0.3 * strength {
-            // 20 ms to 300 ms without a single instruction.
+            // 20 ms to 300 ms without execution
             true => self.random.random_range(2..=5 + (25.0 * strength) as u64),
             false => 0,
         }
     }
 
-    /// Kills the companion, and starts another when the fault ends; whether one runs.
+    /// Ends the companion, and starts another when the fault ends; whether one is running.
     pub(super) fn is_alive(&mut self, acting: &[Fault]) -> bool {
         let killed = acting.iter().any(|fault| fault.kind == FaultKind::Killed);
         if killed && !self.killed {
-            // its recording ends with it
+            // the recording ends with the companion
             self.disk = None;
-            // there is one for each such fault
+            // there is a recorder for each such fault
             if let Some(next) = self.spares.pop() {
                 self.desk = next;
             }
@@ -43,7 +43,7 @@ impl Flight {
         !killed
     }
 
-    /// What the aircraft is exposed to at this step, through no fault of who steers it.
+    /// Exposure of the aircraft at this step that its companion cannot prevent.
     pub(super) fn exposure(&mut self, acting: &[Fault]) -> Exposure {
         let inputs = self.aircraft.inputs();
         let same = std::mem::replace(&mut self.flown, inputs) == inputs;
@@ -55,14 +55,14 @@ impl Flight {
         }
     }
 
-    /// What the faults do to the sensors and the clock.
+    /// Applies the faults of sensors and clock.
     pub(super) fn distortion(&mut self, acting: &[Fault], step: u64) -> Distortion {
         let mut distortion = Distortion::default();
         for fault in acting {
             let s = fault.strength;
             match fault.kind {
                 FaultKind::Frozen => distortion.frozen = true,
-                // What a tube that has iced up shows: the speed of that moment, or less and less.
+                // an iced pitot tube holds its speed, or shows less and less
                 FaultKind::Airspeed => {
                     distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
                 }
@@ -72,7 +72,7 @@ impl Flight {
                 FaultKind::Disk => {
                     self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
                 }
-                // Time begins anew.
+                // the clock starts again
                 FaultKind::Reboot => self.clock_us = -(10_000 * step as i64),
                 _ => {}
             }
@@ -81,7 +81,7 @@ impl Flight {
         distortion
     }
 
-    /// Waits until the recorder's thread has met the full disk, which has to be reported.
+    /// Waits until the recorder's thread has met the full disk, whose report is required.
     pub(super) fn hear_of_the_disk(&mut self, now_s: f64) {
         if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
             return;

@@ -1,5 +1,5 @@
-//! Flights that the model monitor watches, beside a played ArduPlane whose attitude errs: what it says of a healthy aircraft,
-//! and when it says it of one that fails.
+//! Flights under the model monitor, with a simulated ArduPlane whose attitude estimate has errors: its false alarms
+//! and its detection delays.
 
 use std::time::Duration;
 
@@ -16,38 +16,38 @@ use greylag_flight::desk::Desk;
 use greylag_flight::monitor::Monitor;
 use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
-/// Stream of the random numbers of attitude errors and winds.
+/// Random stream of attitude errors and winds.
 const DRAWN: u64 = 30;
-/// Errors of roll, pitch and heading are drawn evenly up to these, degrees: alignment, compass.
+/// Bounds of the uniformly drawn errors of roll, pitch and heading, degrees: alignment, compass.
 pub const ATTITUDE_DEG: [f64; 3] = [1.0, 1.0, 2.0];
-/// Each component of the wind is drawn evenly up to this, m/s.
+/// Bound of each uniformly drawn wind component, m/s.
 const WIND_MPS: f64 = 4.0;
-/// A flight, and the moment of a failure in it, s.
+/// Duration of a flight and time of its failure, s.
 const FLIGHT_S: f64 = 60.0;
-/// When a surface sticks, s: the aircraft is engaged within ten.
+/// Time at which a surface jams, s: the companion is engaged within ten.
 pub const FAILS_S: f64 = 25.0;
-/// Roll and pitch of the legs, degrees, and how long each is flown, s.
+/// Roll and pitch of the legs, degrees, and their duration, s.
 const LEGS: [[f64; 2]; 6] =
     [[0.0, 2.0], [25.0, 3.0], [-20.0, 5.0], [0.0, 0.0], [-35.0, 4.0], [15.0, 6.0]];
 const LEG_S: f64 = 5.0;
 
-/// What is wrong with the aircraft.
+/// Failure of the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// Nothing.
+    /// No failure.
     None,
-    /// The elevator sticks in flight.
+    /// The elevator jams in flight.
     StuckElevator,
-    /// The aileron sticks in flight.
+    /// The aileron jams in flight.
     StuckAileron,
-    /// Ice: the drag of the simulator's effect `drag_alpha2=100`, twice the aircraft's at cruise.
+    /// Ice: drag by the simulator's effect `drag_alpha2=100`, twice the aircraft's at cruise.
     Ice,
     /// A centre of gravity 4 cm aft.
     ShiftedLoad,
 }
 
 impl Failure {
-    /// All of them.
+    /// All kinds of failure.
     pub const ALL: [Failure; 5] = [
         Failure::None,
         Failure::StuckElevator,
@@ -56,7 +56,7 @@ impl Failure {
         Failure::ShiftedLoad,
     ];
 
-    /// Its name in tables.
+    /// The name in tables and reports.
     pub fn name(self) -> &'static str {
         match self {
             Failure::None => "healthy",
@@ -67,7 +67,7 @@ impl Failure {
         }
     }
 
-    /// The simulator's effect that makes it, from the start.
+    /// The simulator's effect that represents it, active from the start.
     fn effect(self) -> Option<&'static str> {
         match self {
             Failure::Ice => Some("drag_alpha2=100"),
@@ -77,22 +77,23 @@ impl Failure {
     }
 }
 
-/// What the monitor said of one flight.
+/// Monitor reports of one flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watched {
-    /// Error of roll, pitch and yaw, degrees.
+    /// Errors of roll, pitch and yaw, degrees.
     pub attitude_error_deg: [f64; 3],
-    /// When the aircraft failed as far as the companion could see: the failure, or being engaged with it, s; nothing
-    /// where it was never engaged.
+    /// Time from which the failure is observable for the companion: the failure, or engagement with it, s; `None` if
+    /// it was never engaged.
     pub since_s: Option<f64>,
-    /// When it said what, s.
+    /// Reports with their times, s.
     pub said: Vec<(f64, String)>,
 }
 
 impl CompanionFactory {
-    /// Flies for a minute, watched; everything random follows from `seed`.
+    /// Flies for a minute under the monitor; all random numbers follow from `seed`.
     ///
     /// # Errors
+    ///
     /// If the aircraft cannot be loaded.
     pub fn watched(&self, seed: u64, failure: Failure) -> Result<Watched, FaultsError> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -133,7 +134,7 @@ impl CompanionFactory {
     }
 }
 
-/// A companion and its client at a played controller.
+/// A companion and its client at a simulated controller.
 struct Bench {
     controller: FlightController,
     desk: Desk,
@@ -151,12 +152,12 @@ impl Bench {
         self.watched.since_s = self.watched.since_s.map(|_| FAILS_S);
     }
 
-    /// 10 ms; `false` when the flight has ended on the ground or outside the numbers.
+    /// Advances 10 ms; `false` when the flight has ended on the ground or with a state that is not finite.
     fn step(&mut self, step: u64) -> bool {
         let (at_s, host) = (step as f64 * 0.01, Duration::from_millis(1000 + 10 * step));
         let (mut down, mut up) = (Vec::new(), Vec::new());
         self.controller.show(&mut down);
-        self.desk.hear(host, &down, &mut up, |_, _| {});
+        self.desk.receive(host, &down, &mut up, |_, _| {});
         self.client(step, at_s, host);
         self.desk.poll(host, &mut up);
         for text in self.desk.texts.drain(..) {
@@ -171,7 +172,7 @@ impl Bench {
         matches!(self.controller.fly(), Ok(None))
     }
 
-    /// The client: arms when it can, and sends its legs.
+    /// The client: arms when possible, then sends its legs.
     fn client(&mut self, step: u64, at_s: f64, host: Duration) {
         let [roll, pitch] = LEGS[(at_s / LEG_S) as usize % LEGS.len()].map(f64::to_radians);
         let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
@@ -180,7 +181,7 @@ impl Bench {
         if !self.armed && step.is_multiple_of(10) {
             self.armed = self.desk.arm(host) == Verdict::Accepted;
             if self.armed {
-                // Refused at most because something is lost at this very moment: HOLD is flown.
+                // a refusal means that the link is lost at this moment: HOLD is flown
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
@@ -188,13 +189,13 @@ impl Bench {
 }
 
 impl Watched {
-    /// How long after the failure something was said of it, s.
+    /// Delay from the failure to the first report, s; `None` without one.
     pub fn delay_s(&self) -> Option<f64> {
         let since = self.since_s?;
         self.said.iter().map(|(at, _)| at - since).find(|delay| *delay >= 0.0)
     }
 
-    /// What was said before there was anything to say.
+    /// Number of reports before the failure.
     pub fn false_alarms(&self, failure: Failure) -> usize {
         let healthy =
             |at: f64| failure == Failure::None || self.since_s.is_none_or(|since| at < since);

@@ -1,4 +1,4 @@
-//! What the rules of flight need to know of a flight under way.
+//! Quantities of a running flight that the flight rules are evaluated on.
 
 use super::Flight;
 use crate::faults::mix::{Fault, FaultKind};
@@ -7,16 +7,16 @@ use greylag_flight::pilot::{Decision, Source, TICK_S};
 use greylag_link::autopilot::{Autopilot, Mode, Status};
 use greylag_link::vehicle::Vehicle;
 
-/// Time constants of what a surface does slowly, and of the mean square of the rest, s.
+/// Time constants of the low-pass on a surface, and of the mean square of the remainder, s.
 const SLOW_S: f64 = 0.5;
 const MEAN_S: f64 = 1.0;
-/// Difference of targets, rad, above which another attitude is asked for.
+/// Difference of targets, rad, that counts as a new target.
 const SAME: f64 = 1e-3;
 
-/// Follows a flight from step to step.
+/// Updates the quantities from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Follower {
-    /// Whether somebody has asked for the companion to steer, and nobody has taken the aircraft since.
+    /// Whether the companion is requested to fly, and no other pilot has taken control since.
     pub(super) asked: bool,
     decision: Option<Decision>,
     fresh: bool,
@@ -32,7 +32,7 @@ pub(super) struct Follower {
     surfaces: [Fast; 2],
 }
 
-/// The fast movement of a surface.
+/// High-pass of a surface's deflection with its mean square.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fast {
     slow: f64,
@@ -69,13 +69,13 @@ impl Follower {
         (self.decision, self.fresh) = (Some(*decision), true);
     }
 
-    /// The companion is dead: what it had decided is of another life, and nobody has asked the next one.
+    /// Resets after the companion has ended: its decisions are void, and its successor is not engaged.
     pub(super) fn died(&mut self) {
         (self.decision, self.fresh, self.asked) = (None, false, false);
         (self.held_s, self.moved) = (0.0, 0.0);
     }
 
-    /// How long the same attitude has been asked for and flown.
+    /// Time for which the same attitude has been commanded and flown.
     fn steady(&mut self, flown: bool) {
         let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
         let same = target.iter().zip(self.target).all(|(a, b)| (a - b).abs() < SAME);
@@ -85,7 +85,7 @@ impl Follower {
 }
 
 impl Flight {
-    /// Takes the sample of a step, where samples are wanted.
+    /// Stores the sample of a step, where samples are requested.
     pub(super) fn sample(&mut self, now_s: f64, acting: &[Fault]) {
         let Some(trace) = &mut self.trace else { return };
         let Status { mode, armed, failsafe, .. } = self.desk.pilot().status();
@@ -112,7 +112,7 @@ impl Flight {
         follower.age_s =
             if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + TICK_S };
         let inputs = self.aircraft.inputs();
-        // flown by attitude, the surfaces are the controller's own
+        // where attitudes are commanded, the surfaces are the controller's own
         let ours = steered && self.desk.vehicle().flies_surfaces();
         let [aileron, elevator] = &mut follower.surfaces;
         aileron.update(if ours { inputs.aileron } else { aileron.slow });
