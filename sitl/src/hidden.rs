@@ -18,13 +18,13 @@ pub use effects::EFFECTS;
 
 /// An effect that can be hidden, under the id it has in the catalogue of effects.
 pub struct Effect {
-    /// Stable id.
+    /// Identifier in the catalogue of effects, stable between versions.
     pub id: &'static str,
     /// What an amplitude a adds, with Q = ½ρV²S; δ are deflections in rad, δt the throttle position.
     pub formula: &'static str,
-    /// Unit of the amplitude; empty without one.
+    /// Unit of the amplitude; empty for a dimensionless one.
     pub unit: &'static str,
-    /// Smallest and largest amplitude taken.
+    /// Smallest and largest amplitude allowed.
     pub bounds: (f64, f64),
     write: fn(&mut Document, f64) -> Result<(), HiddenError>,
 }
@@ -66,7 +66,7 @@ pub struct Hidden {
 pub struct Filter {
     /// Its input, an expression of JSBSim's functions.
     pub input: String,
-    /// What it does.
+    /// Kind of the filter: lag or delay.
     pub kind: FilterKind,
     /// Its time constant or delay, s.
     pub time_s: f64,
@@ -91,13 +91,13 @@ impl Filter {
 /// Where a function of its own acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Drag, lbf.
+    /// Drag along the wind axis, lbf, rearward positive.
     Drag,
-    /// Side force, lbf.
+    /// Side force along the wind axis, lbf, right positive.
     Side,
-    /// Lift, lbf.
+    /// Lift along the wind axis, lbf, up positive.
     Lift,
-    /// Thrust, lbf.
+    /// Thrust of the propulsion, lbf, forward positive.
     Thrust,
     /// Rolling moment, lbf ft.
     Roll,
@@ -164,7 +164,7 @@ impl Hidden {
         (self.effect.write)(document, self.amplitude)
     }
 
-    /// The effect.
+    /// The effect of the catalogue that is hidden.
     pub fn effect(&self) -> &'static Effect {
         self.effect
     }
@@ -214,17 +214,17 @@ pub enum HiddenError {
         "hidden effect '{text}': write ID=AMPLITUDE, such as pitch_break=-3.0; known ids: {known}"
     )]
     Syntax {
-        /// The text.
+        /// The text as given.
         text: String,
-        /// The known ids.
+        /// Identifiers of all known effects.
         known: String,
     },
     /// No effect has that id.
     #[error("hidden effect '{id}' is not known; known ids: {known}")]
     Unknown {
-        /// The id asked for.
+        /// The identifier as given.
         id: String,
-        /// The known ids.
+        /// Identifiers of all known effects.
         known: String,
     },
     /// The amplitude is outside what the effect takes.
@@ -232,13 +232,13 @@ pub enum HiddenError {
         "hidden effect {id}: amplitude {amplitude} {unit} is outside {min} to {max} {unit}; give one within"
     )]
     Amplitude {
-        /// The effect.
+        /// Identifier of the effect.
         id: &'static str,
-        /// The amplitude.
+        /// The amplitude as given.
         amplitude: f64,
-        /// Smallest amplitude taken.
+        /// Smallest amplitude that is allowed.
         min: f64,
-        /// Largest amplitude taken.
+        /// Largest amplitude that is allowed.
         max: f64,
         /// Unit of the three.
         unit: &'static str,
@@ -248,7 +248,7 @@ pub enum HiddenError {
         "hidden effect time_delay: {amplitude} s is not a whole number of steps of {step_s} s; give a multiple"
     )]
     Delay {
-        /// The delay, s.
+        /// The delay as given, s.
         amplitude: f64,
         /// Length of a step, s.
         step_s: f64,
@@ -256,7 +256,7 @@ pub enum HiddenError {
     /// An effect is asked for twice.
     #[error("hidden effect {id} is given twice; give it once, with the sum")]
     Twice {
-        /// The effect.
+        /// Identifier of the effect that is given twice.
         id: &'static str,
     },
     /// The aircraft's XML has no place for the effect.

@@ -4,10 +4,10 @@ use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeri
 use greylag_physics::effects::Description;
 use greylag_sysid::signature::{MANOEUVRE, Pair, Signature};
 
-/// What the page of an effect shows.
+/// Input of the page about one effect.
 #[derive(Clone, Debug)]
 pub struct EffectReport<'a> {
-    /// The effect.
+    /// Description of the effect.
     pub about: Description,
     /// Its channels in words.
     pub channels: String,
@@ -22,7 +22,7 @@ pub struct EffectReport<'a> {
 }
 
 impl EffectReport<'_> {
-    /// The page.
+    /// Builds the page.
     pub fn page(&self) -> Page {
         let mut sections =
             vec![Section::new("", "", vec![Figure::Table(self.facts())]), self.parameters()];

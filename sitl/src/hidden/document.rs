@@ -40,7 +40,6 @@ impl Axis {
     }
 }
 
-/// A control surface.
 #[derive(Clone, Copy)]
 pub(super) enum Surface {
     Aileron,
@@ -87,7 +86,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The throttle position.
+    /// Property of the throttle position, as a JSBSim expression.
     pub(super) fn throttle(&self) -> String {
         property(&self.properties.throttle_position)
     }

@@ -32,7 +32,7 @@ const MOMENTS: [&str; 3] = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "mom
 /// Lengths by which they are compared.
 const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"];
 
-/// What was found.
+/// Result of the discovery of an aircraft's properties.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The properties through which the aircraft flies.

@@ -8,7 +8,7 @@ use super::{Inputs, Properties};
 /// A surface or motor of the aircraft.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moved {
-    /// Its name.
+    /// Name of the surface or motor.
     pub name: String,
     /// Property of its command; `None` if the aircraft makes it of the usual commands itself.
     pub command: Option<String>,
@@ -57,7 +57,7 @@ impl Mixing {
     /// The mixing of `moved`.
     ///
     /// # Errors
-    /// In words, when the positions do not say what the controls do.
+    /// A message: a control moves no surface or motor, or two controls move the surfaces alike.
     pub fn new(moved: Vec<Moved>) -> Result<Mixing, String> {
         let used: [bool; 4] = std::array::from_fn(|j| moved.iter().any(|m| m.gains[j] != 0.0));
         if let Some(j) = [0, 1, 3].into_iter().find(|j| !used[*j]) {

@@ -78,7 +78,7 @@ impl Steering {
         }))
     }
 
-    /// Writes the commands.
+    /// Writes the commands to their JSBSim properties.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
         let values = [inputs.aileron, inputs.elevator, inputs.rudder];
         let throttles = match self {

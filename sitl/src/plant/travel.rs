@@ -40,11 +40,11 @@ impl Stops {
 /// Deflections at full command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travel {
-    /// Of the aileron.
+    /// Stops of the aileron.
     pub aileron: Stops,
-    /// Of the elevator.
+    /// Stops of the elevator.
     pub elevator: Stops,
-    /// Of the rudder, where there is one.
+    /// Stops of the rudder; `None` for an aircraft without one.
     pub rudder: Option<Stops>,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Distorter {
 }
 
 impl Distorter {
-    /// What is shown of `measured`, and when it is said to be.
+    /// Distorted measurement and its time stamp, µs.
     pub(super) fn apply(&mut self, time_us: u64, measured: Truth) -> (u64, Truth) {
         let mut shown = match (self.now.frozen, self.held) {
             (true, Some(held)) => held,

@@ -111,7 +111,7 @@ impl Flight {
         (StateFrame::new(time_us, &measured, self.travel), measured)
     }
 
-    /// Goes one frame on, flying `inputs` if launched; says when the flight is over.
+    /// Advances by one frame, flying `inputs` if launched; `Some` when the flight is over.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Option<Over>, ShimError> {
         let mut truth = self.pending.back().map_or_else(Truth::default, |(_, truth)| *truth);
         if self.launched {

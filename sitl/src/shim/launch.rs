@@ -84,7 +84,7 @@ impl Launcher {
         self.plant.notes()
     }
 
-    /// The state now.
+    /// Present state of the aircraft.
     pub fn truth(&self) -> Truth {
         self.shown
     }
@@ -94,7 +94,7 @@ impl Launcher {
         self.phase == Phase::Flight
     }
 
-    /// Lets the catapult go when it is wanted; says whether it has just been.
+    /// Releases the catapult if armed with open throttle; `true` in the call that releases it.
     pub fn let_go(&mut self, armed: bool, throttle: f64) -> bool {
         let wanted = self.phase == Phase::Stand && armed && throttle > LAUNCH_THROTTLE;
         if wanted {

@@ -23,16 +23,16 @@ pub enum Pace {
 pub enum Launch {
     /// At the first armed answer; until then it stays at its start while time runs.
     WhenArmed,
-    /// At once.
+    /// In the first frame, without waiting for an armed answer.
     Immediate,
 }
 
 /// What to do with a truth file that exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// Refuse to start.
+    /// Keep it and refuse to start.
     Keep,
-    /// Write over it.
+    /// Replace it without asking.
     Replace,
 }
 
@@ -54,7 +54,7 @@ pub struct Noise {
     pub accelerometer_mps2: f64,
     /// Attitude, each Euler angle, rad.
     pub attitude_rad: f64,
-    /// True airspeed, m/s.
+    /// True airspeed, m/s, one draw a frame.
     pub airspeed_mps: f64,
     /// Angle-of-attack and sideslip vanes, rad.
     pub vane_rad: f64,
@@ -63,7 +63,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// No noise.
+    /// Sensors without noise.
     pub const NONE: Noise = Noise {
         gyro_radps: 0.0,
         accelerometer_mps2: 0.0,
@@ -96,7 +96,7 @@ impl Noise {
     }
 }
 
-/// Constant sensor errors.
+/// Constant (bias) and scale errors of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
     /// Added to p, q, r, rad/s.
@@ -161,9 +161,9 @@ pub struct ShimOptions {
     pub seed: u64,
     /// Where the truth goes, if anywhere.
     pub truth: Option<TruthFile>,
-    /// White sensor noise.
+    /// Standard deviations of the white sensor noise.
     pub noise: Noise,
-    /// Constant sensor errors.
+    /// Constant and scale errors of the sensors.
     pub bias: Bias,
     /// What befalls state frames.
     pub faults: FrameFaults,

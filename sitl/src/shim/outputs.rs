@@ -13,13 +13,13 @@ enum Effector {
     Aileron,
     LeftAileron,
     RightAileron,
-    /// Positive pitches up.
+    /// Elevator; positive pitches up.
     Elevator,
     LeftElevon,
     RightElevon,
-    /// Positive yaws right.
+    /// Rudder; positive yaws right.
     Rudder,
-    /// 0 to 1.
+    /// Throttle, 0 to 1.
     Throttle,
 }
 
@@ -202,9 +202,9 @@ impl OutputMap {
 /// The range of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
-    /// −1..1.
+    /// A surface's range, −1..1.
     Surface,
-    /// 0..1.
+    /// The throttle's range, 0..1.
     Throttle,
 }
 
@@ -223,7 +223,7 @@ impl Effector {
     }
 }
 
-/// The mean of what several outputs do: left and right elevon, say.
+/// Mean of several outputs that move one control, such as left and right elevon.
 #[derive(Default)]
 struct Mean {
     sum: f64,

@@ -1,4 +1,4 @@
-//! The conversation with the companion: who is heard, what is said, what is counted.
+//! Exchange of messages with the companion: its presence, its answers and their counts.
 
 use std::time::{Duration, Instant};
 
@@ -18,13 +18,13 @@ const SILENCE: Duration = Duration::from_secs(2);
 /// Whether a receive brought anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// Nothing.
+    /// The wait ended without an arrival.
     Nothing,
     /// Bytes, or a change of the link.
     Something,
 }
 
-/// One run's conversation.
+/// Exchange of messages of one run.
 pub struct Session<'a> {
     link: Link,
     address: Address,
@@ -65,12 +65,13 @@ impl<'a> Session<'a> {
         session
     }
 
-    /// Tells the observer.
+    /// Reports `event` to the observer with the present simulated time.
     pub fn tell(&mut self, event: Event) {
         (self.observer)(Notice { time_s: self.time_us as f64 * 1e-6, event });
     }
 
-    /// Whether the companion has been heard lately.
+    /// Whether the companion is present: it sent a message in the last two seconds, on an open
+    /// link.
     pub fn is_alive(&self) -> bool {
         self.heard.is_some()
     }
@@ -197,7 +198,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The counts, complete.
+    /// Ends the session and returns its counts.
     pub fn finish(mut self) -> Summary {
         self.counts.bad_frames = self.parser.bad();
         self.counts.foreign_frames += self.parser.unknown();

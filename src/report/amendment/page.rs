@@ -109,7 +109,7 @@ fn effects(a: &Amendment) -> Section {
     }
 }
 
-/// The coefficients of the effects, with what each flight says of them.
+/// Section on the coefficients of the added effects, with the estimate from each flight alone.
 fn added(a: &Amendment) -> Section {
     let columns =
         [("Coefficient", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];

@@ -93,7 +93,7 @@ fn state_cells(s: &StateScore) -> Vec<String> {
     cells
 }
 
-/// A state's name and unit as people say them, and the factor from its SI unit.
+/// Name and unit of a state as displayed, and the factor from its SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let (name, unit) = state.rsplit_once('_').unwrap_or((state, ""));
     let name = match name {

@@ -1,4 +1,5 @@
-//! Measured against predicted over time: telling stretches of the flights, then each as a whole.
+//! Measured against predicted states over time: selected stretches of the flights, then each flight
+//! as a whole.
 
 use crate::comparison::page::channel_name;
 use crate::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
@@ -10,7 +11,7 @@ const STRETCH_S: f64 = 30.0;
 const STRETCH_ROWS: usize = 1000;
 /// Values drawn of all whole flights together, so that the page stays near 2 MB.
 const WHOLE_VALUES: usize = 120_000;
-/// Whole flights drawn.
+/// Largest number of whole flights that are drawn.
 const WHOLE_FLIGHTS: usize = 6;
 /// Names and units of the states, in the order of `State::NAMES`, with the factor from SI.
 const STATES: [(&str, &str, f64); 8] = [

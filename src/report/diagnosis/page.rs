@@ -109,7 +109,7 @@ fn maps(c: &Comparison) -> Option<Figure> {
     (!choice.options.is_empty()).then_some(Figure::Choice(choice))
 }
 
-/// Channels over regime variables: what each variable tells of a model's residual.
+/// Map of channels over regime variables: how far each variable explains a model's residual.
 fn map(model: &ModelResult) -> Option<Figure> {
     let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS

@@ -16,7 +16,7 @@ use greylag_sysid::compare::Comparison;
 pub struct FlightReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// The log.
+    /// Log of the flight.
     pub flight: &'a Flight,
     /// Name of the controller that flew.
     pub controller: String,
@@ -58,9 +58,9 @@ pub struct EnvelopeFlown {
 /// Deflections at a command of +1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTravel {
-    /// Aileron, rad.
+    /// Deflection of the aileron, rad.
     pub aileron_rad: f64,
-    /// Elevator, rad.
+    /// Deflection of the elevator, rad.
     pub elevator_rad: f64,
 }
 
@@ -71,9 +71,9 @@ pub struct Segment {
     pub start_s: f64,
     /// When it ended, s.
     pub end_s: f64,
-    /// Commanded roll, rad.
+    /// Commanded roll angle, rad.
     pub roll_target_rad: f64,
-    /// Commanded pitch, rad.
+    /// Commanded pitch angle, rad.
     pub pitch_target_rad: f64,
     /// How far the target is from level flight.
     pub difficulty: Difficulty,
@@ -94,7 +94,7 @@ impl Segment {
 pub enum Difficulty {
     /// |roll| below 45° with |pitch| below 25°.
     Easy,
-    /// Anything beyond.
+    /// Any other target: |roll| from 45° up, or |pitch| from 25° up.
     Hard,
 }
 
@@ -113,20 +113,20 @@ impl Difficulty {
 pub struct Event {
     /// When, s, on the flight's clock.
     pub time_s: f64,
-    /// What kind of thing.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// What, in words.
+    /// Description of the event for the reader.
     pub text: String,
 }
 
-/// What kind of thing happened.
+/// Kinds of events in a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
-    /// The mode changed.
+    /// The flight controller changed its mode.
     Mode,
     /// A message was sent or received.
     Text,
-    /// A failsafe acted.
+    /// A failsafe took over.
     Failsafe,
 }
 

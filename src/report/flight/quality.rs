@@ -10,7 +10,7 @@ use greylag_logs::Sample;
 use greylag_physics::Command;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// A pause longer than this parts a flight, s.
+/// A gap longer than this splits a flight, s.
 const GAP_S: f64 = 0.1;
 
 /// A whole flight against its envelope.

@@ -14,12 +14,12 @@ pub struct Choice {
     pub options: Vec<ChoiceOption>,
 }
 
-/// One alternative.
+/// One of the alternatives.
 #[derive(Clone, Debug)]
 pub struct ChoiceOption {
-    /// Its name on the button.
+    /// Label of its button.
     pub name: String,
-    /// What it shows.
+    /// Figures shown when it is selected.
     pub figures: Vec<Figure>,
 }
 

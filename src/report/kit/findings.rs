@@ -11,7 +11,7 @@ pub struct Findings {
     pub rest: Vec<Finding>,
 }
 
-/// A sentence.
+/// One finding, as a sentence.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The sentence, with its full stop.

@@ -2,12 +2,12 @@
 
 use crate::kit::html::escape;
 
-/// Rows and columns of numbers from nothing to much.
+/// Table of numbers whose cells are shaded by weight.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// What is shown.
+    /// Title of the figure.
     pub title: String,
-    /// What the numbers are.
+    /// Quantity of the numbers.
     pub unit: String,
     /// What the rows are.
     pub corner: String,
@@ -17,19 +17,19 @@ pub struct Grid {
     pub rows: Vec<GridRow>,
 }
 
-/// One row.
+/// One row of cells.
 #[derive(Clone, Debug)]
 pub struct GridRow {
-    /// What it is.
+    /// Name of the row.
     pub label: String,
     /// Its cells, as many as columns.
     pub cells: Vec<GridCell>,
 }
 
-/// One cell.
+/// One cell of a row.
 #[derive(Clone, Debug)]
 pub struct GridCell {
-    /// What it says; empty for nothing.
+    /// Text of the cell; may be empty.
     pub text: String,
     /// How strongly it is coloured, 0..1.
     pub weight: f64,

@@ -11,7 +11,7 @@ const BINS_PER_DECADE: f64 = 20.0;
 /// Counts in bins, with both axes logarithmic: rare large values stay visible.
 #[derive(Clone, Debug, Serialize)]
 pub struct Histogram {
-    /// What is shown.
+    /// Title of the figure.
     #[serde(skip)]
     pub title: String,
     /// Name of the horizontal axis, with its unit.

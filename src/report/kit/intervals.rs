@@ -15,14 +15,14 @@ pub struct Intervals {
     pub unit: String,
     /// What the lines of every panel stand for, in their order.
     pub keys: Vec<(String, Style)>,
-    /// The panels.
+    /// One panel for each quantity.
     pub panels: Vec<IntervalPanel>,
 }
 
 /// One quantity in bins.
 #[derive(Clone, Debug, Serialize)]
 pub struct IntervalPanel {
-    /// What was binned.
+    /// Name of the binned quantity.
     pub title: String,
     /// Its unit; empty when it has none.
     pub unit: String,
@@ -44,13 +44,13 @@ pub struct IntervalBins {
     /// Where the mean is drawn.
     #[serde(serialize_with = "compact")]
     pub center: Vec<f64>,
-    /// The means.
+    /// Mean of each bin.
     #[serde(serialize_with = "compact")]
     pub mean: Vec<f64>,
     /// Lower ends of the 95 % intervals.
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper ends.
+    /// Upper ends of the 95 % intervals.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
     /// Independent samples in each.

@@ -43,10 +43,10 @@ pub struct Section {
     pub folding: Folding,
 }
 
-/// Whether a section is seen at first.
+/// Whether a section is open at first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Folding {
-    /// It is.
+    /// Open when the page loads.
     #[default]
     Open,
     /// Its heading is; a click opens it.

@@ -5,7 +5,7 @@ use crate::kit::html::escape;
 /// Letters above which a text of the last column is broken into lines of some width.
 const LONG: usize = 28;
 
-/// A table.
+/// A table of text with column heads.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     /// What it holds, read out before it and not shown; may be empty.
@@ -16,7 +16,7 @@ pub struct Table {
     pub rows: Vec<Row>,
 }
 
-/// A column's head.
+/// Head of a column.
 #[derive(Clone, Debug)]
 pub struct Column {
     /// Its title, with the unit of its numbers.
@@ -25,16 +25,16 @@ pub struct Column {
     pub align: Align,
 }
 
-/// Where the text of a column stands.
+/// Alignment of a column's text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
-    /// Words.
+    /// Left, for words.
     Left,
-    /// Numbers.
+    /// Right, for numbers.
     Right,
 }
 
-/// One row.
+/// One row of a table.
 #[derive(Clone, Debug, Default)]
 pub struct Row {
     /// Text of each column.

@@ -7,10 +7,10 @@ use crate::{Scale, Style};
 /// Room beside the outermost intervals, in the width of all of them.
 const ROOM: f64 = 0.06;
 
-/// Values with intervals.
+/// Figure of values with intervals, one to a row.
 #[derive(Clone, Debug)]
 pub struct Whiskers {
-    /// What is shown.
+    /// Title of the figure.
     pub title: String,
     /// The unit of the scale.
     pub unit: String,
@@ -27,7 +27,7 @@ pub struct Whiskers {
 /// A value with its interval.
 #[derive(Clone, Debug)]
 pub struct Whisker {
-    /// What it is.
+    /// Name of the value.
     pub label: String,
     /// How it is drawn.
     pub style: Style,

@@ -22,7 +22,7 @@ pub enum WriteError {
     Io {
         /// The file that was asked for.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

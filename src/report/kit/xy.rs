@@ -8,7 +8,7 @@ use crate::kit::html::{compact, escape};
 /// A pair of axes with points or paths.
 #[derive(Clone, Debug, Serialize)]
 pub struct XyFigure {
-    /// What is shown.
+    /// Title of the figure.
     #[serde(skip)]
     pub title: String,
     /// Name of the horizontal axis, with its unit.
@@ -26,13 +26,13 @@ pub struct XyFigure {
 pub struct XyBand {
     /// Its name in the legend.
     pub label: String,
-    /// Horizontal values, ascending.
+    /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
     /// Lower edge, as many values as horizontal ones.
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper edge, likewise.
+    /// Upper edge, as many values as horizontal ones.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
 }
@@ -64,9 +64,9 @@ pub enum XyMark {
     Line,
     /// Small filled points, where there are many.
     Dots,
-    /// Open circles.
+    /// Open circles at the points.
     Circles,
-    /// Crosses.
+    /// Crosses at the points.
     Crosses,
 }
 

@@ -1,4 +1,4 @@
-//! What a run against ArduPilot tells.
+//! Events of a run against ArduPilot.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -11,9 +11,9 @@ use crate::shim::link::Address;
 pub enum ArdupilotEvent {
     /// Nobody has sent a servo packet yet.
     Waiting(Address, Home),
-    /// ArduPilot has been heard.
+    /// The first servo packet of ArduPilot has arrived.
     Connected {
-        /// From where.
+        /// Address from which ArduPilot sends.
         peer: SocketAddr,
         /// Channels that it sends.
         channels: usize,

@@ -64,7 +64,7 @@ struct Client {
     line: String,
 }
 
-/// A run.
+/// State of one run against ArduPilot.
 struct Run<'a> {
     link: Link,
     options: &'a ShimOptions,
@@ -158,7 +158,7 @@ impl Run<'_> {
         self.tell(Event::Ardupilot(event));
     }
 
-    /// Tells of an ArduPilot that has fallen silent.
+    /// Reports an ArduPilot that has sent nothing for [`SILENCE`].
     fn watch(&mut self) {
         let Some(client) = &mut self.client else { return };
         if !client.silent && client.heard.elapsed() >= SILENCE {
@@ -167,7 +167,7 @@ impl Run<'_> {
         }
     }
 
-    /// Counts a datagram that is no servo packet, and tells of the first.
+    /// Counts a datagram that is no servo packet, and reports the first.
     fn refuse(&mut self, from: SocketAddr, length: usize) {
         self.counts.bad_frames += 1;
         if !std::mem::replace(&mut self.garbage_reported, true) {
@@ -176,7 +176,7 @@ impl Run<'_> {
         self.watch();
     }
 
-    /// Answers a servo packet.
+    /// Answers a servo packet with the state after the step that it asks for.
     fn hear(&mut self, packet: &ServoPacket, from: SocketAddr) -> Result<Option<Over>, ShimError> {
         self.watch();
         match &self.client {
@@ -196,7 +196,7 @@ impl Run<'_> {
         self.step(packet)
     }
 
-    /// Counts packets of a second ArduPilot, and tells of the first.
+    /// Counts packets of a second ArduPilot, and reports the first.
     fn turn_away(&mut self, from: SocketAddr) {
         self.counts.foreign_frames += 1;
         if !std::mem::replace(&mut self.second_reported, true) {

@@ -20,7 +20,7 @@ pub struct PwmRange {
 pub struct ChannelRange {
     /// The channel, from 1; `None` for all that have no range of their own.
     pub channel: Option<usize>,
-    /// Its range.
+    /// Pulse widths of the channel.
     pub range: PwmRange,
 }
 

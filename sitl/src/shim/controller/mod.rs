@@ -35,9 +35,9 @@ use parameters::Table;
 use sticks::Sticks;
 use streams::{Equipment, Streams};
 
-/// The system that the played controller is.
+/// System ID of the simulated controller.
 pub const SYSTEM: u8 = 1;
-/// MAV_COMP_ID_AUTOPILOT1.
+/// Component ID MAV_COMP_ID_AUTOPILOT1.
 const COMPONENT: u8 = 1;
 /// ArduPilot reads its channels every second step: 50 Hz.
 const SAMPLE_EVERY: u64 = 2;
@@ -50,17 +50,17 @@ const STICKS_SEEN_S: f64 = 0.15;
 const FAILSAFE_LAG_S: f64 = 0.2;
 /// A radio with its sticks released, µs: idle throttle.
 const RADIO_US: [u16; 3] = [1500, 1500, 1000];
-/// MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
+/// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
 const RECEIVER: u32 = 1 << 16;
 /// The bank at which ArduPilot turns back to where GUIDED was entered, rad: 45° to 55° were seen.
 const TURN_BACK: f64 = 50.0 * std::f64::consts::PI / 180.0;
 
-/// A flight stack.
+/// Flight stack whose behaviour is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Personality {
-    /// PX4, fixed wing.
+    /// PX4 with a fixed-wing airframe.
     Px4,
-    /// ArduPilot Plane.
+    /// ArduPilot's fixed-wing firmware, ArduPlane.
     Ardupilot,
 }
 
@@ -97,7 +97,6 @@ struct Wish {
     thrust: Option<f64>,
 }
 
-/// HEARTBEAT.
 const HEARTBEAT: u32 = 0;
 
 /// The played flight controller with the aircraft it flies.
@@ -132,7 +131,7 @@ pub struct FlightController {
     commanded: Inputs,
     /// What waits to be sent with the next step.
     waiting: Vec<u8>,
-    /// What was counted.
+    /// Counts of accepted and ignored messages.
     pub counts: Counts,
 }
 
@@ -222,7 +221,7 @@ impl FlightController {
         self.parser.restart();
     }
 
-    /// Flies one step on what was heard.
+    /// Flies one step with the commands received so far.
     ///
     /// # Errors
     /// If the plant cannot go on.
@@ -477,7 +476,7 @@ impl FlightController {
         self.wish.is_some_and(|wish| (self.now_us - wish.at_us) as f64 * 1e-6 <= timeout)
     }
 
-    /// Says a line of at most 25 bytes.
+    /// Sends STATUSTEXT with a text of at most 25 bytes.
     fn say(&mut self, severity: u8, words: &[u8]) {
         let mut text = [0; 25];
         text[..words.len()].copy_from_slice(words);
@@ -485,7 +484,7 @@ impl FlightController {
         self.encoder.encode(&line, &mut self.waiting);
     }
 
-    /// The stack's failsafes.
+    /// Checks the stack's failsafes and changes the mode if one triggers.
     fn watch(&mut self) {
         if self.steps.is_multiple_of(LOOK_EVERY) {
             let steady = self.sticks.steady_s(self.now_us).is_some_and(|s| s >= STICKS_SEEN_S);

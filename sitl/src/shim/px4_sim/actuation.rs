@@ -4,7 +4,7 @@ use crate::plant::Inputs;
 use crate::shim::codec::HilActuatorControls;
 use crate::shim::outputs::OutputMap;
 
-/// MAV_MODE_FLAG_SAFETY_ARMED.
+/// Bit MAV_MODE_FLAG_SAFETY_ARMED of `mode`.
 const ARMED: u8 = 128;
 
 /// What an actuator message asks for.

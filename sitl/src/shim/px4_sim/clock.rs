@@ -5,7 +5,7 @@ use super::{FIRST_US, STEP_US};
 /// How the controller's clock stands to the simulated one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Clock {
-    /// No message yet.
+    /// No message has arrived yet.
     #[default]
     Unknown,
     /// It shows simulated time less so much, µs: nothing, or the time at which it was started, as
@@ -20,9 +20,9 @@ pub enum Clock {
 pub enum Answers {
     /// The one that was shown last.
     Present,
-    /// An earlier one.
+    /// An earlier step than the last.
     Past,
-    /// None that was shown.
+    /// No step that was sent.
     Nothing,
 }
 

@@ -1,4 +1,4 @@
-//! What a run against PX4 tells.
+//! Events of a run against PX4.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use crate::shim::link::Address;
 /// A change of state of a run against PX4.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Px4Event {
-    /// Nobody is connected.
+    /// The simulator listens and no client is connected.
     Waiting(Address),
     /// A client has connected.
     Connected(SocketAddr),

@@ -67,7 +67,7 @@ impl Default for Px4Options {
     }
 }
 
-/// A run.
+/// State of one run against PX4.
 struct Run<'a> {
     link: Link,
     options: &'a ShimOptions,
@@ -77,7 +77,7 @@ struct Run<'a> {
     sensors: Sensors,
     log: Option<TruthLog>,
     client: Option<Client>,
-    /// Counts connections.
+    /// Number of connections so far.
     connection: u64,
     counts: Summary,
     time_us: u64,
@@ -231,7 +231,7 @@ impl Run<'_> {
         Ok(false)
     }
 
-    /// Tells of a client that has fallen silent, and lets another take its place.
+    /// Reports a client that has fallen silent, and lets another take its place.
     fn watch(&mut self, now: Instant) {
         let Some(client) = &mut self.client else { return };
         let Some(heard) = client.heard.filter(|_| !client.silent) else { return };

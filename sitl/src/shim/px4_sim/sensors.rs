@@ -41,13 +41,13 @@ pub struct Px4Noise {
     pub gyro_radps: f64,
     /// Magnetometer, by axis, gauss.
     pub magnetometer_gauss: [f64; 3],
-    /// Barometer, Pa.
+    /// Static pressure of the barometer, Pa.
     pub static_pressure_pa: f64,
-    /// Differential pressure, Pa.
+    /// Differential pressure of the airspeed sensor, Pa.
     pub differential_pressure_pa: f64,
     /// GPS position, north and east, m.
     pub gps_horizontal_m: f64,
-    /// GPS altitude, m.
+    /// Altitude of the GPS receiver, m.
     pub gps_altitude_m: f64,
     /// GPS velocity, north, east, down, m/s.
     pub gps_velocity_mps: [f64; 3],
@@ -87,7 +87,7 @@ impl Px4Noise {
 pub struct Sensors {
     noise: Px4Noise,
     bias: Bias,
-    /// North-east-down, gauss.
+    /// Magnetic field, north-east-down, gauss.
     field: [f64; 3],
     random: ChaCha8Rng,
     /// What was shown last, for fields that are not measured anew.
