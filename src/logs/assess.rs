@@ -1,4 +1,4 @@
-//! What the quality of the channels means for a log: what counts as missing, and what is said.
+//! Assessment of a log's channels: which quality counts as missing, and the findings about it.
 
 use super::Sample;
 use super::columns::{COLUMNS, index};
@@ -38,7 +38,7 @@ pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
 
-/// What there is to say of the channels: made-up samples, and spikes.
+/// Findings about the channels: interpolated samples, and spikes.
 pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
     let lines = |wrong: bool| -> Vec<String> {
         let lines = channels.iter().filter(|c| c.quality.interpolated);
@@ -75,7 +75,7 @@ pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
     out
 }
 
-/// Empties the rows of a channel that hangs in flight; says which.
+/// Sets the rows of a channel that is stuck in flight to NaN; one finding for each stuck channel.
 pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) -> Vec<Finding> {
     let flights: Vec<(f64, f64)> = phases::phases(rows, flies)
         .into_iter()

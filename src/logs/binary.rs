@@ -74,7 +74,7 @@ pub(super) fn read(
     })
 }
 
-/// What is said of a log that holds hover only.
+/// Error text for a log that holds hover only.
 const NEVER_ON_WINGS: &str = "there is no flight in this log: the vehicle never flies on its wings alone; give a log with forward flight";
 
 /// That the vehicle has no wings; an error where the log is to be computed with.

@@ -22,7 +22,7 @@ pub(super) const RATES: [&str; 3] = ["p_radps", "q_radps", "r_radps"];
 /// The column of the airspeed.
 pub(super) const AIRSPEED: &str = "airspeed_mps";
 
-/// Fills the columns that `mapping` makes from others; says what was done.
+/// Fills the columns that `mapping` derives from others; one note for each.
 pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
     let mut notes = Vec::new();
     let slopes: Vec<(&str, f64)> = mapping.slopes().collect();

@@ -10,14 +10,14 @@ use super::sources::Source;
 use super::vehicle::Vehicle;
 use super::{Channel, Format, Log, Sample, assess};
 
-/// What `greylag logs info` says of a log.
+/// Summary of a log, as `greylag logs info` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Info {
-    /// `greylag.log-info/1`.
+    /// Identifier of the schema, `greylag.log-info/1`.
     pub schema: &'static str,
-    /// The flight's name.
+    /// Name of the flight.
     pub name: String,
-    /// The file's format.
+    /// Format of the file.
     pub format: Format,
     /// Rows of the table.
     pub rows: usize,
@@ -67,7 +67,7 @@ pub struct Purpose {
 }
 
 impl Info {
-    /// What there is to say of a log.
+    /// Summarises a log.
     pub fn of(log: &Log) -> Info {
         let samples = &log.flight.samples;
         let times: Vec<f64> = samples.iter().map(|s| s.time_s).collect();
@@ -168,7 +168,7 @@ fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
     purpose
 }
 
-/// What stands in for a logged air density.
+/// Sources of air density that replace a logged one.
 fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     match (has("air_density_kgpm3"), has("altitude_m")) {
         (true, _) => Vec::new(),

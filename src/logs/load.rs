@@ -38,7 +38,7 @@ pub struct Channel {
     pub columns: Vec<String>,
     /// Its topic with fields in the file.
     pub origin: String,
-    /// Usable samples.
+    /// Number of usable samples.
     pub samples: usize,
     /// Samples a second, by the median period.
     pub rate_hz: f64,
@@ -51,11 +51,11 @@ pub struct Channel {
 /// A log read from a file.
 #[derive(Clone, Debug)]
 pub struct Log {
-    /// The file's format.
+    /// Format of the file.
     pub format: Format,
-    /// The table.
+    /// Table of the log's rows.
     pub flight: Flight,
-    /// What fills it.
+    /// Channels of the file that fill the table.
     pub channels: Vec<Channel>,
     /// Topics of the file (name, instance, records), used or not.
     pub topics: Vec<(String, u16, usize)>,
@@ -125,8 +125,8 @@ pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Compute)?)
 }
 
-/// Reads all flights of a log, one for each life of each vehicle in it; those without a flight are left out where
-/// another one flies, which the findings of the first say.
+/// Reads all flights of a log, one for each boot of each vehicle in it. If some fly and others do
+/// not, those that do not are dropped, and the findings of the first flight list them.
 ///
 /// # Errors
 /// As [`load`], if none of them can be read.
@@ -168,7 +168,7 @@ fn said_of(log: &Result<Log, LogError>) -> String {
     }
 }
 
-/// The one with the longest flight, which says what the others are; else the first error.
+/// The log with the longest flight, with the others in its findings; else the first error.
 fn longest(mut all: Vec<Result<Log, LogError>>) -> Result<Log, LogError> {
     let said: Vec<String> = all.iter().map(said_of).collect();
     let flown = |log: &Result<Log, LogError>| log.as_ref().map_or(-1.0, Log::flown_s);

@@ -12,7 +12,7 @@ pub(super) struct Share {
     pub column: &'static str,
     /// That column's place in a sample.
     pub place: Place,
-    /// The factor.
+    /// Factor of the column's value.
     pub share: f64,
 }
 

@@ -47,20 +47,20 @@ const GAP_S: f64 = 0.1;
 pub enum PhaseKind {
     /// It stands or rolls.
     Ground,
-    /// It flies.
+    /// In flight.
     Flight,
 }
 
 /// A stretch of a log without gaps in which the aircraft does one thing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Phase {
-    /// What it does.
+    /// Kind of the phase.
     pub kind: PhaseKind,
     /// Time of the first row, s.
     pub from_s: f64,
     /// Time of the last row, s.
     pub to_s: f64,
-    /// Rows in it.
+    /// Number of rows in it.
     pub rows: usize,
 }
 

@@ -12,7 +12,7 @@ use greylag_num::statistics::quantile;
 /// What the samples of a channel are worth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
-    /// How often something new comes, Hz; 0 where too little changes to tell.
+    /// Rate of new values, Hz; 0 where too little changes for an estimate.
     pub native_hz: f64,
     /// Whether most samples lie on straight lines between others.
     pub interpolated: bool,
@@ -26,7 +26,7 @@ pub struct Quality {
     pub largest_spike: f64,
 }
 
-/// Fewest samples that anything is said of.
+/// Smallest number of samples for an assessment.
 const ENOUGH: usize = 100;
 /// Share of the moving samples on straight lines from which they count as interpolated.
 const STRAIGHT: f64 = 0.7;

@@ -50,9 +50,9 @@ impl Reason {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
     pub samples: Vec<Sample>,
-    /// Rows seen.
+    /// Number of rows that were read.
     pub total: usize,
-    /// Rows dropped.
+    /// Number of rows that were dropped.
     pub dropped: usize,
     /// The numbers of the first of them.
     pub dropped_rows: Vec<usize>,

@@ -244,7 +244,8 @@ fn fill(rows: &mut [Sample], track: &Track) {
     rows.iter_mut().for_each(|row| reader.put(row));
 }
 
-/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; says which those are.
+/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; `true` for each row
+/// that is filled.
 fn fill_sparse(rows: &mut [Sample], track: &Track, period: f64) -> Vec<bool> {
     let mut fresh = vec![false; rows.len()];
     let Some(reader) = track.reader() else { return fresh };
@@ -277,7 +278,7 @@ fn hold(rows: &mut [Sample], track: &Track, fresh: &[bool]) {
     }
 }
 
-/// Turns equivalent into true airspeed; says by which density.
+/// Converts equivalent into true airspeed; returns a note on the density used.
 fn make_true(rows: &mut [Sample]) -> String {
     let mut by = [0usize; 3];
     for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {

@@ -5,7 +5,7 @@
 //!
 //! Times are the sender's own where a message carries them. A message without (VFR_HUD) gets the
 //! own time that belongs to its host time, by linear interpolation between the messages around it:
-//! in lockstep, where the host's clock says nothing about the flight's, this is still right.
+//! in lockstep, where the host's clock is unrelated to the flight's, this is still right.
 //! The instance of a topic is system × 256 + component.
 //!
 //! A vehicle that starts again counts its time from zero again. Each life of each vehicle is a flight of its own, for
@@ -208,7 +208,7 @@ impl Reader {
         systems.into_iter().flat_map(of).collect()
     }
 
-    /// What the records `at` say of `system`, one of several lives in the file.
+    /// The records `at` of `system`, one of several boots in the file.
     fn life(&self, system: u8, at: Range<usize>, clocks: &BTreeMap<u8, Vec<Tick>>) -> Topics {
         let whole = at == (0..usize::MAX);
         let own = |source: u16| source.to_be_bytes()[0] == system;

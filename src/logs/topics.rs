@@ -7,7 +7,7 @@ use super::finding::Finding;
 /// One instance of a topic, stored field by field.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topic {
-    /// Sample times, s.
+    /// Times of the samples, s.
     pub time_s: Vec<f64>,
     /// Names of the fields.
     pub fields: Vec<String>,

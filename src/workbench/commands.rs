@@ -16,7 +16,7 @@ pub struct Commands {
     pub flights: String,
     /// Where the model fails.
     pub compare: String,
-    /// What it lacks.
+    /// Command that finds the effects that the model lacks.
     pub diagnose: String,
     /// A formula for what is left; empty without a flight to test it on.
     pub propose: String,

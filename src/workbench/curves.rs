@@ -14,7 +14,7 @@ const ROWS: usize = 2500;
 /// A flight over time, drawn.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightData {
-    /// Its name.
+    /// Name of the flight.
     pub name: String,
     /// Time on the log's clock, s.
     pub time_s: Vec<Option<f64>>,

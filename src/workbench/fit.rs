@@ -25,7 +25,7 @@ const TUNING: f64 = 0.4;
 
 /// A model with accepted effects, as it lies in the session's folder.
 pub struct Fitted {
-    /// The model.
+    /// The model with the fitted coefficients.
     pub model: GreyBox,
     /// What the command `amend` writes as `amend.json`.
     pub story: Value,

@@ -29,21 +29,21 @@ pub enum Work {
     Fit,
     /// A formula for what no effect explains.
     Proposal,
-    /// A schedule that tells two effects apart.
+    /// A flight schedule that distinguishes two effects.
     Schedule,
 }
 
-/// A job as the page sees it.
+/// A job as displayed by the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct Job {
-    /// Its number.
+    /// Id of the job.
     pub id: u64,
-    /// What it works out.
+    /// Kind of result that the job computes.
     pub work: Work,
-    /// What it works it out of: no second job does the same.
+    /// Key of the job's inputs: a second job with the same key is not started.
     #[serde(skip)]
     pub key: String,
-    /// What it does now.
+    /// Current stage of the job.
     pub doing: String,
     /// Share done, 0 to 1.
     pub fraction: f64,
@@ -53,7 +53,7 @@ pub struct Job {
     pub(super) stop: Stop,
 }
 
-/// Tells a job to end.
+/// Cancels a job at its next stage.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -63,7 +63,7 @@ impl Stop {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// What a stage of the job is answered.
+    /// `Break` once the job has been cancelled.
     pub fn answer(&self) -> ControlFlow<()> {
         match self.0.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
@@ -76,19 +76,19 @@ impl Stop {
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// A job is further.
+    /// A job has made progress.
     Progress {
-        /// The job.
+        /// The job in its present state.
         job: Job,
     },
-    /// A flight is further.
+    /// A flight has new samples.
     Flight {
         /// What came of it.
         part: Part,
     },
-    /// Something has changed: look at the state again.
+    /// The session or its results have changed: read the state again.
     Changed {
-        /// The session's revision.
+        /// Present revision of the session.
         revision: u64,
     },
 }
@@ -119,7 +119,7 @@ fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), Work
 impl Bench {
     /// Announces that results have changed, not the session.
     pub(super) fn changed(&self) {
-        (self.hear)(Event::Changed { revision: self.revision() });
+        (self.on_event)(Event::Changed { revision: self.revision() });
     }
 
     /// Starts a job, unless one does the same.
@@ -198,7 +198,7 @@ impl Bench {
         }
         let job = job.clone();
         drop(inner);
-        (self.hear)(Event::Progress { job });
+        (self.on_event)(Event::Progress { job });
     }
 
     /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.

@@ -18,7 +18,7 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }
 
-/// Where a column of a log comes from, as a mapping says it.
+/// Field of the log that fills a column, in the syntax of a mapping.
 fn origin(flight: &Loaded, column: &str) -> String {
     let named = |c: &&greylag_logs::Channel| c.columns.iter().any(|own| own == column);
     match (flight.info.format, flight.info.channels.iter().find(named)) {

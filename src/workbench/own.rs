@@ -38,16 +38,16 @@ pub struct OwnView {
     text: String,
 }
 
-/// What a text says, if it is an effect file.
+/// Content of an effect file that was checked.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
-    /// The effect's id.
+    /// Id of the effect.
     pub id: &'static str,
-    /// What it is.
+    /// Description of the effect.
     pub description: &'static str,
-    /// Its formula.
+    /// Formula of the effect.
     pub formula: &'static str,
-    /// Whether a model with it may fly.
+    /// Whether a model with it may be flown by a controller.
     pub status: Status,
 }
 

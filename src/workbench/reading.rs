@@ -1,4 +1,5 @@
-//! How the session's logs are read: as its command line says, by the session's own mapping if that names none.
+//! Options for reading the session's logs: those of the command line, with the session's own
+//! mapping if it names none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use greylag_logs::csv::Tolerance;
 use greylag_logs::mapping::Mapping;
 use greylag_logs::sources::Asked;
 
-/// How logs are read, as a command line says it.
+/// Options of a command line for reading logs.
 #[derive(Clone, Debug, Default)]
 pub struct Reading {
     /// The mapping that is named there.
@@ -28,9 +29,9 @@ pub struct Reading {
 /// The mapping that logs are read by.
 #[derive(Clone, Debug, Default)]
 pub struct InUse {
-    /// Its file; none without a mapping.
+    /// Path of the mapping file; `None` without a mapping.
     pub file: Option<PathBuf>,
-    /// Its text.
+    /// Content of the mapping file.
     pub text: String,
 }
 

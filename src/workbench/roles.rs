@@ -1,6 +1,6 @@
-//! The session's logs by what they serve for, and what the commands of this program would call them.
+//! Roles of the session's logs, and their names in the commands of this program.
 //!
-//! Which role a log takes when it comes is said in `session.rs`, `Session::usual_role`.
+//! `Session::usual_role` in `session.rs` chooses the role of a new log.
 
 use std::path::PathBuf;
 use std::sync::Arc;

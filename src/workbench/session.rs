@@ -10,7 +10,7 @@ use greylag_report as report;
 
 /// The file in the session's folder.
 pub const FILE: &str = "session.toml";
-/// Its schema.
+/// Version of the file's schema.
 const SCHEMA: u32 = 1;
 
 /// What a flight serves for.
@@ -62,7 +62,7 @@ impl LogEntry {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accepted {
-    /// Its id.
+    /// Id of the effect.
     pub id: String,
     /// Whether it stays though the data refuse it.
     #[serde(default)]
@@ -86,7 +86,7 @@ pub enum Occasion {
 pub struct Opening {
     /// When, seconds since 1970 (UTC).
     pub unix_s: u64,
-    /// Why.
+    /// Occasion on which the test flights were opened.
     #[serde(default)]
     pub occasion: Occasion,
     /// The effects that were in the model.
@@ -113,7 +113,7 @@ pub enum Outcome {
     Flying,
     /// It was flown to its end.
     Flown,
-    /// It was stopped.
+    /// The user stopped it.
     Stopped,
     /// It could not begin, or ended early.
     Failed,
@@ -139,19 +139,19 @@ pub struct Flown {
     /// The command that flies the same; empty of a watched flight.
     #[serde(default)]
     pub command: String,
-    /// How it went.
+    /// Outcome of the flight.
     pub outcome: Outcome,
     /// Time in the recording, s.
     pub seconds: f64,
-    /// What the models' monitors said, each with its time and model.
+    /// Warnings of the models' monitors, each with its time and model.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// What the flying program said last.
+    /// Last line of the flying program.
     #[serde(default)]
     pub said: String,
 }
 
-/// A session.
+/// A session, as its file `session.toml` holds it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
@@ -163,7 +163,7 @@ pub struct Session {
     pub model: PathBuf,
     /// SHA-256 over its files: with airframe, residual and effects of files.
     pub model_sha256: String,
-    /// The logs.
+    /// Logs of the session with their roles.
     #[serde(default)]
     pub logs: Vec<LogEntry>,
     /// The accepted effects, in order.
@@ -178,7 +178,7 @@ pub struct Session {
     /// Ids of effects that were written as text, in the folder `effects`.
     #[serde(default)]
     pub own: Vec<String>,
-    /// Flights, in order.
+    /// Flights of the session, in the order flown.
     #[serde(default)]
     pub flown: Vec<Flown>,
 }
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_session_is_said_and_kept() {
+    fn a_file_that_is_no_session_is_reported_and_kept() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(FILE), "schema = 1\nrevison = 3\n").unwrap();
         let error = Session::read(folder.path()).unwrap_err().to_string();

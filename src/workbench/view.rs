@@ -56,7 +56,7 @@ struct About<'a> {
     strip: Option<Strip>,
 }
 
-/// An accepted effect with what its fit says.
+/// An accepted effect with the results of its fit.
 #[derive(Serialize)]
 struct StepView {
     id: String,
@@ -106,7 +106,7 @@ struct FailingView<'a> {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
-    /// The flight.
+    /// Index of the flight in the session.
     pub flight: usize,
     /// Where it starts, s on the log's clock.
     pub time_s: f64,
@@ -124,7 +124,7 @@ pub struct FreeRun {
 /// A free run of one model.
 #[derive(Clone, Debug, Serialize)]
 pub struct OneRun {
-    /// The model.
+    /// Name of the model.
     pub model: String,
     /// Time on the log's clock, s.
     pub time_s: Vec<f64>,

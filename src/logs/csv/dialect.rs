@@ -86,7 +86,7 @@ const PX4: [Alias; 17] = [
     Alias("throttle_cmd", "control[3]", 1.0),
 ];
 
-/// Names of the time, with what one of their unit is, s; 0 where the steps must say it.
+/// Names of the time column, with the unit in s; 0 where the unit follows from the steps.
 const TIMES: [(&str, f64); 12] = [
     ("Time", 1.0),
     ("timestamp", 0.0),
@@ -117,11 +117,11 @@ const QUATERNIONS: [[&str; 4]; 6] = [
 pub(super) struct Found {
     /// The column of the log format.
     pub column: String,
-    /// The file's name of it.
+    /// Name of the column in the file.
     pub field: String,
-    /// Factor.
+    /// Factor from the file's unit.
     pub scale: f64,
-    /// Summand.
+    /// Offset that is added after the factor.
     pub offset: f64,
 }
 
@@ -130,9 +130,9 @@ pub(super) struct Found {
 pub(super) struct Dialect {
     /// The columns under other names.
     pub found: Vec<Found>,
-    /// The quaternion's columns, w first unless the samples say otherwise.
+    /// The quaternion's columns, w first unless the samples show another order.
     pub quaternion: Option<[String; 4]>,
-    /// Whether the file's time is under another name whose unit its steps must say.
+    /// Whether the time column has an unknown unit, to be found from its steps.
     pub time_by_steps: bool,
 }
 

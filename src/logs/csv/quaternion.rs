@@ -25,9 +25,9 @@ fn turned(q: [f64; 4], order: Order) -> Option<UnitQuaternion<f64>> {
     NORM.contains(&norm).then(|| UnitQuaternion::new_normalize(q))
 }
 
-/// The order in which the quaternions turn as the gyros say and hold the specific force against gravity.
+/// The order in which the quaternions agree best with the gyros' rates and with gravity in the specific force.
 ///
-/// The norm is that of a rotation in either order, so that it only tells a quaternion from other numbers.
+/// The norm is that of a rotation in either order, so that it only distinguishes a quaternion from other numbers.
 pub(super) fn order(rows: &[Sample], quaternions: &[[f64; 4]]) -> Order {
     let misfit = |order: Order| {
         let (mut sum, mut weight) = (0.0, 0.0);

@@ -128,7 +128,7 @@ fn separator(header: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
-/// Reads the rows, taking columns under other names or in other units where `mapping` says so.
+/// Reads the rows; `mapping` may assign columns with other names or units.
 pub(crate) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
     let text = |source| CsvError::Text { path: path.to_owned(), source };
     // A row without its line end may miss digits: it is left out.

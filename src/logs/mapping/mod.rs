@@ -10,13 +10,13 @@
 //! roll_rad = { from = "csv.roll_deg", scale = 0.0174533 }         # another column of a CSV
 //! ```
 //!
-//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` makes roll, pitch and yaw of a quaternion from
-//! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` says which part stands first.
+//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion of
+//! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states which part is first.
 //!
 //! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
 //! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, by a
 //! parabola through so many seconds of rows. `[derive] body_rates_over_s` makes p, q, r from roll, pitch and
-//! yaw in the same way. `[sensors]` says what is known of sensors and wind, see [`Sensors`].
+//! yaw in the same way. `[sensors]` describes sensors and wind, see [`Sensors`].
 
 mod ardupilot;
 mod telemetry;
@@ -48,15 +48,15 @@ pub enum MappingError {
     /// The file cannot be read.
     #[error("cannot read mapping {}: {source}: check the path", path.display())]
     File {
-        /// The file.
+        /// Path of the mapping file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The text is no mapping.
     #[error("mapping {}: {text}", path.display())]
     Text {
-        /// The file.
+        /// Path of the mapping file.
         path: PathBuf,
         /// What is wrong with it.
         text: String,
@@ -68,9 +68,9 @@ pub enum MappingError {
 pub struct Entry {
     /// The topic, message or record type.
     pub topic: String,
-    /// Its field.
+    /// Name of the field.
     pub field: String,
-    /// Factor.
+    /// Factor from the field's unit.
     pub scale: f64,
     /// Summand, in the column's unit.
     pub offset: f64,
@@ -83,7 +83,7 @@ pub struct Entry {
 /// A user's mapping, with the mixer of the aircraft.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
-    /// Sources by column.
+    /// Source of each mapped column.
     entries: BTreeMap<String, Entry>,
     /// Time over which body rates are made from the attitude, s.
     body_rates_over_s: Option<f64>,
@@ -102,7 +102,7 @@ pub struct Turn {
     pub topic: String,
     /// The fields of its parts, as they are written.
     pub fields: [String; 4],
-    /// Which part comes first; found by the rates and gravity where it is not said.
+    /// Which part comes first; `None` finds it from the rates and gravity.
     pub order: Option<Order>,
 }
 
@@ -239,7 +239,7 @@ impl Mapping {
         Mapping { mixer, ..self }
     }
 
-    /// Where the attitude comes from as a quaternion, if the mapping says so.
+    /// Source of the attitude as a quaternion, if the mapping has one.
     pub(super) fn quaternion(&self) -> Option<&Turn> {
         self.quaternion.as_ref()
     }

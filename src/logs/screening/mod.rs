@@ -19,10 +19,10 @@ use super::finding::{Cure, Finding, Severity};
 use super::lag;
 use super::phases::{self, Flying, PhaseKind};
 
-/// Rows below which nothing is said about units.
+/// Smallest number of rows for checks of units.
 const ENOUGH: usize = 50;
 
-/// Everything found in the rows of an aircraft that is known to fly as `flies` says.
+/// All findings in the rows of an aircraft with the flight limits `flies`.
 pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     if rows.is_empty() {
         return vec![Finding::problem("the log has no rows with all needed channels")];

@@ -15,7 +15,6 @@ const WINDOW_S: f64 = 0.1;
 /// Partial correlation beyond which a surface is taken to act the other way.
 const TURNED: f64 = 0.6;
 
-/// Reads a column.
 type Get = fn(&Sample) -> f64;
 
 /// Units, then polarity where the units and the axes are right.

@@ -1,4 +1,4 @@
-//! What came of a flight, as HTML: verdict, time lines, what was said, rules, the scenario with its command.
+//! Result of a flight as HTML: verdict, time lines, texts, rules, the scenario with its command.
 
 use super::Flown;
 use super::verdict::Happened;

@@ -11,7 +11,7 @@ use greylag_sim::faults::{ControllerMode, Fault};
 /// Time before and after what happens first that is shown large, s.
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
-/// A decision as old as this says nothing of now, s.
+/// A decision older than this is no longer in force, s.
 const STALE_S: f64 = 0.2;
 /// A moment, such as a request, is drawn as long as this, s.
 const MOMENT_S: f64 = 0.1;
@@ -20,7 +20,7 @@ const MOMENT_S: f64 = 0.1;
 type Seen = Option<(String, Tone)>;
 
 impl Flown {
-    /// The whole flight.
+    /// Time line of the whole flight.
     pub(super) fn time_line(&self) -> TimeLine {
         let (shaded_s, marks_s) = (self.shaded(), self.marks());
         TimeLine {

@@ -7,7 +7,7 @@ use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 pub(super) const NOTHING: &str = "none";
 /// The client arms and asks for OFFBOARD once more.
 pub(super) const AGAIN: &str = "again";
-/// Requests: value, words.
+/// Requests of the client: form value, displayed text.
 pub(super) const REQUESTS: [(&str, &str); 7] = [
     (NOTHING, "Nothing"),
     (AGAIN, "Client arms, then OFFBOARD, again"),

@@ -139,7 +139,7 @@ fn select(
     )
 }
 
-/// The faults; each says whether it has a length and a strength, and what it does.
+/// Options of the field `fault`, each with its length and strength fields and its description.
 fn faults(form: &Form, wrong: Option<&Wrong>) -> String {
     let chosen = form.value("fault");
     let nothing = if chosen == NOTHING { " selected" } else { "" };
@@ -192,7 +192,7 @@ fn group(name: &str, legend: &str, options: &[(&str, &str)], form: &Form) -> Str
     )
 }
 
-/// How a field says that it is wrong.
+/// HTML attribute that marks an invalid field.
 fn state(name: &str, wrong: Option<&Wrong>) -> &'static str {
     match wrong.is_some_and(|w| w.field == name) {
         true => " aria-invalid=\"true\"",

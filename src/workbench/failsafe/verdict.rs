@@ -28,7 +28,7 @@ struct Cause {
     asked: Option<(f64, Asking)>,
 }
 
-/// Something that happened.
+/// One event of the flight, at its time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Happened {
     pub at_s: f64,
@@ -36,16 +36,16 @@ pub(super) struct Happened {
     pub what: String,
 }
 
-/// Who did or said it.
+/// Party that caused an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Who {
-    /// The scenario.
+    /// The injected fault of the scenario.
     Fault,
     /// The client, or a ground station.
     Client,
-    /// The companion.
+    /// The companion computer's program.
     Companion,
-    /// The flight controller.
+    /// The flight controller's firmware.
     Controller,
 }
 
@@ -62,7 +62,7 @@ impl Who {
 }
 
 impl Flown {
-    /// Everything that happened or was said, by time.
+    /// All events and texts of the flight, in order of time.
     pub(super) fn events(&self) -> Vec<Happened> {
         let mut all = self.befallen();
         let said = |(at_s, words): &(f64, String)| Happened {
@@ -239,7 +239,7 @@ impl Flown {
         answers.find(|(at_s, what, _)| *what == asked && near(*at_s)).map(|(.., verdict)| verdict)
     }
 
-    /// How it ended.
+    /// How the flight ended, in one sentence.
     fn end(&self) -> String {
         let Some(last) = self.witnessed.samples.last() else { return String::new() };
         let found = |finding| self.witnessed.findings.iter().find(|f| f.finding == finding);

@@ -54,7 +54,7 @@ async fn aside<T: Serialize + Send + 'static>(
     }
 }
 
-/// The session.
+/// The session as JSON, without its curves.
 pub async fn state(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.state()).await
 }
@@ -64,7 +64,7 @@ pub async fn failing(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.failing()).await
 }
 
-/// The diagnosis.
+/// The diagnosis as JSON; `null` without one.
 pub async fn diagnosis(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.diagnosis())).await
 }
@@ -86,7 +86,7 @@ pub struct Text {
     text: String,
 }
 
-/// What an effect file says, or what is wrong with it.
+/// Description of an effect file, or its error.
 pub async fn check(Json(Text { text }): Json<Text>) -> Response {
     match crate::check(&text) {
         Ok(checked) => Json(checked).into_response(),
@@ -178,7 +178,7 @@ pub async fn events(
     Sse::new(all).keep_alive(KeepAlive::default())
 }
 
-/// Any other request.
+/// Answer to a request for an unknown address.
 pub async fn nothing() -> Response {
     let body: Value = json!({ "error": "there is nothing of that name" });
     (StatusCode::NOT_FOUND, Json(body)).into_response()
