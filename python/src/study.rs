@@ -32,7 +32,7 @@ pub struct Reading {
     despite_problems: bool,
 }
 
-/// What `amend` is asked for.
+/// Options of `amend`.
 #[derive(FromPyObject)]
 pub struct Wanted {
     /// Effects to add with the values of coefficients near which to search; `None` for what a diagnosis asserts.

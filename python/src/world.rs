@@ -40,7 +40,7 @@ pub struct World {
     bounds: [[f64; OBSERVATIONS]; 2],
 }
 
-/// What a step gave, in rows.
+/// Results of a step, in rows.
 struct Rows {
     now: Vec<f32>,
     reward: Vec<f32>,
@@ -50,7 +50,7 @@ struct Rows {
 
 #[pymethods]
 impl World {
-    /// `instances` aircraft that fly as `model` says.
+    /// `instances` aircraft that are simulated with `model`.
     #[staticmethod]
     fn imagined(
         model: &Model,

@@ -189,7 +189,7 @@ impl Cli {
         simulated.unwrap_or(&self.link)
     }
 
-    /// What the command line asks for.
+    /// Options of the run that the command line describes.
     ///
     /// # Errors
     /// If the airframe file cannot be used.

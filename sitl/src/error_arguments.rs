@@ -59,7 +59,7 @@ pub struct SensorArgs {
     airspeed_scale: f64,
 }
 
-/// What befalls state frames.
+/// Options for faults of state frames.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Frames")]
 pub struct FaultArgs {
@@ -112,7 +112,7 @@ impl SensorArgs {
 }
 
 impl FaultArgs {
-    /// What befalls state frames.
+    /// The faults of state frames that the options describe.
     pub fn rule(&self) -> FrameFaults {
         FrameFaults {
             delay_ms: self.delay_ms,

@@ -55,7 +55,7 @@ impl fmt::Debug for Effect {
 pub struct Hidden {
     effect: &'static Effect,
     amplitude: f64,
-    /// What an effect that is not of the list adds.
+    /// Functions that an effect outside the list adds.
     functions: &'static [(Place, String)],
     /// Filters whose outputs those functions read.
     filters: &'static [Filter],
@@ -64,15 +64,15 @@ pub struct Hidden {
 /// A filter of the flight controls that an effect reads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
-    /// Its input, an expression of JSBSim's functions.
+    /// Input of the filter, an expression of JSBSim's functions.
     pub input: String,
     /// Kind of the filter: lag or delay.
     pub kind: FilterKind,
-    /// Its time constant or delay, s.
+    /// Time constant or delay of the filter, s.
     pub time_s: f64,
 }
 
-/// What a filter does.
+/// Kinds of filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilterKind {
     /// A first-order lag, bilinear at the step.
@@ -264,7 +264,7 @@ pub enum HiddenError {
         "a hidden effect needs {place} in the aircraft's XML, which has none; hide another effect or fly another aircraft"
     )]
     Place {
-        /// What was looked for.
+        /// Element of the XML that is missing.
         place: String,
     },
 }

@@ -91,7 +91,7 @@ pub enum PlantError {
     Undefined {
         /// Name of the aircraft.
         aircraft: String,
-        /// What is not defined.
+        /// Property that is not defined.
         property: String,
         /// Where it is read.
         place: String,
@@ -123,7 +123,7 @@ pub enum PlantError {
     /// JSBSim failed while doing something.
     #[error("JSBSim failed while {doing}: {source}")]
     Jsbsim {
-        /// What was being done.
+        /// Operation that failed.
         doing: &'static str,
         /// Error that JSBSim returned.
         source: jsbsim::Error,
@@ -203,7 +203,7 @@ impl Plant {
         }
     }
 
-    /// What is to be known of the aircraft before it is flown, one sentence each.
+    /// Notes on the aircraft before it is flown, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         let glider = format!(
             "the aircraft '{}' has no throttle: it flies as a glider, and throttle commands move nothing",

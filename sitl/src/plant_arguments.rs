@@ -9,7 +9,7 @@ use crate::air::{Air, Gust, Turbulence};
 use crate::hidden::Hidden;
 use crate::plant::{PlantOptions, Properties};
 
-/// Which aircraft in which air; to be flattened into a program's options.
+/// Options for the aircraft and its air, to be flattened into a program's options.
 #[derive(Clone, Debug, Args)]
 pub struct PlantArgs {
     #[command(flatten)]
@@ -101,7 +101,7 @@ impl<const N: usize> FromStr for Numbers<N> {
 }
 
 impl PlantArgs {
-    /// What the command line asks for, with turbulence of `seed`.
+    /// Options of the plant that the command line describes, with turbulence of `seed`.
     pub fn options(&self, seed: u32) -> PlantOptions {
         let mut plant = PlantOptions { seed, air: self.air.air(), ..Default::default() };
         plant.aircraft_dir = self.aircraft.aircraft_dir.clone();

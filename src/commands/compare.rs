@@ -21,7 +21,7 @@ use crate::sysid::compare::{Answer, Comparison, ModelResult, Options, compare, s
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// What the models are called in the tables, in their order.
+/// Short names of the models in the tables, in their order.
 const LETTERS: std::ops::RangeInclusive<char> = 'A'..='Z';
 
 /// Options of `greylag compare`.
@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], clock)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let bar = Bar::new();
-    let mut comparison = compare(&models, &flights, &options, &|stage| bar.hear(stage))?;
+    let mut comparison = compare(&models, &flights, &options, &|stage| bar.update(stage))?;
     bar.go_on()?;
     drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();

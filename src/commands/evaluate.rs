@@ -48,7 +48,7 @@ const IN_JSBSIM: [&str; 11] = [
 /// Options of `greylag evaluate`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Controllers to score.
+    /// Controllers to be evaluated.
     #[arg(long = "controller", value_name = "NAME", num_args = 1.., required = true, value_parser = choices::controller())]
     controllers: Vec<ControllerKind>,
     /// Models that the controllers are designed from or plan with.
@@ -60,7 +60,7 @@ pub struct Arguments {
     /// Settings of the planners in other than their usual size, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
-    /// Targets to fly.
+    /// File of the targets to fly.
     #[arg(long, default_value = "params/targets.csv")]
     targets: PathBuf,
     /// Only these groups of targets.
@@ -105,14 +105,14 @@ pub struct Arguments {
     force: bool,
 }
 
-/// What lies between a controller and the surfaces: the envelope limiter, or nothing.
+/// Protection between a controller and the surfaces: the envelope limiter, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EnvelopeName {
     Kept,
     Free,
 }
 
-/// The JSON document.
+/// Content of the JSON document.
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -213,7 +213,7 @@ fn page(
     report.page().render()
 }
 
-/// What was flown, in a line.
+/// Description of the evaluation in one line.
 fn subtitle(arguments: &Arguments) -> String {
     let targets = match (arguments.no_targets, arguments.every) {
         (true, _) => Vec::new(),

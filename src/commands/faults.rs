@@ -39,7 +39,7 @@ pub struct Arguments {
     /// Seed of the first flight; the others follow.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     first: u64,
-    /// Controllers.
+    /// Controllers that fly the campaign.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
     /// The simulator's aircraft; the played flight controllers have gains for the X8, so others fly with the
@@ -104,8 +104,8 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     })
 }
 
-/// Flies the campaign; the exit status tells whether the companion itself never failed, with every
-/// aircraft that left its envelope explained.
+/// Flies the campaign; the exit status is 0 if the companion itself never failed and every
+/// aircraft that left its envelope is explained.
 ///
 /// # Errors
 /// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
@@ -217,7 +217,7 @@ fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entrie
     println!("{table}");
 }
 
-/// What was found, in numbers, then every flight with something that nothing explains, or no fault.
+/// Prints the counts of findings, then each flight with a finding that fails the campaign.
 fn print_findings(entries: &[Entry]) {
     println!("\n{} flights in all", entries.len());
     let mut counts: BTreeMap<(&str, &str), u64> = BTreeMap::new();

@@ -12,9 +12,9 @@ use crate::report;
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// Keep it and say so.
+    /// Keep it and fail with an error.
     Never,
-    /// Replace it (`--force`).
+    /// Replace it (option `--force`).
     Force,
 }
 
@@ -37,7 +37,7 @@ pub struct JsonArgument {
     json: Option<PathBuf>,
 }
 
-/// What a command found, with the name of its layout and the program.
+/// Result of a command, with the name of its layout and the program.
 #[derive(Serialize)]
 struct Document<'a, T> {
     schema: &'static str,

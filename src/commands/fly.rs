@@ -67,7 +67,7 @@ pub struct Arguments {
     /// Let whoever reaches an unsigned link steer the aircraft, from other machines too.
     #[arg(long)]
     insecure: bool,
-    /// Controller.
+    /// Controller that flies the aircraft.
     #[arg(long, value_name = "NAME", default_value = CONTROLLER, value_parser = choices::controller())]
     controller: ControllerKind,
     /// Model that the controller is designed from or plans with.
@@ -88,7 +88,7 @@ pub struct Arguments {
     /// New folder for the recording [default: the next number under flights/].
     #[arg(long, value_name = "DIR", conflicts_with = "no_record")]
     record: Option<PathBuf>,
-    /// Record nothing.
+    /// Do not record the flight.
     #[arg(long)]
     no_record: bool,
     /// Wait for every plan, for a simulator that waits for every answer.
@@ -109,21 +109,21 @@ pub struct Arguments {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProfileName {
-    /// The simulator's shim.
+    /// The simulator's own profile.
     Sitl,
-    /// PX4, fixed wing.
+    /// A flight controller with PX4, fixed wing.
     Px4,
-    /// ArduPilot Plane.
+    /// A flight controller with ArduPilot Plane.
     Ardupilot,
 }
 
-/// What is commanded, by name.
+/// Commanded quantity, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CommandName {
-    /// Aileron, elevator, throttle.
+    /// Commands of aileron, elevator and throttle.
     Surfaces,
-    /// Roll, pitch, thrust.
+    /// Setpoints of roll, pitch and thrust.
     Attitude,
 }
 
@@ -139,7 +139,7 @@ impl ProfileName {
 }
 
 impl CommandName {
-    /// What the companion commands of a real controller.
+    /// Authority of the companion over a real controller.
     pub fn authority(self) -> Authority {
         match self {
             CommandName::Surfaces => Authority::Surfaces,
@@ -165,7 +165,7 @@ impl Arguments {
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
     }
 
-    /// What is noted beside the recording.
+    /// Options that are recorded beside the log.
     fn chosen(&self) -> Chosen<'_> {
         Chosen {
             controller: self.controller,
@@ -226,7 +226,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let class = punctual::class(arguments.realtime);
     let flight = Flight::start(&options, companion, stop)?;
     if !arguments.lockstep {
-        punctual::tell(class);
+        punctual::print_timing(class);
     }
     if let Some(folder) = &flight.recording {
         // the flight goes on: the recording is whole without it

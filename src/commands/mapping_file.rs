@@ -36,7 +36,7 @@ pub fn mapping(logs: &[Info]) -> Option<String> {
     (!columns.is_empty()).then_some(text)
 }
 
-/// Where a column of a log comes from, as a mapping says it.
+/// Field of the log that fills a column, in the syntax of a mapping.
 fn origin(log: &Info, column: &str) -> String {
     let named = |c: &&Channel| c.columns.iter().any(|own| own == column);
     match (log.format, log.channels.iter().find(named)) {

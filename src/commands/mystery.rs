@@ -58,7 +58,7 @@ pub struct Arguments {
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
     turbulence_severity: Option<u8>,
-    /// Open the answer of a folder, beside what its diagnosis.json says.
+    /// Reveal the answer of a folder, beside the result in its diagnosis.json.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "what", "turbulence_severity"])]
     open: Option<PathBuf>,
     /// Open the answer without a diagnosis: the game is over then.
@@ -66,7 +66,7 @@ pub struct Arguments {
     give_up: bool,
 }
 
-/// What was hidden.
+/// The effect that was hidden.
 #[derive(Debug, Deserialize, Serialize)]
 struct Answer {
     schema: String,
@@ -141,7 +141,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The simulator's aircraft.
+/// The simulator's aircraft, with the airframe of the reference model.
 fn subject(arguments: &Arguments, reference: &GreyBox) -> Result<Subject> {
     let mut plant =
         PlantOptions { aircraft_dir: arguments.aircraft_dir.clone(), ..PlantOptions::default() };
@@ -170,7 +170,7 @@ fn airframe(path: &Path, model: &str) -> Result<String> {
     std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))
 }
 
-/// What is hidden: the effect of a file, one by its id, or one drawn.
+/// The effect to hide: that of a file, one by its id, or one drawn at random.
 fn missing(arguments: &Arguments, reference: &GreyBox, seed: u64) -> Result<Missing> {
     let Some(file) = &arguments.hide else {
         let craft = Craft::of(reference);

@@ -24,7 +24,7 @@ pub enum CsvError {
     /// The file cannot be opened, read or written.
     #[error("cannot {doing} flight log {path}: {source}: check the path and its permissions")]
     File {
-        /// What was being done.
+        /// Operation that failed, such as `read`.
         doing: &'static str,
         /// Path of the log.
         path: PathBuf,
@@ -46,7 +46,7 @@ pub enum CsvError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// What would satisfy it.
+        /// What would fill the column.
         remedy: String,
     },
     /// Too many rows cannot be used.

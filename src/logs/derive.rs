@@ -142,7 +142,7 @@ fn body_rates(rows: &mut [Sample], over_s: f64) -> usize {
     count
 }
 
-/// What `fit` makes of the samples within half of `over_s` around each.
+/// Value of `fit` for the samples within half of `over_s` around each sample.
 fn around<T, R>(
     samples: &[T],
     time: impl Fn(&T) -> f64,

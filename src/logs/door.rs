@@ -55,7 +55,7 @@ pub(super) fn part(path: &Path) -> (PathBuf, Option<usize>) {
     named.unwrap_or((path.to_owned(), None))
 }
 
-/// Which of two bytes of UTF-16 comes first.
+/// Byte order of UTF-16.
 #[derive(Clone, Copy)]
 enum Wide {
     Little,

@@ -42,7 +42,7 @@ pub enum LogError {
     Vehicle {
         /// Path of the log.
         path: PathBuf,
-        /// What it is, and what to do.
+        /// Type of the vehicle, and the remedy.
         why: String,
     },
     /// The CSV is wrong.
@@ -50,7 +50,7 @@ pub enum LogError {
     Csv {
         /// Error of the CSV reader.
         error: CsvError,
-        /// What it looks like.
+        /// Probable wrong units, for the message; may be empty.
         hint: String,
     },
     /// A needed column is filled by nothing in the file.
@@ -60,7 +60,7 @@ pub enum LogError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// What would satisfy it.
+        /// What would fill the column.
         remedy: String,
     },
     /// Too many rows cannot be used.
@@ -76,7 +76,7 @@ pub enum LogError {
         reasons: String,
         /// The first of those dropped.
         first: usize,
-        /// What it looks like.
+        /// Probable wrong units, for the message; may be empty.
         hint: String,
     },
 }

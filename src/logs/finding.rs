@@ -12,7 +12,7 @@ pub enum Severity {
     Note,
     /// Some of the log cannot be used, or not fully.
     Warning,
-    /// What is computed from the log would be wrong.
+    /// Results computed from the log would be wrong.
     Problem,
 }
 
@@ -40,7 +40,7 @@ impl std::fmt::Display for Cure {
 pub struct Finding {
     /// How much it matters.
     pub severity: Severity,
-    /// What it is, with what would help.
+    /// Description of the finding, with a remedy.
     pub text: String,
     /// The factor that puts it right, where one does.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -82,7 +82,7 @@ impl Default for Sample {
     }
 }
 
-/// What a recorded body rate stands for.
+/// Sampling of a recorded body rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
@@ -108,17 +108,17 @@ pub enum FlowAngles {
 /// Where only the rows matter, `Flight::from(samples)` or `..Flight::default()` fill in the rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
-    /// What the flight is called in reports: its file's name.
+    /// Name of the flight in reports: that of its file.
     pub name: String,
     /// The rows, in time order.
     pub samples: Vec<Sample>,
     /// Where α and β come from.
     pub flow_angles: FlowAngles,
-    /// What is known of its sensors and of the wind.
+    /// Known properties of the sensors and of the wind.
     pub sensors: Sensors,
     /// Channels of the file that the format does not name.
     pub unknown_columns: Vec<String>,
-    /// What was assumed or derived while reading, one sentence each.
+    /// Assumptions and derivations of the reader, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a log holds, how far it goes, what it is missing for which purpose.
+//! Summary of a log: content, length, and missing channels for each purpose.
 
 use serde::Serialize;
 
@@ -33,36 +33,36 @@ pub struct Info {
     pub gaps: Vec<(f64, f64)>,
     /// Time in flight, s.
     pub flight_s: f64,
-    /// What the aircraft does when.
+    /// Phases of flight and ground, in order.
     pub phases: Vec<Phase>,
     /// The vehicle, where the log names it.
     pub vehicle: Option<Vehicle>,
     /// When it did not fly on its wings alone, s: left out.
     pub hovers: Vec<(f64, f64)>,
-    /// Which vehicle and which life of it this is, where the file holds several.
+    /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
     /// The instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// What fills the table.
+    /// Channels that fill the table.
     pub channels: Vec<Channel>,
-    /// What the log serves for.
+    /// Purposes with the channels that the log lacks for each.
     pub purposes: Vec<Purpose>,
     /// Topics of the file: name, instance, records.
     pub topics: Vec<(String, u16, usize)>,
-    /// What its user should know.
+    /// Findings for the log's user.
     pub findings: Vec<Finding>,
 }
 
 /// Something a log may serve for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Purpose {
-    /// What it is.
+    /// Name of the purpose.
     pub name: &'static str,
-    /// What the log lacks for it; nothing if it serves.
+    /// Columns that the log lacks for it; empty if it serves.
     pub missing: Vec<String>,
-    /// What is there, but too slow.
+    /// Columns that are present at too low a rate.
     pub slow: Vec<String>,
-    /// What takes the place of what is absent.
+    /// Replacements for absent columns.
     pub instead: Vec<String>,
 }
 
@@ -106,7 +106,7 @@ impl Info {
     }
 }
 
-/// What a rudder that moves means to whoever studies the log.
+/// Finding about a rudder that moves.
 fn rudder(log: &Log) -> Option<Finding> {
     let motion = RudderMotion::of(&log.flight.samples)?;
     Some(Finding::warning(format!(

@@ -10,7 +10,7 @@ pub(super) struct Share {
     pub field: usize,
     /// The column that it is a part of.
     pub column: &'static str,
-    /// That column's place in a sample.
+    /// Place of that column in a sample.
     pub place: Place,
     /// Factor of the column's value.
     pub share: f64,

@@ -41,13 +41,13 @@ impl Flying {
 /// A gap that splits the log, s, unless the log is slower than that.
 const GAP_S: f64 = 0.1;
 
-/// What an aircraft does.
+/// Kind of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PhaseKind {
-    /// It stands or rolls.
+    /// The aircraft stands or rolls.
     Ground,
-    /// In flight.
+    /// The aircraft is airborne.
     Flight,
 }
 

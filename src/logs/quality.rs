@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::topics::period_s;
 use greylag_num::statistics::quantile;
 
-/// What the samples of a channel are worth.
+/// Quality of the samples of a channel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
     /// Rate of new values, Hz; 0 where too little changes for an estimate.

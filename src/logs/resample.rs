@@ -18,7 +18,7 @@ pub(super) struct Reader<'a> {
     to: Target,
 }
 
-/// What a track's series become.
+/// Destination of a track's series.
 enum Target {
     Attitude,
     Column { place: Place, held: bool, wraps: bool },

@@ -18,9 +18,9 @@ const ENOUGH: usize = 50;
 /// How a rudder moves in flight: the standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RudderMotion {
-    /// Of its deflection, rad.
+    /// Standard deviation of the deflection, rad.
     Deflection(f64),
-    /// Of its command, −1..1, where the log has no deflection.
+    /// Standard deviation of the command, −1..1, where the log has no deflection.
     Command(f64),
 }
 

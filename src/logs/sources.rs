@@ -16,7 +16,7 @@ use super::topics::{Topic, Topics, period_s};
 pub struct Asked {
     /// Name of the topic.
     pub topic: String,
-    /// Its instance: a number, or system × 256 + component.
+    /// Instance of the topic: a number, or system × 256 + component.
     pub instance: u16,
 }
 
@@ -73,7 +73,7 @@ pub(super) struct Choice {
     read: BTreeMap<String, u16>,
     /// All instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// What was taken instead of what is usual.
+    /// Findings about unusual choices.
     pub findings: Vec<Finding>,
 }
 

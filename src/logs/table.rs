@@ -22,7 +22,7 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 /// The longest time that a fast channel is carried over, s.
 const GAP_S: f64 = 0.1;
-/// The same for a slow one, in its sample periods.
+/// The longest time that a slow channel is carried over, in its sample periods.
 const GAP_PERIODS: f64 = 3.0;
 /// Share of finite values that makes a channel usable before others of its column.
 const GOOD_SHARE: f64 = 0.5;
@@ -99,7 +99,7 @@ pub(super) struct Table {
     pub missing: Vec<Missing>,
     /// The instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// What was read instead of what is usual.
+    /// Findings about unusual sources.
     pub findings: Vec<Finding>,
     /// The rule by which each column is filled.
     pub rules: Vec<Rule>,
@@ -109,7 +109,7 @@ pub(super) struct Table {
 pub(super) struct Missing {
     pub column: &'static str,
     pub or: Option<&'static str>,
-    /// What the rules looked for.
+    /// Topics and fields that the rules looked for.
     pub looked_for: Vec<String>,
 }
 

@@ -144,7 +144,7 @@ impl Reader {
     }
 
     fn finish(mut self, skipped: usize, cut: usize) -> Vec<Topics> {
-        // Components of one system share its clock; the one with the most messages tells it best.
+        // Components of one system share its clock; the one with the most messages is the most accurate.
         let mut clocks: BTreeMap<u8, Vec<Tick>> = BTreeMap::new();
         for (source, clock) in std::mem::take(&mut self.clocks) {
             let best = clocks.entry(source.to_be_bytes()[0]).or_default();

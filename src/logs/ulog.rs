@@ -36,7 +36,7 @@ const KINDS: &[u8] = b"BFIMPQARDCLSO";
 struct Subscription {
     key: (String, u16),
     layout: Rc<Layout>,
-    /// Its records, from the first one on.
+    /// Records of the message; `None` before the first.
     topic: Option<Topic>,
     count: usize,
 }
@@ -70,7 +70,7 @@ enum Undeclared {
     Refused,
 }
 
-/// What stands at a place of the file.
+/// Kind of content at a place of the file.
 enum Place {
     /// A record of so many bytes, its header included.
     Record(usize),
@@ -317,7 +317,7 @@ impl Reader {
     }
 }
 
-/// What a damaged file has lost.
+/// Finding about losses of a damaged file.
 pub(super) fn damage(skipped: usize, holes: &[f64]) -> Option<Finding> {
     let lost: f64 = holes.iter().filter(|s| s.is_finite()).sum();
     (skipped > 0).then(|| {

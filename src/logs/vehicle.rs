@@ -13,11 +13,11 @@ use super::topics::Topics;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// It flies on its wings only.
+    /// Aircraft that flies on its wings only.
     FixedWing,
-    /// It hovers and flies on its wings.
+    /// Aircraft that hovers and flies on its wings.
     Vtol,
-    /// It has no wings.
+    /// Vehicle without wings.
     Multicopter,
     /// A helicopter, a rover, a boat: nothing that flies on wings.
     Other,

@@ -26,7 +26,7 @@ pub struct CampaignReport<'a> {
     pub records: &'a [Record],
     /// Summary tables over the cells.
     pub summaries: &'a [Summary],
-    /// What becomes of its claims.
+    /// Verdict on each of the campaign's claims.
     pub findings: &'a [tables::Finding],
     /// The command that wrote the page.
     pub command: String,

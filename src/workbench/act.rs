@@ -1,4 +1,4 @@
-//! What a page may ask for, and what becomes of it.
+//! Requests of a page and their execution.
 
 use std::fs;
 use std::path::PathBuf;
@@ -30,11 +30,11 @@ pub(super) const SAVED: &str = "model";
 pub struct Request {
     /// Revision of the session that the requester saw.
     pub revision: u64,
-    /// What is asked for.
+    /// The request itself.
     pub act: Act,
 }
 
-/// What a page may ask for.
+/// Requests that a page can make.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Act {

@@ -53,12 +53,10 @@ pub struct Given {
 /// - Events go to the callback of [`Bench::open`], on the thread that causes them and without the lock held, so that
 ///   the callback may call the bench. They carry progress; for anything else, look at the views again.
 ///
-/// Order of calls: open, then requests and views in any order. Jobs run on threads of their own: the request returns
-/// at once, and `state` lists the job until it ends. A new job replaces the running one of its kind, which ends at its
-/// next stage, as a cancelled one does.
-///
-/// Time: nothing has to be called periodically. A result is valid for a key of its inputs, so that undoing an edit
-/// brings earlier results back. The system's clock only stamps records of the session.
+/// Order of calls: open, then requests and views in any order. Jobs run on threads of their own, and `state` lists a job
+/// until it ends. A new job replaces the running one of its kind, which ends at its next stage, as a cancelled one does.
+/// Time: nothing has to be called periodically. A result is valid for a key of its inputs, so undoing an edit restores it.
+/// The system's clock only stamps records of the session.
 pub struct Bench {
     pub(super) folder: PathBuf,
     pub(super) on_event: Box<dyn Fn(Event) + Send + Sync>,

@@ -12,7 +12,7 @@ use greylag_sysid::amend::document::MODEL;
 /// The commands for the session as it is.
 #[derive(Clone, Debug, Serialize)]
 pub struct Commands {
-    /// What each log holds.
+    /// Command that summarises the logs.
     pub flights: String,
     /// Where the model fails.
     pub compare: String,

@@ -17,14 +17,14 @@ use greylag_sysid::flight_path::ReconstructError;
 use greylag_sysid::progress::Cancelled;
 use greylag_sysid::weak_form::prepared::ClockError;
 
-/// What kind of failure it is, for whoever answers a request.
+/// Kind of a failure, which sets the status of the HTTP answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The request does not fit the session, for example a log that is none.
     Bad,
     /// The session has moved on since the requester looked.
     Conflict,
-    /// It may not be seen yet.
+    /// The data are locked until the test flights are opened.
     Locked,
     /// There is no such thing.
     Missing,
@@ -106,7 +106,7 @@ pub enum WorkbenchError {
     Lost {
         /// Folder of the written fit.
         folder: PathBuf,
-        /// What is not the same.
+        /// Part of the fit that differs.
         what: String,
     },
     /// A failure inside the program, such as a panic of a job.
@@ -173,7 +173,7 @@ pub enum WorkbenchError {
     Session {
         /// Path of the session file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the file's content.
         why: String,
     },
     /// A file could not be read or a folder not be made.
@@ -230,7 +230,7 @@ pub enum WorkbenchError {
 }
 
 impl WorkbenchError {
-    /// What kind of failure it is.
+    /// Kind of the failure.
     pub fn kind(&self) -> Kind {
         use WorkbenchError as E;
         match self {

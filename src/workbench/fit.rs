@@ -27,7 +27,7 @@ const TUNING: f64 = 0.4;
 pub struct Fitted {
     /// The model with the fitted coefficients.
     pub model: GreyBox,
-    /// What the command `amend` writes as `amend.json`.
+    /// Content of the file `amend.json` of the command `amend`.
     pub story: Value,
     /// Free-run errors over the flights that the fit saw, `given` and `amended`.
     pub on_fit: Value,
@@ -56,7 +56,7 @@ impl Fitted {
     }
 }
 
-/// What a fit is made of.
+/// Inputs of a fit.
 struct Task {
     key: String,
     model: GreyBox,

@@ -24,7 +24,7 @@ const STRIP: usize = 160;
 pub struct Loaded {
     /// Summary of the log by its reader.
     pub info: Info,
-    /// What is odd about the file, without what [`Info`] adds.
+    /// Findings about the file, without those that [`Info`] adds.
     pub findings: Vec<Finding>,
     /// The flight, deflections as recorded.
     pub flight: Reconstruction,

@@ -19,11 +19,11 @@ use greylag_sysid::progress::{FirstLook, Progress, Stage, part};
 /// The effects of files that a diagnosis has tried, in what the workbench keeps of it.
 pub(super) const TRIED: &str = "tried";
 
-/// What a job works out.
+/// Kind of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Work {
-    /// Which effect the model lacks.
+    /// Diagnosis of the effects that the model lacks.
     Diagnosis,
     /// The model with the accepted effects.
     Fit,
@@ -72,7 +72,7 @@ impl Stop {
     }
 }
 
-/// What the page is sent while it waits.
+/// Events for the pages that are connected.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
@@ -83,7 +83,7 @@ pub enum Event {
     },
     /// A flight has new samples.
     Flight {
-        /// What came of it.
+        /// New part of the flight.
         part: Part,
     },
     /// The session or its results have changed: read the state again.
@@ -223,7 +223,7 @@ impl Bench {
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
         let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);
-        // what divides or tunes badly is said when an effect is ticked
+        // errors of dividing and tuning are reported when an effect is accepted
         if let (false, Ok(Divided { fit, .. })) = (there, divided)
             && let Ok(tuned) = tune(&model, &fit, &part(progress, [0.95, 1.0]))
         {
@@ -234,7 +234,7 @@ impl Bench {
 }
 
 impl Work {
-    /// What keys of its results begin with.
+    /// Prefix of the keys of its results.
     pub(super) fn word(self) -> &'static str {
         match self {
             Work::Diagnosis => "diagnosis",

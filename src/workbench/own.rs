@@ -51,7 +51,7 @@ pub struct Checked {
     pub status: Status,
 }
 
-/// What an effect file may name, with one to begin with.
+/// Names that an effect file may use, with a template to start from.
 pub fn grammar() -> Value {
     let variable = |v: &Variable| json!([v.name(), v.alias(), v.meaning()]);
     let functions = Function::ALL.iter().filter(|f| !f.is_operator());
@@ -146,7 +146,7 @@ impl Bench {
     }
 }
 
-/// What an effect makes of a channel, window by window.
+/// Contribution of an effect to a channel, window by window.
 struct Made {
     id: ChannelId,
     made: Vec<f64>,
@@ -155,7 +155,7 @@ struct Made {
 }
 
 impl Made {
-    /// What it makes, squared, by what the model without it leaves.
+    /// Energy of the contribution divided by that of the residual without the effect.
     fn weight(&self) -> f64 {
         let power = |list: &[f64]| list.iter().map(|x| x * x).sum::<f64>();
         power(&self.made) / power(&self.left).max(f64::MIN_POSITIVE)

@@ -27,7 +27,7 @@ pub struct Designed {
     pub between: [String; 2],
     /// Name of the manoeuvre; empty if none distinguishes the two effects.
     pub manoeuvre: String,
-    /// What it is for.
+    /// Purpose of the manoeuvre.
     pub description: String,
     /// Seconds of it that suffice.
     pub seconds: f64,

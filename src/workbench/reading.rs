@@ -18,7 +18,7 @@ use greylag_logs::sources::Asked;
 pub struct Reading {
     /// The mapping that is named there.
     pub mapping: Option<PathBuf>,
-    /// What to do with many unusable rows.
+    /// How many unusable rows a log may have.
     pub tolerance: Tolerance,
     /// Whether logs are used in which wrong units, signs or axes were found.
     pub despite_problems: bool,
@@ -36,7 +36,7 @@ pub struct InUse {
 }
 
 impl Reading {
-    /// The same with a path that holds in any folder.
+    /// The options with absolute paths, valid in any working directory.
     pub(super) fn absolute(self) -> Result<Reading, WorkbenchError> {
         let whole = |path: PathBuf| fs::canonicalize(&path).map_err(|e| io(&path, e));
         Ok(Reading { mapping: self.mapping.map(whole).transpose()?, ..self })

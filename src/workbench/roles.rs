@@ -20,7 +20,7 @@ pub struct Divided {
     pub fit: Vec<Reconstruction>,
     /// Flights that judge it.
     pub held_out: Vec<Reconstruction>,
-    /// What is odd about their logs.
+    /// Notes on findings in the logs.
     pub notes: Vec<String>,
 }
 
@@ -85,7 +85,7 @@ impl Inner {
         self.folder.join(&self.session.logs[place].path)
     }
 
-    /// What a command that names these logs calls their flights.
+    /// Names of the flights in the output of a command that reads these logs.
     pub fn names(&self, places: &[usize]) -> Vec<String> {
         names(&places.iter().map(|k| self.file(*k)).collect::<Vec<_>>())
     }
@@ -139,7 +139,7 @@ impl Inner {
         }
     }
 
-    /// What is odd about the logs at `places`, as a command notes it.
+    /// Findings in the logs at `places`, as a command prints them.
     fn findings(&self, places: &[usize]) -> Vec<String> {
         let of = |(k, name): (&usize, String)| {
             let all = self.flights[*k].iter().flat_map(|flight| flight.findings.clone());

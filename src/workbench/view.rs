@@ -39,7 +39,7 @@ struct FlightView<'a> {
     about: Option<About<'a>>,
 }
 
-/// What is known of a flight that can be used.
+/// Summary of a usable flight.
 #[derive(Serialize)]
 struct About<'a> {
     format: Format,
@@ -271,7 +271,7 @@ fn design_failure(inner: &Inner) -> Option<&String> {
     inner.failures.get(&(inner.key(Work::Schedule.word(), &[]) + &pair))
 }
 
-/// What can be flown, and what is.
+/// Available schedules and the state of the present flight.
 fn fly_view(inner: &Inner) -> Value {
     let flying = inner.flying.as_ref();
     json!({

@@ -37,7 +37,7 @@ const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"
 pub struct Found {
     /// The properties through which the aircraft flies.
     pub properties: Properties,
-    /// What was assumed, one sentence each.
+    /// Assumptions made, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -13,7 +13,7 @@ const AT_REST: usize = 50;
 /// Movement in one step that is none, rad.
 const STILL_RAD: f64 = 1e-12;
 
-/// What the air does to an aircraft in a state.
+/// Aerodynamic force and moment on an aircraft in a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loads {
     /// Aerodynamic force, body axes, N.

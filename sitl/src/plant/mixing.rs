@@ -14,7 +14,7 @@ pub struct Moved {
     pub command: Option<String>,
     /// Property of its position, rad, 0..1 of a motor.
     pub position: String,
-    /// Its command for one of aileron, elevator, rudder, throttle.
+    /// Command per unit of aileron, elevator, rudder and throttle.
     pub gains: [f64; 4],
     /// Deflections at −1 and 1, rad; `None` is a motor.
     pub travel: Option<[f64; 2]>,
@@ -42,7 +42,7 @@ impl Moved {
     }
 }
 
-/// Which surfaces and motors an aircraft has.
+/// Surfaces and motors of an aircraft, with their shares of the controls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixing {
     moved: Vec<Moved>,
@@ -101,7 +101,7 @@ impl Mixing {
         self.has_rudder
     }
 
-    /// What each is given.
+    /// Commands of the surfaces and motors, in their order.
     pub(super) fn mix(&self, inputs: &Inputs) -> impl Iterator<Item = f64> {
         let asked = [inputs.aileron, inputs.elevator, inputs.rudder, inputs.throttle];
         let sum = move |m: &Moved| m.gains.iter().zip(asked).map(|(g, c)| g * c).sum::<f64>();

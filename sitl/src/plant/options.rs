@@ -1,4 +1,4 @@
-//! What a plant is made from.
+//! Options from which a plant is made.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use crate::air::Air;
 use crate::aircraft;
 use crate::hidden::Hidden;
 
-/// Which aircraft to fly, in what air, with what hidden in it.
+/// The aircraft to fly, its air, and the effects hidden in it.
 #[derive(Clone, Debug)]
 pub struct PlantOptions {
     /// Folder that holds `NAME/NAME.xml`; `None` is one of those built into the program.

@@ -1,4 +1,4 @@
-//! What goes into a plant and what it shows of itself, in SI units.
+//! Inputs and observable state of a plant, in SI units.
 
 /// Deflection of the X8's surfaces at full command, rad (read back from the public simulator).
 #[allow(clippy::approx_constant)] // Not π/6: the aircraft's file says 0.5235.

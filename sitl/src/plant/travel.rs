@@ -26,7 +26,7 @@ pub struct Stops {
 }
 
 impl Stops {
-    /// The same to both sides, rad.
+    /// Stops of equal deflection on both sides, rad.
     pub const fn symmetric(most_rad: f64) -> Stops {
         Stops { least_rad: -most_rad, most_rad }
     }
@@ -49,7 +49,7 @@ pub struct Travel {
 }
 
 impl Travel {
-    /// That of the X8.
+    /// Travel of the X8's surfaces.
     pub const X8: Travel = Travel {
         aileron: Stops::symmetric(FULL_DEFLECTION_RAD),
         elevator: Stops::symmetric(FULL_DEFLECTION_RAD),

@@ -2,7 +2,7 @@
 
 use crate::plant::Truth;
 
-/// What is wrong now.
+/// Present errors of the sensors and the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
     /// Every sensor shows what it showed when this began.

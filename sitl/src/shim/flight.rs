@@ -12,7 +12,7 @@ use crate::plant::{Inputs, Plant, Travel, Truth};
 /// Why a flight is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Over {
-    /// It has lasted as long as was asked.
+    /// The requested duration has been flown.
     Duration,
     /// The aircraft has come down to sea level.
     Ground,
@@ -79,7 +79,7 @@ impl Flight {
         self.travel
     }
 
-    /// What is to be known of the aircraft.
+    /// Notes on the aircraft, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         self.plant.notes()
     }

@@ -79,7 +79,7 @@ impl Launcher {
         self.plant.travel()
     }
 
-    /// What is to be known of the aircraft.
+    /// Notes on the aircraft, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         self.plant.notes()
     }

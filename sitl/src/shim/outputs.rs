@@ -1,4 +1,4 @@
-//! Which output of a flight controller moves what.
+//! Assignment of a flight controller's outputs to the aircraft's controls.
 
 use std::fmt;
 use std::str::FromStr;
@@ -39,7 +39,7 @@ impl Effector {
         Effector::ALL.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
     }
 
-    /// What a positive output does to roll (right) and to pitch (up).
+    /// Effect of a positive output on roll (right) and on pitch (up).
     fn acts(self) -> (f64, f64) {
         match self {
             Effector::Aileron | Effector::RightAileron => (1.0, 0.0),
@@ -155,7 +155,7 @@ impl FromStr for OutputMap {
     }
 }
 
-/// What the outputs ask for together.
+/// Commands of all outputs combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mixed {
     /// Commands of the plant.

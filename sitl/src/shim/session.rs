@@ -17,7 +17,7 @@ const SILENCE: Duration = Duration::from_secs(2);
 
 /// Whether a receive brought anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum Received {
     /// The wait ended without an arrival.
     Nothing,
     /// Bytes, or a change of the link.
@@ -35,7 +35,7 @@ pub struct Session<'a> {
     pub counts: Summary,
     /// Simulated time that events are stamped with, µs.
     pub time_us: u64,
-    heard: Option<Instant>,
+    last_message: Option<Instant>,
     armed: bool,
     newly_reachable: bool,
     frames: Vec<Frame>,
@@ -54,26 +54,26 @@ impl<'a> Session<'a> {
             observer,
             counts: Summary::default(),
             time_us: 0,
-            heard: None,
+            last_message: None,
             armed: false,
             newly_reachable: false,
             frames: Vec::new(),
             batch: Vec::new(),
         };
-        session.tell(Event::Open(session.address.clone(), local));
-        session.tell(Event::Waiting(session.address.clone()));
+        session.notify(Event::Open(session.address.clone(), local));
+        session.notify(Event::Waiting(session.address.clone()));
         session
     }
 
     /// Reports `event` to the observer with the present simulated time.
-    pub fn tell(&mut self, event: Event) {
+    pub fn notify(&mut self, event: Event) {
         (self.observer)(Notice { time_s: self.time_us as f64 * 1e-6, event });
     }
 
     /// Whether the companion is present: it sent a message in the last two seconds, on an open
     /// link.
     pub fn is_alive(&self) -> bool {
-        self.heard.is_some()
+        self.last_message.is_some()
     }
 
     /// Whether the companion has come within reach since this was last asked.
@@ -108,7 +108,7 @@ impl<'a> Session<'a> {
     }
 
     /// Takes what has arrived and appends the answers that can be flown to `answers`.
-    pub fn receive(&mut self, answers: &mut Vec<Answer>) -> Heard {
+    pub fn receive(&mut self, answers: &mut Vec<Answer>) -> Received {
         let mut frames = std::mem::take(&mut self.frames);
         frames.clear();
         let parser = &mut self.parser;
@@ -117,7 +117,7 @@ impl<'a> Session<'a> {
         match self.link.receive() {
             Arrival::Nothing => {
                 self.frames = frames;
-                return Heard::Nothing;
+                return Received::Nothing;
             }
             Arrival::Datagram(bytes, from) => {
                 parser.datagram(bytes, &mut keep);
@@ -134,13 +134,13 @@ impl<'a> Session<'a> {
             }
         }
         for frame in &frames {
-            self.hear(frame, sender, answers);
+            self.take(frame, sender, answers);
         }
         self.frames = frames;
-        Heard::Something
+        Received::Something
     }
 
-    fn hear(
+    fn take(
         &mut self,
         frame: &Frame,
         sender: Option<std::net::SocketAddr>,
@@ -167,22 +167,22 @@ impl<'a> Session<'a> {
         if let Some(sender) = sender {
             self.link.adopt(sender);
         }
-        if self.heard.replace(Instant::now()).is_none() {
+        if self.last_message.replace(Instant::now()).is_none() {
             self.newly_reachable = true;
-            self.tell(Event::Found);
+            self.notify(Event::Found);
         }
     }
 
     fn lose(&mut self) {
-        if self.heard.take().is_some() {
-            self.tell(Event::Lost);
-            self.tell(Event::Waiting(self.address.clone()));
+        if self.last_message.take().is_some() {
+            self.notify(Event::Lost);
+            self.notify(Event::Waiting(self.address.clone()));
         }
     }
 
     /// Notices a companion that has fallen silent.
     pub fn watch(&mut self, now: Instant) {
-        if self.heard.is_some_and(|heard| now.saturating_duration_since(heard) > SILENCE) {
+        if self.last_message.is_some_and(|last| now.saturating_duration_since(last) > SILENCE) {
             self.link.abandon();
             self.lose();
         }
@@ -194,7 +194,7 @@ impl<'a> Session<'a> {
         self.counts.limited_answers += u64::from(answer.limited);
         if answer.armed != self.armed {
             self.armed = answer.armed;
-            self.tell(if answer.armed { Event::Armed } else { Event::Disarmed });
+            self.notify(if answer.armed { Event::Armed } else { Event::Disarmed });
         }
     }
 

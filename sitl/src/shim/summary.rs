@@ -14,7 +14,7 @@ use super::px4_sim::Px4Event;
 pub enum Event {
     /// The link is open; this side's own address where there is one.
     Open(Address, Option<SocketAddr>),
-    /// What is to be known of the aircraft.
+    /// A note on the aircraft.
     Note(String),
     /// No companion has sent a message yet, or the last one was lost.
     Waiting(Address),

@@ -30,7 +30,7 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// What was found, as JSON: SI units, angles in rad.
+/// Result of the check as JSON: SI units, angles in rad.
 #[derive(Serialize)]
 struct Document<'a> {
     model: &'a str,

@@ -19,7 +19,7 @@ use crate::sim::import::{Imported, import};
 pub struct Jsbsim {
     /// Folder that holds NAME/NAME.xml.
     dir: PathBuf,
-    /// The aircraft.
+    /// The aircraft's name, that of its file.
     name: String,
     /// Folder to make, with airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
@@ -34,12 +34,12 @@ pub struct Jsbsim {
     /// their own names are found by trying all. NAME may be -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
-    /// Hold a property at a value (may be repeated): flaps, say. The airframe file keeps it.
+    /// Hold a property at a value (may be repeated), for example flaps. The airframe file keeps it.
     #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
     set: Vec<(String, f64)>,
 }
 
-/// Imports, writes, says what is left out.
+/// Imports the aircraft, writes its files and lists what was left out.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let mut options = PlantOptions {
         aircraft_dir: Some(jsbsim.dir.clone()),

@@ -11,7 +11,7 @@ pub struct Bound {
     bounds: [f64; 2],
 }
 
-/// `NAME=LEAST..MOST`.
+/// Parses `NAME=LEAST..MOST`.
 pub fn bound(text: &str) -> Result<Bound, String> {
     let parts =
         text.split_once('=').and_then(|(name, range)| Some((name, range.split_once("..")?)));

@@ -47,7 +47,7 @@ impl Places {
         Ok(places)
     }
 
-    /// The new model.
+    /// Path of the amended model.
     pub fn model(&self) -> PathBuf {
         self.folder.join(MODEL)
     }

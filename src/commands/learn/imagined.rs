@@ -1,4 +1,4 @@
-//! What the controllers of a learned model and its policy reach in that model.
+//! Scores of the controllers of a learned model and its policy in that model.
 
 use std::path::Path;
 
@@ -19,12 +19,12 @@ const TARGETS: u64 = 3;
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
-/// What a controller reached in the model.
+/// Score of a controller in the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reached {
-    /// The controller's name.
+    /// Name of the controller.
     pub controller: String,
-    /// Targets flown.
+    /// Number of targets flown.
     pub targets: usize,
     /// Mean settled error on easy targets, degrees.
     pub easy_deg: f64,

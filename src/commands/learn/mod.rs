@@ -22,7 +22,7 @@ use crate::model::GreyBox;
 use crate::model::residual::hash;
 use budget::{Algorithm, Budget};
 use imagined::Reached;
-use plan::{Recent, Source, Stage, Wish};
+use plan::{Recent, Source, Stage, Inputs};
 use record::Record;
 
 /// Options of `greylag learn`.
@@ -71,7 +71,7 @@ pub struct Arguments {
     /// With --log: take nothing from the widths of the prior's coefficients, for a prior whose numbers are guesses.
     #[arg(long, conflicts_with = "collect")]
     from_scratch: bool,
-    /// Seed of everything.
+    /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u32,
     /// Folder that holds NAME/NAME.xml of the aircraft that flies in JSBSim.
@@ -126,7 +126,7 @@ impl Arguments {
             None => Source::Logs(self.logs.clone()),
         };
         let file = self.prior_file()?;
-        let wish = Wish {
+        let inputs = Inputs {
             prior: &file,
             out: &self.out,
             source,
@@ -137,7 +137,7 @@ impl Arguments {
             budget: self.budget,
             seed: self.seed,
         };
-        Ok(wish.stages())
+        Ok(inputs.stages())
     }
 
     /// The file of the prior, or of the model of the earlier learning.
@@ -149,7 +149,7 @@ impl Arguments {
         }
     }
 
-    /// What the learning in `folder` goes on with.
+    /// Results of the earlier learning in `folder` from which this one continues.
     fn recent(&self, folder: &Path) -> Result<Recent> {
         let policy = shipped(&flying(folder)?.join(plan::POLICY));
         if !policy.exists() {
@@ -216,7 +216,7 @@ impl Arguments {
         words
     }
 
-    /// Scores the result in its model, puts the folder that flies together, says what came of it.
+    /// Scores the result in its model, assembles the controller's folder and prints the result.
     fn finish(
         &self,
         prior: &GreyBox,
@@ -257,7 +257,7 @@ impl Arguments {
 /// Share of the targets that a controller may lose and still be called ready to fly: the LQI loses none.
 const LOST: f64 = 0.02;
 
-/// What the best controller of a learning is worth, in words, with how it is flown.
+/// Score of the best controller of a learning in words, with the command that flies it.
 fn worth(reached: &[Reached], options: &str) -> String {
     let lost = |name: &str| {
         let row = reached.iter().find(|r| r.controller == name)?;

@@ -39,7 +39,7 @@ pub struct FlightArguments {
     recent_share: f64,
 }
 
-/// What there is to learn from.
+/// Flights for training and validation.
 pub struct Flights {
     /// Tracks to learn from.
     pub learn: Vec<Track>,
@@ -49,7 +49,7 @@ pub struct Flights {
     pub samples: usize,
     /// Time between samples of the slowest log, s.
     pub slowest_s: f64,
-    /// What the reader must know.
+    /// Notes for the reader of the report.
     pub notes: Vec<String>,
 }
 

@@ -125,7 +125,7 @@ pub(super) struct Found {
     pub offset: f64,
 }
 
-/// What the names of a header mean, beside those of the log format.
+/// Meaning of the header's names that are not those of the log format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Dialect {
     /// The columns under other names.
@@ -137,7 +137,7 @@ pub(super) struct Dialect {
 }
 
 impl Dialect {
-    /// What `names` mean for the columns that neither they nor the mapping name.
+    /// Meaning of `names` for the columns that neither they nor the mapping fill.
     pub fn of(names: &[String], mapping: &Mapping) -> Dialect {
         let has = |name: &str| names.iter().any(|n| n == name);
         let mut dialect = Dialect::default();
@@ -198,7 +198,7 @@ impl Dialect {
             || self.quaternion.as_ref().is_some_and(|q| q.iter().any(|n| n == name))
     }
 
-    /// What was read under other names.
+    /// Note on the columns that were found under other names.
     pub fn said(&self) -> Option<String> {
         let mut parts: Vec<String> =
             self.found.iter().map(|f| format!("{} from {}", f.column, f.field)).collect();
@@ -207,7 +207,7 @@ impl Dialect {
     }
 }
 
-/// What one of the unit of a time is, s, by its median step.
+/// Length of the time's unit, s, from its median step.
 pub(super) fn unit_of(step: f64) -> f64 {
     match step {
         s if s >= 5e6 => 1e-9,

@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::Sample;
 
-/// Which part comes first.
+/// Order of a quaternion's parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// w, x, y, z.

@@ -26,7 +26,7 @@ pub(crate) struct Raw {
     pub missing: Vec<CsvError>,
     pub(super) unknown_columns: Vec<String>,
     pub(super) cut_short: bool,
-    /// What was read under other names.
+    /// Notes on columns that were found under other names.
     pub notes: Vec<String>,
 }
 
@@ -115,7 +115,7 @@ enum Part {
     OneOfSeveral,
 }
 
-/// What separates the columns of a table: commas, else semicolons or tabs.
+/// Separator of a table's columns: commas, else semicolons or tabs.
 fn separator(header: &[u8]) -> u8 {
     let count = |by: u8| header.iter().filter(|b| **b == by).count();
     if count(b',') > 0 && count(b';') <= count(b',') {

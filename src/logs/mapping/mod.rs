@@ -58,7 +58,7 @@ pub enum MappingError {
     Text {
         /// Path of the mapping file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the content.
         text: String,
     },
 }
@@ -87,7 +87,7 @@ pub struct Mapping {
     entries: BTreeMap<String, Entry>,
     /// Time over which body rates are made from the attitude, s.
     body_rates_over_s: Option<f64>,
-    /// What is known of sensors and wind.
+    /// Known properties of sensors and wind.
     sensors: Sensors,
     /// Where the attitude comes from as a quaternion.
     quaternion: Option<Turn>,
@@ -200,7 +200,7 @@ impl Mapping {
         Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, mixer: None })
     }
 
-    /// What is known of sensors and wind.
+    /// Known properties of sensors and wind.
     pub fn sensors(&self) -> &Sensors {
         &self.sensors
     }
@@ -215,7 +215,7 @@ impl Mapping {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
 
-    /// What a column of a CSV table is read from or made of.
+    /// Source of a column of a CSV table: a column of the file or a derivation.
     pub(super) fn origin(&self, column: &str) -> String {
         match self.get(column) {
             Some(e) if e.rate_over_s.is_some() => format!("rate of {}", e.field),
@@ -234,7 +234,7 @@ impl Mapping {
         }
     }
 
-    /// The same for an aircraft whose surfaces and motors the log names.
+    /// The mapping with the mixer of an aircraft whose surfaces and motors the log names.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Mapping {
         Mapping { mixer, ..self }
     }

@@ -53,9 +53,9 @@ impl Shape {
 pub struct Term {
     /// Name of the field.
     pub field: String,
-    /// Its factor, after the shape.
+    /// Factor after the shape.
     pub gain: f64,
-    /// What is done to it first.
+    /// Shape that is applied to the field first.
     pub shape: Shape,
 }
 
@@ -83,7 +83,7 @@ impl Tilt {
     }
 }
 
-/// What fills which columns.
+/// Columns of a rule, and how they are filled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fill {
     /// One column: the sum of terms plus an offset.
@@ -118,15 +118,15 @@ pub enum Fill {
 /// One way to fill columns from a topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
-    /// The topic.
+    /// Name of the topic.
     pub topic: String,
-    /// Its instance, where no other one will do.
+    /// Instance of the topic; `None` accepts any.
     pub instance: Option<u16>,
     /// The instance that is usual for the vehicle's type, if it moves.
     pub preferred: Option<u16>,
     /// Columns that it fills, and how.
     pub fill: Fill,
-    /// What the user should know if this rule is used.
+    /// Note to the user if this rule is used.
     pub note: Option<String>,
     /// Whether the airspeed is equivalent, to be made true by the density.
     pub equivalent: bool,
@@ -190,7 +190,7 @@ impl Rule {
         Rule { instance, ..self }
     }
 
-    /// Of an instance, if it moves; else of one that does.
+    /// The rule for one instance if it moves; else for another one that does.
     pub fn preferring(self, preferred: Option<u16>) -> Rule {
         Rule { preferred, ..self }
     }
@@ -236,7 +236,7 @@ impl Rule {
         format!("{}.{}", self.topic, self.fields().join("+"))
     }
 
-    /// Its only field with the factor, where there is no more to it than that.
+    /// Field and factor of a rule that scales one field and adds nothing.
     pub fn factor(&self) -> Option<(&str, f64)> {
         match &self.fill {
             Fill::Sum { terms, offset: 0.0, .. } => match &terms[..] {

@@ -86,7 +86,7 @@ pub(super) struct Layout {
     pub sampled: Option<(Kind, usize)>,
     /// Bytes of a whole record, without the padding at its end, which PX4 does not write.
     pub size: usize,
-    /// The same with that padding.
+    /// Bytes of a whole record with that padding.
     pub padded: usize,
 }
 

@@ -185,7 +185,8 @@ fn sensors(a: &Amendment) -> Section {
     Section::new("Sensors", &note, vec![Figure::Table(table)])
 }
 
-/// What, value with standard deviation, factor to the unit, unit.
+/// Name, value with standard deviation, factor to the displayed unit, and unit of each flight's
+/// constants.
 fn constants(f: &FittedFlight) -> [(&'static str, [f64; 2], f64, &'static str); 4] {
     let degree = 1f64.to_degrees();
     [

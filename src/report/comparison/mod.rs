@@ -1,4 +1,4 @@
-//! What the report of a comparison is made from.
+//! Input of the report on a comparison.
 
 pub(super) mod page;
 pub(super) mod regimes;

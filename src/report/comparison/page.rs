@@ -64,7 +64,7 @@ fn subtitle(c: &Comparison) -> String {
     )
 }
 
-/// What a channel is called on buttons and in tables.
+/// Name of a channel on buttons and in tables.
 pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }

@@ -41,7 +41,7 @@ pub(crate) fn summary(c: &Comparison) -> Section {
     Section::new("Free runs", note, figures)
 }
 
-/// The same free runs by forecasts without aerodynamics, which a model has to beat.
+/// Scores of forecasts without aerodynamics over the same free runs, which a model has to beat.
 pub(crate) fn baselines(c: &Comparison) -> Section {
     let columns = [
         ("Forecast", Align::Left),

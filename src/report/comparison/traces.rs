@@ -129,7 +129,7 @@ fn stretches(c: &Comparison) -> Vec<Stretch> {
             let end = first + time[first..].iter().take_while(|t| **t < last).count().max(1);
             let own: Vec<f64> =
                 errors[first..end].iter().copied().filter(|e| e.is_finite()).collect();
-            // A stretch that is mostly pause, or the short rest at the end, tells little.
+            // A stretch that is mostly a gap, or the short rest at the end, shows little.
             if time[end - 1] - time[first] > 0.5 * STRETCH_S && 2 * own.len() > end - first {
                 let error = own.iter().sum::<f64>() / own.len() as f64;
                 found.push(Stretch { flight, first, end, error });

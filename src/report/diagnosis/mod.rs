@@ -1,4 +1,4 @@
-//! What the report of a diagnosis is made from.
+//! Input of the report on a diagnosis.
 
 pub(super) mod page;
 pub(super) mod proof;

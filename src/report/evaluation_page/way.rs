@@ -1,4 +1,5 @@
-//! What happened on the way to the targets: error against surface travel, every measure, their definitions.
+//! Transients on the way to the targets: error against surface travel, every measure, their
+//! definitions.
 
 use super::{EvaluationReport, Left, Right, label, with_interval};
 use crate::kit::numbers::number;

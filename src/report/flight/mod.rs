@@ -1,4 +1,4 @@
-//! What a flight report is made from.
+//! Input of a flight report.
 
 pub(super) mod page;
 pub(super) mod quality;
@@ -38,15 +38,15 @@ pub struct FlightReport<'a> {
     pub travel: SurfaceTravel,
     /// Durations of the control cycles; `None` when they were not recorded.
     pub timing: Option<LoopTiming>,
-    /// What happened, in time order.
+    /// Events of the flight, in time order.
     pub events: Vec<Event>,
     /// How well the model predicts this flight; `None` when they were not compared.
     pub comparison: Option<Comparison>,
-    /// What the planner saw at some ticks; empty when none flew.
+    /// Insight into the planner at some ticks; empty if no planner flew.
     pub sights: Vec<Sight>,
 }
 
-/// What a flight is measured against.
+/// Flight envelope with which a flight is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvelopeFlown {
     /// The limits of the aircraft.
@@ -99,7 +99,7 @@ pub enum Difficulty {
 }
 
 impl Difficulty {
-    /// Its name in tables.
+    /// Name of the group in tables.
     pub fn name(self) -> &'static str {
         match self {
             Difficulty::Easy => "easy",
@@ -131,7 +131,7 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// Its name in tables.
+    /// Name of the kind in tables.
     pub fn name(self) -> &'static str {
         match self {
             EventKind::Mode => "mode",
@@ -155,7 +155,7 @@ impl FlightReport<'_> {
         Some(self.segments.iter().map(of).collect())
     }
 
-    /// What happened, in the sentence that leads the page.
+    /// Verdict on the flight in one sentence, which leads the page.
     pub fn page_sentence(&self) -> String {
         verdict::verdict(self).sentence
     }

@@ -44,7 +44,7 @@ fn moment(s: &Sample) -> Moment {
     }
 }
 
-/// What happened between the ends of a segment.
+/// Measures of a segment between its ends.
 pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits) -> Quality {
     let first = samples.partition_point(|s| s.time_s < segment.start_s);
     let end = samples.partition_point(|s| s.time_s <= segment.end_s).max(first);

@@ -10,7 +10,7 @@ pub struct Bars {
     pub title: String,
     /// Unit of the values, such as `%`.
     pub unit: String,
-    /// What the bars of a group stand for, in their order.
+    /// Names of the bars of a group, in their order.
     pub keys: Vec<(String, Style)>,
     /// The groups, top to bottom.
     pub groups: Vec<BarGroup>,

@@ -6,9 +6,9 @@ use crate::kit::html::escape;
 /// Named alternatives behind a row of buttons; choices with the same label switch together.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// What a link points to: letters and hyphens, once a page.
+    /// Target of links: letters and hyphens, unique on the page.
     pub anchor: String,
-    /// What is chosen, for example `Channel`.
+    /// Name of the choice, for example `Channel`.
     pub label: String,
     /// The alternatives; the first is seen at first. A browser without scripts shows all.
     pub options: Vec<ChoiceOption>,

@@ -11,7 +11,7 @@ pub struct Drawing {
     pub said: String,
     /// Width and height, in the unit of its coordinates.
     pub size: [f64; 2],
-    /// Its elements, as SVG that holds no text of a user's.
+    /// SVG elements of the drawing, without text from a user.
     pub svg: String,
 }
 

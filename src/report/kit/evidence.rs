@@ -19,7 +19,7 @@ pub struct Evidence {
 /// Things that belong together.
 #[derive(Clone, Debug)]
 pub struct EvidenceGroup {
-    /// What they have in common.
+    /// Property that the rows of the group share.
     pub title: String,
     /// A sentence on it; may be empty.
     pub note: String,
@@ -38,7 +38,7 @@ pub struct EvidenceRow {
     pub detail: String,
     /// Evidence; NaN if it could not be determined.
     pub value: f64,
-    /// What chance reaches; NaN if it is not known.
+    /// Threshold of the evidence under the null; NaN if it is not known.
     pub threshold: f64,
 }
 

@@ -48,7 +48,7 @@ pub enum Figure {
 /// How a verdict came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// What was asked for was reached.
+    /// The goal was reached.
     Reached,
     /// Something that was asked for was missed.
     Missed,
@@ -88,7 +88,7 @@ impl Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
-    /// What was asked for: orange, dashed.
+    /// Commanded value: orange, dashed.
     Command,
     /// Actual value: blue.
     Actual,
@@ -98,17 +98,18 @@ pub enum Style {
     Third,
     /// Fourth actual value: ochre.
     Fourth,
-    /// What was measured, where others were predicted: grey, and wide enough to be seen under them.
+    /// Measured value beside predicted ones: grey, and wide enough to be visible under them.
     Measured,
 }
 
 impl Style {
-    /// Of several alike, such as models, the one at `index`; they repeat after the fourth.
+    /// Style of item `index` among items of one kind, such as models; the styles repeat after the
+    /// fourth.
     pub fn nth(index: usize) -> Style {
         [Style::Actual, Style::Second, Style::Third, Style::Fourth][index % 4]
     }
 
-    /// Its name in the style sheet.
+    /// Name of the style in the style sheet.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Style::Command => "command",
@@ -126,6 +127,6 @@ impl Style {
 pub struct Rule {
     /// Where, in the unit of the axis.
     pub value: f64,
-    /// What it is, a word or two.
+    /// Name of the value, a word or two.
     pub label: String,
 }

@@ -5,7 +5,7 @@ use crate::kit::html::escape;
 /// Sentences, the leading ones large.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
-    /// What the reader must know first.
+    /// Findings that are shown first.
     pub lead: Vec<Finding>,
     /// The rest, in order.
     pub rest: Vec<Finding>,

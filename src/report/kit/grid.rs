@@ -9,7 +9,7 @@ pub struct Grid {
     pub title: String,
     /// Quantity of the numbers.
     pub unit: String,
-    /// What the rows are.
+    /// Name of the rows, in the corner of the table.
     pub corner: String,
     /// Heads of the columns: a sign, with what it stands for.
     pub columns: Vec<(String, String)>,
@@ -22,7 +22,7 @@ pub struct Grid {
 pub struct GridRow {
     /// Name of the row.
     pub label: String,
-    /// Its cells, as many as columns.
+    /// Cells of the row, as many as columns.
     pub cells: Vec<GridCell>,
 }
 

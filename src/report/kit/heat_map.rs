@@ -35,7 +35,7 @@ pub struct HeatCell {
     pub x: usize,
     /// Row of the cell, from 0.
     pub y: usize,
-    /// Its value, in the figure's unit.
+    /// Value of the cell, in the figure's unit.
     #[serde(serialize_with = "compact_one")]
     pub value: f64,
     /// Independent samples in it.

@@ -16,7 +16,7 @@ pub struct Histogram {
     pub title: String,
     /// Name of the horizontal axis, with its unit.
     pub x_label: String,
-    /// What is counted, in the plural.
+    /// Name of the counted items, in the plural.
     pub counted: String,
     /// Edges of the bins, ascending, one more than counts.
     #[serde(serialize_with = "compact")]

@@ -13,7 +13,7 @@ pub struct Intervals {
     pub y_label: String,
     /// Unit of the means.
     pub unit: String,
-    /// What the lines of every panel stand for, in their order.
+    /// Names of the lines in every panel, in their order.
     pub keys: Vec<(String, Style)>,
     /// One panel for each quantity.
     pub panels: Vec<IntervalPanel>,
@@ -24,7 +24,7 @@ pub struct Intervals {
 pub struct IntervalPanel {
     /// Name of the binned quantity.
     pub title: String,
-    /// Its unit; empty when it has none.
+    /// Unit of the quantity; empty for a dimensionless one.
     pub unit: String,
     /// Names at 0, 1, 2 …, when the bins are no intervals.
     pub names: Vec<String>,

@@ -8,7 +8,7 @@ const LONG: usize = 28;
 /// A table of text with column heads.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
-    /// What it holds, read out before it and not shown; may be empty.
+    /// Caption for screen readers, not displayed; may be empty.
     pub caption: String,
     /// The columns, left to right.
     pub columns: Vec<Column>,
@@ -19,7 +19,7 @@ pub struct Table {
 /// Head of a column.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// Its title, with the unit of its numbers.
+    /// Title of the column, with the unit of its numbers.
     pub title: String,
     /// Where its text stands.
     pub align: Align,
@@ -41,7 +41,7 @@ pub struct Row {
     pub cells: Vec<String>,
     /// Start and end, s, of the time it speaks of: its first cell then zooms the time figures there.
     pub span_s: Option<[f64; 2]>,
-    /// What a link of the page calls it.
+    /// Name by which a link of the page finds the row.
     pub anchor: Option<String>,
     /// The anchor that its first cell leads to.
     pub link: Option<String>,

@@ -16,7 +16,7 @@ pub struct TimeFigure {
     pub tracks: Vec<Track>,
     /// Instants marked in every panel.
     pub marks: Vec<Mark>,
-    /// What stands under the panels: what was left out or thinned.
+    /// Notes under the panels on what was dropped or thinned.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
@@ -76,9 +76,9 @@ pub enum Scale {
 /// One line of a panel.
 #[derive(Clone, Debug, Serialize)]
 pub struct Series {
-    /// Its name in the legend.
+    /// Name of the series in the legend.
     pub label: String,
-    /// What it stands for.
+    /// Meaning of the series, which sets its colour.
     pub style: Style,
     /// One value for each time of the track; what is not finite is a gap.
     #[serde(serialize_with = "compact")]
@@ -103,7 +103,7 @@ pub struct Band {
     pub around: usize,
     /// Distance from the line to either edge, in the unit of the panel.
     pub half_width: f64,
-    /// Its name in the legend.
+    /// Name of the band in the legend.
     pub label: String,
 }
 

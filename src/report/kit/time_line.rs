@@ -64,7 +64,7 @@ pub enum Tone {
     Idle,
     /// On the way to something.
     Begins,
-    /// What was asked for is done.
+    /// The commanded activity.
     Asked,
     /// Something safe is done in its place.
     Safe,
@@ -75,7 +75,7 @@ pub enum Tone {
 /// Lines on one pair of axes.
 #[derive(Clone, Debug)]
 pub struct Traces {
-    /// What they show, with its unit.
+    /// Name of the vertical axis, with its unit.
     pub label: String,
     /// The lines, in drawing order.
     pub lines: Vec<TraceLine>,
@@ -190,7 +190,7 @@ impl TimeLine {
         )
     }
 
-    /// What is shaded and marked behind lines.
+    /// SVG of shaded stretches and marks behind the lines.
     fn behind(&self) -> String {
         let shaded = self.shaded_s.map_or_else(String::new, |[from, to]| {
             let [from, to] = [from, to].map(|t| self.place(t));

@@ -18,7 +18,7 @@ pub struct Whiskers {
     pub scale: Scale,
     /// Where upright lines stand behind the values, in the unit.
     pub lines: Vec<f64>,
-    /// What the lines stand for.
+    /// Explanation of the lines, under the figure.
     pub legend: String,
     /// The values, top to bottom.
     pub rows: Vec<Whisker>,
@@ -35,7 +35,7 @@ pub struct Whisker {
     pub value: f64,
     /// The ends of its 95 % interval.
     pub interval: [f64; 2],
-    /// The same in words.
+    /// The value with its interval as text.
     pub text: String,
 }
 

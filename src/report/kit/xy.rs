@@ -17,14 +17,14 @@ pub struct XyFigure {
     pub y_label: String,
     /// Shaded ranges behind what is drawn.
     pub bands: Vec<XyBand>,
-    /// What is drawn, in drawing order.
+    /// Points and paths, in drawing order.
     pub series: Vec<XySeries>,
 }
 
 /// A shaded range over the horizontal axis.
 #[derive(Clone, Debug, Serialize)]
 pub struct XyBand {
-    /// Its name in the legend.
+    /// Name of the band in the legend.
     pub label: String,
     /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
@@ -40,9 +40,9 @@ pub struct XyBand {
 /// Points of one kind.
 #[derive(Clone, Debug, Serialize)]
 pub struct XySeries {
-    /// Its name in the legend.
+    /// Name of the series in the legend.
     pub label: String,
-    /// What it stands for.
+    /// Meaning of the series, which sets its colour.
     pub style: Style,
     /// How it is drawn.
     pub mark: XyMark,

@@ -71,7 +71,7 @@ impl Flown {
         rows
     }
 
-    /// What goes wrong and is asked for.
+    /// Band of the faults and requests.
     fn befalls(&self) -> States {
         let of_fault = |f: &Fault| Span {
             time_s: [f.from_s, f.to_s.max(f.from_s + MOMENT_S)],
@@ -150,7 +150,7 @@ pub(super) fn companion(s: &Sample) -> Seen {
     })
 }
 
-/// Whose command was decided on.
+/// Source of the actuator command in a sample.
 fn command(s: &Sample, controller: &str) -> Seen {
     let decision = s.decision.filter(|_| s.age_s <= STALE_S)?;
     let (word, tone) = match decision.source {
@@ -165,7 +165,7 @@ fn command(s: &Sample, controller: &str) -> Seen {
     Some((word.into(), tone))
 }
 
-/// Whose the aircraft is.
+/// Party in control of the aircraft in a sample.
 fn owner(s: &Sample, stack: &str) -> Seen {
     Some(match (s.engaged, s.steered) {
         (true, true) if s.confirmed => ("the companion's".into(), Tone::Asked),

@@ -84,7 +84,7 @@ pub(super) struct Form {
 pub(super) struct Wrong {
     /// The field; empty for one that the form has not.
     pub field: &'static str,
-    /// What is wrong, and what to do.
+    /// Error in words, with a remedy.
     pub why: String,
 }
 

@@ -26,7 +26,7 @@ const STACK: usize = 16 << 20;
 /// Flies what the page asks for.
 pub struct Failsafes {
     make: Make,
-    /// What was made before: a design takes a moment.
+    /// Companions made so far, by controller: the design of one takes a moment.
     made: Mutex<HashMap<&'static str, Arc<CompanionFactory>>>,
 }
 
@@ -40,7 +40,7 @@ struct Flown {
     judged: Vec<Option<(f64, f64)>>,
 }
 
-/// What a request for the page is answered.
+/// Answer to a request for the page.
 #[derive(Debug)]
 pub struct Answer {
     /// The page, as HTML.

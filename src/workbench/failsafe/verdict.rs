@@ -1,4 +1,4 @@
-//! What happened in a flight: the events by time, and the verdict in a sentence.
+//! Events of a flight in order of time, and the verdict in one sentence.
 
 use super::Flown;
 use super::bands::{companion, spans};
@@ -14,7 +14,7 @@ use greylag_sim::faults::{Asking, Fault, Finding, Found};
 const NAMED: usize = 4;
 /// Arming and asking for OFFBOARD within this time are one request, s.
 const TOGETHER_S: f64 = 0.2;
-/// What has not changed after this time did not, s.
+/// Time after a cause at which its effect is evaluated, s.
 const LATER_S: f64 = 2.0;
 
 /// A loss of altitude that the sentence mentions, m.
@@ -50,7 +50,7 @@ pub(super) enum Who {
 }
 
 impl Who {
-    /// What the page calls it.
+    /// Name of the party on the page.
     pub fn name(self, stack: Option<&'static str>) -> &'static str {
         match self {
             Who::Fault => "fault",
@@ -111,7 +111,7 @@ impl Flown {
         })
     }
 
-    /// What was done, by time, as clauses.
+    /// Actions in order of time, as clauses.
     fn deeds(&self) -> Vec<(f64, String)> {
         let mut all: Vec<(f64, String)> = Vec::new();
         for (k, pair) in self.witnessed.samples.windows(2).enumerate() {
@@ -169,7 +169,7 @@ impl Flown {
         format!("{text}{}{} {}", self.end(), self.lost(), self.rules_in_words())
     }
 
-    /// What goes wrong and what is asked for, by time.
+    /// Faults and requests in order of time.
     fn causes(&self) -> Vec<Cause> {
         let of_fault = |f: &Fault| {
             let (name, from, to) = (fault(f.kind).0, f.from_s, f.to_s);
@@ -199,7 +199,7 @@ impl Flown {
         all
     }
 
-    /// What a cause came to after which nothing changed hands.
+    /// Clause for a cause after which control did not change hands.
     fn nothing_changed(&self, cause: &Cause) -> String {
         match cause.asked.map(|(at_s, what)| self.answer(at_s, what)) {
             Some(Some(Verdict::Rejected(why) | Verdict::Denied(why))) => return why.clone(),
@@ -220,7 +220,7 @@ impl Flown {
         samples.get(((cause.at_s + LATER_S) / TICK_S) as usize).or(samples.last())
     }
 
-    /// Who is left with an aircraft that nobody flies, if so after a cause.
+    /// Party left with an aircraft that nobody controls after a cause; `None` if somebody does.
     fn left_alone(&self, cause: &Cause) -> Option<String> {
         let later = self.later(cause).filter(|s| s.shown.is_none() && s.steered)?;
         let counterpart = self.scenario.counterpart;

@@ -41,11 +41,11 @@ const SAID: usize = 400;
 pub struct Flying {
     /// Number of the flight, which names its folder.
     pub number: u64,
-    /// Its place among the session's flights.
+    /// Index of the flight in the session's list of flights.
     pub place: usize,
     /// Whether it goes on.
     pub on: bool,
-    /// What was seen of it.
+    /// Samples, predictions and warnings so far.
     pub live: Live,
     /// Points dropped from the start of `live`, so that it stays short.
     pub gone: usize,
@@ -65,7 +65,7 @@ pub struct Part {
     pub live: Live,
 }
 
-/// What a flight is flown or watched with.
+/// Inputs of the thread that follows a flight.
 struct Task {
     number: u64,
     log: PathBuf,
@@ -276,7 +276,7 @@ fn free(folder: &Path) -> u64 {
     numbers.max().unwrap_or(0) + 1
 }
 
-/// What was read of a recording.
+/// State of reading a recording that grows.
 #[derive(Default)]
 struct Tail {
     growing: Growing,

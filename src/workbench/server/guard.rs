@@ -1,4 +1,4 @@
-//! Who may ask: a page of this program on this machine, by its token.
+//! Access control: only pages of this program on this machine, by a token.
 
 use axum::extract::{Request, State};
 use axum::http::header::{

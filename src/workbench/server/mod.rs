@@ -43,7 +43,7 @@ pub enum ServeError {
     },
 }
 
-/// What all requests share.
+/// State shared by all requests.
 #[derive(Clone)]
 struct Shared {
     bench: Arc<Bench>,

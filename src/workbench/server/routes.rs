@@ -1,4 +1,4 @@
-//! What is answered to which request.
+//! Handlers of the HTTP routes.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -69,12 +69,12 @@ pub async fn diagnosis(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.diagnosis())).await
 }
 
-/// What a search for a formula found.
+/// Result of the search for a formula, as JSON.
 pub async fn proposal(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.proposal())).await
 }
 
-/// What an effect file may name.
+/// Names that an effect file may use, as JSON.
 pub async fn grammar() -> Response {
     Json(crate::grammar()).into_response()
 }
@@ -139,7 +139,7 @@ pub async fn take(
     body: Body,
 ) -> Response {
     let announced = headers.get(CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-    // one that says so is refused before it is sent
+    // a log of a declared length that is too large is refused before its body is read
     if announced.is_some_and(|bytes: usize| bytes > LARGEST_LOG) {
         return too_large(&sent.name);
     }
@@ -164,7 +164,7 @@ fn changed(revision: Option<u64>) -> Arc<str> {
     json!({ "event": "changed", "revision": revision }).to_string().into()
 }
 
-/// What happens, as it happens.
+/// Stream of events while the page is open.
 pub async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {

@@ -7,9 +7,9 @@ use crate::aircraft;
 
 /// Names by what the aircraft's files do with them.
 pub(super) struct Names {
-    /// What its systems read and nothing of them writes: commands, and more.
+    /// Properties that the systems read and none of them writes: commands, and more.
     pub commands: Vec<String>,
-    /// What the aerodynamics read.
+    /// Properties that the aerodynamic functions read.
     pub read: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a pulse width commands.
+//! Conversion of pulse widths to normalised commands.
 
 use std::fmt;
 use std::str::FromStr;

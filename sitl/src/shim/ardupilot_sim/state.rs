@@ -22,7 +22,7 @@ pub struct Home {
     pub heading_deg: f64,
 }
 
-/// What a line holds; names and units are ArduPilot's.
+/// Content of one JSON line; names and units are ArduPilot's.
 #[derive(Debug, Serialize)]
 struct State {
     timestamp: f64,

@@ -20,7 +20,7 @@ pub fn checksum(bytes: &[u8], crc_extra: u8) -> u16 {
     accumulate(crc, &crc_extra)
 }
 
-/// Which generation of MAVLink a frame came in.
+/// Version of MAVLink in which a frame was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
     /// MAVLink 1, magic 0xFE.

@@ -12,7 +12,7 @@ pub struct Parser {
     unknown: u64,
 }
 
-/// What lies at the front of some bytes.
+/// Content at the front of a byte sequence.
 enum Front {
     /// A good frame of so many bytes.
     Frame(Box<Frame>, usize),

@@ -1,4 +1,4 @@
-//! What the played controller sends by itself: nothing much until it is asked.
+//! Streams of the simulated controller: few until they are requested.
 
 use crate::plant::{Travel, Truth};
 use crate::shim::codec::{AoaSsa, Encoder, ServoOutputRaw, VfrHud};

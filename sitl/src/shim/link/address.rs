@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Which protocol, with which side beginning.
+/// Transport protocol, with the side that opens it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
     /// UDP: listens, and answers the sender of the first frame of the companion.

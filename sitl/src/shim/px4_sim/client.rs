@@ -41,8 +41,8 @@ pub(super) struct Client {
     /// Whether the step that was shown last is answered.
     pub(super) answered: bool,
     /// When an actuator message last came.
-    pub(super) heard: Option<Instant>,
-    /// Its silence has been reported.
+    pub(super) last_actuation: Option<Instant>,
+    /// Whether its silence has been reported.
     pub(super) silent: bool,
     reported: Vec<&'static str>,
     state_interval_us: Option<u64>,
@@ -59,7 +59,7 @@ impl Client {
             actuation: None,
             lockstep: false,
             answered: false,
-            heard: None,
+            last_actuation: None,
             silent: false,
             reported: Vec::new(),
             state_interval_us: None,
@@ -139,10 +139,10 @@ impl Client {
         }
         counts.answers += 1;
         counts.limited_answers += u64::from(actuation.limited);
-        self.heard = Some(Instant::now());
+        self.last_actuation = Some(Instant::now());
         self.actuation = Some(actuation);
         if std::mem::take(&mut self.silent) {
-            events.push(if self.lockstep { Px4Event::Resumed } else { Px4Event::Heard });
+            events.push(if self.lockstep { Px4Event::Resumed } else { Px4Event::SilenceEnded });
         }
     }
 

@@ -27,7 +27,7 @@ pub enum Px4Event {
     /// Real time: no actuator message for a second; the outputs stay as they are.
     Silent,
     /// Real time: actuator messages come again.
-    Heard,
+    SilenceEnded,
     /// The client is not what this side speaks to; why, and what to do.
     Refused(&'static str),
 }
@@ -60,7 +60,7 @@ impl fmt::Display for Px4Event {
                 "no actuator message for 1 s: the outputs stay as they are; see whether PX4 is \
                  stopped"
             ),
-            Px4Event::Heard => write!(f, "actuator messages come again"),
+            Px4Event::SilenceEnded => write!(f, "actuator messages come again"),
             Px4Event::Refused(why) => write!(f, "{why}"),
         }
     }

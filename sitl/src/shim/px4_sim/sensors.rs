@@ -90,7 +90,7 @@ pub struct Sensors {
     /// Magnetic field, north-east-down, gauss.
     field: [f64; 3],
     random: ChaCha8Rng,
-    /// What was shown last, for fields that are not measured anew.
+    /// Last message, for fields that are not measured anew.
     last: HilSensor,
 }
 
