@@ -219,7 +219,8 @@ impl Local<'_> {
         let took = self.store.times(cell)?.map_or(String::new(), |t| time(t.seconds));
         let (done, cells) = (self.count(State::Done), self.states.len());
         let left = self.left()?.map_or(String::new(), |[_, left]| format!("{} left", time(left)));
-        self.bar.print(&format!("{done:>4}/{cells}  {:<40} {took:>7}  {left:>11}  {what}", cell.id));
+        self.bar
+            .print(&format!("{done:>4}/{cells}  {:<40} {took:>7}  {left:>11}  {what}", cell.id));
         Ok(())
     }
 

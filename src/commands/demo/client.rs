@@ -90,7 +90,9 @@ impl Client {
             let begun = Instant::now();
             while self.view.time_s - start < legs.seconds && !ended.load(Ordering::Relaxed) {
                 self.turn()?;
-                if begun.elapsed() > ANSWER_TIMEOUT.mul_f64(2.0) + Duration::from_secs_f64(legs.seconds) {
+                if begun.elapsed()
+                    > ANSWER_TIMEOUT.mul_f64(2.0) + Duration::from_secs_f64(legs.seconds)
+                {
                     bail!("the companion has fallen silent: {}", self.last_text());
                 }
                 if self.view.mode != Some(Mode::Offboard) {

@@ -22,7 +22,7 @@ use crate::model::GreyBox;
 use crate::model::residual::hash;
 use budget::{Algorithm, Budget};
 use imagined::Reached;
-use plan::{Recent, Source, Stage, Inputs};
+use plan::{Inputs, Recent, Source, Stage};
 use record::Record;
 
 /// Options of `greylag learn`.

@@ -237,7 +237,8 @@ impl Bench {
         let recorded = self.amend_session(|inner| {
             let Some(flying) = inner.flying.as_mut().filter(|f| f.number == number) else { return };
             flying.on = false;
-            let name = |w: &Warning| flying.live.models.get(w.model).map_or("", |m| m.model.as_str());
+            let name =
+                |w: &Warning| flying.live.models.get(w.model).map_or("", |m| m.model.as_str());
             let warning = |w: &Warning| format!("{:.1} s, {}: {}", w.time_s, name(w), w.text);
             let warnings = flying.live.warnings.iter().map(warning).collect();
             let place = flying.place;

@@ -473,7 +473,8 @@ impl FlightController {
             Personality::Px4 => self.parameters.get("COM_OF_LOSS_T"),
             Personality::Ardupilot => self.parameters.get("GUIDED_TIMEOUT"),
         };
-        self.setpoint.is_some_and(|setpoint| (self.now_us - setpoint.at_us) as f64 * 1e-6 <= timeout)
+        self.setpoint
+            .is_some_and(|setpoint| (self.now_us - setpoint.at_us) as f64 * 1e-6 <= timeout)
     }
 
     /// Sends STATUSTEXT with a text of at most 25 bytes.
