@@ -63,7 +63,7 @@ impl Reading {
         }
     }
 
-    /// The flights of `paths`, reconstructed; what was odd about them goes into `notes`.
+    /// The flights of `paths`, reconstructed; findings about them are appended to `notes`.
     fn flights(
         &self,
         paths: &[PathBuf],

@@ -75,7 +75,7 @@ impl World {
         Ok(World::new(Box::new(world), 1, &model.model))
     }
 
-    /// The least and the greatest observation of an episode that goes on.
+    /// Least and greatest observation of an episode that has not ended.
     #[getter]
     fn bounds(&self) -> [[f64; OBSERVATIONS]; 2] {
         self.bounds

@@ -82,13 +82,14 @@ pub enum FilterKind {
 }
 
 impl Filter {
-    /// What stands in an expression for the property with the output of the filter at `place` of the effect's list.
+    /// Placeholder in an expression for the output property of the filter at `place` of the
+    /// effect's list.
     pub fn placeholder(place: usize) -> String {
         format!("{{filter-{place}}}")
     }
 }
 
-/// Where a function of its own acts.
+/// Axis or propulsion on which an added function acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Drag along the wind axis, lbf, rearward positive.

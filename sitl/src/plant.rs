@@ -28,7 +28,7 @@ pub use travel::{Stops, Travel};
 /// Default length of one step, s.
 pub const DT_S: f64 = 0.01;
 
-/// Steps that the integrators and filters are known to bear.
+/// Range of steps in which the integrators and filters are known to be stable.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.001..=DT_S;
 
 /// Why the plant cannot fly on.

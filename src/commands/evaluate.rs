@@ -69,8 +69,9 @@ pub struct Arguments {
     /// Only the Nth of every N targets.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     every: u32,
-    /// Fly steps between random attitudes of the envelope too, so many: the first attitude is held for 5 s at the cruise
-    /// airspeed, then the second is flown for 8 s and scored. The same --seed draws the same steps.
+    /// Also fly this number of steps between random attitudes of the envelope: the first attitude
+    /// is held for 5 s at the cruise airspeed, then the second is flown for 8 s and scored. The
+    /// same --seed draws the same steps.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=10_000))]
     steps: u32,
     /// Fly the steps alone.
@@ -79,8 +80,9 @@ pub struct Arguments {
     /// Fly targets beyond the bank and pitch of the airframe's envelope too.
     #[arg(long)]
     beyond_envelope: bool,
-    /// Fly models drawn from the widths of the first --model's coefficients, so many, in place of JSBSim: Monte Carlo over
-    /// what is not known of the aircraft. The controllers keep the --model that they are built from.
+    /// Fly this number of models drawn from the widths of the first --model's coefficients in place
+    /// of JSBSim: Monte Carlo over the uncertainty of the aircraft. The controllers keep the
+    /// --model that they are built from.
     #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: Option<u32>,
     /// Whether the controllers fly behind the envelope limiter, as in `fly` and `demo`, or bare, as in the paper.

@@ -61,18 +61,20 @@ pub struct Arguments {
     /// Show the faults and the messages of each flight with a finding.
     #[arg(long)]
     show: bool,
-    /// Note each flight in this file, and do not fly again those that are there (of the same program).
+    /// Record each flight in this file, and skip those that it has already (of the same program).
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
-    /// Search so many flights for one that breaks a rule of flight, with the first of the controllers: faults, winds,
-    /// targets and requests are varied, always from the flights that came nearest. `--first` is its seed.
+    /// Search this number of flights for one that breaks a rule of flight, with the first of the
+    /// controllers: faults, winds, targets and requests are varied, always from the flights that
+    /// came nearest. `--first` is its seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show"])]
     search: Option<u64>,
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
     scenario: Option<PathBuf>,
-    /// Fly so many flights, healthy and with each failure, that the model monitor watches, beside a played ArduPlane whose attitude
-    /// is off by errors drawn for each flight: false alarms and delays. `--first` is the first seed.
+    /// Fly this number of flights, healthy and with each failure, under the model monitor, beside a
+    /// simulated ArduPlane whose attitude has errors drawn for each flight: false alarms and
+    /// delays. `--first` is the first seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json"])]
     monitor: Option<u64>,
     #[command(flatten)]

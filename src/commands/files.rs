@@ -24,7 +24,7 @@ impl From<bool> for Overwrite {
     }
 }
 
-/// Whether a path stands for standard output: `-`.
+/// Whether a path denotes standard output: `-`.
 pub fn is_stdout(path: Option<&Path>) -> bool {
     path == Some(Path::new("-"))
 }
@@ -86,7 +86,7 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
-/// Writes a whole file at once: it is there complete, or not at all.
+/// Writes a file through a temporary one: it exists completely or not at all.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {

@@ -184,7 +184,7 @@ impl Reading {
         Ok(intake)
     }
 
-    /// The reconstructed flight of a log, with what was odd about the file.
+    /// The reconstructed flight of a log, with the findings about the file.
     fn reconstruct_one(
         &self,
         path: &Path,

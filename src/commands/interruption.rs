@@ -17,7 +17,7 @@ pub struct Interruption(Arc<AtomicBool>);
 pub enum Ended {
     /// The task is complete.
     Done,
-    /// Ctrl-C ended it; the same command goes on.
+    /// Ctrl-C ended it; the same command resumes it.
     Interrupted,
 }
 

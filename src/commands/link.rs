@@ -84,7 +84,7 @@ struct Check {
 /// Runs `greylag link …`.
 ///
 /// # Errors
-/// If the link cannot be opened, or nobody answers on it.
+/// If the link cannot be opened, or no flight controller answers on it.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(check) => run_check(check),
@@ -132,7 +132,7 @@ impl Listener {
         Ok(Listener { started, arrivals, link, remarks: Vec::new(), _network: network })
     }
 
-    /// The stack of whoever is there.
+    /// The stack of the flight controller on the link.
     fn find(&mut self, command: CommandName, actuators: ActuatorFigures) -> Result<Stack> {
         let authority = command.authority();
         let guess = Profile { stack: Stack::Px4, authority, actuators };

@@ -39,7 +39,8 @@ enum Verb {
         /// As JSON: an object, of several logs a list of them.
         #[arg(long)]
         json: bool,
-        /// Write a mapping file that puts right the units and signs that were found wrong: what --mapping takes.
+        /// Write a mapping file that corrects the wrong units and signs that were found: what
+        /// --mapping takes.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         write_mapping: Option<PathBuf>,
         /// The model file of the aircraft: its envelope sets the airspeed above which it flies.
@@ -159,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
-/// Writes the mapping that puts right what was found.
+/// Writes the mapping that corrects the findings.
 fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<ExitCode> {
     let Some(text) = mapping(logs) else {
         bail!("no factor puts anything of these logs right, so no mapping was written");

@@ -1,4 +1,4 @@
-//! A mapping file that puts right what was found wrong with units and signs of logs.
+//! A mapping file that corrects wrong units and signs of logs.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

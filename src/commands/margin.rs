@@ -1,4 +1,4 @@
-//! The delay that a controller bears, for whoever flies through a flight controller's channels.
+//! Delay margin of a controller, for flights through a flight controller's channels.
 
 use std::time::Duration;
 

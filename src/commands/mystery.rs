@@ -223,7 +223,7 @@ fn coefficient_names(id: &str) -> Vec<&'static str> {
         .map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
 }
 
-/// JSON in hexadecimal digits: nobody reads it by accident.
+/// JSON in hexadecimal digits, so that it is not read by accident.
 fn seal(answer: &Answer) -> Result<String> {
     let mut out = String::new();
     for line in serde_json::to_vec(answer)?.chunks(32) {

@@ -109,7 +109,7 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
 /// Columns without which a row is no sample, should they hang; the airspeed may be slow or stay out for a while.
 const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
 
-/// Whether a row lies where a channel hangs without which it is no sample.
+/// Whether the row lacks a required column because its channel is stuck.
 pub(super) fn hangs(row: &Sample, channels: &[Channel]) -> bool {
     let hanging = channels.iter().filter(|c| !c.quality.frozen.is_empty());
     hanging

@@ -67,7 +67,7 @@ pub enum CsvError {
     },
 }
 
-/// A flight read from a file, with what was odd about it.
+/// A flight read from a file, with the findings about the file.
 #[derive(Clone, Debug, Default)]
 pub struct Reading {
     /// The flight as read.

@@ -54,7 +54,7 @@ fn size(letter: u8) -> Option<usize> {
     })
 }
 
-/// A number of format `letter`; NaN for texts and for what lies beyond the record.
+/// Number of format `letter`; NaN for texts and beyond the record's end.
 fn number(letter: u8, bytes: &[u8], offset: usize) -> f64 {
     fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
         bytes.get(offset..)?.first_chunk().copied()

@@ -210,8 +210,8 @@ mod tests {
         [derive]\nbody_rates_over_s = 0.07\n[sensors]\nwind_north_mps = { value = 2.0, sd = 0.1 }\n\
         wind_east_mps = { value = 0.0, sd = 0.1 }\n";
 
-    /// A coordinated turn: pitch 0.1, bank 0.5, ψ̇ = 0.6 rad/s, 8 m/s over ground on its heading; positions
-    /// stand in the columns of the velocity, as a mapping puts them there.
+    /// A coordinated turn: pitch 0.1, bank 0.5, ψ̇ = 0.6 rad/s, 8 m/s over ground on its heading;
+    /// the velocity columns hold positions, as a mapping puts them there.
     fn turn(k: usize) -> Sample {
         let (t, turn, v) = (0.01 * k as f64, 0.6, 8.0);
         let yaw: f64 = turn * t;

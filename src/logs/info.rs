@@ -53,7 +53,7 @@ pub struct Info {
     pub findings: Vec<Finding>,
 }
 
-/// Something a log may serve for.
+/// Purpose for which a log can be used.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Purpose {
     /// Name of the purpose.
@@ -144,7 +144,7 @@ fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     (missing, instead)
 }
 
-/// The purpose with what stands against it beside absent columns: no wings, no flight, slow channels.
+/// The purpose with its obstacles besides absent columns: no wings, no flight, slow channels.
 fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
     let wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
     if !wings {

@@ -39,7 +39,7 @@ pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
     both.into_iter().flatten().collect()
 }
 
-/// The shares of control `j`, if all columns that it takes are there.
+/// The shares of control `j`; `None` if a column is missing.
 fn made_of(
     names: &[String],
     mixer: &Mixer,

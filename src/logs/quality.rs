@@ -30,7 +30,7 @@ pub struct Quality {
 const ENOUGH: usize = 100;
 /// Share of the moving samples on straight lines from which they count as interpolated.
 const STRAIGHT: f64 = 0.7;
-/// A kink counts if it is so many times what rounding makes.
+/// A kink counts if it is this many times the rounding step.
 const KINK: f64 = 10.0;
 /// Fewest samples from kink to kink.
 const APART: f64 = 3.0;
@@ -39,7 +39,7 @@ const FROZEN_S: f64 = 1.0;
 const FROZEN_STEPS: f64 = 20.0;
 /// Samples on both sides whose median a spike is compared with.
 const AROUND: usize = 4;
-/// How far a spike lies out, in robust standard deviations, and in parts of the usual value.
+/// Least size of a spike, in robust standard deviations, and in parts of the usual value.
 const FAR_SD: f64 = 10.0;
 const FAR_PART: f64 = 0.4;
 

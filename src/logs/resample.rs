@@ -97,7 +97,7 @@ fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     ])
 }
 
-/// Where a time lies among a channel's times.
+/// Position of a time among a channel's times.
 #[derive(Clone, Copy)]
 struct At {
     t: f64,

@@ -28,8 +28,9 @@ const GAP_PERIODS: f64 = 3.0;
 const GOOD_SHARE: f64 = 0.5;
 /// A preferred channel slower than this, Hz, yields to one five times as fast.
 const SLOW_HZ: f64 = 10.0;
-/// A measured channel with less than this part of the table's rate stands at its own samples only.
-/// Held values repeat in a third of the rows then, by which a reconstruction knows them.
+/// A measured channel with less than this part of the table's rate fills only the rows of its own
+/// samples. Held values would repeat in a third of the rows, by which a reconstruction recognises
+/// them.
 const SPARSE: f64 = 0.65;
 /// Columns that are measurements of the path, not what drives it.
 const MEASURED: [&str; 9] = [

@@ -31,7 +31,7 @@ const WRAP_MS_S: f64 = 4_294_967.296;
 
 /// How far back the time of a vehicle goes that has started again, s.
 const BACK_S: f64 = 5.0;
-/// Attitudes from which a system beside the one that sends most is a vehicle of its own.
+/// Number of attitudes from which a further system counts as another vehicle.
 const VEHICLE: usize = 50;
 /// Messages in a row that show it; one alone may be late or wrong.
 const BACK_FOR: usize = 5;

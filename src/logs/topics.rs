@@ -23,7 +23,7 @@ impl Topic {
         Topic { time_s: Vec::new(), fields, values }
     }
 
-    /// Whether a field is there and takes at least two finite values.
+    /// Whether a field exists and has at least two finite values.
     pub fn moves(&self, name: &str) -> bool {
         let Some(values) = self.field(name) else { return false };
         let mut finite = values.iter().filter(|x| x.is_finite());

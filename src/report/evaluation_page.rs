@@ -246,8 +246,8 @@ mod tests {
         Evaluation::measured(names, &courses(&rows, 16.67), &vec![outcome; 8], &limits)
     }
 
-    /// Every controller stands with its interval, the paper's beside it, and a lost aircraft draws nothing
-    /// that is no number.
+    /// Every controller is drawn with its interval and the paper's result; a lost aircraft draws no
+    /// NaN.
     #[test]
     fn the_page_has_ours_and_the_papers() {
         let evaluations = [evaluated("hybrid", 0.25), evaluated("lqi", 1e-7)];

@@ -62,7 +62,7 @@ pub enum WorkbenchError {
         /// Path of the log.
         path: PathBuf,
     },
-    /// The log is there already.
+    /// The session has the log already.
     #[error("this log is in the session already, as {0}")]
     Twice(String),
     /// A name that no file may have.
@@ -93,7 +93,7 @@ pub enum WorkbenchError {
         /// Path of the session's model.
         model: PathBuf,
     },
-    /// The amended model would stand in the place of the one it was made of.
+    /// The amended model would replace the model from which it was made.
     #[error("{} is the model to start from, which stays as it is; move it out of the session's folder", .0.display())]
     OverModel(PathBuf),
     /// No effect joined the model.
@@ -123,7 +123,7 @@ pub enum WorkbenchError {
     /// Nothing to take back or to do.
     #[error("there is nothing to {0}")]
     Nothing(&'static str),
-    /// The effect is there.
+    /// The session has the effect already.
     #[error("{0} is in the model already")]
     Present(String),
     /// The mapping is the user's own.

@@ -94,20 +94,20 @@ pub enum Event {
 }
 
 impl Inner {
-    /// Ends the jobs of a kind, as far as anyone can see; each lets go of the processor at its next stage.
+    /// Removes the jobs of a kind from the list; each stops computing at its next stage.
     pub(super) fn supersede(&mut self, work: Work) {
         self.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
         self.jobs.retain(|job| job.work != work);
     }
 
-    /// Whether every fit of the accepted effects is there.
+    /// Whether every fit of the accepted effects exists.
     fn fitted(&self) -> bool {
         let all = &self.session.effects;
         (1..=all.len()).all(|count| self.fits.contains_key(&self.key("fit", &all[..count])))
     }
 }
 
-/// What came of a job; a panic of it is an error, so that it does not run for ever in the eyes of its user.
+/// Outcome of a job; a panic becomes an error, so that the job does not appear to run for ever.
 fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), WorkbenchError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let said = panic.downcast_ref::<&str>().map(ToString::to_string);
@@ -156,7 +156,7 @@ impl Bench {
         std::thread::spawn(move || bench.work(id, work, &stop));
     }
 
-    /// Ends the job `id` as far as anyone can see; it lets go of the processor at its next stage.
+    /// Removes the job `id` from the list; it stops computing at its next stage.
     pub(super) fn cancel(&self, id: u64) {
         let mut inner = self.lock();
         inner.jobs.iter().filter(|job| job.id == id).for_each(|job| job.stop.stop());

@@ -27,7 +27,8 @@ fn origin(flight: &Loaded, column: &str) -> String {
     }
 }
 
-/// The mapping `text` with one column more; a column that is there is scaled once more.
+/// The mapping `text` with one more column; the scale of a column that it has already is
+/// multiplied.
 fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<String> {
     let mut table: toml::Table = toml::from_str(text).ok()?;
     table.insert("schema".into(), 1.into());

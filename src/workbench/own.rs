@@ -71,7 +71,7 @@ pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
 }
 
 impl Bench {
-    /// Keeps an effect that was written as text; one of that id that is there is replaced.
+    /// Adds an effect that was written as text to the session; it replaces one of the same id.
     pub(super) fn write_effect(
         self: &std::sync::Arc<Self>,
         seen: u64,

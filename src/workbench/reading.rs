@@ -52,7 +52,7 @@ impl Inner {
         self.read_by(&file, text)
     }
 
-    /// Reads logs by the mapping `text`, which stands, or will stand, in `file`.
+    /// Reads the logs by the mapping `text`, the present or future content of `file`.
     pub fn read_by(&mut self, file: &Path, text: String) -> Result<(), WorkbenchError> {
         self.options.mapping = Mapping::parse(&text, file)?;
         self.mapping = InUse { file: Some(file.into()), text };

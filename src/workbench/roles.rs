@@ -14,7 +14,7 @@ use greylag_logs::names;
 use greylag_sysid::amend::split;
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 
-/// The flights that a fit sees and those that it is judged by, with what is odd about their logs.
+/// The flights of a fit and those for its validation, with notes on findings in their logs.
 pub struct Divided {
     /// Flights that the fit sees.
     pub fit: Vec<Reconstruction>,
@@ -50,7 +50,8 @@ impl Inner {
         }
     }
 
-    /// Gives a log another role. A test flight that nobody has seen can be seen then, which is recorded.
+    /// Gives a log another role. A test flight that was locked is opened by this, which is
+    /// recorded.
     pub fn give_role(&mut self, place: usize, role: Role) -> Result<(), WorkbenchError> {
         let log = self.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
         if role != Role::Test && self.locked(log) && self.flights[place].is_ok() {
@@ -70,7 +71,7 @@ impl Inner {
         Ok(())
     }
 
-    /// Whether a flight is a test that nobody has opened.
+    /// Whether a flight is a test flight that has not been opened.
     pub fn locked(&self, log: &LogEntry) -> bool {
         // sessions of before hashes know their flights by name
         let opened = self.session.openings.iter().any(|o| match o.sha256.is_empty() {

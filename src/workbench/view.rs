@@ -251,7 +251,7 @@ impl Bench {
     }
 }
 
-/// Whether a result is there, or why not.
+/// Whether a result exists, with the error of its job.
 fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Value {
     let key = inner.key(work.word(), &[]);
     let known = known.as_ref().filter(|(of, _)| *of == key);

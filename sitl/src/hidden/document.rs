@@ -91,7 +91,7 @@ impl<'a> Document<'a> {
         property(&self.properties.throttle_position)
     }
 
-    /// `expression` with the properties of the positions in the places that stand for them.
+    /// `expression` with its placeholders replaced by the properties of the positions.
     pub(super) fn with_positions(&self, expression: &str) -> String {
         expression
             .replace("{aileron}", &self.properties.aileron_position)
@@ -364,7 +364,7 @@ impl<'a> Document<'a> {
         Ok((start, end))
     }
 
-    /// Renames a property within `range`, where it stands alone.
+    /// Renames a property within `range`, whole names only.
     fn rename(&mut self, range: std::ops::Range<usize>, from: &str, to: &str) {
         let part = |c: char| c.is_ascii_alphanumeric() || "_-/[]".contains(c);
         let old = &self.xml[range.clone()];

@@ -77,7 +77,7 @@ pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
     })
 }
 
-/// A loaded aircraft that stands still in the air.
+/// A loaded aircraft that is held at rest in the air.
 struct Bench {
     fdm: Fdm,
     start: Snapshot,
@@ -134,7 +134,8 @@ impl Bench {
         Ok(Seen { moments, positions })
     }
 
-    /// What is seen once all stands where `command` puts it; `None` where that gives no number.
+    /// Response once everything has settled at `value` of `command`; `None` where it is not a
+    /// number.
     fn at(&mut self, command: Option<NodeId>, value: f64) -> Result<Option<Seen>, PlantError> {
         self.fdm.restore(&self.start).map_err(jsbsim("going back to the loaded aircraft"))?;
         self.fdm.set_dt(STILL_S);

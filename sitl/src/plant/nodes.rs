@@ -93,8 +93,8 @@ impl Nodes {
         self.steering.is_shared()
     }
 
-    /// Starts every engine that can stand still; the number of the first that does not run then.
-    /// JSBSim starts them at full power, from where they follow the throttle.
+    /// Starts every engine that can be off; `Some` with the number of the first that does not run
+    /// then. JSBSim starts them at full power, from where they follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {
         if self.running.is_empty() {
             return Ok(None);

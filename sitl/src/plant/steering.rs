@@ -31,7 +31,7 @@ pub(super) struct Mixed {
     /// Command of each surface and motor; `None` follows the usual commands.
     commands: Vec<Option<NodeId>>,
     positions: Vec<NodeId>,
-    /// The usual commands, for what has none of its own: aileron, elevator, rudder.
+    /// The usual commands (aileron, elevator, rudder), for parts without a command of their own.
     usual: [Option<NodeId>; 3],
     throttles: Vec<NodeId>,
 }

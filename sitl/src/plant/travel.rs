@@ -64,8 +64,8 @@ impl Default for Travel {
 }
 
 impl Plant {
-    /// Measures the travel of the surfaces: commands them fully both ways while the aircraft stands
-    /// still in its state, then goes back to where it was.
+    /// Measures the travel of the surfaces: commands them fully both ways with the aircraft held in
+    /// its state, then restores it.
     ///
     /// # Errors
     /// [`PlantError::Travel`] when a surface does not follow its command.

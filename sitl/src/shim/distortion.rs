@@ -1,4 +1,4 @@
-//! What goes wrong with what is measured, apart from noise: sensors that stand still, lie or jump.
+//! Faults of the measurements apart from noise: sensors that freeze, err or jump.
 
 use crate::plant::Truth;
 

@@ -44,7 +44,7 @@ pub enum ShimError {
     /// The link could not be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The truth file is there already.
+    /// The truth file exists.
     #[error("the truth file {} exists; choose another name with --truth, or allow overwriting with --force", path.display())]
     TruthExists {
         /// Path of the truth file.

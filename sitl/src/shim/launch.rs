@@ -5,7 +5,7 @@ use crate::shim::options::Launch;
 
 /// How long the catapult pulls, s: 1.7 g for 16.67 m/s, within 8.3 m.
 const PULL_S: f64 = 1.0;
-/// The catapult is let go at this throttle; PX4 and ArduPlane idle below it before a take-off.
+/// The catapult is released at this throttle; PX4 and ArduPlane idle below it before a take-off.
 const LAUNCH_THROTTLE: f64 = 0.1;
 /// Radius of the earth's equator, m, and its first eccentricity squared (WGS 84).
 const EQUATOR_M: f64 = 6_378_137.0;
@@ -15,7 +15,7 @@ const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Stand,
-    /// Steps since the catapult was let go.
+    /// Steps since the catapult was released.
     Catapult(u64),
     Flight,
 }

@@ -93,7 +93,7 @@ impl<'a> Session<'a> {
         self.counts.unsent_frames += u64::from(!self.link.send(bytes));
     }
 
-    /// Sends what `write` encodes, if it encodes anything, as a datagram of its own.
+    /// Sends the bytes that `write` encodes, if any, as a separate datagram.
     pub fn send_slow(&mut self, write: impl FnOnce(&mut Encoder, &mut Vec<u8>)) {
         self.batch.clear();
         write(&mut self.encoder, &mut self.batch);
@@ -102,7 +102,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends a heartbeat out of turn: a sign of life while simulated time stands still.
+    /// Sends an additional heartbeat while simulated time is stopped.
     pub fn send_heartbeat(&mut self) {
         self.send_slow(encode_heartbeat);
     }

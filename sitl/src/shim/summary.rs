@@ -143,7 +143,7 @@ pub struct Summary {
     pub repeated_frames: u64,
     /// State frames lost on purpose.
     pub dropped_frames: u64,
-    /// State frames that could not be sent: nobody there, or no room.
+    /// State frames that could not be sent: no peer, or no room.
     pub unsent_frames: u64,
     /// Answers that were flown (or, before the launch, would have been).
     pub answers: u64,

@@ -14,7 +14,7 @@ use crate::commands::{Command, command_of, given};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 
-/// Share of its own size up to which a coefficient's standard deviation leaves it known.
+/// A coefficient is known if its standard deviation is at most this share of its magnitude.
 const KNOWN: f64 = 0.3;
 /// Manoeuvres that excite the coefficients of an effect, for those that the flights leave unknown.
 const MANOEUVRES: [(&str, &str); 7] = [

@@ -27,10 +27,10 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     }
 }
 
-/// `model` with `all` these bounds.
+/// `model` with these bounds.
 ///
 /// # Errors
-/// It has no such coefficient, or one that lies outside of them.
+/// It has no such coefficient, or one that lies outside of its bounds.
 pub fn given(mut model: GreyBox, all: &[Bound]) -> Result<GreyBox> {
     for Bound { name, bounds: [low, high] } in all {
         let Some(c) = model.coefficients().iter().find(|c| c.name == *name) else {

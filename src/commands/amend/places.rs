@@ -77,7 +77,7 @@ impl Places {
     }
 }
 
-/// Whether the file at `path` is there with this text.
+/// Whether the file at `path` exists with this text.
 fn holds(path: &Path, text: &str) -> bool {
     fs::read_to_string(path).is_ok_and(|there| there == text)
 }

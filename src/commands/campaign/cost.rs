@@ -19,7 +19,7 @@ pub struct Cost {
 /// How a cost is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The median of so many cells.
+    /// The median of this many cells.
     Measured(usize),
     /// As the campaign file states.
     Stated,

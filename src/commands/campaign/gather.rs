@@ -32,7 +32,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Joins what there is.
+/// Joins the results that exist.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.results.iter().chain(&arguments.times) {

@@ -1,4 +1,5 @@
-//! All cells of a campaign on this machine: each in a process of its own, as a scheduler would run it.
+//! All cells of a campaign on this machine: each in a separate process, as a scheduler would run
+//! it.
 
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
@@ -35,7 +36,7 @@ pub enum Failed {
     Again,
 }
 
-/// Where a cell stands in this run.
+/// State of a cell in this run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Waiting { not_before: Option<Instant>, kills: u32 },

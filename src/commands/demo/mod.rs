@@ -236,7 +236,7 @@ fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
     Ok(plant)
 }
 
-/// Runs the shim on a thread of its own until `stop`.
+/// Runs the shim on a separate thread until `stop`.
 fn simulate(
     arguments: &Arguments,
     plant: PlantOptions,

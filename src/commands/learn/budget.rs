@@ -7,7 +7,7 @@ use clap::ValueEnum;
 pub enum Budget {
     /// Tens of seconds: to see it work.
     Quick,
-    /// Minutes of two cores: a controller worth flying.
+    /// A controller that flies acceptably, in minutes on two cores.
     Standard,
     /// The paper's numbers of flights and updates: hours with td3.
     Paper,

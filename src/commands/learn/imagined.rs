@@ -15,7 +15,8 @@ use crate::sim::{Group, TargetFile};
 
 /// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
 const TARGETS: u64 = 3;
-/// One target in so many is flown: a planner takes milliseconds a step, and the LQI needs few to be judged.
+/// One of this many targets is flown: a planner takes milliseconds a step, and the LQI needs few to
+/// be judged.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 

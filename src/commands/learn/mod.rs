@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Learn from these flight logs instead; no rounds are flown.
     #[arg(long = "log", value_name = "LOG", num_args = 1..)]
     logs: Vec<PathBuf>,
-    /// Folder of everything that comes of it; a learning found there goes on.
+    /// Folder of all outputs; a learning found there is resumed.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Rounds of flights planned through the model learned so far [default: the budget's].
@@ -169,7 +169,8 @@ impl Arguments {
         Ok(Recent { flights, policy, logs: self.logs.clone(), share: self.recent_share })
     }
 
-    /// Hashes of the files that a learning begins with: prior, airframe, logs, the policy that it goes on with.
+    /// Hashes of a learning's input files: prior, airframe, logs, the policy from which it
+    /// continues.
     fn inputs(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let mut hashes = vec![prior.sha256.clone(), format!("{:?}", prior.airframe)];
         let mut files = self.logs.clone();
@@ -202,7 +203,8 @@ impl Arguments {
         }
     }
 
-    /// Which aircraft flies, from which airspeed: that of the prior, as the first round has no model to take it from.
+    /// Options that select the aircraft, its hidden effects and its airspeed, that of the prior, as
+    /// the first round has no model yet.
     fn aircraft_options(&self, prior: &GreyBox) -> Vec<OsString> {
         let mut words: Vec<OsString> = Vec::new();
         let mut add = |name: &str, value: OsString| words.extend([name.into(), value]);

@@ -19,7 +19,7 @@ pub enum Source {
     Simulator(Vec<OsString>),
     /// Recorded logs at these paths.
     Logs(Vec<PathBuf>),
-    /// Recent logs that an earlier learning goes on with.
+    /// Recent logs with which an earlier learning is continued.
     Recent(Recent),
 }
 

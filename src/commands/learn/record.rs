@@ -1,4 +1,4 @@
-//! What a learning has done so far, on disk, so that it goes on where it was interrupted.
+//! Progress of a learning on disk, from which it resumes after an interruption.
 
 use std::path::{Path, PathBuf};
 

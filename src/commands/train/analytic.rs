@@ -73,7 +73,7 @@ pub fn climb(
     Ok(Some(Arc::new(trainer.actor()?)))
 }
 
-/// Learns what `actor` is worth in `world`; `None` if interrupted.
+/// Learns the value function of `actor` in `world`; `None` if interrupted.
 ///
 /// # Errors
 /// If a parameter is no longer finite.

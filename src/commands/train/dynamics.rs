@@ -27,7 +27,7 @@ const LINE: u64 = 500;
 const KEEP: u64 = 4;
 /// Horizons of the score, steps.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
-/// The file that a training goes on from.
+/// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
 /// How the training went so far, for its report.
@@ -109,7 +109,7 @@ pub struct Arguments {
     /// Seed of the residual's start and of the minibatches.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder for model, checkpoint and scores; a training found there goes on.
+    /// Folder for model, checkpoint and scores; a training found there is resumed.
     #[arg(long)]
     out: PathBuf,
 }
@@ -148,7 +148,7 @@ struct Document<'a> {
     notes: Vec<String>,
 }
 
-/// Trains, prints what came of it, writes the model.
+/// Trains, prints the result, writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }

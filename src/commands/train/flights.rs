@@ -13,7 +13,7 @@ use crate::physics::{Controls, State};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// One track in so many is held out, where there are that many.
+/// One of this many tracks is held out, where there are that many.
 const HELD_OUT: usize = 10;
 /// Part of each recent flight, its end, that is held out.
 const HELD_OUT_PART: f64 = 0.2;

@@ -63,7 +63,7 @@ pub struct Arguments {
     /// Aircraft imagined at once.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     instances: u64,
-    /// Policies to train, each with a seed of its own, from --seed on; they share the cores.
+    /// Number of policies to train, with consecutive seeds from --seed on; they share the cores.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Seed of the first.
@@ -119,8 +119,8 @@ pub struct Arguments {
     /// Steps between two checkpoints.
     #[arg(long, default_value_t = 50_000, value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: u64,
-    /// Folder for the policy, its learning curve and the checkpoint (seed-N below it for several seeds);
-    /// a training found there goes on.
+    /// Folder for the policy, its learning curve and the checkpoint (seed-N below it for several
+    /// seeds); a training found there is resumed.
     #[arg(long)]
     out: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! Attitude from a quaternion in a table, whichever way round its parts stand.
+//! Attitude from a quaternion in a table, with its parts in either order.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -51,7 +51,7 @@ pub(super) fn order(rows: &[Sample], quaternions: &[[f64; 4]]) -> Order {
     if misfit(Order::Xyzw) < misfit(Order::Wxyz) { Order::Xyzw } else { Order::Wxyz }
 }
 
-/// Fills roll, pitch and yaw; where no rotation stands they stay empty.
+/// Fills roll, pitch and yaw; they stay NaN where the numbers are no rotation.
 pub(super) fn fill(rows: &mut [Sample], quaternions: &[[f64; 4]], order: Order) {
     for (row, q) in rows.iter_mut().zip(quaternions) {
         if let Some(turn) = turned(*q, order) {

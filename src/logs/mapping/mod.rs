@@ -76,7 +76,7 @@ pub struct Entry {
     pub offset: f64,
     /// The topic's instance; the first one if none is named.
     pub instance: Option<u16>,
-    /// The column is the rate of change of the field, over so many s of rows.
+    /// Length of the parabola whose slope is the column, s; `None` takes the field itself.
     pub rate_over_s: Option<f64>,
 }
 

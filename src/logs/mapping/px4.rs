@@ -33,7 +33,7 @@ pub const TOPICS: [&str; 20] = [
     "vehicle_attitude_setpoint",
 ];
 
-/// The fields that the rules use; what ends with a bracket stands for all elements.
+/// Fields that the rules use; a name that ends with a bracket matches all elements.
 const FIELDS: [&str; 25] = [
     "q[",
     "q_d[",

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::Sample;
 use greylag_num::statistics;
 
-/// A gap of so many median periods ends a window.
+/// A gap of this many median periods ends a window.
 const PAUSE_PERIODS: f64 = 5.0;
 /// Fewest pairs that a relation is taken from.
 const FEWEST: usize = 12;
@@ -15,7 +15,7 @@ pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
     rows.iter().map(get).filter(|x| x.is_finite()).collect()
 }
 
-/// The value below which the share `q` of the values lies; `None` for fewer than [`super::ENOUGH`].
+/// Quantile `q` of the values; `None` for fewer than [`super::ENOUGH`].
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     (values.len() >= super::ENOUGH).then(|| statistics::quantile(values, q))
 }

@@ -93,7 +93,8 @@ fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// q̇ on q, α (or the normal force in its place) and the elevator: positive is nose down.
+/// Regression of q̇ on q, α (or the normal force in its place) and the elevator: positive is nose
+/// down.
 fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;

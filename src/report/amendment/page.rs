@@ -9,10 +9,10 @@ use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
 
-/// Sentences that stand large at the top.
+/// Number of findings that are shown first.
 const LEADING: usize = 2;
 
-/// The page of `report`: the sentence first, then what bears it out.
+/// The page of `report`: the verdict first, then the evidence for it.
 pub fn amendment_page(report: &AmendmentReport) -> Page {
     let a = report.amendment;
     let answer = report.answer.unwrap_or(&a.answer).clone();

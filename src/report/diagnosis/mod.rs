@@ -9,7 +9,7 @@ use crate::Page;
 use greylag_sysid::compare::{Answer, Comparison};
 use greylag_sysid::diagnose::Diagnosis;
 
-/// A diagnosis of what a model lacks, with what bears it out.
+/// A diagnosis of a model's missing effects, with its evidence.
 #[derive(Clone, Debug)]
 pub struct DiagnosisReport<'a> {
     /// Title of the page.

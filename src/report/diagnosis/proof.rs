@@ -1,4 +1,4 @@
-//! What bears a diagnosis out: what chance reaches, the error on flights that no fit has seen.
+//! Evidence for a diagnosis: the level that arises by chance, and the error on held-out flights.
 
 use crate::Align::{Left, Right};
 use crate::comparison::page::{growth, unexplained};

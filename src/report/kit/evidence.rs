@@ -7,7 +7,7 @@ use crate::kit::numbers::evidence;
 /// Longest bars, in thresholds; longer ones are cut, and marked.
 const FULL: f64 = 6.0;
 
-/// Bars of evidence divided by threshold: a line through all of them stands at one.
+/// Bars of evidence divided by threshold, with one line through all of them at one.
 #[derive(Clone, Debug)]
 pub struct Evidence {
     /// Title of the figure.

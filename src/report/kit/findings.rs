@@ -1,4 +1,4 @@
-//! Findings in plain words, each with a link to what bears it out.
+//! Findings in plain words, each with a link to its evidence.
 
 use crate::kit::html::escape;
 

@@ -11,7 +11,7 @@ pub struct Grid {
     pub unit: String,
     /// Name of the rows, in the corner of the table.
     pub corner: String,
-    /// Heads of the columns: a sign, with what it stands for.
+    /// Heads of the columns: a sign with its meaning.
     pub columns: Vec<(String, String)>,
     /// The rows, top to bottom.
     pub rows: Vec<GridRow>,

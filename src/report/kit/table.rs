@@ -21,7 +21,7 @@ pub struct Table {
 pub struct Column {
     /// Title of the column, with the unit of its numbers.
     pub title: String,
-    /// Where its text stands.
+    /// Alignment of the column's text.
     pub align: Align,
 }
 

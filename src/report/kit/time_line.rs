@@ -66,7 +66,7 @@ pub enum Tone {
     Begins,
     /// The commanded activity.
     Asked,
-    /// Something safe is done in its place.
+    /// A safe activity in place of the commanded one.
     Safe,
     /// A failure.
     Wrong,

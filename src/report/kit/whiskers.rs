@@ -14,9 +14,10 @@ pub struct Whiskers {
     pub title: String,
     /// The unit of the scale.
     pub unit: String,
-    /// How values become places; what is not positive stands at the floor of a scale by decades.
+    /// Mapping of values to positions; on a logarithmic scale, values that are not positive are
+    /// drawn at its floor.
     pub scale: Scale,
-    /// Where upright lines stand behind the values, in the unit.
+    /// Positions of vertical lines behind the values, in the unit.
     pub lines: Vec<f64>,
     /// Explanation of the lines, under the figure.
     pub legend: String,

@@ -1,4 +1,4 @@
-//! The page: the choices, and beside them what came of them.
+//! The page: the choices, and beside them the result.
 
 use super::choices::{
     FAULTS, NOTHING, REQUESTS, TURBULENCE, controllers, counterpart, fault, file_name,

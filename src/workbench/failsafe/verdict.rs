@@ -144,7 +144,8 @@ impl Flown {
         [companion, controller]
     }
 
-    /// What happened and what came of it: a sentence for each cause, how it ended, how the rules stand.
+    /// One sentence for each cause with its consequence, one on the end of the flight, one on the
+    /// rules.
     pub(super) fn sentence(&self) -> String {
         let causes = self.causes();
         let deeds = self.deeds();
@@ -271,7 +272,7 @@ impl Flown {
         if lost < MUCH_M { String::new() } else { format!(" The aircraft lost {lost:.0} m.") }
     }
 
-    /// How the rules stand.
+    /// Sentence on the rules of flight: all hold, or which are broken.
     fn rules_in_words(&self) -> String {
         let judged = self.judged.iter().zip(&self.rules);
         let judged: Vec<_> =

@@ -200,7 +200,7 @@ impl Point {
 }
 
 impl Live {
-    /// Takes on what came later; how many of the oldest points were let go.
+    /// Appends a later part; returns the number of oldest points that were dropped.
     pub fn append(&mut self, later: Live) -> usize {
         self.time_s.extend(later.time_s);
         for (name, column) in later.states {
@@ -238,7 +238,8 @@ impl Watched {
     }
 }
 
-/// A row as the monitor takes it. What is missing is a fault of the frame, which the monitor does not compare.
+/// A row converted for the monitor. A missing value is a fault of the frame, which the monitor does
+/// not compare.
 fn frame(row: &Sample) -> Telemetry {
     let [roll, pitch, yaw] = row.attitude_rad;
     let [p, q, r] = row.rates_radps;

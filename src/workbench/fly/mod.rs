@@ -43,7 +43,7 @@ pub struct Flying {
     pub number: u64,
     /// Index of the flight in the session's list of flights.
     pub place: usize,
-    /// Whether it goes on.
+    /// Whether the flight is in progress.
     pub on: bool,
     /// Samples, predictions and warnings so far.
     pub live: Live,
@@ -57,7 +57,7 @@ pub struct Flying {
 pub struct Part {
     /// Number of the flight.
     pub number: u64,
-    /// Whether the flight goes on.
+    /// Whether the flight is in progress.
     pub on: bool,
     /// Points of the flight before this part.
     pub from: usize,

@@ -1,4 +1,4 @@
-//! The program that flies: this one, as `greylag demo`, in a process of its own.
+//! The process that flies: this program as `greylag demo`.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
@@ -12,7 +12,8 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(120);
 /// Start of the line that `greylag demo` prints when a flight is complete.
 const COMPLETE: &str = "report: ";
 
-/// A flight in a process of its own, which ends with this program because its standard input is closed then.
+/// A flight in a separate process, which ends with this program because its standard input is
+/// closed then.
 pub struct Program {
     child: Child,
     input: Option<ChildStdin>,
@@ -82,7 +83,7 @@ impl Drop for Program {
     }
 }
 
-/// Collects the last [`LINES`] lines of `from` in `output`, on a thread of its own.
+/// Collects the last [`LINES`] lines of `from` in `output`, on a separate thread.
 fn listen(from: Option<impl Read + Send + 'static>, output: &Arc<Mutex<Vec<String>>>) {
     let (Some(from), output) = (from, output.clone()) else { return };
     std::thread::spawn(move || {

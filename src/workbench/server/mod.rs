@@ -84,7 +84,7 @@ pub fn serve(
     })
 }
 
-/// A token that nobody guesses, hexadecimal.
+/// A random token, hexadecimal.
 ///
 /// # Errors
 /// The system has no random numbers.

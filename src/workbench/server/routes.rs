@@ -39,7 +39,7 @@ impl IntoResponse for WorkbenchError {
     }
 }
 
-/// Works on a thread of its own, so that other requests are answered meanwhile.
+/// Runs the work on a separate thread, so that other requests are answered meanwhile.
 async fn aside<T: Serialize + Send + 'static>(
     shared: Shared,
     work: impl FnOnce(&Arc<Bench>) -> Result<T, WorkbenchError> + Send + 'static,

@@ -13,7 +13,7 @@ pub(super) struct Names {
     pub read: Vec<String>,
 }
 
-/// JSBSim's own names, which need not stand in a file to be read by it.
+/// JSBSim's built-in properties, which exist without an entry in a file.
 const USUAL: [&str; 3] = ["fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm"];
 
 impl Names {

@@ -24,7 +24,7 @@ pub enum ArdupilotEvent {
     },
     /// The frame count has gone back: the aircraft is at its start again.
     Restarted,
-    /// The catapult has been let go.
+    /// The catapult has been released.
     Catapult,
     /// No servo packet for a second.
     Stopped,

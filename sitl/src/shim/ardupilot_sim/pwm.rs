@@ -15,7 +15,7 @@ pub struct PwmRange {
     high_us: u16,
 }
 
-/// A channel of its own range, or all of them; written as `3=1100:1500:1900` or `1000:1500:2000`.
+/// Range of one channel, or of all; written as `3=1100:1500:1900` or `1000:1500:2000`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelRange {
     /// The channel, from 1; `None` for all that have no range of their own.

@@ -29,7 +29,7 @@ impl Writer {
     }
 }
 
-/// A payload that is being read; what lies beyond its end reads as zero.
+/// A payload that is being read; bytes beyond its end read as zero.
 #[derive(Debug)]
 pub struct Reader<'a> {
     rest: &'a [u8],

@@ -1,4 +1,4 @@
-//! The parameter server of the played stacks: a small table of what bears on a companion.
+//! The parameter server of the simulated stacks: a small table of what concerns a companion.
 
 use super::Personality;
 use crate::shim::codec::{Encoder, ParamRequestRead, ParamSet, ParamValue};

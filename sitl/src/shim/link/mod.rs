@@ -142,7 +142,7 @@ impl Link {
         }
     }
 
-    /// Sends one batch of whole frames; `false` when there is nobody or no room for it.
+    /// Sends one batch of whole frames; `false` without a peer or without room for it.
     pub fn send(&mut self, bytes: &[u8]) -> bool {
         match self {
             Link::Udp(link) => link.send(bytes),

@@ -18,7 +18,7 @@ const CONNECT: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 enum Source {
     Listener(TcpListener),
-    /// Connects in a thread of its own, so that a slow network costs no cycle.
+    /// Connects in a separate thread, so that a slow network costs no cycle.
     Connector {
         to: SocketAddr,
         attempt: Option<Receiver<io::Result<TcpStream>>>,

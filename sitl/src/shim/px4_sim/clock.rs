@@ -2,7 +2,7 @@
 
 use super::{FIRST_US, STEP_US};
 
-/// How the controller's clock stands to the simulated one.
+/// Relation of the controller's clock to simulated time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Clock {
     /// No message has arrived yet.

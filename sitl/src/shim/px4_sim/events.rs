@@ -18,9 +18,9 @@ pub enum Px4Event {
     Lockstep,
     /// The client's times are of another clock: its messages are counted instead.
     ForeignClock,
-    /// The catapult has been let go.
+    /// The catapult has been released.
     Catapult,
-    /// Lockstep: no answer for a second; simulated time stands still.
+    /// Lockstep: no answer for a second; simulated time is stopped.
     Stopped,
     /// Lockstep: the answer has come after all.
     Resumed,

@@ -36,7 +36,7 @@ use sensors::Sensors;
 pub const STEP_US: u64 = 4_000;
 /// Simulated time of the first step, µs; not 0, see the clock's judgement of an answer.
 pub const FIRST_US: u64 = 1_000_000_000;
-/// HIL_GPS comes every so many steps: 10 Hz.
+/// HIL_GPS is sent every this many steps: 10 Hz.
 const GPS_EVERY: u64 = 25;
 const STEP: Duration = Duration::from_micros(STEP_US);
 /// After this silence it is reported.

@@ -29,7 +29,7 @@ const INERTIAL: u32 = 0x0007 | 0x0038;
 const MAGNETIC: u32 = 0x01C0;
 const DIFFERENTIAL: u32 = 0x0400;
 const BAROMETRIC: u32 = 0x0200 | 0x0800 | 0x1000;
-/// The latter come every so many steps: 50 Hz.
+/// Period of the slow sensors in steps: 50 Hz.
 pub const SLOW_EVERY: u64 = 5;
 
 /// Standard deviations of white noise, one draw a message.

@@ -22,7 +22,7 @@ use crate::model::residual::hash;
 use crate::sim::imagined::Imagination;
 use crate::sim::world::World;
 
-/// The file that a training goes on from.
+/// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 /// Largest share of lost imagined episodes without a warning.
 const MANY: f64 = 0.2;
