@@ -27,8 +27,8 @@ impl Write for LogOnce {
 }
 
 fn is_new(line: &[u8]) -> bool {
-    let Ok(mut said) = PRINTED.lock() else { return true };
-    said.len() >= REMEMBERED || said.insert(line.to_owned())
+    let Ok(mut printed) = PRINTED.lock() else { return true };
+    printed.len() >= REMEMBERED || printed.insert(line.to_owned())
 }
 
 #[cfg(test)]

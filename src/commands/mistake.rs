@@ -67,7 +67,7 @@ mod tests {
         let text_of = |kind: ErrorKind, code: i32, text: &str| {
             let system = io::Error::from_raw_os_error(code);
             assert_eq!(system.kind(), kind);
-            text(&anyhow::Error::new(system).context(text.to_owned()))
+            super::text(&anyhow::Error::new(system).context(text.to_owned()))
         };
         // ENOSPC, EACCES, ENOENT
         let full = text_of(

@@ -35,7 +35,7 @@ const LOG: &str = "flight.csv";
 /// Time between two looks at the recording.
 const LOOK: Duration = Duration::from_millis(100);
 /// Characters that are kept of a program's last line.
-const SAID: usize = 400;
+const LINE_LENGTH: usize = 400;
 
 /// The flight that is flown or watched, or that was last.
 pub struct Flying {
@@ -244,7 +244,7 @@ impl Bench {
             let place = flying.place;
             let flown = &mut inner.session.flown[place];
             (flown.outcome, flown.seconds, flown.warnings) = (outcome, seconds, warnings);
-            flown.said = last.chars().take(SAID).collect();
+            flown.said = last.chars().take(LINE_LENGTH).collect();
         });
         if let Err(error) = recorded {
             tracing::warn!("the flight's end is not in the session: {error}");
