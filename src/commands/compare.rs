@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Horizons of the free runs, s.
     #[arg(long = "horizon", value_delimiter = ',', default_values_t = [1.0, 2.0, 5.0, 10.0])]
     horizons: Vec<f64>,
-    /// Write everything that was found as JSON; `-` for standard output, with nothing else on it.
+    /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Write the report, one HTML page.
@@ -48,8 +48,9 @@ pub struct Arguments {
     /// of the prediction by the errors of the other runs.
     #[arg(long, value_name = "CSV")]
     predictions: Option<PathBuf>,
-    /// Take the deflections at the times that the log has for them, as `diagnose`, `amend` and the workbench do;
-    /// without it a delay of the log's actuator clock that is beyond doubt is put right.
+    /// Take the deflections at the log's own times for them, as `diagnose`, `amend` and the
+    /// workbench do; without this option, a delay of the log's actuator clock is corrected if it is
+    /// certain.
     #[arg(long)]
     recorded_clock: bool,
     /// Seed of the bootstrap intervals.

@@ -23,7 +23,8 @@ pub struct Arguments {
     /// The two effects: ids of the catalogue, or effect files (TOML).
     #[arg(long, value_name = "ID|FILE", num_args = 2, required = true)]
     between: Vec<String>,
-    /// Values of an effect's constants, in its own order, in place of typical ones (may be repeated).
+    /// Values of an effect's constants, in the effect's order, in place of typical ones (may be
+    /// repeated).
     #[arg(long, value_name = "ID=V,V…", allow_hyphen_values = true)]
     values: Vec<String>,
     /// Write the schedule, for `greylag fly --schedule`.

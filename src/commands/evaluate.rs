@@ -95,11 +95,11 @@ pub struct Arguments {
     plant: PlantArgs,
     #[command(flatten)]
     start: StartArguments,
-    /// Write the scores as JSON; `-` for standard output, with nothing else there.
+    /// Write the scores as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write what happened on the way, the scores beside the paper's, single flights and what the planners saw as an HTML
-    /// page.
+    /// Write the transients, the scores beside the paper's, single flights and the planners'
+    /// rollouts as an HTML page.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
     /// Replace the JSON file and the page if they exist.

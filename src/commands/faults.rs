@@ -55,7 +55,7 @@ pub struct Arguments {
         conflicts_with = "resume"
     )]
     model: PathBuf,
-    /// What is at the other end of the vehicle's link.
+    /// Flight controller or simulator at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_parser = counterparts())]
     counterpart: Vec<Counterpart>,
     /// Show the faults and the messages of each flight with a finding.

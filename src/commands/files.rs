@@ -32,7 +32,7 @@ pub fn is_stdout(path: Option<&Path>) -> bool {
 /// `--json` of a command.
 #[derive(clap::Args, Clone, Debug)]
 pub struct JsonArgument {
-    /// Write what was found as JSON; `-` for standard output, with nothing else there.
+    /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

@@ -45,26 +45,28 @@ pub struct Arguments {
     /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT, or serial:DEVICE:BAUD.
     #[arg(long, value_name = "ADDRESS", default_value = "udpin:127.0.0.1:14600")]
     vehicle: Address,
-    /// What flies at the other end of the vehicle's link.
+    /// Flight controller or simulator at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", default_value = "sitl", value_enum)]
     profile: ProfileName,
-    /// What a real flight controller is commanded: surfaces (MANUAL), or attitude (OFFBOARD, GUIDED).
+    /// Commanded quantity of a real flight controller: surfaces (MANUAL), or attitude (OFFBOARD,
+    /// GUIDED).
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
     /// Link to clients; may be given several times. One that other machines reach needs --sign, or --insecure.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:127.0.0.1:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
-    /// Sign what is sent to clients, and refuse what is not signed, with the key in this file: 64
-    /// hexadecimal digits, readable by its owner alone.
+    /// Sign messages to clients and refuse unsigned ones, with the key in this file: 64 hexadecimal
+    /// digits, readable by its owner only.
     #[arg(long, value_name = "FILE")]
     sign: Option<PathBuf>,
     /// Sign the vehicle's link as well.
     #[arg(long, requires = "sign")]
     sign_vehicle: bool,
-    /// A further link to clients, declared local: nothing is signed on it; may be given several times.
+    /// A further link to clients, declared local: messages on it are not signed; may be given
+    /// several times.
     #[arg(long, value_name = "ADDRESS", requires = "sign")]
     local: Vec<Address>,
-    /// Let whoever reaches an unsigned link steer the aircraft, from other machines too.
+    /// Let anybody who reaches an unsigned link steer the aircraft, from other machines too.
     #[arg(long)]
     insecure: bool,
     /// Controller that flies the aircraft.

@@ -68,10 +68,10 @@ struct Check {
     /// Model of the aircraft, for the actuators of its airframe.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// What it shall be commanded.
+    /// Quantity that shall be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Controller whose share of the delay is judged, by surfaces.
+    /// Controller whose delay margin is checked, when surfaces are commanded.
     #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: ControllerKind,
     /// How long to measure.

@@ -30,7 +30,8 @@ const SCHEMA: &str = "greylag.mystery/1";
 /// Options of `greylag mystery`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// What everything is drawn from: the effect, the flights, the wind, the errors of model and sensors.
+    /// Seed of all random draws: the effect, the flights, the wind, the errors of model and
+    /// sensors.
     #[arg(long, required_unless_present = "open")]
     seed: Option<u64>,
     /// New folder for the logs, the model and the sealed answer.
@@ -46,7 +47,8 @@ pub struct Arguments {
     /// Name of the simulator's aircraft that the model is of [default: x8].
     #[arg(long, value_name = "NAME", requires = "model")]
     aircraft: Option<String>,
-    /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with all there are.
+    /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with a list of
+    /// all.
     #[arg(long, value_name = "ID", group = "what")]
     effect: Option<String>,
     /// Hide the effect of this file, with the values that the file has.

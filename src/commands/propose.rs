@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Write the effect file, which `greylag amend --effect` takes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write everything that was found as JSON; `-` for standard output, with nothing else there.
+    /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.

@@ -55,10 +55,10 @@ pub struct FlownArguments {
     /// Schedule that was flown [default: as recorded].
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
-    /// What was at the other end of the vehicle's link [default: as recorded, else sitl].
+    /// Profile of the vehicle's link [default: as recorded, else sitl].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
-    /// What a real flight controller was commanded [default: as recorded, else surfaces].
+    /// Commanded quantity of a real flight controller [default: as recorded, else surfaces].
     #[arg(long, value_name = "WHAT", value_enum)]
     command: Option<CommandName>,
 }

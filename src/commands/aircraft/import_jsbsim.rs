@@ -30,8 +30,8 @@ pub struct Jsbsim {
     /// Altitude at which it is taken, above mean sea level.
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
-    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does; without any, commands and surfaces of
-    /// their own names are found by trying all. NAME may be -NAME*SCALE,NAME,….
+    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does; without any,
+    /// unusual commands and surfaces are found by trying all. NAME may be -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
     /// Hold a property at a value (may be repeated), for example flaps. The airframe file keeps it.

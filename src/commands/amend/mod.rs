@@ -63,11 +63,12 @@ pub struct Arguments {
     /// Add nothing: fit the model's own coefficients.
     #[arg(long, group = "what", conflicts_with_all = ["accept", "diagnosis", "effects"])]
     tune_only: bool,
-    /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and take
-    /// those that the flights bear out, the atmosphere unless they deny it.
+    /// Also try the model's other conventions (integrator, axes of the forces, the standard
+    /// atmosphere), and adopt those that the flights support, the atmosphere unless they contradict
+    /// it.
     #[arg(long)]
     conventions: bool,
-    /// Take nothing from the model's coefficients but what is physically possible: all that it is linear in are free,
+    /// Use only physical bounds as prior: all coefficients in which the model is linear are free,
     /// zeros too. For a model whose numbers are guesses.
     #[arg(long)]
     from_scratch: bool,
@@ -88,7 +89,8 @@ pub struct Arguments {
     /// these within one standard error of the best.
     #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
     leave_one_out: bool,
-    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; made if there is none.
+    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if
+    /// missing.
     #[arg(long)]
     out: PathBuf,
     /// Write the report, one HTML page.

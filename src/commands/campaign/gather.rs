@@ -21,10 +21,11 @@ pub struct Arguments {
     /// Write the results as JSON lines: the same cells give the same file to the bit.
     #[arg(long, value_name = "FILE.jsonl")]
     results: Option<PathBuf>,
-    /// Write what each cell took, when, and on which processor.
+    /// Write the duration, date and processor of each cell.
     #[arg(long, value_name = "FILE.jsonl")]
     times: Option<PathBuf>,
-    /// Take the results of other machines for the cells that are not done here: files that `--results` wrote there.
+    /// Take the results of other machines for the cells that are not done here: files that
+    /// `--results` wrote on them.
     #[arg(long, value_name = "FILE.jsonl", num_args = 1..)]
     join: Vec<PathBuf>,
     /// Replace the files if they exist.

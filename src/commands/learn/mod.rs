@@ -39,9 +39,9 @@ pub struct Arguments {
     /// The prior: a model file that may be wrong.
     #[arg(long, value_name = "FILE", required_unless_present = "earlier")]
     prior: Option<PathBuf>,
-    /// Go on from what was learned before, with recent flights (--log): the folder of a learning, or of a model with its
-    /// policy, such as params/x8/learned. Its flights are learned from again if they are there, and its policy is trained
-    /// further; nothing in it is changed.
+    /// Continue an earlier learning with recent flights (--log): the folder of a learning, or of a
+    /// model with its policy, such as params/x8/learned. Its flights are used again if they exist,
+    /// and its policy is trained further; the folder is not changed.
     #[arg(long = "continue", value_name = "DIR", requires = "logs", conflicts_with_all = ["prior", "collect", "algorithm"])]
     earlier: Option<PathBuf>,
     /// With --continue: part of all samples that the recent flights make up; 1 forgets the earlier ones.
@@ -68,7 +68,7 @@ pub struct Arguments {
     /// Coefficients of the prior that are learned with the residual: full names, `all`, or `none`.
     #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "all", value_name = "NAME")]
     trainable: Vec<String>,
-    /// With --log: take nothing from the widths of the prior's coefficients, for a prior whose numbers are guesses.
+    /// With --log: ignore the widths of the prior's coefficients, for a prior whose numbers are guesses.
     #[arg(long, conflicts_with = "collect")]
     from_scratch: bool,
     /// Seed of all random draws.

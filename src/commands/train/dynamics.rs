@@ -43,8 +43,7 @@ pub struct Arguments {
     prior: PathBuf,
     #[command(flatten)]
     flights: FlightArguments,
-    /// A model whose coefficients are the true ones, where they are known: to be shown beside the
-    /// learned ones.
+    /// A model with the true coefficients, where they are known: displayed beside the learned ones.
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Leave the prior's coefficients as they are (the default).

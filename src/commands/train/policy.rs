@@ -113,7 +113,7 @@ pub struct Arguments {
     /// randomisation); 0: the model itself. The critics are those of the model itself.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4096))]
     draws: u64,
-    /// Steps between two evaluations, flown in what it is trained in.
+    /// Steps between two evaluations, flown in the training's simulation.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluate: u64,
     /// Steps between two checkpoints.
