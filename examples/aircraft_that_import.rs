@@ -24,7 +24,7 @@ use greylag_sitl::plant::{PlantOptions, Start};
 
 /// Where the aircraft are imported and flown, m.
 const ALTITUDE_M: f64 = 1000.0;
-/// Lift coefficient there.
+/// Lift coefficient in the flight.
 const LIFT: f64 = 0.4;
 /// 20 s in which surfaces and throttle move for the first 15: for as long as the attitude is not judged.
 const FLIGHT: Flight = Flight {

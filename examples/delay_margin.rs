@@ -30,7 +30,7 @@ const SECOND: usize = 1000;
 const SLEW: f64 = 0.2;
 /// Swing of a rate, from peak to peak over the last two seconds, that counts as unstable, rad/s.
 const SWING: f64 = 0.17;
-/// Delays tried, ms.
+/// Step of the delays, ms, and the longest delay below.
 const STEP_MS: usize = 2;
 const LONGEST_MS: usize = 200;
 
@@ -41,7 +41,7 @@ enum Axis {
     Roll,
 }
 
-/// What lies between state and surface beside the delay.
+/// Element between state and surface besides the delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Between {
     Direct,
@@ -146,7 +146,7 @@ struct Flight {
     path: Between,
     axis: Axis,
     pulse: f64,
-    /// What is on its way to the late surface.
+    /// Commands on their way to the delayed surface.
     late: VecDeque<f64>,
 }
 

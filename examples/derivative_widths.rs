@@ -14,7 +14,7 @@ use greylag::model::derivatives::widths::Tool;
 use greylag::model::derivatives::{Beside, read, reference};
 use greylag::model::textbook::{Measures, Tail};
 
-/// What may go wrong: a file, a number.
+/// Result whose error may be one of a file or a number.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// How many aircraft a guess counts as.
@@ -108,7 +108,7 @@ fn widths(guesses: &[Row], errors: &BTreeMap<(&str, &str), Vec<f64>>) -> Result<
     Ok(out)
 }
 
-/// What textbook, tools and the authors' own runs say.
+/// Values from the textbook, from tools and from the authors' own runs.
 fn computed(root: &Path) -> Result<Computed> {
     let mut all = Computed::new();
     for row in table(&root.join("params/widths/computed.csv"))? {

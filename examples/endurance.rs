@@ -33,7 +33,7 @@ use greylag_sitl::shim::bench::Bench;
 use greylag_sitl::shim::controller::FlightController;
 use greylag_sitl::shim::{self, Launch, Noise, Personality, ShimOptions};
 
-/// u32 milliseconds, s.
+/// Period of a 32-bit counter of milliseconds, s.
 const WRAP_S: f64 = 4_294_967.296;
 /// Between two legs, s.
 const LEG_S: u64 = 30;
@@ -41,7 +41,7 @@ const LEG_S: u64 = 30;
 const LEGS: [(f64, f64); 4] = [(0.0, 2.0), (35.0, 5.0), (0.0, 2.0), (-35.0, 0.0)];
 /// Growth of memory that is still flat, bytes: pages that a heap spreads over.
 const FLAT: u64 = 2 << 20;
-/// The message that tells the altitude, in its third word, m.
+/// VFR_HUD, which holds the altitude in its third word, m.
 const VFR_HUD: u32 = 74;
 /// Altitude bounds: outside them the pitch of the legs is corrected, m.
 const ALTITUDE_M: (f64, f64) = (300.0, 900.0);
@@ -65,7 +65,7 @@ fn main() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Resident memory, bytes.
+/// Resident memory of this process, bytes.
 fn resident() -> Result<u64> {
     let text = std::fs::read_to_string("/proc/self/status").context("reading the memory's size")?;
     let line = text.lines().find(|line| line.starts_with("VmRSS")).context("no VmRSS")?;
@@ -101,11 +101,11 @@ impl Aircraft {
     fn fly(&mut self, heard: &[u8]) -> Result<()> {
         let over = match self {
             Aircraft::Sitl(bench) => {
-                bench.hear(heard);
+                bench.receive(heard);
                 bench.fly()?
             }
             Aircraft::Real(controller) => {
-                controller.hear(heard);
+                controller.receive(heard);
                 controller.fly()?
             }
         };

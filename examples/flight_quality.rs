@@ -84,7 +84,7 @@ fn options() -> Result<Options> {
     Ok(o)
 }
 
-/// What is measured of one flight to one target.
+/// Measures of one flight to one target.
 #[derive(Clone, Copy, Debug, Default)]
 struct Measures {
     settled: f64,

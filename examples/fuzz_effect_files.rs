@@ -1,4 +1,4 @@
-//! Reads broken effect files, a million or as many as are asked for, and says what became of them.
+//! Reads broken effect files, a million or as many as are asked for, and prints how they were refused.
 //!
 //! `cargo run --release --ignore-rust-version --no-default-features --example fuzz_effect_files -- 1000000 1`
 

@@ -55,7 +55,7 @@ const AGREEMENT_DEG: f64 = 0.05;
 /// Least ratio of lockstep to real time.
 const SPEED: f64 = 20.0;
 
-/// What a flight came to.
+/// Results of a flight.
 struct Flown {
     samples: Vec<Sample>,
     companion: Summary,
@@ -65,7 +65,7 @@ struct Flown {
 /// Real-time figures through MAVLink.
 #[derive(Parser)]
 struct Arguments {
-    /// Controller that flies.
+    /// Controller that flies the aircraft.
     #[arg(long, default_value = "lqi")]
     controller: ControllerKind,
     /// Settings of a planner in other than their usual size.
@@ -113,7 +113,7 @@ fn told([early, late]: [f64; 2]) -> String {
     format!("{early:.4} deg after 10 s, {late:.4} at the end")
 }
 
-/// What is wanted of the flight in real time, and whether it was reached.
+/// Requirements on the flight in real time, and whether they were met.
 fn real_time(
     real: &Flown,
     kind: ControllerKind,
@@ -178,7 +178,7 @@ impl Drop for Busy {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // a thread that only loops has nothing to tell
+            // a thread that only loops is of no interest
             let _ = thread.join();
         }
     }

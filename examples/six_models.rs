@@ -58,7 +58,7 @@ struct Arguments {
     /// Held-out flights of each kind.
     #[arg(long, default_value_t = 24)]
     held_out: usize,
-    /// Seed of everything.
+    /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }

@@ -1,4 +1,4 @@
-//! The program `greylag`.
+//! Entry point of the program `greylag`.
 
 use std::process::ExitCode;
 

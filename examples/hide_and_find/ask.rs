@@ -13,7 +13,7 @@ use crate::record::Record;
 /// Candidates that are kept of a diagnosis.
 const KEPT: usize = 10;
 
-/// What the diagnosis says.
+/// Answer of the diagnosis.
 pub struct Answer {
     said: Diagnosis,
     /// Values of the asserted effects' coefficients, in their own order.
@@ -81,8 +81,8 @@ fn seldom(said: &Diagnosis) -> Vec<String> {
     ids
 }
 
-/// Amplitude as a multiple of what the diagnosis says that these flights would have shown, the smaller one of a
-/// pair; as it was wanted where the diagnosis does not say.
+/// Amplitude as a multiple of the minimum detectable one by the diagnosis, the smaller one of a
+/// pair; as requested where the diagnosis has none.
 fn reached(record: &Record) -> f64 {
     let truth = record.truth.iter().zip(&record.amplitudes);
     let multiples = truth.filter_map(|(id, amplitude)| {

@@ -16,7 +16,7 @@ pub const FACTORS: [f64; 3] = [1.0, 2.0, 5.0];
 /// Amplitude of both effects of a pair, and of one that the catalogue lacks, likewise.
 const CLEAR: f64 = 5.0;
 /// Share of the largest clear amplitude that is taken for the minimum detectable one as long as no
-/// null has said what it is.
+/// null has shown it.
 const ASSUMED: f64 = 0.1;
 
 /// One case.
@@ -24,7 +24,7 @@ const ASSUMED: f64 = 0.1;
 pub struct Case {
     /// `nulls`, `installed`, `probes`, `effects`, `without` or `pairs`.
     pub part: &'static str,
-    /// What is missing.
+    /// Effects that the model lacks.
     pub missing: Vec<Missing>,
     /// Amplitude as a multiple of the minimum detectable one, as wanted; 0 for nulls.
     pub factor: f64,
@@ -32,12 +32,12 @@ pub struct Case {
     pub reached: f64,
     /// Ids that the catalogue is robbed of.
     pub without: Vec<String>,
-    /// What everything is drawn from.
+    /// Seed of all random draws of the case.
     pub seed: u64,
 }
 
 impl Case {
-    /// Its name in the results.
+    /// Name of the case in the results.
     pub fn key(&self) -> String {
         let ids: Vec<&str> = self.missing.iter().map(|m| m.id).collect();
         format!("{}/{}/x{}/{}", self.part, ids.join("+"), self.factor, self.seed)
@@ -59,7 +59,7 @@ impl Case {
 pub struct Seen(BTreeMap<String, f64>, Craft);
 
 impl Seen {
-    /// What the nulls and probes among `records` say.
+    /// Median minimum detectable amplitudes of the nulls and probes among `records`.
     pub fn of(records: &[Record], craft: &Craft) -> Seen {
         let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         for record in records.iter().filter(|r| r.part == "nulls" || r.part == "probes") {
@@ -122,7 +122,7 @@ pub fn installed(seeds: Range<u64>) -> Vec<Case> {
     seeds.map(|seed| nothing("installed", seed, None)).collect()
 }
 
-/// Flights that tell how much of `drag_beta2` could have been seen. They are no nulls: the part of it that
+/// Flights that show how much of `drag_beta2` is detectable. They are no nulls: the part of it that
 /// goes with |β| cannot be taken from the aircraft.
 pub fn probes(craft: &Craft, seeds: Range<u64>) -> Vec<Case> {
     let absent = || Missing::new(craft, "drag_beta2", 0.0).ok();

@@ -40,16 +40,16 @@ const PROBES: u64 = 8;
 /// Hides effects in JSBSim, looks for them, and prints the table.
 #[derive(Parser)]
 struct Arguments {
-    /// Which part of the campaign.
+    /// Part of the campaign to run.
     #[arg(long, value_enum, default_value = "all")]
     part: Part,
     /// Seeds of the cases, as FIRST..LAST (the last one not included).
     #[arg(long, value_parser = seeds, default_value = "1000..1005")]
     seeds: (u64, u64),
-    /// Null flights.
+    /// Number of null flights.
     #[arg(long, default_value_t = 100)]
     nulls: u64,
-    /// Seed of the first null flight and of the first that tells what could have been seen.
+    /// Seed of the first null flight and of the first probe flight.
     #[arg(long, default_value_t = 0)]
     null_seed: u64,
     /// Amplitudes of single effects, as multiples of the minimum detectable one.
@@ -64,7 +64,7 @@ struct Arguments {
     /// The simulator's aircraft, built in.
     #[arg(long, default_value = "x8")]
     aircraft: String,
-    /// Only these effects.
+    /// Only these effects, by their ids.
     #[arg(long, num_args = 1..)]
     effects: Vec<String>,
     /// One line of JSON a case; cases that are in it are not done again.

@@ -1,4 +1,4 @@
-//! What is kept of a case: one line of JSON.
+//! Record of a case: one line of JSON.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,20 +11,20 @@ use crate::cases::Case;
 /// A parameter of an asserted true effect, after the fit.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Found {
-    /// `effect.coefficient`.
+    /// Full name `effect.coefficient` of the parameter.
     pub name: String,
-    /// The hidden value.
+    /// Value that was hidden.
     pub truth: f64,
-    /// The fitted one.
+    /// Value that was fitted.
     pub value: f64,
-    /// Its 95 % interval.
+    /// 95 % interval of the fitted value.
     pub ci95: [f64; 2],
 }
 
 /// Free-run errors over 5 s on held-out flights, scaled by x_c.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub struct HeldOut {
-    /// Of the tuned prior.
+    /// Error of the tuned prior.
     pub tuned: f64,
     /// With what was asserted.
     pub amended: f64,
@@ -35,26 +35,26 @@ pub struct HeldOut {
 /// Seconds that the steps of a case took.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize)]
 pub struct Seconds {
-    /// Flying, logging, reconstructing.
+    /// Time of flying, logging and reconstructing.
     pub flights: f64,
-    /// The diagnosis.
+    /// Time of the diagnosis.
     pub diagnose: f64,
-    /// The fits.
+    /// Time of the fits.
     pub amend: f64,
 }
 
 /// A case with what came of it.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct Record {
-    /// The case's name.
+    /// Name of the case.
     pub key: String,
     /// `nulls`, `probes`, `effects`, `without` or `pairs`.
     pub part: String,
-    /// What was missing.
+    /// Ids of the effects that the model lacked.
     pub truth: Vec<String>,
     /// How much of it.
     pub amplitudes: Vec<f64>,
-    /// The same as a multiple of the median minimum detectable amplitude of the nulls, as wanted.
+    /// Amplitude as a multiple of the median minimum detectable one of the nulls, as requested.
     pub factor: f64,
     /// And as a multiple of what the case's own flights would have shown; of a pair, the smaller one.
     pub reached: f64,
@@ -66,7 +66,7 @@ pub struct Record {
     pub ranked: Vec<String>,
     /// Those that it asserts.
     pub asserted: Vec<String>,
-    /// What is wrong with the instruments' installation, if something is.
+    /// Error of the instruments' installation, if there is one.
     #[serde(default)]
     pub installed: Option<String>,
     /// Errors of the instruments that the diagnosis asserts, beyond biases, wind and clocks within a sample.
@@ -99,7 +99,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// What is known before the search.
+    /// A record with what is known before the search.
     pub fn of(case: &Case) -> Record {
         Record {
             key: case.key(),
@@ -123,7 +123,7 @@ impl Record {
         self.asserted.iter().any(|a| a == id || self.is_alike(a, id))
     }
 
-    /// Whether the diagnosis says that `other` cannot be distinguished from `id`.
+    /// Whether the diagnosis finds `other` indistinguishable from `id`.
     pub fn is_alike(&self, id: &str, other: &str) -> bool {
         self.alike.get(id).is_some_and(|alike| alike.iter().any(|a| a == other))
     }

@@ -30,7 +30,7 @@ const SLOWEST: f64 = 5.0;
 /// Values of effects' coefficients by the effects' ids.
 type Starts = BTreeMap<String, Vec<f64>>;
 
-/// What all cases share.
+/// State shared by all cases.
 pub struct Bench {
     /// The model that flies as the simulator does: its file with its text.
     path: PathBuf,
@@ -38,11 +38,11 @@ pub struct Bench {
     craft: Craft,
     subject: Subject,
     controller: Box<dyn Controller>,
-    /// Simulated nulls of each diagnosis; as many as usual if none is said.
+    /// Number of simulated nulls of each diagnosis; `None` is the usual number.
     nulls: Option<usize>,
 }
 
-/// A flown case.
+/// The flights of a case.
 pub struct Flown {
     /// The model to start from.
     pub model: GreyBox,

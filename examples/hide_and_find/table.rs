@@ -69,7 +69,7 @@ fn two(values: impl Iterator<Item = f64>, other: f64, unit: f64, places: usize) 
 
 fn summary(records: &[Record]) -> Table {
     // a case without an answer is not left out: it counts as not found; one whose effect its flights hardly
-    // show is, by what the diagnosis itself says that they would show
+    // show is, by the diagnosis' own minimum detectable amplitude
     let part = |name: &'static str| move |r: &&Record| r.part == name;
     let effects: Vec<&Record> = records.iter().filter(part("effects")).collect();
     let visible = |r: &&Record| r.reached >= EXPECTED;
@@ -214,7 +214,7 @@ fn near(r: &Record) -> bool {
         || r.ranked.first().is_some_and(|first| r.is_alike(first, truth))
 }
 
-/// Whether anything is asserted that is neither true nor said to be indistinguishable from it.
+/// Whether anything is asserted that is neither true nor reported as indistinguishable from it.
 fn wrong(r: &Record) -> bool {
     let is =
         |id: &String| r.truth.contains(id) || r.truth.iter().any(|truth| r.is_alike(id, truth));
@@ -274,7 +274,7 @@ fn by_effect(records: &[Record]) -> Table {
     table
 }
 
-/// What is ranked first in its place, with how often.
+/// Effects that are ranked first in its place, with their counts.
 fn mistaken<'a>(records: impl Iterator<Item = &'a Record>, id: &str) -> String {
     let mut others: Vec<(String, usize)> = Vec::new();
     for other in records.filter_map(|r| r.ranked.first()).filter(|other| *other != id) {

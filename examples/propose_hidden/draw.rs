@@ -30,15 +30,15 @@ pub const CHANNELS: [(&str, &str, f64); 6] = [
     ("yaw", "qbar*S*b", 0.002),
 ];
 
-/// A hidden effect.
+/// An effect that is hidden in the aircraft.
 pub struct Drawn {
-    /// The effect.
+    /// The effect as written.
     pub effect: &'static Written,
-    /// Its channel.
+    /// Channel on which it acts.
     pub channel: &'static str,
-    /// Its variables, in the order of their names.
+    /// Variables of the formula, in the order of their names.
     pub variables: Vec<&'static str>,
-    /// Its shape.
+    /// Shape of the formula.
     pub shape: String,
 }
 

@@ -1,4 +1,4 @@
-//! What a proposal is held against: the effect that was hidden.
+//! Comparison of a proposal with the effect that was hidden.
 
 use greylag::sysid::diagnose::{Proposal, trend};
 
@@ -45,7 +45,7 @@ fn same_form(found: &str, hidden: &str) -> bool {
         && numbers.iter().zip(&thresholds).all(near)
 }
 
-/// What a proposal says of a hidden effect, as JSON.
+/// Comparison of a proposal with a hidden effect, as JSON.
 pub fn judged(p: &Proposal, hidden: Option<&Drawn>) -> serde_json::Value {
     let chosen = p.front.iter().find(|r| r.chosen).map(|r| r.formula.as_str());
     let first = chosen.and_then(|_| p.front.first()).map(|r| r.formula.as_str());

@@ -1,4 +1,4 @@
-//! What has nothing beside it: TD3's updates, imagination, policies, the processor's peak.
+//! Timings without a counterpart: TD3's updates, imagination, policies, the processor's peak.
 
 use std::path::Path;
 use std::sync::Arc;

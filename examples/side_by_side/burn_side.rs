@@ -35,7 +35,7 @@ pub fn rollouts(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> {
     }
 }
 
-/// Plans in tensors.
+/// Scores plans in tensors.
 struct Scorer {
     model: InBurn,
     actor: Mlp,

@@ -32,9 +32,9 @@ use torch::Torch;
 /// Calls that were timed, and what the last of them came to.
 #[derive(Clone, Debug, Default, serde::Deserialize)]
 pub struct Timed {
-    /// What each call, or the mean of some, took.
+    /// Time of each call, or of the mean of some, s.
     pub seconds: Vec<f64>,
-    /// What the last one computed.
+    /// Result of the last call.
     pub value: f64,
 }
 
@@ -43,7 +43,7 @@ struct Method<'a> {
     name: &'static str,
     /// How many times our time it is asked to take at least.
     asked: Option<f64>,
-    /// What it is to come to, to a thousandth.
+    /// Expected result, to a thousandth.
     expected: Option<f64>,
     /// Makes a number of calls.
     run: Box<dyn FnMut(usize) -> Result<Timed> + 'a>,
@@ -93,7 +93,7 @@ fn compare(task: &str, [rounds, calls]: [usize; 2], mut methods: Vec<Method>) ->
     Ok(())
 }
 
-/// Our training step.
+/// Training step of Greylag.
 fn train(problem: &Rollouts) -> impl FnMut(usize) -> Result<Timed> + '_ {
     let subject = Subject {
         scales: problem.scales(),

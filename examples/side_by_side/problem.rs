@@ -49,7 +49,7 @@ pub struct Scoring {
     pub actions: Vec<Vec<[f32; ACTIONS]>>,
 }
 
-/// The true prior.
+/// The prior of the X8 as shipped.
 pub fn prior() -> Result<GreyBox> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8");
     Ok(GreyBox::load(&folder.join("prior.toml"))?)
@@ -230,7 +230,7 @@ impl Scoring {
         self.model.atmosphere.density_at(self.seen.altitude)
     }
 
-    /// For PyTorch.
+    /// The problem as JSON, for PyTorch.
     pub fn told(&self) -> Value {
         let (figures, task) = (&self.model.airframe.actuators, Task::PAPER);
         let [one, two] = self.critics();
@@ -258,7 +258,7 @@ impl Scoring {
     }
 }
 
-/// Everything, for PyTorch.
+/// Both problems as JSON, for PyTorch.
 pub fn told(rollouts: &Rollouts, scorings: &[Scoring]) -> Value {
     let settings = Hyperparameters::default();
     let scorings: serde_json::Map<_, _> =

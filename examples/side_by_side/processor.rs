@@ -1,4 +1,4 @@
-//! What the processor could do at best, and what the prior asks of it.
+//! Peak performance of the processor, and the operations of the prior.
 
 use std::cell::Cell;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -24,7 +24,7 @@ pub fn peak() -> f64 {
     best(&|| chains::<Base<BASE_FUSED>, 3>())
 }
 
-/// The same in vectors of four, as NEON has: multiplications with additions where none is fused.
+/// Peak in vectors of four, as NEON has: multiplications with additions where none is fused.
 pub fn narrow_peak() -> f64 {
     let run = chains::<Base<BASE_FUSED>, 3>;
     (0..20).map(|_| run()).fold(0.0, f64::max)
@@ -70,9 +70,9 @@ thread_local! {
 /// Operations that were made.
 #[derive(Clone, Copy, Debug)]
 pub struct Operations {
-    /// Additions, subtractions, multiplications.
+    /// Number of additions, subtractions and multiplications.
     pub simple: u64,
-    /// Fused multiply-adds.
+    /// Number of fused multiply-adds.
     pub fused: u64,
     /// Divisions and square roots.
     pub divisions: u64,
@@ -91,7 +91,7 @@ impl Operations {
         self.simple + 2 * self.fused + self.divisions + SINE * self.sines
     }
 
-    /// Of a step of `model` from `state`.
+    /// Operations of one step of `model` from `state`.
     pub fn of_step(model: &GreyBox, state: &State, controls: &Controls) -> Operations {
         let state = state.map(Counted);
         let controls = Controls {

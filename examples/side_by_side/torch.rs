@@ -17,7 +17,7 @@ pub struct Torch {
 }
 
 impl Torch {
-    /// Starts the script under `python`, told of `problem`.
+    /// Starts the script under `python` with `problem`.
     pub fn start(python: &Path, problem: &serde_json::Value) -> Result<Torch> {
         let mut file = tempfile::NamedTempFile::new()?;
         serde_json::to_writer(&mut file, problem)?;
@@ -53,7 +53,7 @@ impl Torch {
 
 impl Drop for Torch {
     fn drop(&mut self) {
-        // what it was doing is of no use any more; an error here has nobody to be told
+        // its work is of no use any more, and nobody can handle an error here
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

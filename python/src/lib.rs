@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 
 use error::GreylagError;
 
-/// Where a file named by a user or shipped with the program lies, as for the commands.
+/// Path of a file named by a user or shipped with the program, as for the commands.
 #[pyfunction]
 fn shipped(path: PathBuf) -> PathBuf {
     greylag::commands::shipped::shipped(&path)

@@ -1,4 +1,5 @@
-//! Long work beside the interpreter: the lock is given up, progress is told, Ctrl-C ends the work.
+//! Long work beside the interpreter: the lock is released, progress is reported, Ctrl-C ends the
+//! work.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -13,16 +14,16 @@ use pyo3::prelude::*;
 /// Time between two looks at signals.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Does `work` on a thread of its own. `heard` is called with each stage and its share of the whole; what it
-/// raises, and what Ctrl-C raises, ends the work at its next stage and comes out of here.
+/// Does `work` on a thread of its own. `on_stage` is called with each stage and its share of the
+/// whole; an exception that it raises, or Ctrl-C, ends the work at its next stage and is returned.
 pub fn done<T: Send>(
     py: Python<'_>,
-    heard: Option<Py<PyAny>>,
+    on_stage: Option<Py<PyAny>>,
     work: impl FnOnce(&Progress) -> Result<T, String> + Send,
 ) -> PyResult<T> {
     let stage = Mutex::new(None);
     let stop = AtomicBool::new(false);
-    let hear = |now: Stage<'_>| {
+    let progress = |now: Stage<'_>| {
         if let Ok(mut stage) = stage.lock() {
             *stage = Some((now.doing.to_owned(), now.fraction));
         }
@@ -31,20 +32,20 @@ pub fn done<T: Send>(
             false => ControlFlow::Continue(()),
         }
     };
-    let tell = || -> PyResult<()> {
+    let report = || -> PyResult<()> {
         py.check_signals()?;
         let news = stage.lock().ok().and_then(|mut stage| stage.take());
-        if let (Some(heard), Some((doing, fraction))) = (&heard, news) {
-            heard.call1(py, (doing, fraction))?;
+        if let (Some(on_stage), Some((doing, fraction))) = (&on_stage, news) {
+            on_stage.call1(py, (doing, fraction))?;
         }
         Ok(())
     };
     thread::scope(|scope| {
-        let worker = scope.spawn(|| work(&hear));
+        let worker = scope.spawn(|| work(&progress));
         let mut raised = None;
         while !worker.is_finished() && raised.is_none() {
             py.detach(|| thread::sleep(LOOK));
-            raised = tell().err();
+            raised = report().err();
         }
         stop.store(raised.is_some(), Ordering::Relaxed);
         let result = py.detach(|| worker.join());

@@ -38,7 +38,7 @@ fn check(what: &str, shape: &[usize], expected: &[usize]) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{what} has the shape {shape:?}, not {expected:?}")))
 }
 
-/// What acts when the actuators have long been at `measured`.
+/// The controls in force when the actuators have rested at `measured`.
 fn acting<R: Real>(model: &GreyBox, measured: Controls<R>) -> Controls<R> {
     match model.acts_at_once() {
         true => measured,

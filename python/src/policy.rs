@@ -74,7 +74,7 @@ impl Policy {
     }
 }
 
-/// Writes a policy's folder, over a policy that is there.
+/// Writes a policy's folder, and replaces a policy that exists.
 #[pyfunction]
 #[pyo3(signature = (folder, model, actor, critics, trained_in, seed, steps))]
 pub fn export_policy(

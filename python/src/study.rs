@@ -32,7 +32,7 @@ pub struct Reading {
     despite_problems: bool,
 }
 
-/// What `amend` is asked for.
+/// Options of `amend`.
 #[derive(FromPyObject)]
 pub struct Wanted {
     /// Effects to add with the values of coefficients near which to search; `None` for what a diagnosis asserts.
@@ -63,7 +63,7 @@ impl Reading {
         }
     }
 
-    /// The flights of `paths`, reconstructed; what was odd about them goes into `notes`.
+    /// The flights of `paths`, reconstructed; findings about them are appended to `notes`.
     fn flights(
         &self,
         paths: &[PathBuf],

@@ -40,7 +40,7 @@ pub struct World {
     bounds: [[f64; OBSERVATIONS]; 2],
 }
 
-/// What a step gave, in rows.
+/// Results of a step, in rows.
 struct Rows {
     now: Vec<f32>,
     reward: Vec<f32>,
@@ -50,7 +50,7 @@ struct Rows {
 
 #[pymethods]
 impl World {
-    /// `instances` aircraft that fly as `model` says.
+    /// `instances` aircraft that are simulated with `model`.
     #[staticmethod]
     fn imagined(
         model: &Model,
@@ -75,7 +75,7 @@ impl World {
         Ok(World::new(Box::new(world), 1, &model.model))
     }
 
-    /// The least and the greatest observation of an episode that goes on.
+    /// Least and greatest observation of an episode that has not ended.
     #[getter]
     fn bounds(&self) -> [[f64; OBSERVATIONS]; 2] {
         self.bounds

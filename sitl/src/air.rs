@@ -52,7 +52,7 @@ pub enum AirError {
     /// A component of the wind is not a number JSBSim can use.
     #[error("steady wind: {value} m/s is not within ±{MAX_AIR_MPS} m/s; give finite components")]
     Wind {
-        /// The component.
+        /// The component that is out of range, m/s.
         value: f64,
     },
     /// Turbulence outside the tables of the standard.
@@ -63,7 +63,7 @@ pub enum AirError {
     Turbulence {
         /// Wind at 20 ft, m/s.
         wind_20ft_mps: f64,
-        /// Severity.
+        /// Severity as given; 1 to 7 are allowed.
         severity: u8,
     },
     /// A gust without a shape.

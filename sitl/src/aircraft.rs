@@ -55,17 +55,17 @@ pub enum AircraftError {
     /// The aircraft's file does not exist or cannot be read.
     #[error("cannot read the aircraft file {}: {source}; check --aircraft-dir and --aircraft", path.display())]
     Read {
-        /// The file.
+        /// Path of the aircraft's XML file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// JSBSim refused the aircraft.
     #[error("JSBSim cannot load the aircraft '{name}': {source}; correct its XML")]
     Load {
-        /// The aircraft's name.
+        /// Name of the aircraft.
         name: String,
-        /// What JSBSim said.
+        /// Error that JSBSim returned.
         source: Error,
     },
     /// A hidden effect could not be written into the aircraft.

@@ -1,4 +1,5 @@
-//! What an airframe file of the companion says of the simulator's aircraft: surfaces, motors, conditions.
+//! Surfaces, motors and conditions of the simulator's aircraft, read from an airframe file of the
+//! companion.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use serde::Deserialize;
 
 use crate::plant::{Mixing, Moved, PlantOptions};
 
-/// Why an airframe file says nothing of use.
+/// Error of reading an airframe file; `why` names the entry.
 #[derive(Debug, thiserror::Error)]
 #[error("airframe file {}: {why}", path.display())]
 pub struct AirframeError {

@@ -57,8 +57,8 @@ pub struct Cli {
     force: bool,
     #[command(flatten)]
     plant: PlantArgs,
-    /// Airframe file of the companion: its [surfaces], [motors] and [conditions] say which JSBSim properties are moved
-    /// and held.
+    /// Airframe file of the companion: its [surfaces], [motors] and [conditions] name the JSBSim
+    /// properties that are commanded and held.
     #[arg(long, value_name = "FILE", help_heading = "Aircraft")]
     airframe: Option<PathBuf>,
     #[command(flatten)]
@@ -72,13 +72,13 @@ pub struct Cli {
 /// A flight stack to be played.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum PersonalityName {
-    /// PX4, fixed wing.
+    /// PX4 with a fixed-wing airframe.
     Px4,
-    /// ArduPilot Plane.
+    /// ArduPilot's fixed-wing firmware, ArduPlane.
     Ardupilot,
 }
 
-/// Reads NAME=VALUE.
+/// Parses `NAME=VALUE` with a numeric value.
 fn parameter(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
     let value = value.trim().parse().map_err(|_| format!("{value} is not a number"))?;
@@ -99,7 +99,7 @@ struct Px4Args {
     /// elevator, left-elevon, right-elevon, rudder, throttle; a minus reverses.
     #[arg(long, value_name = "WHAT=N,..", requires = "px4_sim", default_value_t = OutputMap::px4())]
     px4_outputs: OutputMap,
-    /// Sensor noise.
+    /// Preset of the white noise of PX4's sensors.
     #[arg(long, value_name = "PRESET", requires = "px4_sim", default_value = "standard")]
     px4_noise: Px4NoiseName,
 }
@@ -110,9 +110,9 @@ const PX4_ADDRESS: &str = "tcpin:127.0.0.1:4560";
 /// A preset of sensor noise.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Px4NoiseName {
-    /// Perfect sensors.
+    /// Sensors without noise.
     None,
-    /// That of PX4's own simulators.
+    /// Noise of PX4's own simulators.
     Standard,
 }
 
@@ -126,7 +126,7 @@ impl Px4Args {
     }
 }
 
-/// ArduPilot's JSON interface.
+/// Options of ArduPilot's JSON interface.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "ArduPilot JSON interface (instead of a companion)")]
 struct ArdupilotArgs {
@@ -171,10 +171,10 @@ struct StartArgs {
     /// From true north towards east.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_yaw_deg: f64,
-    /// Angle of attack.
+    /// Angle of attack at the start.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     start_alpha_deg: f64,
-    /// True airspeed.
+    /// True airspeed at the start.
     #[arg(long, value_name = "MPS", default_value_t = Start::NEUTRAL.airspeed_mps)]
     start_airspeed_mps: f64,
     /// Above mean sea level.
@@ -189,7 +189,7 @@ impl Cli {
         simulated.unwrap_or(&self.link)
     }
 
-    /// What the command line asks for.
+    /// Options of the run that the command line describes.
     ///
     /// # Errors
     /// If the airframe file cannot be used.

@@ -1,4 +1,4 @@
-//! The options of a command line that say what goes wrong on the way to the companion.
+//! Command-line options for sensor errors and faults of state frames.
 
 use clap::{Args, ValueEnum};
 
@@ -8,35 +8,35 @@ use crate::shim::{Bias, FrameFaults, Noise};
 /// A preset of sensor noise.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Preset {
-    /// Perfect sensors.
+    /// Sensors without noise.
     None,
     /// The order of a small autopilot with its motor running.
     Realistic,
 }
 
-/// Sensor errors.
+/// Options for sensor noise and constant sensor errors.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Sensors (standard deviations replace those of the preset)")]
 pub struct SensorArgs {
     /// Preset of white noise.
     #[arg(long, value_name = "PRESET", default_value = "none")]
     noise: Preset,
-    /// Rate gyros.
+    /// White noise of the rate gyros, each axis.
     #[arg(long, value_name = "RADPS")]
     noise_gyro_radps: Option<f64>,
-    /// Accelerometers.
+    /// White noise of the accelerometers, each axis.
     #[arg(long, value_name = "MPS2")]
     noise_accelerometer_mps2: Option<f64>,
-    /// Each Euler angle.
+    /// White noise of roll, pitch and yaw.
     #[arg(long, value_name = "DEG")]
     noise_attitude_deg: Option<f64>,
-    /// True airspeed.
+    /// White noise of the true airspeed.
     #[arg(long, value_name = "MPS")]
     noise_airspeed_mps: Option<f64>,
-    /// Angle of attack and sideslip.
+    /// White noise of angle of attack and sideslip.
     #[arg(long, value_name = "DEG")]
     noise_vane_deg: Option<f64>,
-    /// Altitude.
+    /// White noise of the altitude.
     #[arg(long, value_name = "M")]
     noise_altitude_m: Option<f64>,
     /// Constant error of the rate gyros.
@@ -59,7 +59,7 @@ pub struct SensorArgs {
     airspeed_scale: f64,
 }
 
-/// What befalls state frames.
+/// Options for faults of state frames.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Frames")]
 pub struct FaultArgs {
@@ -98,7 +98,7 @@ impl SensorArgs {
         }
     }
 
-    /// Constant errors.
+    /// The constant sensor errors, in SI units and radians.
     pub fn bias(&self) -> Bias {
         Bias {
             gyro_radps: self.bias_gyro_radps.0,
@@ -112,7 +112,7 @@ impl SensorArgs {
 }
 
 impl FaultArgs {
-    /// What befalls state frames.
+    /// The faults of state frames that the options describe.
     pub fn rule(&self) -> FrameFaults {
         FrameFaults {
             delay_ms: self.delay_ms,

@@ -18,13 +18,13 @@ pub use effects::EFFECTS;
 
 /// An effect that can be hidden, under the id it has in the catalogue of effects.
 pub struct Effect {
-    /// Stable id.
+    /// Identifier in the catalogue of effects, stable between versions.
     pub id: &'static str,
     /// What an amplitude a adds, with Q = ½ρV²S; δ are deflections in rad, δt the throttle position.
     pub formula: &'static str,
-    /// Unit of the amplitude; empty without one.
+    /// Unit of the amplitude; empty for a dimensionless one.
     pub unit: &'static str,
-    /// Smallest and largest amplitude taken.
+    /// Smallest and largest amplitude allowed.
     pub bounds: (f64, f64),
     write: fn(&mut Document, f64) -> Result<(), HiddenError>,
 }
@@ -55,7 +55,7 @@ impl fmt::Debug for Effect {
 pub struct Hidden {
     effect: &'static Effect,
     amplitude: f64,
-    /// What an effect that is not of the list adds.
+    /// Functions that an effect outside the list adds.
     functions: &'static [(Place, String)],
     /// Filters whose outputs those functions read.
     filters: &'static [Filter],
@@ -64,15 +64,15 @@ pub struct Hidden {
 /// A filter of the flight controls that an effect reads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
-    /// Its input, an expression of JSBSim's functions.
+    /// Input of the filter, an expression of JSBSim's functions.
     pub input: String,
-    /// What it does.
+    /// Kind of the filter: lag or delay.
     pub kind: FilterKind,
-    /// Its time constant or delay, s.
+    /// Time constant or delay of the filter, s.
     pub time_s: f64,
 }
 
-/// What a filter does.
+/// Kinds of filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilterKind {
     /// A first-order lag, bilinear at the step.
@@ -82,22 +82,23 @@ pub enum FilterKind {
 }
 
 impl Filter {
-    /// What stands in an expression for the property with the output of the filter at `place` of the effect's list.
+    /// Placeholder in an expression for the output property of the filter at `place` of the
+    /// effect's list.
     pub fn placeholder(place: usize) -> String {
         format!("{{filter-{place}}}")
     }
 }
 
-/// Where a function of its own acts.
+/// Axis or propulsion on which an added function acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Drag, lbf.
+    /// Drag along the wind axis, lbf, rearward positive.
     Drag,
-    /// Side force, lbf.
+    /// Side force along the wind axis, lbf, right positive.
     Side,
-    /// Lift, lbf.
+    /// Lift along the wind axis, lbf, up positive.
     Lift,
-    /// Thrust, lbf.
+    /// Thrust of the propulsion, lbf, forward positive.
     Thrust,
     /// Rolling moment, lbf ft.
     Roll,
@@ -164,7 +165,7 @@ impl Hidden {
         (self.effect.write)(document, self.amplitude)
     }
 
-    /// The effect.
+    /// The effect of the catalogue that is hidden.
     pub fn effect(&self) -> &'static Effect {
         self.effect
     }
@@ -214,17 +215,17 @@ pub enum HiddenError {
         "hidden effect '{text}': write ID=AMPLITUDE, such as pitch_break=-3.0; known ids: {known}"
     )]
     Syntax {
-        /// The text.
+        /// The text as given.
         text: String,
-        /// The known ids.
+        /// Identifiers of all known effects.
         known: String,
     },
     /// No effect has that id.
     #[error("hidden effect '{id}' is not known; known ids: {known}")]
     Unknown {
-        /// The id asked for.
+        /// The identifier as given.
         id: String,
-        /// The known ids.
+        /// Identifiers of all known effects.
         known: String,
     },
     /// The amplitude is outside what the effect takes.
@@ -232,13 +233,13 @@ pub enum HiddenError {
         "hidden effect {id}: amplitude {amplitude} {unit} is outside {min} to {max} {unit}; give one within"
     )]
     Amplitude {
-        /// The effect.
+        /// Identifier of the effect.
         id: &'static str,
-        /// The amplitude.
+        /// The amplitude as given.
         amplitude: f64,
-        /// Smallest amplitude taken.
+        /// Smallest amplitude that is allowed.
         min: f64,
-        /// Largest amplitude taken.
+        /// Largest amplitude that is allowed.
         max: f64,
         /// Unit of the three.
         unit: &'static str,
@@ -248,7 +249,7 @@ pub enum HiddenError {
         "hidden effect time_delay: {amplitude} s is not a whole number of steps of {step_s} s; give a multiple"
     )]
     Delay {
-        /// The delay, s.
+        /// The delay as given, s.
         amplitude: f64,
         /// Length of a step, s.
         step_s: f64,
@@ -256,7 +257,7 @@ pub enum HiddenError {
     /// An effect is asked for twice.
     #[error("hidden effect {id} is given twice; give it once, with the sum")]
     Twice {
-        /// The effect.
+        /// Identifier of the effect that is given twice.
         id: &'static str,
     },
     /// The aircraft's XML has no place for the effect.
@@ -264,7 +265,7 @@ pub enum HiddenError {
         "a hidden effect needs {place} in the aircraft's XML, which has none; hide another effect or fly another aircraft"
     )]
     Place {
-        /// What was looked for.
+        /// Element of the XML that is missing.
         place: String,
     },
 }

@@ -1,6 +1,6 @@
 //! The program `greylag-sitl`: a flight controller with an aircraft, played to a companion.
 
-mod said_once;
+mod one_line;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -11,13 +11,13 @@ use anyhow::Context;
 use clap::Parser;
 use greylag_sitl::arguments::Cli;
 use greylag_sitl::shim::{self, Launch, Pace, ShimOptions};
-use said_once::said_once;
+use one_line::one_line;
 
 fn main() -> ExitCode {
     match fly(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("greylag-sitl: {}", said_once(&error));
+            eprintln!("greylag-sitl: {}", one_line(&error));
             ExitCode::FAILURE
         }
     }
@@ -29,20 +29,20 @@ fn fly(cli: &Cli) -> anyhow::Result<()> {
     let handler = Arc::clone(&stop);
     ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed))
         .context("cannot listen for Ctrl-C")?;
-    say(format_args!("greylag-sitl: {}", intent(&options)));
+    print(format_args!("greylag-sitl: {}", intent(&options)));
     let mut tell =
-        |notice: shim::Notice| say(format_args!("{:9.2} s  {}", notice.time_s, notice.event));
+        |notice: shim::Notice| print(format_args!("{:9.2} s  {}", notice.time_s, notice.event));
     let summary = shim::run(&options, &stop, &mut tell)?;
-    say(format_args!("\n{summary}"));
+    print(format_args!("\n{summary}"));
     Ok(())
 }
 
 /// Prints a line; a reader that has gone away does not end the flight.
-fn say(line: std::fmt::Arguments<'_>) {
+fn print(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
-/// What is about to happen, in one line.
+/// Description of the run in one line.
 fn intent(options: &ShimOptions) -> String {
     let pace = match options.pace {
         Pace::RealTime => "in real time, 100 frames a second",

@@ -25,10 +25,10 @@ pub use options::{PlantOptions, Properties};
 pub use state::{FULL_DEFLECTION_RAD, Inputs, Start, Truth};
 pub use travel::{Stops, Travel};
 
-/// Length of one step, s, unless the options say otherwise.
+/// Default length of one step, s.
 pub const DT_S: f64 = 0.01;
 
-/// Steps that the integrators and filters are known to bear.
+/// Range of steps in which the integrators and filters are known to be stable.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.001..=DT_S;
 
 /// Why the plant cannot fly on.
@@ -45,9 +45,9 @@ pub enum PlantError {
         "the aircraft '{aircraft}' has no property '{property}', which the plant needs; add it to the aircraft's XML or name the aircraft's own with --property"
     )]
     Property {
-        /// The aircraft's name.
+        /// Name of the aircraft.
         aircraft: String,
-        /// The property's name.
+        /// Name of the missing property.
         property: String,
     },
     /// An engine does not run after its start.
@@ -55,7 +55,7 @@ pub enum PlantError {
         "engine {engine} of the aircraft '{aircraft}' does not run after its start: see that the aircraft's XML fills its tanks, feeds it from them and leaves its ignition on"
     )]
     Engine {
-        /// The aircraft's name.
+        /// Name of the aircraft.
         aircraft: String,
         /// The engine, from 0.
         engine: usize,
@@ -65,7 +65,7 @@ pub enum PlantError {
         "the aircraft '{aircraft}' does not move '{property}' at full command, so the travel of that surface is unknown; name the property that holds its deflection in rad with --property"
     )]
     Travel {
-        /// The aircraft's name.
+        /// Name of the aircraft.
         aircraft: String,
         /// The property that stays where it is.
         property: String,
@@ -76,11 +76,11 @@ pub enum PlantError {
          given with --property (as KEY=NAME, KEY=-NAME*SCALE or KEY=NAME,-NAME)"
     )]
     Unmoved {
-        /// The aircraft's name.
+        /// Name of the aircraft.
         aircraft: String,
-        /// What nothing does.
+        /// Motion that no command causes, such as rolling.
         does: &'static str,
-        /// What was tried.
+        /// Properties that were tried.
         tried: String,
     },
     /// A file of the aircraft reads a property that nothing defines.
@@ -89,9 +89,9 @@ pub enum PlantError {
          give its value with --set {property}=0"
     )]
     Undefined {
-        /// The aircraft's name.
+        /// Name of the aircraft.
         aircraft: String,
-        /// What is not defined.
+        /// Property that is not defined.
         property: String,
         /// Where it is read.
         place: String,
@@ -104,7 +104,7 @@ pub enum PlantError {
     /// The step is too long or too short.
     #[error("cannot fly in steps of {step_s} s: give 0.001 to 0.01 s")]
     Step {
-        /// The step, s.
+        /// The step as given, s.
         step_s: f64,
     },
     /// A command is not a number; nothing was stepped.
@@ -123,9 +123,9 @@ pub enum PlantError {
     /// JSBSim failed while doing something.
     #[error("JSBSim failed while {doing}: {source}")]
     Jsbsim {
-        /// What was being done.
+        /// Operation that failed.
         doing: &'static str,
-        /// What JSBSim said.
+        /// Error that JSBSim returned.
         source: jsbsim::Error,
     },
 }
@@ -203,7 +203,7 @@ impl Plant {
         }
     }
 
-    /// What is to be known of the aircraft before it is flown, one sentence each.
+    /// Notes on the aircraft before it is flown, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         let glider = format!(
             "the aircraft '{}' has no throttle: it flies as a glider, and throttle commands move nothing",
@@ -315,12 +315,13 @@ impl Plant {
     }
 }
 
-/// Turns what JSBSim says while `doing` into a [`PlantError`].
+/// Maps an error that JSBSim returned while `doing` to [`PlantError::Jsbsim`].
 fn jsbsim(doing: &'static str) -> impl Fn(jsbsim::Error) -> PlantError {
     move |source| PlantError::Jsbsim { doing, source }
 }
 
-/// Turns what JSBSim says at a start into a [`PlantError`]: a property that is missing has a name.
+/// Maps an error of JSBSim's start to [`PlantError::Undefined`] if it names a missing property,
+/// else to [`PlantError::Jsbsim`].
 fn starting(aircraft: &str) -> impl Fn(jsbsim::Error) -> PlantError {
     let aircraft = aircraft.to_owned();
     move |source| {

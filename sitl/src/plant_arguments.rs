@@ -9,7 +9,7 @@ use crate::air::{Air, Gust, Turbulence};
 use crate::hidden::Hidden;
 use crate::plant::{PlantOptions, Properties};
 
-/// Which aircraft in which air; to be flattened into a program's options.
+/// Options for the aircraft and its air, to be flattened into a program's options.
 #[derive(Clone, Debug, Args)]
 pub struct PlantArgs {
     #[command(flatten)]
@@ -18,7 +18,7 @@ pub struct PlantArgs {
     air: AirArgs,
 }
 
-/// Which aircraft.
+/// Options that select the aircraft and its changes.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Aircraft")]
 struct AircraftArgs {
@@ -34,7 +34,8 @@ struct AircraftArgs {
     /// -NAME*SCALE,NAME.
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
-    /// Hold a property of the aircraft at a value (may be repeated): flaps, say, by fcs/flap-cmd-norm=0.5.
+    /// Hold a property of the aircraft at a value (may be repeated), for example flaps:
+    /// fcs/flap-cmd-norm=0.5.
     #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
     set: Vec<(String, f64)>,
     /// Hide an effect in the aircraft (may be repeated); a wrong ID is answered with all that are known.
@@ -42,7 +43,7 @@ struct AircraftArgs {
     hide: Vec<Hidden>,
 }
 
-/// Wind, turbulence, gusts.
+/// Options for wind, turbulence and gusts.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Air")]
 struct AirArgs {
@@ -66,7 +67,7 @@ struct AirArgs {
     gust: Vec<Numbers<7>>,
 }
 
-/// Reads KEY=NAME.
+/// Parses `KEY=NAME`; KEY is one of [`Properties::KEYS`].
 pub fn property(text: &str) -> Result<(String, String), String> {
     let (key, name) = text.split_once('=').ok_or("write it as KEY=NAME")?;
     match Properties::default().name_mut(key) {
@@ -75,7 +76,7 @@ pub fn property(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// Reads NAME=VALUE.
+/// Parses `NAME=VALUE` with a finite value.
 pub fn held(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
     match value.trim().parse::<f64>() {
@@ -100,7 +101,7 @@ impl<const N: usize> FromStr for Numbers<N> {
 }
 
 impl PlantArgs {
-    /// What the command line asks for, with turbulence of `seed`.
+    /// Options of the plant that the command line describes, with turbulence of `seed`.
     pub fn options(&self, seed: u32) -> PlantOptions {
         let mut plant = PlantOptions { seed, air: self.air.air(), ..Default::default() };
         plant.aircraft_dir = self.aircraft.aircraft_dir.clone();

@@ -34,7 +34,7 @@ fn sensors_come_every_4_ms_of_simulated_time_and_the_others_at_their_rates() {
     // PX4 asks for the state every 5 ms.
     let states = steps.iter().filter(|s| s.state.is_some()).count();
     assert!((1980..=2001).contains(&states), "{states} in 10 s");
-    // Slower sensors at 50 Hz, told by the flags.
+    // Slower sensors at 50 Hz, by the flags.
     let slow = HilSensorUpdatedFlags::from_bits_retain(0x1FC0);
     let fast = HilSensorUpdatedFlags::from_bits_retain(0x003F);
     assert!(steps.iter().all(|s| s.sensor.fields_updated.contains(fast)));
@@ -180,7 +180,7 @@ fn without_lockstep_time_is_the_walls() {
     let simulated = (last - first) as f64 * 1e-6;
     // A machine that stops for more than 0.1 s loses that time; 10 % are allowed for it.
     assert!((1.8..2.05).contains(&simulated), "{simulated} s in 2 s");
-    // A client that falls silent does not stop the simulation, and is told.
+    // A client that falls silent does not stop the simulation, and is reported.
     std::thread::sleep(Duration::from_millis(1300));
     simulator.until(|e| *e == Px4Event::Silent);
     let (mut now, drained) = (last, Instant::now());
@@ -189,7 +189,7 @@ fn without_lockstep_time_is_the_walls() {
     }
     assert!(now - last > 1_000_000, "{} µs", now - last);
     px4.step([0.0; 16]);
-    simulator.until(|e| *e == Px4Event::Heard);
+    simulator.until(|e| *e == Px4Event::SilenceEnded);
     simulator.stop();
 }
 

@@ -297,7 +297,7 @@ fn random_bytes_never_panic_and_hold_no_frame() {
 
 #[test]
 fn the_checksum_is_mcrf4xx() {
-    // The check value of CRC-16/MCRF4XX over "123456789" is 0x6F91; its last byte stands in for
+    // The check value of CRC-16/MCRF4XX over "123456789" is 0x6F91; its last byte is used as
     // CRC_EXTRA.
     assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
 }

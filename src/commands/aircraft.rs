@@ -1,4 +1,4 @@
-//! `greylag aircraft`: files of an aircraft of one's own, and what they say of it.
+//! `greylag aircraft`: create, import, check and export the files of an aircraft.
 
 mod check;
 mod export;
@@ -23,7 +23,8 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Say how a model's aircraft flies: trim, modes, authority of the surfaces, margins of the LQI.
+    /// Check a model's aircraft in flight: trim, modes, authority of the surfaces, margins of the
+    /// LQI.
     Check(check::Arguments),
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),

@@ -66,7 +66,7 @@ impl Bar {
     }
 
     /// Shows a stage; ends the task if Ctrl-C was pressed.
-    pub fn hear(&self, stage: Stage<'_>) -> ControlFlow<()> {
+    pub fn update(&self, stage: Stage<'_>) -> ControlFlow<()> {
         match &self.bar {
             Some(bar) => {
                 bar.set_message(stage.doing.to_owned());
@@ -86,7 +86,7 @@ impl Bar {
     }
 
     /// Prints a line of the result above the bar.
-    pub fn say(&self, line: &str) {
+    pub fn print(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| println!("{line}")),
             None => println!("{line}"),

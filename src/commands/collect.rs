@@ -21,7 +21,7 @@ use crate::sim::collect::{Place, explore};
 /// Options of `greylag collect`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder of the exploration; a round goes into a folder `round-NN` of its own.
+    /// Folder of the exploration; a round goes into a folder `round-NN` below it.
     #[arg(long)]
     out: PathBuf,
     /// The round: 0 is random, later ones are planned with CEM-MPC through `--model`, half, a quarter
@@ -97,7 +97,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     Ok(Ended::Done)
 }
 
-/// An episode's file is there whole or not at all: what is there need not be flown again.
+/// An episode's file is written as a whole, so that an existing one need not be flown again.
 fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
     let part = path.with_extension("part");
     let _ = std::fs::remove_file(&part);

@@ -21,7 +21,7 @@ use crate::sysid::compare::{Answer, Comparison, ModelResult, Options, compare, s
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// What the models are called in the tables, in their order.
+/// Short names of the models in the tables, in their order.
 const LETTERS: std::ops::RangeInclusive<char> = 'A'..='Z';
 
 /// Options of `greylag compare`.
@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Horizons of the free runs, s.
     #[arg(long = "horizon", value_delimiter = ',', default_values_t = [1.0, 2.0, 5.0, 10.0])]
     horizons: Vec<f64>,
-    /// Write everything that was found as JSON; `-` for standard output, with nothing else on it.
+    /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Write the report, one HTML page.
@@ -48,8 +48,9 @@ pub struct Arguments {
     /// of the prediction by the errors of the other runs.
     #[arg(long, value_name = "CSV")]
     predictions: Option<PathBuf>,
-    /// Take the deflections at the times that the log has for them, as `diagnose`, `amend` and the workbench do;
-    /// without it a delay of the log's actuator clock that is beyond doubt is put right.
+    /// Take the deflections at the log's own times for them, as `diagnose`, `amend` and the
+    /// workbench do; without this option, a delay of the log's actuator clock is corrected if it is
+    /// certain.
     #[arg(long)]
     recorded_clock: bool,
     /// Seed of the bootstrap intervals.
@@ -75,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Intake { flights, mut notes, mut in_doubt } = arguments.logs.take_in(&models[0], clock)?;
     let options = Options { horizons_s: arguments.horizons.clone(), seed: arguments.seed };
     let bar = Bar::new();
-    let mut comparison = compare(&models, &flights, &options, &|stage| bar.hear(stage))?;
+    let mut comparison = compare(&models, &flights, &options, &|stage| bar.update(stage))?;
     bar.go_on()?;
     drop(bar);
     in_doubt |= comparison.flights.len() < arguments.logs.paths.len();

@@ -11,7 +11,7 @@ use clap_complete::Shell;
     after_help = "For bash: greylag completions bash > ~/.local/share/bash-completion/completions/greylag"
 )]
 pub struct Arguments {
-    /// The shell.
+    /// Shell to write completions for.
     shell: Shell,
 }
 

@@ -58,7 +58,7 @@ pub fn policy(
     Ok(Some(agent))
 }
 
-/// What is to be said of a policy that was trained in another model than the one that flies with it.
+/// Note for a policy that was trained in another model than the one that flies with it.
 fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
     (origin.model_sha256 != model.sha256).then(|| {
         format!(

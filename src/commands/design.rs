@@ -1,4 +1,4 @@
-//! `greylag design`: the manoeuvre that tells two effects apart.
+//! `greylag design`: the manoeuvre that distinguishes two effects.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,7 +23,8 @@ pub struct Arguments {
     /// The two effects: ids of the catalogue, or effect files (TOML).
     #[arg(long, value_name = "ID|FILE", num_args = 2, required = true)]
     between: Vec<String>,
-    /// Values of an effect's constants, in its own order, in place of typical ones (may be repeated).
+    /// Values of an effect's constants, in the effect's order, in place of typical ones (may be
+    /// repeated).
     #[arg(long, value_name = "ID=V,V…", allow_hyphen_values = true)]
     values: Vec<String>,
     /// Write the schedule, for `greylag fly --schedule`.
@@ -36,13 +37,14 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// What each manoeuvre is expected to tell, as JSON; no value where the aircraft would leave its bounds.
+/// Expected discrimination of each manoeuvre, as JSON; no value where the aircraft would leave its
+/// bounds.
 #[derive(Serialize)]
 struct Document<'a> {
     between: [&'a str; 2],
     manoeuvres: Vec<Manoeuvre<'a>>,
     chosen: Option<&'a str>,
-    /// How many seconds of the chosen one tell the two apart.
+    /// Seconds of the chosen manoeuvre that suffice.
     chosen_s: Option<f64>,
 }
 
@@ -73,10 +75,10 @@ fn document<'a>(
     }
 }
 
-/// Flies the menu in both imagined aircraft, prints what each manoeuvre would tell, writes the best.
+/// Flies the menu in both imagined aircraft, prints how well each manoeuvre distinguishes them, writes the best.
 ///
 /// # Errors
-/// If the model, an effect or the file cannot be used, or no manoeuvre tells the two apart.
+/// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     if let Some(path) = &arguments.out {
@@ -87,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let suspects = suspects(arguments)?;
     let lqi = build(ControllerKind::Lqi, &model)?;
     let bar = Bar::new();
-    let all = prospects(&model, lqi.as_ref(), &suspects, &|stage| bar.hear(stage))?;
+    let all = prospects(&model, lqi.as_ref(), &suspects, &|stage| bar.update(stage))?;
     bar.go_on()?;
     drop(bar);
     let quiet = arguments.json.takes_stdout();
@@ -145,7 +147,7 @@ fn suspects(arguments: &Arguments) -> Result<[Suspect; 2]> {
     Ok([suspect(0), suspect(1)])
 }
 
-/// Reads `id=1.0,2.0`.
+/// Parses `id=1.0,2.0`.
 fn read(text: &str) -> Result<(String, Vec<f64>)> {
     let wrong = || format!("--values {text}: write ID=VALUE,VALUE…, such as drag_alpha2=0.5");
     let (id, values) = text.split_once('=').with_context(wrong)?;

@@ -36,7 +36,7 @@ const ROWS: usize = 12;
     after_help = "Exit status: 0 done, whatever was found; 1 nothing could be diagnosed; 3 done, but a log was left out or holds what makes the figures wrong, or a figure was found that cannot be. The verdict is in the output: effect, adequate, unexplained or unknown."
 )]
 pub struct Arguments {
-    /// The model file.
+    /// The model file of the aircraft.
     #[arg(long, env = "GREYLAG_MODEL", hide_env_values = true)]
     model: PathBuf,
     #[command(flatten)]
@@ -85,9 +85,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         ..Options::default()
     };
     let bar = Bar::new();
-    let hear = |stage: Stage<'_>| bar.hear(stage);
+    let on_stage = |stage: Stage<'_>| bar.update(stage);
     let [searching, drawing] = shares(arguments.report.as_deref());
-    let mut diagnosis = diagnose(&model, &flights, &options, &part(&hear, searching))?;
+    let mut diagnosis = diagnose(&model, &flights, &options, &part(&on_stage, searching))?;
     for flight in &flights {
         notes.extend(flight.notes.iter().map(|note| format!("{}: {note}", flight.name)));
     }
@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         let mut models = [tuned, model.clone()];
         models[1].name = "as given".into();
         let told = (&diagnosis, &answer);
-        let page = page(arguments, told, &models, &flights, &part(&hear, drawing))?;
+        let page = page(arguments, told, &models, &flights, &part(&on_stage, drawing))?;
         Ok::<_, anyhow::Error>((path, page))
     });
     let drawn = drawn.transpose()?;
@@ -124,7 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// What goes into JSON: the diagnosis, with the answer that screen and page begin with.
+/// Content of the JSON document: the diagnosis, with the answer that also leads screen and page.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
@@ -256,7 +256,7 @@ fn channels(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// What each flight has of its own; `None` if nothing of it was asked for.
+/// Table of the constants estimated for each flight; `None` if none were requested.
 fn own(diagnosis: &Diagnosis) -> Option<Table> {
     let angles = diagnosis.measurement.iter().filter(|m| m.id == askew::ID).map(|m| {
         let [value, sd] = [m.value, m.sd].map(f64::to_degrees);

@@ -48,7 +48,7 @@ const IN_JSBSIM: [&str; 11] = [
 /// Options of `greylag evaluate`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Controllers to score.
+    /// Controllers to be evaluated.
     #[arg(long = "controller", value_name = "NAME", num_args = 1.., required = true, value_parser = choices::controller())]
     controllers: Vec<ControllerKind>,
     /// Models that the controllers are designed from or plan with.
@@ -60,7 +60,7 @@ pub struct Arguments {
     /// Settings of the planners in other than their usual size, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
-    /// Targets to fly.
+    /// File of the targets to fly.
     #[arg(long, default_value = "params/targets.csv")]
     targets: PathBuf,
     /// Only these groups of targets.
@@ -69,8 +69,9 @@ pub struct Arguments {
     /// Only the Nth of every N targets.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     every: u32,
-    /// Fly steps between random attitudes of the envelope too, so many: the first attitude is held for 5 s at the cruise
-    /// airspeed, then the second is flown for 8 s and scored. The same --seed draws the same steps.
+    /// Also fly this number of steps between random attitudes of the envelope: the first attitude
+    /// is held for 5 s at the cruise airspeed, then the second is flown for 8 s and scored. The
+    /// same --seed draws the same steps.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=10_000))]
     steps: u32,
     /// Fly the steps alone.
@@ -79,8 +80,9 @@ pub struct Arguments {
     /// Fly targets beyond the bank and pitch of the airframe's envelope too.
     #[arg(long)]
     beyond_envelope: bool,
-    /// Fly models drawn from the widths of the first --model's coefficients, so many, in place of JSBSim: Monte Carlo over
-    /// what is not known of the aircraft. The controllers keep the --model that they are built from.
+    /// Fly this number of models drawn from the widths of the first --model's coefficients in place
+    /// of JSBSim: Monte Carlo over the uncertainty of the aircraft. The controllers keep the
+    /// --model that they are built from.
     #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: Option<u32>,
     /// Whether the controllers fly behind the envelope limiter, as in `fly` and `demo`, or bare, as in the paper.
@@ -93,11 +95,11 @@ pub struct Arguments {
     plant: PlantArgs,
     #[command(flatten)]
     start: StartArguments,
-    /// Write the scores as JSON; `-` for standard output, with nothing else there.
+    /// Write the scores as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write what happened on the way, the scores beside the paper's, single flights and what the planners saw as an HTML
-    /// page.
+    /// Write the transients, the scores beside the paper's, single flights and the planners'
+    /// rollouts as an HTML page.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
     /// Replace the JSON file and the page if they exist.
@@ -105,14 +107,14 @@ pub struct Arguments {
     force: bool,
 }
 
-/// What lies between a controller and the surfaces: the envelope limiter, or nothing.
+/// Protection between a controller and the surfaces: the envelope limiter, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EnvelopeName {
     Kept,
     Free,
 }
 
-/// The JSON document.
+/// Content of the JSON document.
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -213,7 +215,7 @@ fn page(
     report.page().render()
 }
 
-/// What was flown, in a line.
+/// Description of the evaluation in one line.
 fn subtitle(arguments: &Arguments) -> String {
     let targets = match (arguments.no_targets, arguments.every) {
         (true, _) => Vec::new(),

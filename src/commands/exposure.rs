@@ -1,13 +1,12 @@
-//! Who can reach the clients' links: this machine alone, whoever has the key, or, said aloud, anybody.
+//! Access control of the clients' links: this machine only, holders of the key, or explicitly
+//! anybody.
 
 use anyhow::{Result, bail};
 
 use crate::link::address::Address;
 
-/// Refuses links that other machines reach without a signature, unless they are to be. What is to be said of them then.
-///
-/// # Errors
-/// If there are such links and nobody has asked for them.
+/// Refuses links that other machines reach without a signature, unless the user asked for them;
+/// then returns a warning.
 pub fn check<'a>(
     unsigned: impl Iterator<Item = &'a Address>,
     asked: Asked,
@@ -27,7 +26,7 @@ pub fn check<'a>(
     Ok(Some(format!("INSECURE: whoever reaches {links} steers the aircraft")))
 }
 
-/// What the user has asked for.
+/// Exposure that the user allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
     /// Nothing beyond what is safe.

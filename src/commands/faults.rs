@@ -39,7 +39,7 @@ pub struct Arguments {
     /// Seed of the first flight; the others follow.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     first: u64,
-    /// Controllers.
+    /// Controllers that fly the campaign.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
     /// The simulator's aircraft; the played flight controllers have gains for the X8, so others fly with the
@@ -55,24 +55,26 @@ pub struct Arguments {
         conflicts_with = "resume"
     )]
     model: PathBuf,
-    /// What is at the other end of the vehicle's link.
+    /// Flight controller or simulator at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["sitl", "px4", "ardupilot"], value_parser = counterparts())]
     counterpart: Vec<Counterpart>,
     /// Show the faults and the messages of each flight with a finding.
     #[arg(long)]
     show: bool,
-    /// Note each flight in this file, and do not fly again those that are there (of the same program).
+    /// Record each flight in this file, and skip those that it has already (of the same program).
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
-    /// Search so many flights for one that breaks a rule of flight, with the first of the controllers: faults, winds,
-    /// targets and requests are varied, always from the flights that came nearest. `--first` is its seed.
+    /// Search this number of flights for one that breaks a rule of flight, with the first of the
+    /// controllers: faults, winds, targets and requests are varied, always from the flights that
+    /// came nearest. `--first` is its seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show"])]
     search: Option<u64>,
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
     scenario: Option<PathBuf>,
-    /// Fly so many flights, healthy and with each failure, that the model monitor watches, beside a played ArduPlane whose attitude
-    /// is off by errors drawn for each flight: false alarms and delays. `--first` is the first seed.
+    /// Fly this number of flights, healthy and with each failure, under the model monitor, beside a
+    /// simulated ArduPlane whose attitude has errors drawn for each flight: false alarms and
+    /// delays. `--first` is the first seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json"])]
     monitor: Option<u64>,
     #[command(flatten)]
@@ -104,8 +106,8 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     })
 }
 
-/// Flies the campaign; the exit status tells whether the companion itself never failed, with every
-/// aircraft that left its envelope explained.
+/// Flies the campaign; the exit status is 0 if the companion itself never failed and every
+/// aircraft that left its envelope is explained.
 ///
 /// # Errors
 /// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
@@ -217,7 +219,7 @@ fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entrie
     println!("{table}");
 }
 
-/// What was found, in numbers, then every flight with something that nothing explains, or no fault.
+/// Prints the counts of findings, then each flight with a finding that fails the campaign.
 fn print_findings(entries: &[Entry]) {
     println!("\n{} flights in all", entries.len());
     let mut counts: BTreeMap<(&str, &str), u64> = BTreeMap::new();

@@ -12,9 +12,9 @@ use crate::report;
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// Keep it and say so.
+    /// Keep it and fail with an error.
     Never,
-    /// Replace it (`--force`).
+    /// Replace it (option `--force`).
     Force,
 }
 
@@ -24,7 +24,7 @@ impl From<bool> for Overwrite {
     }
 }
 
-/// Whether a path stands for standard output: `-`.
+/// Whether a path denotes standard output: `-`.
 pub fn is_stdout(path: Option<&Path>) -> bool {
     path == Some(Path::new("-"))
 }
@@ -32,12 +32,12 @@ pub fn is_stdout(path: Option<&Path>) -> bool {
 /// `--json` of a command.
 #[derive(clap::Args, Clone, Debug)]
 pub struct JsonArgument {
-    /// Write what was found as JSON; `-` for standard output, with nothing else there.
+    /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
 
-/// What a command found, with the name of its layout and the program.
+/// Result of a command, with the name of its layout and the program.
 #[derive(Serialize)]
 struct Document<'a, T> {
     schema: &'static str,
@@ -86,7 +86,7 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
-/// Writes a whole file at once: it is there complete, or not at all.
+/// Writes a file through a temporary one: it exists completely or not at all.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {

@@ -23,11 +23,11 @@ pub struct FlownWith {
     schema: u32,
     /// The program with its version.
     program: String,
-    /// The command line.
+    /// Command line of the flight.
     command: String,
-    /// The controller.
+    /// Name of the controller.
     pub controller: String,
-    /// The model file.
+    /// Path of the model file.
     pub model: PathBuf,
     /// SHA-256 of the model's files.
     model_sha256: String,
@@ -39,21 +39,21 @@ pub struct FlownWith {
     /// Airframe file in place of the model's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub airframe: Option<PathBuf>,
-    /// Flight-test schedule.
+    /// Path of the flight-test schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<PathBuf>,
-    /// What was at the other end of the vehicle's link, and what it was commanded.
+    /// Profile of the vehicle's link, and the commanded quantity.
     pub profile: ProfileName,
-    /// See `profile`.
+    /// Quantity that the flight controller was commanded.
     pub commanded: CommandName,
 }
 
 /// The options that `fly` and `demo` have in common.
 #[derive(Clone, Copy, Debug)]
 pub struct Chosen<'a> {
-    /// The controller.
+    /// Controller that flies.
     pub controller: ControllerKind,
-    /// The model file.
+    /// Path of the model file.
     pub model: &'a Path,
     /// The folder of the policy.
     pub policy: &'a Path,
@@ -61,11 +61,11 @@ pub struct Chosen<'a> {
     pub changes: &'a [Change],
     /// Airframe file in place of the model's.
     pub airframe: Option<&'a Path>,
-    /// Flight-test schedule.
+    /// Path of the flight-test schedule.
     pub schedule: Option<&'a Path>,
     /// The other end of the vehicle's link.
     pub profile: ProfileName,
-    /// What it is commanded.
+    /// Quantity that the flight controller is commanded.
     pub commanded: CommandName,
 }
 
@@ -75,10 +75,7 @@ fn lasting(path: &Path) -> PathBuf {
 }
 
 impl FlownWith {
-    /// Says in the recording `folder` what flies.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
+    /// Writes what flies into the recording `folder`.
     pub fn write(folder: &Path, chosen: &Chosen<'_>, model: &GreyBox) -> Result<()> {
         let said = FlownWith {
             schema: SCHEMA,
@@ -135,7 +132,7 @@ impl FlownWith {
         Ok(self.controller.parse()?)
     }
 
-    /// What is to be said if the model is no longer the one that flew.
+    /// Note if the model's files have changed since the flight.
     pub fn changed_model(&self, model: &GreyBox) -> Option<String> {
         (model.sha256 != self.model_sha256).then(|| {
             format!(

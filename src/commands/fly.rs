@@ -45,29 +45,31 @@ pub struct Arguments {
     /// Link to the vehicle: udpin:, udpout:, tcpin: or tcpout:HOST:PORT, or serial:DEVICE:BAUD.
     #[arg(long, value_name = "ADDRESS", default_value = "udpin:127.0.0.1:14600")]
     vehicle: Address,
-    /// What flies at the other end of the vehicle's link.
+    /// Flight controller or simulator at the other end of the vehicle's link.
     #[arg(long, value_name = "NAME", default_value = "sitl", value_enum)]
     profile: ProfileName,
-    /// What a real flight controller is commanded: surfaces (MANUAL), or attitude (OFFBOARD, GUIDED).
+    /// Commanded quantity of a real flight controller: surfaces (MANUAL), or attitude (OFFBOARD,
+    /// GUIDED).
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
     /// Link to clients; may be given several times. One that other machines reach needs --sign, or --insecure.
     #[arg(long = "client", value_name = "ADDRESS", default_values = ["udpin:127.0.0.1:14550", "udpout:127.0.0.1:14540"])]
     clients: Vec<Address>,
-    /// Sign what is sent to clients, and refuse what is not signed, with the key in this file: 64
-    /// hexadecimal digits, readable by its owner alone.
+    /// Sign messages to clients and refuse unsigned ones, with the key in this file: 64 hexadecimal
+    /// digits, readable by its owner only.
     #[arg(long, value_name = "FILE")]
     sign: Option<PathBuf>,
     /// Sign the vehicle's link as well.
     #[arg(long, requires = "sign")]
     sign_vehicle: bool,
-    /// A further link to clients, declared local: nothing is signed on it; may be given several times.
+    /// A further link to clients, declared local: messages on it are not signed; may be given
+    /// several times.
     #[arg(long, value_name = "ADDRESS", requires = "sign")]
     local: Vec<Address>,
-    /// Let whoever reaches an unsigned link steer the aircraft, from other machines too.
+    /// Let anybody who reaches an unsigned link steer the aircraft, from other machines too.
     #[arg(long)]
     insecure: bool,
-    /// Controller.
+    /// Controller that flies the aircraft.
     #[arg(long, value_name = "NAME", default_value = CONTROLLER, value_parser = choices::controller())]
     controller: ControllerKind,
     /// Model that the controller is designed from or plans with.
@@ -88,7 +90,7 @@ pub struct Arguments {
     /// New folder for the recording [default: the next number under flights/].
     #[arg(long, value_name = "DIR", conflicts_with = "no_record")]
     record: Option<PathBuf>,
-    /// Record nothing.
+    /// Do not record the flight.
     #[arg(long)]
     no_record: bool,
     /// Wait for every plan, for a simulator that waits for every answer.
@@ -109,21 +111,21 @@ pub struct Arguments {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProfileName {
-    /// The simulator's shim.
+    /// The simulator's own profile.
     Sitl,
-    /// PX4, fixed wing.
+    /// A flight controller with PX4, fixed wing.
     Px4,
-    /// ArduPilot Plane.
+    /// A flight controller with ArduPilot Plane.
     Ardupilot,
 }
 
-/// What is commanded, by name.
+/// Commanded quantity, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CommandName {
-    /// Aileron, elevator, throttle.
+    /// Commands of aileron, elevator and throttle.
     Surfaces,
-    /// Roll, pitch, thrust.
+    /// Setpoints of roll, pitch and thrust.
     Attitude,
 }
 
@@ -139,7 +141,7 @@ impl ProfileName {
 }
 
 impl CommandName {
-    /// What the companion commands of a real controller.
+    /// Authority of the companion over a real controller.
     pub fn authority(self) -> Authority {
         match self {
             CommandName::Surfaces => Authority::Surfaces,
@@ -165,7 +167,7 @@ impl Arguments {
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
     }
 
-    /// What is noted beside the recording.
+    /// Options that are recorded beside the log.
     fn chosen(&self) -> Chosen<'_> {
         Chosen {
             controller: self.controller,
@@ -226,7 +228,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let class = punctual::class(arguments.realtime);
     let flight = Flight::start(&options, companion, stop)?;
     if !arguments.lockstep {
-        punctual::tell(class);
+        punctual::print_timing(class);
     }
     if let Some(folder) = &flight.recording {
         // the flight goes on: the recording is whole without it

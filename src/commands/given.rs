@@ -1,4 +1,4 @@
-//! Files that stand in one another's place: a log given as a model, a model given as a log.
+//! Hints for a log given as a model and a model given as a log.
 
 use std::fs::File;
 use std::io::Read;

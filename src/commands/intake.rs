@@ -17,7 +17,7 @@ use crate::sysid::flight_path::{self, ActuatorClock, reconstruct};
 #[cfg(feature = "study")]
 use crate::workbench;
 
-/// Which logs, read how.
+/// Logs and options for reading them.
 #[derive(Clone, clap::Args)]
 pub struct LogArguments {
     /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
@@ -30,7 +30,7 @@ pub struct LogArguments {
 /// How logs are read.
 #[derive(Clone, clap::Args)]
 pub struct Reading {
-    /// A TOML file that says where columns of the logs come from.
+    /// A TOML file that assigns fields of the logs to columns.
     #[arg(long)]
     mapping: Option<PathBuf>,
     /// Read logs in which more than 5 % of the rows are unusable.
@@ -45,12 +45,12 @@ pub struct Reading {
     source: Vec<Asked>,
 }
 
-/// What the logs gave.
+/// Flights read from the logs.
 #[derive(Default)]
 pub struct Intake {
     /// The flights that could be reconstructed; at least one.
     pub flights: Vec<Reconstruction>,
-    /// What was odd about the logs, left-out ones included.
+    /// Findings about the logs, including those that were left out.
     pub notes: Vec<String>,
     /// Whether a log was left out or holds what makes the figures wrong.
     pub in_doubt: bool,
@@ -64,7 +64,7 @@ impl Intake {
     }
 
     fn leave_out(&mut self, error: &anyhow::Error) {
-        let said = mistake::told(error);
+        let said = mistake::text(error);
         eprintln!("greylag: {said}");
         self.in_doubt = true;
         self.notes.push(format!("left out: {}", said.lines().next().unwrap_or_default()));
@@ -84,7 +84,7 @@ impl LogArguments {
         format!(" --log{logs}{}", self.reading.words())
     }
 
-    /// The options that say how the logs are read, as arguments of another command.
+    /// The options for reading the logs, as arguments of another command.
     pub fn reading_words(&self) -> Vec<std::ffi::OsString> {
         let Reading { mapping, lenient, despite_problems, source } = &self.reading;
         let mapping = mapping.iter().flat_map(|file| ["--mapping".into(), file.clone().into()]);
@@ -94,10 +94,7 @@ impl LogArguments {
         mapping.chain(sources).chain(given).collect()
     }
 
-    /// Reads and reconstructs the logs; one that cannot be is said and left out.
-    ///
-    /// # Errors
-    /// If the mapping cannot be read, or no log is left.
+    /// Reads and reconstructs the logs; prints an error for each that cannot be used, and skips it.
     pub fn take_in(&self, model: &GreyBox, clock: ActuatorClock) -> Result<Intake> {
         self.reading.take_in(&self.paths, model, clock)
     }
@@ -114,7 +111,7 @@ impl Reading {
         Ok(logs::Options { tolerance, mapping, flies: Flying::default(), sources })
     }
 
-    /// The same for a workbench.
+    /// The logs and options for a workbench.
     #[cfg(feature = "study")]
     pub fn of_workbench(&self) -> workbench::Reading {
         workbench::Reading {
@@ -125,7 +122,7 @@ impl Reading {
         }
     }
 
-    /// The same options as words of a command line, each with a space before it.
+    /// The options as words of a command line, each with a space before it.
     pub fn words(&self) -> String {
         let mapping = self.mapping.iter().map(|file| format!(" --mapping {}", quoted(file)));
         let flags = [(self.lenient, " --lenient"), (self.despite_problems, " --despite-problems")];
@@ -187,7 +184,7 @@ impl Reading {
         Ok(intake)
     }
 
-    /// The reconstructed flight of a log, with what was odd about the file.
+    /// The reconstructed flight of a log, with the findings about the file.
     fn reconstruct_one(
         &self,
         path: &Path,

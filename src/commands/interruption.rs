@@ -15,9 +15,9 @@ pub struct Interruption(Arc<AtomicBool>);
 /// How a long task ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// It is done.
+    /// The task is complete.
     Done,
-    /// Ctrl-C ended it; the same command goes on.
+    /// Ctrl-C ended it; the same command resumes it.
     Interrupted,
 }
 

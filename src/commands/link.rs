@@ -27,15 +27,15 @@ use crate::physics::airframe::ActuatorFigures;
 use shown::{delay, latency, parameters};
 
 /// Writes a line; a reader that is gone is no error.
-macro_rules! say {
+macro_rules! print_to {
     ($out:expr, $($words:tt)*) => {{
         let _ = writeln!($out, $($words)*);
     }};
 }
-use say;
+use print_to;
 
-/// How long a controller has to be heard.
-const PATIENCE: Duration = Duration::from_secs(4);
+/// Time within which the flight controller must send a heartbeat.
+const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(4);
 /// Share of a serial port that state may take: what is left is for parameters, commands, routing.
 const BUDGET: f64 = 0.6;
 /// A stream below this share of its rate is missing.
@@ -50,7 +50,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Measure rates, loss, jitter, latency; say what is missing, which parameters to set.
+    /// Measure rates, loss, jitter, latency; list what is missing and which parameters to set.
     Check(Check),
     /// Make a key that signs links.
     Key(key::Make),
@@ -68,10 +68,10 @@ struct Check {
     /// Model of the aircraft, for the actuators of its airframe.
     #[arg(long, value_name = "FILE", default_value = "params/x8/jsbsim.toml")]
     model: PathBuf,
-    /// What it shall be commanded.
+    /// Quantity that shall be commanded.
     #[arg(long, value_name = "WHAT", default_value = "surfaces", value_enum)]
     command: CommandName,
-    /// Controller whose share of the delay is judged, by surfaces.
+    /// Controller whose delay margin is checked, when surfaces are commanded.
     #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
     controller: ControllerKind,
     /// How long to measure.
@@ -84,7 +84,7 @@ struct Check {
 /// Runs `greylag link …`.
 ///
 /// # Errors
-/// If the link cannot be opened, or nobody answers on it.
+/// If the link cannot be opened, or no flight controller answers on it.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(check) => run_check(check),
@@ -97,25 +97,25 @@ fn run_check(check: &Check) -> Result<ExitCode> {
     let mut out: Box<dyn Write> =
         if check.json.takes_stdout() { Box::new(io::sink()) } else { Box::new(io::stdout()) };
     let model = fly::model(&check.model, None)?;
-    let mut ear = Ear::open(&check.vehicle)?;
+    let mut listener = Listener::open(&check.vehicle)?;
     let actuators = model.airframe.actuators;
     let asked = check.profile.and_then(ProfileName::stack);
     let stack = match asked {
         Some(stack) => stack,
-        None => ear.find(check.command, actuators)?,
+        None => listener.find(check.command, actuators)?,
     };
     let profile = Profile { stack, authority: check.command.authority(), actuators };
-    say!(out, "measuring {} for {} s …", check.vehicle, check.seconds);
+    print_to!(out, "measuring {} for {} s …", check.vehicle, check.seconds);
     let mut real = Real::new(profile);
     if profile.authority == Authority::Surfaces {
         real.bear(margin::of(check.controller, &model)?);
     }
-    let real = ear.listen(real, Duration::from_secs(check.seconds));
+    let real = listener.listen(real, Duration::from_secs(check.seconds));
     report(check, &real, &mut out)
 }
 
-/// The open link.
-struct Ear {
+/// An open link and the messages received on it.
+struct Listener {
     started: Instant,
     arrivals: Receiver<Arrival>,
     link: Link,
@@ -123,20 +123,20 @@ struct Ear {
     _network: Network,
 }
 
-impl Ear {
-    fn open(address: &Address) -> Result<Ear> {
+impl Listener {
+    fn open(address: &Address) -> Result<Listener> {
         let network = Network::start()?;
         let (to, arrivals) = bounded(1024);
         let link = network.open(LinkId(0), address, "--vehicle", to)?;
         let started = Instant::now();
-        Ok(Ear { started, arrivals, link, remarks: Vec::new(), _network: network })
+        Ok(Listener { started, arrivals, link, remarks: Vec::new(), _network: network })
     }
 
-    /// The stack of whoever is there.
+    /// The stack of the flight controller on the link.
     fn find(&mut self, command: CommandName, actuators: ActuatorFigures) -> Result<Stack> {
         let authority = command.authority();
         let guess = Profile { stack: Stack::Px4, authority, actuators };
-        let end = Instant::now() + PATIENCE;
+        let end = Instant::now() + HEARTBEAT_TIMEOUT;
         let mut real = Real::new(guess);
         while Instant::now() < end {
             real = self.listen(real, Duration::from_millis(100));
@@ -156,7 +156,7 @@ impl Ear {
         bail!(
             "no flight controller heard for {} s: check port, baud rate, and that its port speaks \
              MAVLink (MAV_1_CONFIG on PX4, SERIAL2_PROTOCOL 2 on ArduPilot)",
-            PATIENCE.as_secs()
+            HEARTBEAT_TIMEOUT.as_secs()
         )
     }
 
@@ -180,7 +180,7 @@ impl Ear {
     }
 }
 
-/// What was found, as JSON.
+/// Result of the check as JSON.
 #[derive(Serialize)]
 struct Document {
     stack: String,
@@ -192,7 +192,7 @@ struct Document {
     streams: Vec<StreamRow>,
     parameters: Vec<String>,
     warning: Option<String>,
-    /// What keeps the profile from being flown; nothing if it can be.
+    /// Reasons against flying the profile; empty if it can be flown.
     missing: Vec<String>,
 }
 
@@ -236,7 +236,7 @@ fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
     };
     let who = Stack::of(autopilot).map_or("unknown autopilot".into(), |stack| stack.to_string());
     let state = if armed { "armed" } else { "disarmed" };
-    say!(out, "controller  {who}, system {}, {state}", real.system().unwrap_or(0));
+    print_to!(out, "controller  {who}, system {}, {state}", real.system().unwrap_or(0));
     let mut missing = Vec::new();
     if Stack::of(autopilot) != Some(real.profile().stack) {
         missing.push(format!("the controller is {who}, not {}", real.profile().stack));
@@ -254,17 +254,17 @@ fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
         parameters(real, &mut missing, out);
         delay(real, &mut missing, out);
         if let Some(words) = real.radio_warning() {
-            say!(out, "\nwarning: {words}");
+            print_to!(out, "\nwarning: {words}");
         }
     }
     check.json.write("greylag.link-check/1", &Document::new(real, &missing), Overwrite::Never)?;
     if missing.is_empty() {
-        say!(out, "\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
+        print_to!(out, "\n{} can be flown by {:?}", real.profile().stack, real.profile().authority);
         return Ok(ExitCode::SUCCESS);
     }
-    say!(out, "\nmissing for {} by {:?}:", real.profile().stack, real.profile().authority);
+    print_to!(out, "\nmissing for {} by {:?}:", real.profile().stack, real.profile().authority);
     for line in &missing {
-        say!(out, "  {line}");
+        print_to!(out, "  {line}");
     }
     Ok(ExitCode::FAILURE)
 }
@@ -282,7 +282,7 @@ fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>, out: &mut dyn 
     match check.vehicle {
         Address::Serial { baud, .. } => {
             let share = wanted * 10.0 / f64::from(baud);
-            say!(
+            print_to!(
                 out,
                 "; the streams need {:.0} of {:.0} kbit/s, {:.0} %",
                 kilobits(wanted),
@@ -296,12 +296,12 @@ fn traffic(check: &Check, real: &Real, missing: &mut Vec<String>, out: &mut dyn 
                 ));
             }
         }
-        _ => say!(out, "; the streams need {:.0}", kilobits(wanted)),
+        _ => print_to!(out, "; the streams need {:.0}", kilobits(wanted)),
     }
-    say!(out, "loss        {:.2} % by sequence numbers", 100.0 * survey.loss());
+    print_to!(out, "loss        {:.2} % by sequence numbers", 100.0 * survey.loss());
     let counts = real.counts().frames;
     if counts.bad() > 0 {
-        say!(out, "bad frames  {} ({} with a wrong CRC)", counts.bad(), counts.bad_crc);
+        print_to!(out, "bad frames  {} ({} with a wrong CRC)", counts.bad(), counts.bad_crc);
     }
     if survey.loss() > 0.02 {
         missing.push("more than 2 % of the frames are lost: check cable and flow control".into());
@@ -342,7 +342,7 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
             verdict.to_owned(),
         ]);
     }
-    say!(out, "\n{table}");
+    print_to!(out, "\n{table}");
     let named: Vec<u32> = real.profile().stack.streams().iter().map(|stream| stream.id).collect();
     let others: Vec<String> = real
         .survey()
@@ -351,11 +351,11 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
         .map(|(id, traffic)| format!("{id} ({:.1} Hz)", real.survey().mean_hz(traffic)))
         .collect();
     if !others.is_empty() {
-        say!(out, "others by number: {}", others.join(", "));
+        print_to!(out, "others by number: {}", others.join(", "));
     }
 }
 
-/// What makes a stream come faster.
+/// How the rate of a stream is raised.
 fn remedy(stack: Stack) -> &'static str {
     match stack {
         Stack::Px4 => "raise the port's data rate (MAV_1_RATE) or its baud rate",

@@ -1,12 +1,13 @@
-//! Warnings on standard error, each said once: every worker that loads an aircraft has the same ones.
+//! Warnings on standard error, each printed once: every worker that loads an aircraft has the same
+//! ones.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::sync::Mutex;
 
-/// Lines that were said.
-static SAID: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
-/// Lines that are remembered at most; later ones are said whenever they come.
+/// Lines that were printed.
+static PRINTED: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
+/// Largest number of lines that are remembered; later ones are printed each time.
 const REMEMBERED: usize = 1000;
 
 /// Standard error without repetitions.
@@ -26,8 +27,8 @@ impl Write for LogOnce {
 }
 
 fn is_new(line: &[u8]) -> bool {
-    let Ok(mut said) = SAID.lock() else { return true };
-    said.len() >= REMEMBERED || said.insert(line.to_owned())
+    let Ok(mut printed) = PRINTED.lock() else { return true };
+    printed.len() >= REMEMBERED || printed.insert(line.to_owned())
 }
 
 #[cfg(test)]

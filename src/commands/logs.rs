@@ -30,7 +30,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Say what logs hold, at which rates, with which gaps, and what each is missing for which
+    /// Show what logs hold, at which rates, with which gaps, and what each is missing for which
     /// purpose. Exit status 3 when something makes the numbers of one wrong.
     Info {
         /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
@@ -39,11 +39,12 @@ enum Verb {
         /// As JSON: an object, of several logs a list of them.
         #[arg(long)]
         json: bool,
-        /// Write a mapping file that puts right the units and signs that were found wrong: what --mapping takes.
+        /// Write a mapping file that corrects the wrong units and signs that were found: what
+        /// --mapping takes.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         write_mapping: Option<PathBuf>,
-        /// The model file of the aircraft: its envelope says from which airspeed on it flies. Without it
-        /// that is 7 m/s.
+        /// The model file of the aircraft: its envelope sets the airspeed above which it flies.
+        /// Without it that is 7 m/s.
         #[arg(long)]
         model: Option<PathBuf>,
         #[command(flatten)]
@@ -53,10 +54,10 @@ enum Verb {
     Convert {
         /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
         input: PathBuf,
-        /// The table.
+        /// The CSV table to write.
         output: PathBuf,
-        /// The model file of the aircraft: its envelope says from which airspeed on it flies. Without it
-        /// that is 7 m/s.
+        /// The model file of the aircraft: its envelope sets the airspeed above which it flies.
+        /// Without it that is 7 m/s.
         #[arg(long)]
         model: Option<PathBuf>,
         /// Replace the table if it exists.
@@ -85,7 +86,7 @@ enum Verb {
 
 #[derive(clap::Args)]
 struct Reading {
-    /// A TOML file that says where columns come from.
+    /// A TOML file that assigns fields of the logs to columns.
     #[arg(long)]
     mapping: Option<PathBuf>,
     /// Airframe file whose [surfaces] and [motors] the log names.
@@ -115,7 +116,7 @@ impl Reading {
     }
 }
 
-/// Does what the verb says.
+/// Runs the chosen subcommand.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.verb {
         Verb::Info { files, json, write_mapping, model, reading } => {
@@ -159,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
-/// Writes the mapping that puts right what was found.
+/// Writes the mapping that corrects the findings.
 fn write_mapping_file(path: &Path, logs: &[Info]) -> Result<ExitCode> {
     let Some(text) = mapping(logs) else {
         bail!("no factor puts anything of these logs right, so no mapping was written");
@@ -203,7 +204,7 @@ fn convert(log: &Log, output: &Path, force: bool) -> Result<ExitCode> {
     Ok(status(Some(Info::of(log).severity())))
 }
 
-/// What the worst of the findings makes the exit status.
+/// Exit status for the most severe finding.
 fn status(worst: Option<Severity>) -> ExitCode {
     match worst {
         Some(Severity::Problem) => ExitCode::from(IN_DOUBT),
@@ -275,7 +276,7 @@ fn print(info: &Info) {
     }
 }
 
-/// What the log serves for.
+/// Prints the purposes of the log with what it lacks for each.
 fn print_purposes(info: &Info) {
     println!("\nServes for");
     for purpose in &info.purposes {

@@ -11,7 +11,8 @@ use anyhow::{Context, Result};
     after_help = "For one user: greylag man ~/.local/share/man/man1; then: man greylag-compare"
 )]
 pub struct Arguments {
-    /// Folder for greylag.1, a page for every subcommand and greylag-sitl.1; made if there is none. Pages there are replaced.
+    /// Folder for greylag.1, a page for every subcommand and greylag-sitl.1; created if missing.
+    /// Pages in it are replaced.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! A mapping file that puts right what was found wrong with units and signs of logs.
+//! A mapping file that corrects wrong units and signs of logs.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -36,7 +36,7 @@ pub fn mapping(logs: &[Info]) -> Option<String> {
     (!columns.is_empty()).then_some(text)
 }
 
-/// Where a column of a log comes from, as a mapping says it.
+/// Field of the log that fills a column, in the syntax of a mapping.
 fn origin(log: &Info, column: &str) -> String {
     let named = |c: &&Channel| c.columns.iter().any(|own| own == column);
     match (log.format, log.channels.iter().find(named)) {

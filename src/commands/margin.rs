@@ -1,4 +1,4 @@
-//! The delay that a controller bears, for whoever flies through a flight controller's channels.
+//! Delay margin of a controller, for flights through a flight controller's channels.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ pub fn of(kind: ControllerKind, model: &GreyBox) -> Result<Option<Duration>> {
     let kind = if designed && kind.pace() != Pace::Planned { kind } else { ControllerKind::Lqi };
     match build(kind, model) {
         Ok(controller) => Ok(delay_margin(controller.as_ref(), model)),
-        // No LQI: what flies then was said already, and nothing is known of its delay.
+        // No LQI: the substitute was reported already, and its delay margin is unknown.
         Err(_) if !designed => Ok(None),
         Err(why) => Err(why.into()),
     }

@@ -1,10 +1,10 @@
-//! What is said of a mistake: each cause once, and only a cure that cures.
+//! Text of an error for the user: each cause once, and only a remedy that applies.
 
 use std::io::{self, ErrorKind};
 
-use super::said_once::said_once;
+use super::one_line::one_line;
 
-/// Cures that stand in errors whatever the system said; the right one takes their place.
+/// Remedies in error texts that do not depend on the cause; the right one replaces them.
 const ANY_CURE: [&str; 4] = [
     ": check the path and its permissions",
     "; check that its folder exists, can be written to and has room",
@@ -12,9 +12,9 @@ const ANY_CURE: [&str; 4] = [
     "; name a file that exists",
 ];
 
-/// The error as it is printed.
-pub fn told(error: &anyhow::Error) -> String {
-    let text = said_once(error);
+/// Text of `error` as it is printed.
+pub fn text(error: &anyhow::Error) -> String {
+    let text = one_line(error);
     let system = error.chain().find_map(|cause| cause.downcast_ref::<io::Error>());
     match system.and_then(|system| cure(system.kind())) {
         Some(cure) => format!("{}; {cure}", plain(&text)),
@@ -22,7 +22,7 @@ pub fn told(error: &anyhow::Error) -> String {
     }
 }
 
-/// What helps against what the system said; `None` where its own words must do.
+/// Remedy for an error of the operating system; `None` where its own text must suffice.
 fn cure(kind: ErrorKind) -> Option<&'static str> {
     match kind {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
@@ -64,13 +64,13 @@ mod tests {
 
     #[test]
     fn the_cure_is_the_systems_and_no_temporary_name_is_shown() {
-        let told_of = |kind: ErrorKind, code: i32, text: &str| {
+        let text_of = |kind: ErrorKind, code: i32, text: &str| {
             let system = io::Error::from_raw_os_error(code);
             assert_eq!(system.kind(), kind);
-            told(&anyhow::Error::new(system).context(text.to_owned()))
+            super::text(&anyhow::Error::new(system).context(text.to_owned()))
         };
         // ENOSPC, EACCES, ENOENT
-        let full = told_of(
+        let full = text_of(
             ErrorKind::StorageFull,
             28,
             "writing a.json: No space left on device (os error 28); check that its folder exists, can be written to and has room",
@@ -79,9 +79,9 @@ mod tests {
             full,
             "writing a.json: No space left on device; make room there, or write to another disk"
         );
-        let denied = told_of(ErrorKind::PermissionDenied, 13, "cannot read a.csv");
+        let denied = text_of(ErrorKind::PermissionDenied, 13, "cannot read a.csv");
         assert!(denied.starts_with("cannot read a.csv: Permission denied; change its"), "{denied}");
-        let gone = told_of(ErrorKind::NotFound, 2, "making a folder at path \"/proc/.tmpEHi2\"");
+        let gone = text_of(ErrorKind::NotFound, 2, "making a folder at path \"/proc/.tmpEHi2\"");
         assert_eq!(gone, "making a folder: No such file or directory; check the path");
     }
 }

@@ -56,7 +56,7 @@ mod recording_report;
 mod replay;
 #[cfg(feature = "demo")]
 mod report;
-mod said_once;
+mod one_line;
 pub mod shipped;
 mod status;
 mod terminal;
@@ -103,7 +103,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Say more of what happens; twice, all of it.
+    /// Print more messages; twice prints all.
     #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
     verbose: u8,
     /// Show no progress and no warnings, only results and errors.
@@ -131,10 +131,10 @@ enum Command {
     /// Fly a schedule of easy and hard attitudes: simulator, companion and client in one program.
     #[cfg(feature = "demo")]
     Demo(demo::Arguments),
-    /// Say what the catalogue of physical effects knows.
+    /// Show the catalogue of physical effects.
     #[cfg(feature = "study")]
     Effects(effects::Arguments),
-    /// Find the manoeuvre that tells two missing effects apart, as a schedule to fly.
+    /// Find the manoeuvre that distinguishes two missing effects, as a schedule to fly.
     #[cfg(all(feature = "demo", feature = "study"))]
     Design(design::Arguments),
     /// Name the physical effect that a model lacks, from flight logs.
@@ -153,7 +153,7 @@ enum Command {
     Learn(learn::Arguments),
     /// Check the link to a flight controller.
     Link(link::Arguments),
-    /// Say what a flight log holds, or write it as a CSV table.
+    /// Show what a flight log holds, or write it as a CSV table.
     Logs(logs::Arguments),
     /// Fly an aircraft that has an effect which its model lacks: data to find it in.
     #[cfg(feature = "demo")]
@@ -199,21 +199,21 @@ fn parse() -> Arguments {
     <Arguments as clap::FromArgMatches>::from_arg_matches(&found).unwrap_or_else(|e| e.exit())
 }
 
-/// The command with values that may begin with a minus sign wherever one is taken: what a number may be is for its
-/// option to say.
+/// The command with values that may begin with a minus sign wherever one is taken: the option's
+/// parser checks the range.
 fn with_signs(command: clap::Command) -> clap::Command {
     let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
     let command = command.mut_args(|a| if takes(&a) { a.allow_negative_numbers(true) } else { a });
     command.mut_subcommands(with_signs)
 }
 
-/// Runs the subcommand of the command line; what goes wrong is said in one line.
+/// Runs the subcommand of the command line; an error is printed in one line.
 pub fn main() -> ExitCode {
     let Arguments { command, verbose, quiet } = parse();
     bar::silence(quiet);
     let level = match (quiet, verbose) {
         (true, _) => "error",
-        // what the port of JSBSim says of an aircraft's XML is said once more, in our words
+        // warnings of the port of JSBSim on an aircraft's XML are repeated in our words
         (_, 0) => "warn,jsbsim=off",
         (_, 1) => "info",
         (_, 2..) => "debug",
@@ -234,12 +234,11 @@ pub fn main() -> ExitCode {
             eprintln!("greylag: stopped by Ctrl-C; nothing was written");
             return ExitCode::from(status::INTERRUPTED);
         }
-        eprintln!("greylag: {}", mistake::told(&error));
+        eprintln!("greylag: {}", mistake::text(&error));
         ExitCode::FAILURE
     })
 }
 
-/// Runs one subcommand.
 fn run(command: Command) -> Result<ExitCode> {
     match command {
         Command::Aircraft(arguments) => aircraft::run(&arguments),

@@ -30,7 +30,8 @@ const SCHEMA: &str = "greylag.mystery/1";
 /// Options of `greylag mystery`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// What everything is drawn from: the effect, the flights, the wind, the errors of model and sensors.
+    /// Seed of all random draws: the effect, the flights, the wind, the errors of model and
+    /// sensors.
     #[arg(long, required_unless_present = "open")]
     seed: Option<u64>,
     /// New folder for the logs, the model and the sealed answer.
@@ -46,7 +47,8 @@ pub struct Arguments {
     /// Name of the simulator's aircraft that the model is of [default: x8].
     #[arg(long, value_name = "NAME", requires = "model")]
     aircraft: Option<String>,
-    /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with all there are.
+    /// Hide this effect instead of one drawn from the seed; a wrong ID is answered with a list of
+    /// all.
     #[arg(long, value_name = "ID", group = "what")]
     effect: Option<String>,
     /// Hide the effect of this file, with the values that the file has.
@@ -58,7 +60,7 @@ pub struct Arguments {
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
     turbulence_severity: Option<u8>,
-    /// Open the answer of a folder, beside what its diagnosis.json says.
+    /// Reveal the answer of a folder, beside the result in its diagnosis.json.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "what", "turbulence_severity"])]
     open: Option<PathBuf>,
     /// Open the answer without a diagnosis: the game is over then.
@@ -66,7 +68,7 @@ pub struct Arguments {
     give_up: bool,
 }
 
-/// What was hidden.
+/// The effect that was hidden.
 #[derive(Debug, Deserialize, Serialize)]
 struct Answer {
     schema: String,
@@ -141,7 +143,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The simulator's aircraft.
+/// The simulator's aircraft, with the airframe of the reference model.
 fn subject(arguments: &Arguments, reference: &GreyBox) -> Result<Subject> {
     let mut plant =
         PlantOptions { aircraft_dir: arguments.aircraft_dir.clone(), ..PlantOptions::default() };
@@ -170,7 +172,7 @@ fn airframe(path: &Path, model: &str) -> Result<String> {
     std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))
 }
 
-/// What is hidden: the effect of a file, one by its id, or one drawn.
+/// The effect to hide: that of a file, one by its id, or one drawn at random.
 fn missing(arguments: &Arguments, reference: &GreyBox, seed: u64) -> Result<Missing> {
     let Some(file) = &arguments.hide else {
         let craft = Craft::of(reference);
@@ -223,7 +225,7 @@ fn coefficient_names(id: &str) -> Vec<&'static str> {
         .map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
 }
 
-/// JSON in hexadecimal digits: nobody reads it by accident.
+/// JSON in hexadecimal digits, so that it is not read by accident.
 fn seal(answer: &Answer) -> Result<String> {
     let mut out = String::new();
     for line in serde_json::to_vec(answer)?.chunks(32) {

@@ -7,11 +7,11 @@ const MOST_DEG: f64 = 10.0;
 /// Largest factor on the trims' widths.
 const MOST_TIMES: f64 = 100.0;
 
-/// What may differ from flight to flight.
+/// Constants that may differ from flight to flight.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct PerFlightArguments {
-    /// Give each flight trims of its own (CD0, CL0, CY0, Cl0, Cm0, Cn0, a share of the thrust) beside what all flights
-    /// have in common; FACTOR times their usual standard deviations.
+    /// Estimate trims for each flight (CD0, CL0, CY0, Cl0, Cm0, Cn0, a share of the thrust) beside
+    /// the common coefficients; FACTOR times their usual standard deviations.
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, require_equals = true, default_missing_value = "1",
           value_parser = factor)]
     flight_trims: Option<f64>,
@@ -22,7 +22,7 @@ pub struct PerFlightArguments {
 }
 
 impl PerFlightArguments {
-    /// What is asked for.
+    /// The constants that the options request.
     #[cfg(feature = "study")]
     pub fn asked(&self) -> PerFlight {
         PerFlight { trims: self.flight_trims, askew_deg: self.axes_askew }

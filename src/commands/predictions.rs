@@ -18,7 +18,7 @@ struct Row<'a> {
     model: &'a str,
     flight: String,
     start_s: f64,
-    /// Which of the horizons.
+    /// Index of the horizon.
     horizon: usize,
     predicted: [f64; 8],
     measured: [f64; 8],

@@ -22,7 +22,7 @@ use crate::sysid::flight_path::ActuatorClock;
     after_help = "Exit status: 0 a formula is proposed, 1 the search could not be made, 3 none is proposed, or a log was left out or holds what makes the figures wrong: the output says which."
 )]
 pub struct Arguments {
-    /// The model file.
+    /// The model file of the aircraft.
     #[arg(long)]
     model: PathBuf,
     #[command(flatten)]
@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Write the effect file, which `greylag amend --effect` takes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write everything that was found as JSON; `-` for standard output, with nothing else there.
+    /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.
@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     let bar = Bar::new();
     let mut proposal =
-        propose(&model, &flights, &tests.flights, &options, &|stage| bar.hear(stage))?;
+        propose(&model, &flights, &tests.flights, &options, &|stage| bar.update(stage))?;
     bar.go_on()?;
     drop(bar);
     notes.append(&mut proposal.notes);
@@ -135,7 +135,7 @@ fn print(proposal: &Proposal) {
     proposal.notes.iter().for_each(|note| println!("note: {note}"));
 }
 
-/// Formulas by size.
+/// Table of the formulas by size.
 fn front(rungs: &[Rung], evidence: &str) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -24,8 +24,9 @@ pub fn class(wanted: bool) -> Class {
     }
 }
 
-/// Measures for two seconds beside the flight, then says on the console how punctual this computer is.
-pub fn tell(class: Class) {
+/// Measures for two seconds beside the flight, then prints the timing jitter of this computer with
+/// advice.
+pub fn print_timing(class: Class) {
     let measured = move || {
         let punctuality = Punctuality::measure(MEASURED);
         let class_words = if class == Class::RealTime { "SCHED_FIFO, " } else { "" };

@@ -26,9 +26,9 @@ use crate::sysid::flight_path;
 /// "near-perfect tracking" (its section V-E).
 pub const TOLERANCE_DEG: f64 = 0.5;
 
-/// What the report needs besides the recording.
+/// Inputs of the report besides the recording.
 pub struct Reporter<'a> {
-    /// The page's title.
+    /// Title of the page.
     pub title: String,
     /// Name of the controller.
     pub controller: &'a str,
@@ -38,9 +38,9 @@ pub struct Reporter<'a> {
     pub seed: Option<u64>,
     /// The attitudes that were to be tracked.
     pub segments: Vec<Segment>,
-    /// What the companion said, with its time, s.
+    /// Texts that the companion sent, with their times, s.
     pub texts: Vec<(f64, String)>,
-    /// What the planner saw.
+    /// Insight into the planner after each command.
     pub sights: Vec<Sight>,
 }
 
@@ -100,8 +100,8 @@ impl Reporter<'_> {
 /// Ticks after a command at which the planner's view is taken: the search has begun to move the aircraft.
 const REPORTED_AFTER: usize = 20;
 
-/// What the planner of `companion` saw a moment after each command: the recording in `folder` is replayed, which
-/// also says whether its commands come out to the bit.
+/// Insight into the planner of `companion` a moment after each command, by a replay of the
+/// recording in `folder`; prints whether its commands are reproduced to the bit.
 pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<Vec<Sight>> {
     println!("replaying the recording, to show what the planner saw");
     let mut all = Vec::new();

@@ -34,53 +34,53 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// What flew, where it is not what the recording says.
+/// Options on what flew, where it differs from the recording's own statement.
 #[derive(Args, Debug)]
 pub struct FlownArguments {
-    /// Controller that flew [default: what the recording says, else hybrid-lqi].
+    /// Controller that flew [default: as recorded, else hybrid-lqi].
     #[arg(long, value_name = "NAME", value_parser = choices::controller())]
     controller: Option<ControllerKind>,
-    /// Model that it was designed from [default: what the recording says].
+    /// Model that it was designed from [default: as recorded].
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Folder of the trained policy, for controllers that need one [default: what the recording says].
+    /// Folder of the trained policy, for controllers that need one [default: as recorded].
     #[arg(long, value_name = "DIR")]
     policy: Option<PathBuf>,
-    /// Settings of the planner that were not of their usual size [default: what the recording says].
+    /// Settings of the planner that were not of their usual size [default: as recorded].
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
-    /// Airframe file in place of the one that the model names [default: what the recording says].
+    /// Airframe file in place of the one that the model names [default: as recorded].
     #[arg(long, value_name = "FILE")]
     airframe: Option<PathBuf>,
-    /// Schedule that was flown [default: what the recording says].
+    /// Schedule that was flown [default: as recorded].
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
-    /// What was at the other end of the vehicle's link [default: what the recording says, else sitl].
+    /// Profile of the vehicle's link [default: as recorded, else sitl].
     #[arg(long, value_name = "NAME", value_enum)]
     profile: Option<ProfileName>,
-    /// What a real flight controller was commanded [default: what the recording says, else surfaces].
+    /// Commanded quantity of a real flight controller [default: as recorded, else surfaces].
     #[arg(long, value_name = "WHAT", value_enum)]
     command: Option<CommandName>,
 }
 
-/// What flew a recording, ready to fly it again.
+/// Model and controllers that flew a recording, ready to fly it again.
 #[cfg_attr(
     not(feature = "demo"),
     expect(dead_code, reason = "pages are drawn with the simulator built in")
 )]
 pub struct Again {
-    /// The controller.
+    /// Controller that flew.
     pub controller: ControllerKind,
-    /// The model.
+    /// Model of the aircraft.
     pub model: GreyBox,
-    /// Pilot and controllers.
+    /// Pilot and controllers, as at the start of the flight.
     pub companion: Companion,
     /// The other end of the vehicle's link.
     pub vehicle: Vehicle,
 }
 
 impl FlownArguments {
-    /// What flew the recording in `folder`: as the options say, else as the recording does.
+    /// What flew the recording in `folder`: by the options, else as recorded.
     ///
     /// # Errors
     /// If a file cannot be used.
@@ -162,7 +162,7 @@ impl From<&Outcome> for Document {
     }
 }
 
-/// Replays; the exit status tells whether every command came out as it was recorded.
+/// Replays; the exit status is 0 if every command equals the recorded one.
 ///
 /// # Errors
 /// If a file cannot be used.

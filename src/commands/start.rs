@@ -1,4 +1,4 @@
-//! Where an episode in JSBSim begins, and what is said of its aircraft before.
+//! Start of an episode in JSBSim, and notes about its aircraft.
 
 use anyhow::{Result, bail};
 use greylag_sitl::plant::{Plant, PlantOptions, Start};
@@ -71,10 +71,8 @@ pub fn describe(plant: &mut PlantOptions, models: &[GreyBox]) -> Result<()> {
         .map_err(|why| anyhow::anyhow!("the airframe of model {}: {why}", model.name))
 }
 
-/// Says on standard error what is to be known of the aircraft, and where a model's airframe is not its.
-///
-/// # Errors
-/// If the aircraft cannot be loaded.
+/// Prints notes about the aircraft on standard error, and the differences between its travel and a
+/// model's airframe.
 pub fn introduce(options: &PlantOptions, models: &[GreyBox]) -> Result<()> {
     let mut plant = Plant::new(options)?;
     plant.notes().iter().for_each(|note| eprintln!("note: {note}"));

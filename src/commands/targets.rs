@@ -22,7 +22,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Writes the file.
+/// Generates the targets and writes their file.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let targets = TargetFile::generate(arguments.seed);
     files::write(&arguments.out, &targets.to_csv(), arguments.force.into())?;

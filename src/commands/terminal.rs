@@ -22,14 +22,14 @@ pub fn table<const N: usize>(header: [&str; N], words: usize) -> Table {
     table
 }
 
-/// What a text says, for its colour.
+/// Meaning of a text, which sets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// It is as wished.
+    /// A good result.
     Good,
-    /// It is not.
+    /// A bad result.
     Bad,
-    /// Neither.
+    /// Neither good nor bad.
     Plain,
 }
 
@@ -44,7 +44,7 @@ pub fn painted(text: &str, tone: Tone) -> String {
     }
 }
 
-/// Prints the answer box: what a command says first.
+/// Prints the answer box, before any other output of a command.
 pub fn print_answer(answer: &Answer) {
     let tone = match answer.numbers.change_percent {
         p if p <= -0.05 => Tone::Good,

@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Port on 127.0.0.1; 0 for any that is free.
     #[arg(long, default_value_t = 0)]
     port: u16,
-    /// The session's folder; made if there is none.
+    /// Folder of the session; created if missing.
     #[arg(long = "dir", default_value = "greylag-session")]
     folder: PathBuf,
     #[command(flatten)]

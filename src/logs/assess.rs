@@ -1,4 +1,4 @@
-//! What the quality of the channels means for a log: what counts as missing, and what is said.
+//! Assessment of a log's channels: which quality counts as missing, and the findings about it.
 
 use super::Sample;
 use super::columns::{COLUMNS, index};
@@ -38,7 +38,7 @@ pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
 
-/// What there is to say of the channels: made-up samples, and spikes.
+/// Findings about the channels: interpolated samples, and spikes.
 pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
     let lines = |wrong: bool| -> Vec<String> {
         let lines = channels.iter().filter(|c| c.quality.interpolated);
@@ -75,7 +75,7 @@ pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
     out
 }
 
-/// Empties the rows of a channel that hangs in flight; says which.
+/// Sets the rows of a channel that is stuck in flight to NaN; one finding for each stuck channel.
 pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) -> Vec<Finding> {
     let flights: Vec<(f64, f64)> = phases::phases(rows, flies)
         .into_iter()
@@ -109,7 +109,7 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
 /// Columns without which a row is no sample, should they hang; the airspeed may be slow or stay out for a while.
 const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
 
-/// Whether a row lies where a channel hangs without which it is no sample.
+/// Whether the row lacks a required column because its channel is stuck.
 pub(super) fn hangs(row: &Sample, channels: &[Channel]) -> bool {
     let hanging = channels.iter().filter(|c| !c.quality.frozen.is_empty());
     hanging

@@ -74,10 +74,10 @@ pub(super) fn read(
     })
 }
 
-/// What is said of a log that holds hover only.
+/// Error text for a log that holds hover only.
 const NEVER_ON_WINGS: &str = "there is no flight in this log: the vehicle never flies on its wings alone; give a log with forward flight";
 
-/// That the vehicle has no wings; an error where the log is to be computed with.
+/// Finding for a vehicle without wings; an error if the log is used for computation.
 fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Finding>, LogError> {
     match vehicle.and_then(Vehicle::refusal) {
         Some(why) if to == Use::Compute => Err(LogError::Vehicle { path: path.to_owned(), why }),

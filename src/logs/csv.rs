@@ -24,29 +24,29 @@ pub enum CsvError {
     /// The file cannot be opened, read or written.
     #[error("cannot {doing} flight log {path}: {source}: check the path and its permissions")]
     File {
-        /// What was being done.
+        /// Operation that failed, such as `read`.
         doing: &'static str,
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The text is no CSV.
     #[error("flight log {path}: {source}: correct the row or cut the file before it")]
     Text {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the CSV reader said.
+        /// Error of the CSV reader.
         source: ::csv::Error,
     },
     /// A needed column is missing.
     #[error("flight log {path} has no column `{column}`: {remedy}")]
     Column {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// The column.
+        /// Name of the missing column.
         column: &'static str,
-        /// What would satisfy it.
+        /// What would fill the column.
         remedy: String,
     },
     /// Too many rows cannot be used.
@@ -54,23 +54,23 @@ pub enum CsvError {
         "flight log {path}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently"
     )]
     Unusable {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// Rows dropped.
+        /// Number of rows that were dropped.
         dropped: usize,
-        /// Rows read.
+        /// Number of rows that were read.
         rows: usize,
-        /// Why, with counts.
+        /// Reasons for dropping, with counts.
         reasons: String,
         /// The first of those dropped, the header being row 1.
         first: usize,
     },
 }
 
-/// A flight read from a file, with what was odd about it.
+/// A flight read from a file, with the findings about the file.
 #[derive(Clone, Debug, Default)]
 pub struct Reading {
-    /// The flight.
+    /// The flight as read.
     pub flight: Flight,
     /// Columns that the format does not name.
     pub unknown_columns: Vec<String>,
@@ -105,7 +105,7 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     settle(raw, path, tolerance)
 }
 
-/// What [`settle`] would say against a table.
+/// The error that [`settle`] would return for this table, if any.
 pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
     refusal(&raw.judged(rows::Rows::take), path, tolerance)
 }

@@ -20,14 +20,14 @@ use super::topics::{Topic, Topics};
 use super::ulog::damage;
 use super::window::Window;
 
-/// Magic and type.
+/// Length of a record's header: two magic bytes and the type.
 const HEADER: usize = 3;
 /// The type of the record that declares types, its length, and that of its texts.
 const FMT: u8 = 128;
 const FMT_LEN: usize = 89;
 /// The longest record; its length has one byte.
 const LONGEST: usize = 255;
-/// Records whose time tells where another flight begins, and how far back it must go, s.
+/// Records whose time shows where another flight begins, and the least step back, s.
 const CLOCKS: [&str; 2] = ["ATT", "IMU"];
 const BACK_S: f64 = 1.0;
 
@@ -54,7 +54,7 @@ fn size(letter: u8) -> Option<usize> {
     })
 }
 
-/// A number of format `letter`; NaN for texts and for what lies beyond the record.
+/// Number of format `letter`; NaN for texts and beyond the record's end.
 fn number(letter: u8, bytes: &[u8], offset: usize) -> f64 {
     fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
         bytes.get(offset..)?.first_chunk().copied()

@@ -22,7 +22,7 @@ pub(super) const RATES: [&str; 3] = ["p_radps", "q_radps", "r_radps"];
 /// The column of the airspeed.
 pub(super) const AIRSPEED: &str = "airspeed_mps";
 
-/// Fills the columns that `mapping` makes from others; says what was done.
+/// Fills the columns that `mapping` derives from others; one note for each.
 pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
     let mut notes = Vec::new();
     let slopes: Vec<(&str, f64)> = mapping.slopes().collect();
@@ -142,7 +142,7 @@ fn body_rates(rows: &mut [Sample], over_s: f64) -> usize {
     count
 }
 
-/// What `fit` makes of the samples within half of `over_s` around each.
+/// Value of `fit` for the samples within half of `over_s` around each sample.
 fn around<T, R>(
     samples: &[T],
     time: impl Fn(&T) -> f64,
@@ -210,8 +210,8 @@ mod tests {
         [derive]\nbody_rates_over_s = 0.07\n[sensors]\nwind_north_mps = { value = 2.0, sd = 0.1 }\n\
         wind_east_mps = { value = 0.0, sd = 0.1 }\n";
 
-    /// A coordinated turn: pitch 0.1, bank 0.5, ψ̇ = 0.6 rad/s, 8 m/s over ground on its heading; positions
-    /// stand in the columns of the velocity, as a mapping puts them there.
+    /// A coordinated turn: pitch 0.1, bank 0.5, ψ̇ = 0.6 rad/s, 8 m/s over ground on its heading;
+    /// the velocity columns hold positions, as a mapping puts them there.
     fn turn(k: usize) -> Sample {
         let (t, turn, v) = (0.01 * k as f64, 0.6, 8.0);
         let yaw: f64 = turn * t;

@@ -8,12 +8,12 @@ use flate2::read::MultiGzDecoder;
 
 /// First bytes of a gzip file.
 const GZIP: [u8; 2] = [0x1F, 0x8B];
-/// Bytes looked at to tell what a file is.
+/// Number of bytes by which the format of a file is recognised.
 pub(super) const LOOK: usize = 4096;
 
 /// A file opened, unpacked if it is compressed, with its first bytes read.
 pub(super) struct Opened {
-    /// The first bytes.
+    /// The first bytes of the unpacked content.
     pub start: Vec<u8>,
     rest: Box<dyn Read>,
 }
@@ -22,7 +22,7 @@ impl Opened {
     /// Opens a file.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error of the operating system.
     pub fn file(path: &Path) -> io::Result<Opened> {
         let (start, file) = begun(Box::new(File::open(path)?))?;
         if !start.starts_with(&GZIP) {
@@ -55,7 +55,7 @@ pub(super) fn part(path: &Path) -> (PathBuf, Option<usize>) {
     named.unwrap_or((path.to_owned(), None))
 }
 
-/// Which of two bytes of UTF-16 comes first.
+/// Byte order of UTF-16.
 #[derive(Clone, Copy)]
 enum Wide {
     Little,

@@ -10,27 +10,27 @@ pub enum LogError {
     /// The file cannot be read.
     #[error("cannot read flight log {}: {source}: check the path and its permissions", path.display())]
     File {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is empty.
     #[error("flight log {} is empty: the logger wrote nothing, or the copy failed", path.display())]
     Empty {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
     },
     /// The file is none of the formats.
     #[error("{} is no flight log: it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or a MAVLink .tlog", path.display())]
     Foreign {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file has no flight of that number.
     #[error("flight log {} holds {there} flights: there is no #{asked} in it", path.display())]
     Part {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
         /// The number asked for.
         asked: usize,
@@ -40,43 +40,43 @@ pub enum LogError {
     /// The vehicle has no wings.
     #[error("flight log {}: {why}", path.display())]
     Vehicle {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// What it is, and what to do.
+        /// Type of the vehicle, and the remedy.
         why: String,
     },
     /// The CSV is wrong.
     #[error("{error}{hint}")]
     Csv {
-        /// What is wrong.
+        /// Error of the CSV reader.
         error: CsvError,
-        /// What it looks like.
+        /// Probable wrong units, for the message; may be empty.
         hint: String,
     },
     /// A needed column is filled by nothing in the file.
     #[error("flight log {} has nothing for column `{column}`: {remedy}", path.display())]
     Missing {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// The column.
+        /// Name of the missing column.
         column: &'static str,
-        /// What would satisfy it.
+        /// What would fill the column.
         remedy: String,
     },
     /// Too many rows cannot be used.
     #[error("flight log {}: {dropped} of {rows} rows are unusable ({reasons}; first: row {first}), above 5 %: repair it or read it leniently{hint}", path.display())]
     Unusable {
-        /// The file.
+        /// Path of the log.
         path: PathBuf,
-        /// Rows dropped.
+        /// Number of rows that were dropped.
         dropped: usize,
         /// Rows of the table.
         rows: usize,
-        /// Why, with counts.
+        /// Reasons for dropping, with counts.
         reasons: String,
         /// The first of those dropped.
         first: usize,
-        /// What it looks like.
+        /// Probable wrong units, for the message; may be empty.
         hint: String,
     },
 }

@@ -8,20 +8,20 @@ use super::mapping::TEXT;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Good to know.
+    /// For information; the log can be used fully.
     Note,
     /// Some of the log cannot be used, or not fully.
     Warning,
-    /// What is computed from the log would be wrong.
+    /// Results computed from the log would be wrong.
     Problem,
 }
 
 /// The mapping that puts a column right.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cure {
-    /// The column.
+    /// Name of the column to be corrected.
     pub column: String,
-    /// The factor.
+    /// Factor by which the column is multiplied.
     pub scale: f64,
 }
 
@@ -40,7 +40,7 @@ impl std::fmt::Display for Cure {
 pub struct Finding {
     /// How much it matters.
     pub severity: Severity,
-    /// What it is, with what would help.
+    /// Description of the finding, with a remedy.
     pub text: String,
     /// The factor that puts it right, where one does.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,22 +48,22 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// A note.
+    /// A finding of severity [`Severity::Note`].
     pub fn note(text: impl Into<String>) -> Self {
         Finding { severity: Severity::Note, text: text.into(), cure: None }
     }
-    /// A warning.
+    /// A finding of severity [`Severity::Warning`].
     pub fn warning(text: impl Into<String>) -> Self {
         Finding { severity: Severity::Warning, text: text.into(), cure: None }
     }
-    /// A problem.
+    /// A finding of severity [`Severity::Problem`].
     pub fn problem(text: impl Into<String>) -> Self {
         Finding { severity: Severity::Problem, text: text.into(), cure: None }
     }
 }
 
 impl Finding {
-    /// The same with more to say.
+    /// The finding with `more` appended to its text.
     pub fn with(self, more: &str) -> Self {
         Finding { text: self.text + more, ..self }
     }

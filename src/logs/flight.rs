@@ -13,7 +13,7 @@ pub struct Sample {
     pub attitude_rad: [f64; 3],
     /// p, q, r: body rates, rad/s.
     pub rates_radps: [f64; 3],
-    /// True airspeed, m/s.
+    /// True airspeed relative to the air, m/s.
     pub airspeed_mps: f64,
     /// Angle of attack, rad; positive with the air from below.
     pub alpha_rad: f64,
@@ -25,7 +25,7 @@ pub struct Sample {
     pub velocity_ned_mps: [f64; 3],
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
-    /// Air density, kg/m³.
+    /// Density of the air, kg/m³.
     pub air_density_kgpm3: f64,
     /// Recorded aileron deflection, rad; positive rolls right.
     pub aileron_rad: f64,
@@ -41,7 +41,7 @@ pub struct Sample {
     pub elevator_cmd: f64,
     /// Commanded rudder, −1..1; positive yaws left.
     pub rudder_cmd: f64,
-    /// Commanded throttle, 0..1.
+    /// Commanded throttle position, 0..1.
     pub throttle_cmd: f64,
     /// Commanded roll φ*, rad (an extra column, `roll_target_rad`).
     pub roll_target_rad: f64,
@@ -82,7 +82,7 @@ impl Default for Sample {
     }
 }
 
-/// What a recorded body rate stands for.
+/// Sampling of a recorded body rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
@@ -108,17 +108,17 @@ pub enum FlowAngles {
 /// Where only the rows matter, `Flight::from(samples)` or `..Flight::default()` fill in the rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
-    /// What the flight is called in reports: its file's name.
+    /// Name of the flight in reports: that of its file.
     pub name: String,
     /// The rows, in time order.
     pub samples: Vec<Sample>,
     /// Where α and β come from.
     pub flow_angles: FlowAngles,
-    /// What is known of its sensors and of the wind.
+    /// Known properties of the sensors and of the wind.
     pub sensors: Sensors,
     /// Channels of the file that the format does not name.
     pub unknown_columns: Vec<String>,
-    /// What was assumed or derived while reading, one sentence each.
+    /// Assumptions and derivations of the reader, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -131,7 +131,7 @@ impl Flight {
         all
     }
 
-    /// What the log's own column `rate_hold_s` says of its rates; `None` if it says nothing.
+    /// How the rates were sampled, from the log's own column `rate_hold_s`; `None` without the column.
     ///
     /// A simulator that holds its rates for less than half a sample period samples at instants.
     pub fn declared_sampling(&self) -> Option<Sampling> {

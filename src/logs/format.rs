@@ -2,17 +2,17 @@
 
 use serde::Serialize;
 
-/// A log format.
+/// Format of a flight log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Format {
-    /// The plain table.
+    /// Table of comma-separated values.
     Csv,
-    /// PX4 ULog.
+    /// ULog of the PX4 logger (`.ulg`).
     Ulog,
-    /// ArduPilot DataFlash `.bin`.
+    /// DataFlash log of ArduPilot (`.bin`).
     Dataflash,
-    /// MAVLink telemetry log.
+    /// Telemetry log of MAVLink frames (`.tlog`).
     Tlog,
 }
 

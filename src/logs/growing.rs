@@ -6,7 +6,7 @@ use super::csv::{self, CsvError};
 use super::flight::Sample;
 use super::mapping::Mapping;
 
-/// What has come of a growing log but is no whole row yet.
+/// Buffer of a growing log for bytes that do not yet form a whole row.
 #[derive(Clone, Debug, Default)]
 pub struct Growing {
     /// The first line with its end; empty as long as it is not whole.

@@ -1,4 +1,4 @@
-//! What a log holds, how far it goes, what it is missing for which purpose.
+//! Summary of a log: content, length, and missing channels for each purpose.
 
 use serde::Serialize;
 
@@ -10,14 +10,14 @@ use super::sources::Source;
 use super::vehicle::Vehicle;
 use super::{Channel, Format, Log, Sample, assess};
 
-/// What `greylag logs info` says of a log.
+/// Summary of a log, as `greylag logs info` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Info {
-    /// `greylag.log-info/1`.
+    /// Identifier of the schema, `greylag.log-info/1`.
     pub schema: &'static str,
-    /// The flight's name.
+    /// Name of the flight.
     pub name: String,
-    /// The file's format.
+    /// Format of the file.
     pub format: Format,
     /// Rows of the table.
     pub rows: usize,
@@ -33,41 +33,41 @@ pub struct Info {
     pub gaps: Vec<(f64, f64)>,
     /// Time in flight, s.
     pub flight_s: f64,
-    /// What the aircraft does when.
+    /// Phases of flight and ground, in order.
     pub phases: Vec<Phase>,
     /// The vehicle, where the log names it.
     pub vehicle: Option<Vehicle>,
     /// When it did not fly on its wings alone, s: left out.
     pub hovers: Vec<(f64, f64)>,
-    /// Which vehicle and which life of it this is, where the file holds several.
+    /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
     /// The instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// What fills the table.
+    /// Channels that fill the table.
     pub channels: Vec<Channel>,
-    /// What the log serves for.
+    /// Purposes with the channels that the log lacks for each.
     pub purposes: Vec<Purpose>,
     /// Topics of the file: name, instance, records.
     pub topics: Vec<(String, u16, usize)>,
-    /// What its user should know.
+    /// Findings for the log's user.
     pub findings: Vec<Finding>,
 }
 
-/// Something a log may serve for.
+/// Purpose for which a log can be used.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Purpose {
-    /// What it is.
+    /// Name of the purpose.
     pub name: &'static str,
-    /// What the log lacks for it; nothing if it serves.
+    /// Columns that the log lacks for it; empty if it serves.
     pub missing: Vec<String>,
-    /// What is there, but too slow.
+    /// Columns that are present at too low a rate.
     pub slow: Vec<String>,
-    /// What takes the place of what is absent.
+    /// Replacements for absent columns.
     pub instead: Vec<String>,
 }
 
 impl Info {
-    /// What there is to say of a log.
+    /// Summarises a log.
     pub fn of(log: &Log) -> Info {
         let samples = &log.flight.samples;
         let times: Vec<f64> = samples.iter().map(|s| s.time_s).collect();
@@ -106,7 +106,7 @@ impl Info {
     }
 }
 
-/// What a rudder that moves means to whoever studies the log.
+/// Finding about a rudder that moves.
 fn rudder(log: &Log) -> Option<Finding> {
     let motion = RudderMotion::of(&log.flight.samples)?;
     Some(Finding::warning(format!(
@@ -144,7 +144,7 @@ fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     (missing, instead)
 }
 
-/// The purpose with what stands against it beside absent columns: no wings, no flight, slow channels.
+/// The purpose with its obstacles besides absent columns: no wings, no flight, slow channels.
 fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
     let wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
     if !wings {
@@ -168,7 +168,7 @@ fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
     purpose
 }
 
-/// What stands in for a logged air density.
+/// Sources of air density that replace a logged one.
 fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     match (has("air_density_kgpm3"), has("altitude_m")) {
         (true, _) => Vec::new(),

@@ -1,7 +1,8 @@
-//! How late a channel is behind the inertial ones, by cross-correlation.
+//! Delay of a channel against the inertial ones, by cross-correlation.
 //!
-//! The velocity over ground changes as the specific force, turned into earth axes, and gravity say; the airspeed changes
-//! as the force along the body says. The shift at which both agree best is the delay.
+//! The rate of change of the ground velocity equals the specific force in earth axes plus gravity;
+//! that of the airspeed equals the specific force along the body axis. The delay is the shift with
+//! the highest correlation.
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -16,9 +17,9 @@ const STEP_S: f64 = 0.05;
 const SHIFT_S: f64 = 3.0;
 /// Time over which a change is taken, s.
 const OVER_S: f64 = 0.6;
-/// Shortest stretch that is looked at, s.
+/// Shortest stretch that is evaluated, s.
 const SHORTEST_S: f64 = 12.0;
-/// Longest stretch that is looked at, s: more says no more.
+/// Longest stretch that is evaluated, s: longer ones add no accuracy.
 const LONGEST_S: f64 = 300.0;
 /// Correlation from which a delay is believed, and by how much it must exceed that without a shift.
 const CERTAIN: f64 = 0.7;
@@ -130,7 +131,8 @@ fn earth(s: &Sample) -> Vector3<f64> {
         + Vector3::new(0.0, 0.0, STANDARD_GRAVITY)
 }
 
-/// The shift at which the first of each pair changes as the second says; `None` where nothing is certain.
+/// Shift at which the change of each first series matches its second series best; `None` where no
+/// shift is significant.
 fn delay(pairs: &[(Vec<f64>, Vec<f64>)]) -> Option<f64> {
     let over = (OVER_S / STEP_S) as usize;
     let (mut changes, mut expected): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());

@@ -21,7 +21,7 @@ use super::{Flight, binary, dataflash, text, tlog, ulog};
 /// How a log is read.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// What to do with many unusable rows.
+    /// How many unusable rows a log may have.
     pub tolerance: Tolerance,
     /// Where columns come from, where that is not the format's usual place.
     pub mapping: Mapping,
@@ -36,26 +36,26 @@ pub struct Options {
 pub struct Channel {
     /// The columns that it fills.
     pub columns: Vec<String>,
-    /// Its topic with fields in the file.
+    /// Topic and fields of the channel in the file.
     pub origin: String,
-    /// Usable samples.
+    /// Number of usable samples.
     pub samples: usize,
     /// Samples a second, by the median period.
     pub rate_hz: f64,
     /// Longest time between two samples, s.
     pub largest_gap_s: f64,
-    /// What the samples are worth.
+    /// Quality of the samples.
     pub quality: Quality,
 }
 
 /// A log read from a file.
 #[derive(Clone, Debug)]
 pub struct Log {
-    /// The file's format.
+    /// Format of the file.
     pub format: Format,
-    /// The table.
+    /// Table of the log's rows.
     pub flight: Flight,
-    /// What fills it.
+    /// Channels of the file that fill the table.
     pub channels: Vec<Channel>,
     /// Topics of the file (name, instance, records), used or not.
     pub topics: Vec<(String, u16, usize)>,
@@ -63,7 +63,7 @@ pub struct Log {
     pub dropped: usize,
     /// The numbers of the first of them; in a CSV the header is row 1, else the first row is.
     pub dropped_rows: Vec<usize>,
-    /// What its user should know.
+    /// Findings for the log's user.
     pub findings: Vec<Finding>,
     /// From when on the aircraft was taken to fly.
     pub flies: Flying,
@@ -73,7 +73,7 @@ pub struct Log {
     pub hovers: Vec<(f64, f64)>,
     /// The instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// Which vehicle and which life of it this is, where the file holds several.
+    /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
 }
 
@@ -125,8 +125,8 @@ pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Compute)?)
 }
 
-/// Reads all flights of a log, one for each life of each vehicle in it; those without a flight are left out where
-/// another one flies, which the findings of the first say.
+/// Reads all flights of a log, one for each boot of each vehicle in it. If some fly and others do
+/// not, those that do not are dropped, and the findings of the first flight list them.
 ///
 /// # Errors
 /// As [`load`], if none of them can be read.
@@ -168,7 +168,7 @@ fn said_of(log: &Result<Log, LogError>) -> String {
     }
 }
 
-/// The one with the longest flight, which says what the others are; else the first error.
+/// The log with the longest flight, with the others in its findings; else the first error.
 fn longest(mut all: Vec<Result<Log, LogError>>) -> Result<Log, LogError> {
     let said: Vec<String> = all.iter().map(said_of).collect();
     let flown = |log: &Result<Log, LogError>| log.as_ref().map_or(-1.0, Log::flown_s);
@@ -251,13 +251,13 @@ pub(super) fn name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// What wrong units may have made rows unusable, for an error: the findings of `screening` whose text says "look"
-/// ("looks like degrees"), so such a text must keep that word.
+/// Probable wrong units behind unusable rows, for an error text: the findings of `screening` whose
+/// text contains "look" ("looks like degrees"), so such a text must keep that word.
 pub(super) fn hint(findings: &[Finding]) -> String {
     findings.iter().filter(|f| f.text.contains("look")).map(|f| format!("; {}", f.text)).collect()
 }
 
-/// That rows were dropped.
+/// Finding about dropped rows, if any.
 pub(super) fn dropped(count: usize, numbers: &[usize]) -> Option<Finding> {
     let list = numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     let more = if count > numbers.len() { " …" } else { "" };

@@ -10,9 +10,9 @@ pub(super) struct Share {
     pub field: usize,
     /// The column that it is a part of.
     pub column: &'static str,
-    /// That column's place in a sample.
+    /// Place of that column in a sample.
     pub place: Place,
-    /// The factor.
+    /// Factor of the column's value.
     pub share: f64,
 }
 
@@ -39,7 +39,7 @@ pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
     both.into_iter().flatten().collect()
 }
 
-/// The shares of control `j`, if all columns that it takes are there.
+/// The shares of control `j`; `None` if a column is missing.
 fn made_of(
     names: &[String],
     mixer: &Mixer,

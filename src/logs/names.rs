@@ -1,4 +1,4 @@
-//! What flights are called where several logs are at hand.
+//! Names of flights where several logs are used.
 
 use std::path::Path;
 

@@ -41,26 +41,26 @@ impl Flying {
 /// A gap that splits the log, s, unless the log is slower than that.
 const GAP_S: f64 = 0.1;
 
-/// What an aircraft does.
+/// Kind of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PhaseKind {
-    /// It stands or rolls.
+    /// The aircraft stands or rolls.
     Ground,
-    /// It flies.
+    /// The aircraft is airborne.
     Flight,
 }
 
 /// A stretch of a log without gaps in which the aircraft does one thing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Phase {
-    /// What it does.
+    /// Kind of the phase.
     pub kind: PhaseKind,
     /// Time of the first row, s.
     pub from_s: f64,
     /// Time of the last row, s.
     pub to_s: f64,
-    /// Rows in it.
+    /// Number of rows in it.
     pub rows: usize,
 }
 

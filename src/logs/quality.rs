@@ -9,10 +9,10 @@ use serde::Serialize;
 use super::topics::period_s;
 use greylag_num::statistics::quantile;
 
-/// What the samples of a channel are worth.
+/// Quality of the samples of a channel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
-    /// How often something new comes, Hz; 0 where too little changes to tell.
+    /// Rate of new values, Hz; 0 where too little changes for an estimate.
     pub native_hz: f64,
     /// Whether most samples lie on straight lines between others.
     pub interpolated: bool,
@@ -26,11 +26,11 @@ pub struct Quality {
     pub largest_spike: f64,
 }
 
-/// Fewest samples that anything is said of.
+/// Smallest number of samples for an assessment.
 const ENOUGH: usize = 100;
 /// Share of the moving samples on straight lines from which they count as interpolated.
 const STRAIGHT: f64 = 0.7;
-/// A kink counts if it is so many times what rounding makes.
+/// A kink counts if it is this many times the rounding step.
 const KINK: f64 = 10.0;
 /// Fewest samples from kink to kink.
 const APART: f64 = 3.0;
@@ -39,7 +39,7 @@ const FROZEN_S: f64 = 1.0;
 const FROZEN_STEPS: f64 = 20.0;
 /// Samples on both sides whose median a spike is compared with.
 const AROUND: usize = 4;
-/// How far a spike lies out, in robust standard deviations, and in parts of the usual value.
+/// Least size of a spike, in robust standard deviations, and in parts of the usual value.
 const FAR_SD: f64 = 10.0;
 const FAR_PART: f64 = 0.4;
 

@@ -18,7 +18,7 @@ pub(super) struct Reader<'a> {
     to: Target,
 }
 
-/// What a track's series become.
+/// Destination of a track's series.
 enum Target {
     Attitude,
     Column { place: Place, held: bool, wraps: bool },
@@ -97,7 +97,7 @@ fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     ])
 }
 
-/// Where a time lies among a channel's times.
+/// Position of a time among a channel's times.
 #[derive(Clone, Copy)]
 struct At {
     t: f64,

@@ -1,4 +1,4 @@
-//! Which rows of a table can be used.
+//! Usable rows of a table, and the reasons against the others.
 
 use super::Sample;
 use super::columns::{COLUMNS, NEEDED, index};
@@ -27,13 +27,13 @@ pub enum Tolerance {
 /// Why a row cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reason {
-    /// It could not be read: a field is no number, or fields are missing.
+    /// A field is no number, or fields are missing.
     Unreadable,
     /// A needed column is empty.
     Incomplete,
     /// An angle, an airspeed or an infinite number that no aircraft shows.
     Impossible,
-    /// It is not later than the row before.
+    /// Its time is not later than that of the row before.
     OutOfOrder,
 }
 
@@ -50,9 +50,9 @@ impl Reason {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
     pub samples: Vec<Sample>,
-    /// Rows seen.
+    /// Number of rows that were read.
     pub total: usize,
-    /// Rows dropped.
+    /// Number of rows that were dropped.
     pub dropped: usize,
     /// The numbers of the first of them.
     pub dropped_rows: Vec<usize>,

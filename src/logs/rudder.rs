@@ -12,15 +12,15 @@ pub const MOVES_RAD: f64 = 0.0035;
 /// The same of a command, whose travel is not known: a part of it. 1 % of 25° of travel is 0.25°, and
 /// more than the dead band of a servo (some 4 µs of 500 µs).
 const MOVES_PART: f64 = 0.01;
-/// Fewer rows in flight say nothing.
+/// Smallest number of rows in flight for a decision.
 const ENOUGH: usize = 50;
 
 /// How a rudder moves in flight: the standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RudderMotion {
-    /// Of its deflection, rad.
+    /// Standard deviation of the deflection, rad.
     Deflection(f64),
-    /// Of its command, −1..1, where the log has no deflection.
+    /// Standard deviation of the command, −1..1, where the log has no deflection.
     Command(f64),
 }
 

@@ -1,7 +1,7 @@
 //! The sources of a log: which instance of a topic is read, and what else there is.
 //!
 //! A vehicle may carry two pitots, a VTOL has one controller for its lift and one for its wings. The reader takes the
-//! first instance that moves, the one that the vehicle's type calls for before that, and says what it took.
+//! first instance that moves, the one that the vehicle's type calls for before that, and reports its choice in a finding.
 
 use std::collections::BTreeMap;
 
@@ -14,9 +14,9 @@ use super::topics::{Topic, Topics, period_s};
 /// An instance that the user asks for, of a topic: `--source airspeed=1`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Asked {
-    /// The topic.
+    /// Name of the topic.
     pub topic: String,
-    /// Its instance: a number, or system × 256 + component.
+    /// Instance of the topic: a number, or system × 256 + component.
     pub instance: u16,
 }
 
@@ -51,7 +51,7 @@ impl std::str::FromStr for Asked {
 /// One instance of a topic that could fill columns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
-    /// The topic.
+    /// Name of the topic.
     pub topic: String,
     /// The instance as a mapping writes it.
     pub instance: String,
@@ -73,7 +73,7 @@ pub(super) struct Choice {
     read: BTreeMap<String, u16>,
     /// All instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// What was taken instead of what is usual.
+    /// Findings about unusual choices.
     pub findings: Vec<Finding>,
 }
 
@@ -138,7 +138,7 @@ impl Choice {
     }
 }
 
-/// What there is to say of the choice among the sources of a topic.
+/// Finding about the choice among the sources of a topic.
 fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
     let read = sources.iter().find(|s| s.read)?;
     let list = |of: &dyn Fn(&&Source) -> bool| -> Vec<&str> {

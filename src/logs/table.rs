@@ -22,14 +22,15 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 
 /// The longest time that a fast channel is carried over, s.
 const GAP_S: f64 = 0.1;
-/// The same for a slow one, in its sample periods.
+/// The longest time that a slow channel is carried over, in its sample periods.
 const GAP_PERIODS: f64 = 3.0;
 /// Share of finite values that makes a channel usable before others of its column.
 const GOOD_SHARE: f64 = 0.5;
 /// A preferred channel slower than this, Hz, yields to one five times as fast.
 const SLOW_HZ: f64 = 10.0;
-/// A measured channel with less than this part of the table's rate stands at its own samples only.
-/// Held values repeat in a third of the rows then, by which a reconstruction knows them.
+/// A measured channel with less than this part of the table's rate fills only the rows of its own
+/// samples. Held values would repeat in a third of the rows, by which a reconstruction recognises
+/// them.
 const SPARSE: f64 = 0.65;
 /// Columns that are measurements of the path, not what drives it.
 const MEASURED: [&str; 9] = [
@@ -99,7 +100,7 @@ pub(super) struct Table {
     pub missing: Vec<Missing>,
     /// The instances of topics of which there are several.
     pub sources: Vec<Source>,
-    /// What was read instead of what is usual.
+    /// Findings about unusual sources.
     pub findings: Vec<Finding>,
     /// The rule by which each column is filled.
     pub rules: Vec<Rule>,
@@ -109,7 +110,7 @@ pub(super) struct Table {
 pub(super) struct Missing {
     pub column: &'static str,
     pub or: Option<&'static str>,
-    /// What the rules looked for.
+    /// Topics and fields that the rules looked for.
     pub looked_for: Vec<String>,
 }
 
@@ -244,7 +245,8 @@ fn fill(rows: &mut [Sample], track: &Track) {
     rows.iter_mut().for_each(|row| reader.put(row));
 }
 
-/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; says which those are.
+/// Fills the rows that follow the samples of `track`, rows `period` (s) apart; `true` for each row
+/// that is filled.
 fn fill_sparse(rows: &mut [Sample], track: &Track, period: f64) -> Vec<bool> {
     let mut fresh = vec![false; rows.len()];
     let Some(reader) = track.reader() else { return fresh };
@@ -277,7 +279,7 @@ fn hold(rows: &mut [Sample], track: &Track, fresh: &[bool]) {
     }
 }
 
-/// Turns equivalent into true airspeed; says by which density.
+/// Converts equivalent into true airspeed; returns a note on the density used.
 fn make_true(rows: &mut [Sample]) -> String {
     let mut by = [0usize; 3];
     for row in rows.iter_mut().filter(|row| row.airspeed_mps.is_finite()) {

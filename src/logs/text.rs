@@ -12,7 +12,7 @@ use super::quality::Quality;
 use super::topics::period_s;
 use super::{Flight, Format, Sample, assess, derive, screening};
 
-/// The flights of a table: each recording that stands in it.
+/// The flights of a table: one for each recording in it.
 ///
 /// # Errors
 /// The text is no table. Of each flight: it lacks a needed column, or has too many unusable rows.

@@ -5,7 +5,7 @@
 //!
 //! Times are the sender's own where a message carries them. A message without (VFR_HUD) gets the
 //! own time that belongs to its host time, by linear interpolation between the messages around it:
-//! in lockstep, where the host's clock says nothing about the flight's, this is still right.
+//! in lockstep, where the host's clock is unrelated to the flight's, this is still right.
 //! The instance of a topic is system × 256 + component.
 //!
 //! A vehicle that starts again counts its time from zero again. Each life of each vehicle is a flight of its own, for
@@ -31,7 +31,7 @@ const WRAP_MS_S: f64 = 4_294_967.296;
 
 /// How far back the time of a vehicle goes that has started again, s.
 const BACK_S: f64 = 5.0;
-/// Attitudes from which a system beside the one that sends most is a vehicle of its own.
+/// Number of attitudes from which a further system counts as another vehicle.
 const VEHICLE: usize = 50;
 /// Messages in a row that show it; one alone may be late or wrong.
 const BACK_FOR: usize = 5;
@@ -144,7 +144,7 @@ impl Reader {
     }
 
     fn finish(mut self, skipped: usize, cut: usize) -> Vec<Topics> {
-        // Components of one system share its clock; the one with the most messages tells it best.
+        // Components of one system share its clock; the one with the most messages is the most accurate.
         let mut clocks: BTreeMap<u8, Vec<Tick>> = BTreeMap::new();
         for (source, clock) in std::mem::take(&mut self.clocks) {
             let best = clocks.entry(source.to_be_bytes()[0]).or_default();
@@ -208,7 +208,7 @@ impl Reader {
         systems.into_iter().flat_map(of).collect()
     }
 
-    /// What the records `at` say of `system`, one of several lives in the file.
+    /// The records `at` of `system`, one of several boots in the file.
     fn life(&self, system: u8, at: Range<usize>, clocks: &BTreeMap<u8, Vec<Tick>>) -> Topics {
         let whole = at == (0..usize::MAX);
         let own = |source: u16| source.to_be_bytes()[0] == system;

@@ -1,4 +1,4 @@
-//! What a binary log holds: topics with numeric fields over time.
+//! Content of a binary log: topics with numeric fields over time.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::finding::Finding;
 /// One instance of a topic, stored field by field.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topic {
-    /// Sample times, s.
+    /// Times of the samples, s.
     pub time_s: Vec<f64>,
     /// Names of the fields.
     pub fields: Vec<String>,
@@ -23,7 +23,7 @@ impl Topic {
         Topic { time_s: Vec::new(), fields, values }
     }
 
-    /// Whether a field is there and takes at least two finite values.
+    /// Whether a field exists and has at least two finite values.
     pub fn moves(&self, name: &str) -> bool {
         let Some(values) = self.field(name) else { return false };
         let mut finite = values.iter().filter(|x| x.is_finite());
@@ -73,13 +73,13 @@ impl Naming {
 /// The content of a binary log, or of one life of a vehicle in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topics {
-    /// Which vehicle and which life of it this is, where the file holds several.
+    /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
     /// The MAVLink system whose life it is.
     pub system: Option<u8>,
     /// How instances are written.
     pub naming: Naming,
-    /// What the firmware calls itself; empty if it does not.
+    /// Name and version of the firmware; empty if the log has none.
     pub firmware: String,
     /// The topics that were asked for, by name with instance.
     pub topics: BTreeMap<(String, u16), Topic>,
@@ -87,7 +87,7 @@ pub(super) struct Topics {
     pub counts: BTreeMap<(String, u16), usize>,
     /// Parameters of the vehicle; the last value of each.
     pub parameters: BTreeMap<String, f64>,
-    /// What was odd about the file.
+    /// Findings about the file.
     pub findings: Vec<Finding>,
 }
 

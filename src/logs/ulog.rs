@@ -27,7 +27,7 @@ const HEADER: usize = 16;
 const RECORD: usize = 3;
 /// The longest record with the beginning of those after it.
 const LONGEST: usize = RECORD + u16::MAX as usize + 1024;
-/// Records in a row that show the place where a damaged file goes on.
+/// Valid records in a row that show where a damaged file is readable again.
 const IN_STEP: usize = 3;
 /// The kinds of records.
 const KINDS: &[u8] = b"BFIMPQARDCLSO";
@@ -36,7 +36,7 @@ const KINDS: &[u8] = b"BFIMPQARDCLSO";
 struct Subscription {
     key: (String, u16),
     layout: Rc<Layout>,
-    /// Its records, from the first one on.
+    /// Records of the message; `None` before the first.
     topic: Option<Topic>,
     count: usize,
 }
@@ -57,22 +57,22 @@ struct Reader {
     in_step: bool,
     /// Bytes that belong to no record.
     skipped: usize,
-    /// Seconds lost at each damaged place; NaN until the file goes on.
+    /// Seconds lost at each damaged place; NaN until the next valid record.
     holes: Vec<f64>,
     /// Time of the last data, s.
     last_s: f64,
 }
 
-/// Whether data of a topic that the file does not declare may stand among records that are believed.
+/// Whether valid records may include data of topics that the file does not declare.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Undeclared {
     Allowed,
     Refused,
 }
 
-/// What stands at a place of the file.
+/// Kind of content at a place of the file.
 enum Place {
-    /// A record of so many bytes, its header included.
+    /// A record of this many bytes, with its header.
     Record(usize),
     /// A record that the file's end cuts.
     Cut,
@@ -128,10 +128,10 @@ fn header(view: &[u8]) -> Option<(usize, u8)> {
 }
 
 impl Reader {
-    /// What stands at the beginning of `view`.
+    /// Kind of content at the beginning of `view`.
     ///
-    /// A record that several others follow is believed. Where the file is damaged, it must have the size of its topic
-    /// as well.
+    /// A record that several others follow is valid. Where the file is damaged, it must have the
+    /// size of its topic as well.
     fn place(&self, view: &[u8]) -> Place {
         let Some((len, kind)) = header(view) else { return Place::Damage };
         let exact = kind == b'D' && self.fits(view, len);
@@ -317,7 +317,7 @@ impl Reader {
     }
 }
 
-/// What a damaged file has lost.
+/// Finding about losses of a damaged file.
 pub(super) fn damage(skipped: usize, holes: &[f64]) -> Option<Finding> {
     let lost: f64 = holes.iter().filter(|s| s.is_finite()).sum();
     (skipped > 0).then(|| {

@@ -1,4 +1,4 @@
-//! What kind of vehicle flew, and when it flew on its wings, as the log itself says.
+//! Type of the vehicle and its times of wing-borne flight, from the log's own records.
 //!
 //! Sources: MAV_TYPE of HEARTBEAT, vtol_state of EXTENDED_SYS_STATE (MAVLink common.xml); vehicle_status and
 //! vtol_vehicle_status (PX4 msg/); Q_ENABLE, Q_TILT_MASK, FRAME_CLASS, SERVOn_FUNCTION 33 to 40, the mode numbers 17 to
@@ -13,11 +13,11 @@ use super::topics::Topics;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// It flies on its wings only.
+    /// Aircraft that flies on its wings only.
     FixedWing,
-    /// It hovers and flies on its wings.
+    /// Aircraft that hovers and flies on its wings.
     Vtol,
-    /// It has no wings.
+    /// Vehicle without wings.
     Multicopter,
     /// A helicopter, a rover, a boat: nothing that flies on wings.
     Other,
@@ -35,12 +35,12 @@ impl Kind {
     }
 }
 
-/// A vehicle with what says so.
+/// A vehicle type with its evidence.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Vehicle {
-    /// The kind.
+    /// Type of the vehicle.
     pub kind: Kind,
-    /// What in the log says so.
+    /// Record of the log that shows the type.
     pub by: String,
 }
 
@@ -59,7 +59,7 @@ impl Vehicle {
     }
 }
 
-/// The vehicle of a log; `None` where nothing in it says so.
+/// The vehicle of a log; `None` where no record shows it.
 pub(super) fn vehicle(format: Format, topics: &Topics) -> Option<Vehicle> {
     match format {
         Format::Csv => None,
@@ -219,14 +219,14 @@ fn held(series: Option<(&[f64], &[f64])>, is: impl Fn(f64) -> bool) -> Vec<(f64,
     merged(spans.map(|((from, to), _)| (*from, to)).collect())
 }
 
-/// Where QTUN says that the lift motors carry.
+/// Times at which QTUN shows throttle on the lift motors.
 fn lift_by_qtun(topics: &Topics) -> Vec<(f64, f64)> {
     let Some((times, throttle)) = topics.series("QTUN", "ThO") else { return Vec::new() };
     let carries = times.iter().zip(throttle).filter(|(_, x)| **x > CARRIES);
     merged(carries.map(|(t, _)| (*t, t + QTUN_HOLDS_S)).collect())
 }
 
-/// Where pulses say that lift motors carry which do not tilt forward.
+/// Times at which the pulses drive lift motors that do not tilt forward.
 fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     let tilting = topics.parameter("Q_TILT_MASK").unwrap_or(0.0) as u32;
     let least = topics.parameter("Q_M_PWM_MIN").filter(|x| *x > 0.0).unwrap_or(1000.0);

@@ -11,23 +11,23 @@ use greylag_control::aircraft_check::AircraftCheck;
 use greylag_control::stick_response::{STEPPED, StickResponse};
 use greylag_model::GreyBox;
 
-/// What the page is made from.
+/// Input of the page about one aircraft's model.
 #[derive(Clone, Debug)]
 pub struct AircraftReport<'a> {
-    /// The model.
+    /// The model that the page is about.
     pub model: &'a GreyBox,
-    /// What was found of it.
+    /// Results of the checks of the model.
     pub check: &'a AircraftCheck,
-    /// Its answers to a quarter of the aileron, then of the elevator.
+    /// Responses to a quarter of the aileron, then of the elevator.
     pub responses: &'a [StickResponse; 2],
-    /// The model's file.
+    /// Path of the model's file.
     pub model_file: String,
     /// The command line that made the page.
     pub command_line: String,
 }
 
 impl AircraftReport<'_> {
-    /// The page.
+    /// Builds the page.
     pub fn page(&self) -> Page {
         let airframe = &self.model.airframe;
         let sections = vec![

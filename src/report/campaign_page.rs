@@ -15,25 +15,25 @@ use greylag_campaign::{CampaignFile, Record};
 /// Names of the three statistics.
 const STATISTICS: [&str; 3] = ["median", "interquartile mean", "mean"];
 
-/// A campaign's results.
+/// Results of a campaign, finished or not.
 #[derive(Clone, Debug)]
 pub struct CampaignReport<'a> {
-    /// The campaign.
+    /// Definition of the campaign.
     pub file: &'a CampaignFile,
-    /// Cells that it has.
+    /// Number of cells in the campaign.
     pub cells: usize,
-    /// Results of those that are done.
+    /// Results of the cells that are done.
     pub records: &'a [Record],
-    /// Its tables.
+    /// Summary tables over the cells.
     pub summaries: &'a [Summary],
-    /// What becomes of its claims.
+    /// Verdict on each of the campaign's claims.
     pub findings: &'a [tables::Finding],
     /// The command that wrote the page.
     pub command: String,
 }
 
 impl CampaignReport<'_> {
-    /// The page.
+    /// Builds the page.
     pub fn page(&self) -> Page {
         let mut sections = vec![self.said()];
         sections.extend(self.summaries.iter().enumerate().map(|(t, s)| summary(t, s)));

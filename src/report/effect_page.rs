@@ -4,16 +4,16 @@ use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeri
 use greylag_physics::effects::Description;
 use greylag_sysid::signature::{MANOEUVRE, Pair, Signature};
 
-/// What the page of an effect shows.
+/// Input of the page about one effect.
 #[derive(Clone, Debug)]
 pub struct EffectReport<'a> {
-    /// The effect.
+    /// Description of the effect.
     pub about: Description,
-    /// Its channels in words.
+    /// Channels on which the effect acts, in words.
     pub channels: String,
     /// Where it acts: on the air and the body, on the deflections, on the measurement.
     pub place: &'static str,
-    /// Its signature; `None` for an error of the measurement.
+    /// Signature of the effect; `None` for an error of the measurement.
     pub signature: Option<&'a Signature>,
     /// The model that the signature is drawn on.
     pub model: String,
@@ -22,7 +22,7 @@ pub struct EffectReport<'a> {
 }
 
 impl EffectReport<'_> {
-    /// The page.
+    /// Builds the page.
     pub fn page(&self) -> Page {
         let mut sections =
             vec![Section::new("", "", vec![Figure::Table(self.facts())]), self.parameters()];
@@ -84,7 +84,7 @@ impl EffectReport<'_> {
     }
 }
 
-/// What the catalogue knows of an effect besides its parameters, as names and texts.
+/// Properties of an effect in the catalogue besides its parameters, as names and texts.
 pub fn facts(about: &Description, place: &str, channels: &str) -> Vec<[String; 2]> {
     let mut rows = vec![
         ["what it is".into(), about.description.into()],

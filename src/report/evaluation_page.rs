@@ -20,7 +20,7 @@ use greylag_sim::tracking::{Tracking, seconds};
 pub struct EvaluationReport<'a> {
     /// A line under the title.
     pub subtitle: String,
-    /// What each controller reached.
+    /// Results of each controller.
     pub evaluations: &'a [Evaluation],
     /// Single flights: the target, and one flight for each of the evaluations.
     pub flights: &'a [(Target, Vec<Tracking>)],
@@ -153,7 +153,7 @@ impl EvaluationReport<'_> {
         Section::new("On the way", note, vec![Figure::Choice(choice)])
     }
 
-    /// What the planners saw on their way to the targets; none if no planner flew.
+    /// Section on the planners' rollouts on the way to the targets; `None` if no planner flew.
     fn sight(&self) -> Option<Section> {
         let mut options = Vec::new();
         for (target, flights) in self.flights {
@@ -246,8 +246,8 @@ mod tests {
         Evaluation::measured(names, &courses(&rows, 16.67), &vec![outcome; 8], &limits)
     }
 
-    /// Every controller stands with its interval, the paper's beside it, and a lost aircraft draws nothing
-    /// that is no number.
+    /// Every controller is drawn with its interval and the paper's result; a lost aircraft draws no
+    /// NaN.
     #[test]
     fn the_page_has_ours_and_the_papers() {
         let evaluations = [evaluated("hybrid", 0.25), evaluated("lqi", 1e-7)];

@@ -9,7 +9,7 @@ use greylag_learn::policy::learning_curve::{CurvePoint, best, knee, spread};
 /// A training of one or several seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
-    /// What tells it from others.
+    /// Name that distinguishes it from the other trainings.
     pub name: String,
     /// Each seed's name and evaluations, in order; none is without evaluations.
     pub seeds: Vec<(String, Vec<CurvePoint>)>,
@@ -22,9 +22,9 @@ pub struct LearningReport<'a> {
     pub title: String,
     /// A line under it.
     pub subtitle: String,
-    /// The trainings.
+    /// Trainings to be drawn side by side.
     pub trainings: &'a [Training],
-    /// Things and their values: commands, files.
+    /// Pairs of name and value, such as commands and files.
     pub provenance: Vec<(String, String)>,
 }
 

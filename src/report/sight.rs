@@ -6,14 +6,14 @@ use crate::kit::numbers::number;
 use greylag_control::insight::{Insight, Path};
 use greylag_model::STEP;
 
-/// A tick of a planner that is shown.
+/// Internal state of a planner at one displayed tick.
 #[derive(Clone, Debug)]
 pub struct Sight {
     /// When, s, on the clock of the page.
     pub time_s: f64,
     /// Commanded roll and pitch, rad.
     pub target: [f64; 2],
-    /// What it saw.
+    /// Rollouts and plan of that tick.
     pub insight: Insight,
 }
 

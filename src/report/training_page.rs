@@ -25,9 +25,9 @@ pub struct TrainingReport<'a> {
     pub prior: &'a [Horizon],
     /// Errors of the learned model on the same.
     pub learned: &'a [Horizon],
-    /// What the residual adds, where there is one.
+    /// Map of the residual's contribution; `None` for a model without one.
     pub residual: Option<&'a ResidualMap>,
-    /// What the reader must know.
+    /// Notes for the reader of the page.
     pub notes: &'a [String],
     /// Things and their values: files, hashes, options.
     pub provenance: Vec<(String, String)>,

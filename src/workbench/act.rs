@@ -1,4 +1,4 @@
-//! What a page may ask for, and what becomes of it.
+//! Requests of a page and their execution.
 
 use std::fs;
 use std::path::PathBuf;
@@ -28,42 +28,42 @@ pub(super) const SAVED: &str = "model";
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Request {
-    /// The revision.
+    /// Revision of the session that the requester saw.
     pub revision: u64,
-    /// What is asked for.
+    /// The request itself.
     pub act: Act,
 }
 
-/// What a page may ask for.
+/// Requests that a page can make.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Act {
-    /// A flight shall serve for something else.
+    /// Change the role of a flight.
     Role {
-        /// The flight.
+        /// Index of the flight in the session.
         flight: usize,
-        /// What for.
+        /// New role of the flight.
         role: Role,
     },
-    /// A flight leaves the session; its file stays.
+    /// Remove a flight from the session; its file stays.
     Remove {
-        /// The flight.
+        /// Index of the flight in the session.
         flight: usize,
     },
     /// Multiply a column of all logs by a factor, as a finding advises.
     Map {
-        /// The flight with the finding.
+        /// Index of the flight with the finding.
         flight: usize,
-        /// The column.
+        /// Name of the column in the log format.
         column: String,
-        /// The factor.
+        /// Factor by which the column is multiplied.
         scale: f64,
     },
-    /// Diagnose the model.
+    /// Start a diagnosis of the model.
     Diagnose,
     /// Accept an effect, and fit the model with it.
     Tick {
-        /// Its id.
+        /// Id of the effect in the catalogue.
         effect: String,
     },
     /// Keep the effect accepted last though the data refuse it.
@@ -80,9 +80,9 @@ pub enum Act {
     Save,
     /// Read the model file again.
     ReloadModel,
-    /// End a job.
+    /// Cancel a running job.
     Cancel {
-        /// Its number.
+        /// Id of the job.
         job: u64,
     },
     /// Keep an effect that was written as text.
@@ -92,24 +92,24 @@ pub enum Act {
     },
     /// Take an effect that was written as text out of the session.
     Forget {
-        /// Its id.
+        /// Id of the effect.
         effect: String,
     },
     /// Search a formula for what no effect explains.
     Propose,
-    /// Make a schedule that tells two effects apart.
+    /// Make a flight schedule that distinguishes two effects.
     Design {
-        /// Their ids.
+        /// Ids of the two effects.
         between: [String; 2],
     },
     /// Fly the model in the simulator.
     Fly(Order),
     /// Watch a recording that another program is writing.
     Watch {
-        /// Its folder.
+        /// Folder of the recording, or the recorded log itself.
         folder: PathBuf,
     },
-    /// End the flight.
+    /// Stop the flight or the watching of a recording.
     StopFlight,
     /// Take a recording as a log.
     TakeFlight {

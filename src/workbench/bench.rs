@@ -1,4 +1,4 @@
-//! The session in memory, with what has been worked out of it.
+//! The session in memory, with the results computed from it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -23,74 +23,90 @@ use greylag_sysid::amend::{Estimate, Fit};
 use greylag_sysid::compare::{self, Comparison, compare};
 use greylag_sysid::progress::unheard;
 
-/// What a workbench begins with.
+/// Options with which a workbench is opened.
 pub struct Given {
-    /// The session's folder; made if there is none.
+    /// Folder of the session; created if it does not exist.
     pub folder: PathBuf,
-    /// The model; needed for a new session.
+    /// Path of the model file; required for a new session.
     pub model: Option<PathBuf>,
-    /// Logs to add, those that are there already left out.
+    /// Logs to add; those that the session has already are skipped.
     pub logs: Vec<PathBuf>,
     /// How logs are read.
     pub reading: Reading,
-    /// What flies failsafes.
+    /// Flies the failsafe scenarios of the page `failsafes`.
     #[cfg(feature = "sitl")]
     pub failsafes: super::failsafe::Failsafes,
 }
 
-/// The session with what was worked out of it.
+/// A session with the results computed from it: logs and their roles, the model, accepted effects, jobs, flights.
+///
+/// It is shared as an `Arc`, may be called from any thread and knows no network. Its methods are of four kinds:
+///
+/// - [`Bench::open`] reads or creates the session of a folder and claims the folder until the value is dropped.
+/// - Requests: [`Bench::act`] and [`Bench::take`] (a log). Each carries the revision that the requester saw. One that
+///   edits the session fails with [`WorkbenchError::Conflict`] and changes nothing if the revision is no longer the
+///   present one; otherwise the edit is on disk when the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`,
+///   `Cancel` and `StopFlight` edit nothing that a requester sees and work at any revision.
+/// - Views, which change nothing in the session: [`Bench::state`], [`Bench::diagnosis`], [`Bench::failing`],
+///   [`Bench::flight`], [`Bench::free_run`] and others. `failing` and `flight` block while they compute a comparison
+///   that is not cached. `flight` and `free_run` refuse test flights that have not been opened.
+/// - Events go to the callback of [`Bench::open`], on the thread that causes them and without the lock held, so that
+///   the callback may call the bench. They carry progress; for anything else, look at the views again.
+///
+/// Order of calls: open, then requests and views in any order. Jobs run on threads of their own, and `state` lists a job
+/// until it ends. A new job replaces the running one of its kind, which ends at its next stage, as a cancelled one does.
+/// Time: nothing has to be called periodically. A result is valid for a key of its inputs, so undoing an edit restores it.
+/// The system's clock only stamps records of the session.
 pub struct Bench {
     pub(super) folder: PathBuf,
-    pub(super) hear: Box<dyn Fn(Event) + Send + Sync>,
+    pub(super) on_event: Box<dyn Fn(Event) + Send + Sync>,
     inner: Mutex<Inner>,
-    /// Held while a log is taken: two that come at once have one name each.
+    /// Held while a log is added, so that two at once cannot take the same file name.
     pub(super) taking: Mutex<()>,
     #[cfg(feature = "sitl")]
     pub(super) failsafes: super::failsafe::Failsafes,
     _claim: Claim,
 }
 
-/// What changes.
+/// State behind the lock of a [`Bench`].
 pub(super) struct Inner {
     pub folder: PathBuf,
     pub session: Session,
     pub model: GreyBox,
-    /// The model's files.
+    /// Contents of the model's files as read.
     pub original: Original,
     /// The session's logs, in its order, or why one cannot be used.
     pub flights: Vec<Result<Arc<Loaded>, String>>,
     pub comparison: Option<(String, Arc<Comparison>)>,
     pub tuned: Option<(String, Fit)>,
     pub diagnosis: Option<(String, Arc<Value>)>,
-    /// What a search for a formula found.
+    /// Result of the search for a formula.
     pub proposal: Option<(String, Arc<Value>)>,
-    /// The two effects that a schedule is made for.
+    /// The two effects that the next schedule shall distinguish.
     pub between: Option<[String; 2]>,
-    /// Schedules that were made.
+    /// Schedules made in this session.
     pub designed: Vec<Designed>,
-    /// The flight that is flown, or was last.
+    /// The present flight, or the last one.
     pub flying: Option<Flying>,
     pub estimate: Option<(String, Estimate)>,
     pub fits: BTreeMap<String, Arc<Fitted>>,
-    /// What went wrong with the job of a key.
+    /// Error of the failed job of each key.
     pub failures: BTreeMap<String, String>,
     pub jobs: Vec<Job>,
     pub next_job: u64,
-    /// How logs are read, as the command line says it.
+    /// Options of the command line for reading logs.
     pub given: Reading,
-    /// The same as their readers take it.
+    /// The same options as [`greylag_logs`] takes them.
     pub options: logs::Options,
     pub mapping: InUse,
 }
 
 impl Bench {
-    /// Opens the session of a folder, or begins one; `hear` hears what happens to it.
-    ///
-    /// # Errors
-    /// The folder is taken or cannot be used, the session or the model cannot be read, or a log is none.
+    /// Opens the session of a folder, or creates one. `on_event` is called for every event, on the
+    /// thread that causes it.
     pub fn open(
         given: Given,
-        hear: impl Fn(Event) + Send + Sync + 'static,
+        on_event: impl Fn(Event) + Send + Sync + 'static,
     ) -> Result<Arc<Bench>, WorkbenchError> {
         let claim = Claim::of(&given.folder)?;
         let folder = fs::canonicalize(&given.folder).map_err(|e| io(&given.folder, e))?;
@@ -127,7 +143,7 @@ impl Bench {
         inner.session.write(&folder)?;
         let bench = Arc::new(Bench {
             folder,
-            hear: Box::new(hear),
+            on_event: Box::new(on_event),
             inner: Mutex::new(inner),
             taking: Mutex::new(()),
             #[cfg(feature = "sitl")]
@@ -146,12 +162,12 @@ impl Bench {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The session's revision.
+    /// Present revision of the session; each change increments it.
     pub fn revision(&self) -> u64 {
         self.lock().session.revision
     }
 
-    /// Changes the session if `seen` is its revision, and writes it; all or nothing.
+    /// Applies `edit` if `seen` is the session's revision and writes the session; restores the state if either fails.
     pub(super) fn change<T>(
         &self,
         seen: u64,
@@ -170,7 +186,7 @@ impl Bench {
             Ok(t) => {
                 inner.recall();
                 drop(inner);
-                (self.hear)(Event::Changed { revision });
+                (self.on_event)(Event::Changed { revision });
                 Ok(t)
             }
             Err(error) => {
@@ -180,7 +196,7 @@ impl Bench {
         }
     }
 
-    /// Changes the session whatever its revision is, as when something ends by itself, and writes it.
+    /// Applies `edit` at any revision, for changes that no requester makes, and writes the session.
     pub(super) fn amend_session(
         &self,
         edit: impl FnOnce(&mut Inner),
@@ -191,11 +207,11 @@ impl Bench {
         let revision = inner.session.revision;
         let written = inner.session.write(&self.folder);
         drop(inner);
-        (self.hear)(Event::Changed { revision });
+        (self.on_event)(Event::Changed { revision });
         written
     }
 
-    /// Adds the log at `path`, unless it is there.
+    /// Adds the log at `path`, unless the session has it already.
     fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
         let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
         let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
@@ -205,7 +221,7 @@ impl Bench {
         }
     }
 
-    /// Adds a log with its content; `path` is where it stands. Without a `role` it takes the usual one.
+    /// Adds the log at `path` with the content `bytes`. Without a `role` it gets that of [`Session::usual_role`].
     pub(super) fn add(
         &self,
         seen: u64,
@@ -231,7 +247,7 @@ impl Bench {
         })
     }
 
-    /// The comparison of the model as given, and as amended if it is, with the flights that may be seen.
+    /// Comparison of the given and, if there is one, the amended model with the flights that are not locked; cached by key.
     pub(super) fn comparison(&self) -> Result<Arc<Comparison>, WorkbenchError> {
         let (key, models, flights) = {
             let inner = self.lock();
@@ -258,7 +274,7 @@ impl Bench {
         self.folder.join("fits").join(key)
     }
 
-    /// An error if the model file is not what was read.
+    /// [`WorkbenchError::ModelChanged`] if the model file differs from what was read.
     pub(super) fn same_model(&self) -> Result<(), WorkbenchError> {
         let inner = self.lock();
         match inner.model_changed() {
@@ -268,7 +284,7 @@ impl Bench {
     }
 }
 
-/// What a change that fails goes back to.
+/// State to which a failed change is rolled back.
 struct Before {
     session: Session,
     model: GreyBox,
@@ -297,7 +313,7 @@ impl Before {
     }
 }
 
-/// The session with its model; one that was edited meanwhile is taken as it is now.
+/// The session with its model; a model that was edited since the last run is read as it is now.
 fn begin(
     folder: &Path,
     model: Option<&Path>,
@@ -319,27 +335,27 @@ fn begin(
     Ok((session, read.model, read.original))
 }
 
-/// A model with its files as they were read.
+/// A model with the contents of its files.
 pub(super) struct Read {
     pub model: GreyBox,
     pub original: Original,
     pub fingerprint: String,
 }
 
-/// The model at `path`.
+/// Reads the model at `path`.
 pub(super) fn load(path: &Path) -> Result<Read, WorkbenchError> {
     // first, so that a file that is edited meanwhile is noticed later
     let fingerprint = fingerprint(path).map_err(|e| io(path, e))?;
     Ok(Read { model: GreyBox::load(path)?, original: Original::read(path)?, fingerprint })
 }
 
-/// Where a result is kept.
+/// Path of a stored result.
 fn result_file(folder: &Path, key: &str) -> PathBuf {
     folder.join(format!("{key}.json"))
 }
 
 impl Inner {
-    /// Takes up results that lie in the folder: of earlier runs, or of a time when the flights had these roles.
+    /// Loads the stored results that match the present keys: of earlier runs, or of the same roles at an earlier time.
     pub fn recall(&mut self) {
         let stored = |key: &str, known: &Option<(String, Arc<Value>)>| {
             if known.as_ref().is_some_and(|(of, _)| of == key) {
@@ -364,7 +380,7 @@ impl Inner {
         }
     }
 
-    /// What stands in for the amended model now.
+    /// Which model is displayed as the amended one: `fitted`, `estimated` or `given`.
     pub fn shown(&self) -> String {
         let key = self.key("fit", &self.session.effects);
         match (self.fits.contains_key(&key), &self.estimate) {

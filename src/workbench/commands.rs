@@ -12,11 +12,11 @@ use greylag_sysid::amend::document::MODEL;
 /// The commands for the session as it is.
 #[derive(Clone, Debug, Serialize)]
 pub struct Commands {
-    /// What each log holds.
+    /// Command that summarises the logs.
     pub flights: String,
     /// Where the model fails.
     pub compare: String,
-    /// What it lacks.
+    /// Command that finds the effects that the model lacks.
     pub diagnose: String,
     /// A formula for what is left; empty without a flight to test it on.
     pub propose: String,

@@ -14,7 +14,7 @@ const ROWS: usize = 2500;
 /// A flight over time, drawn.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightData {
-    /// Its name.
+    /// Name of the flight.
     pub name: String,
     /// Time on the log's clock, s.
     pub time_s: Vec<Option<f64>>,
@@ -24,7 +24,7 @@ pub struct FlightData {
     pub controls: BTreeMap<&'static str, Vec<Option<f32>>>,
     /// Middles of the windows, s.
     pub window_s: Vec<Option<f64>>,
-    /// Where each window lies, by variable.
+    /// Value of each regime variable in each window.
     pub regimes: BTreeMap<String, Vec<Option<f32>>>,
     /// Channels by symbol: measured, then each model.
     pub channels: BTreeMap<&'static str, Vec<Vec<Option<f32>>>>,

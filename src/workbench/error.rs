@@ -17,14 +17,14 @@ use greylag_sysid::flight_path::ReconstructError;
 use greylag_sysid::progress::Cancelled;
 use greylag_sysid::weak_form::prepared::ClockError;
 
-/// What kind of failure it is, for whoever answers a request.
+/// Kind of a failure, which sets the status of the HTTP answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The request does not fit the session, for example a log that is none.
     Bad,
     /// The session has moved on since the requester looked.
     Conflict,
-    /// It may not be seen yet.
+    /// The data are locked until the test flights are opened.
     Locked,
     /// There is no such thing.
     Missing,
@@ -41,9 +41,9 @@ pub enum WorkbenchError {
          shows it as it is now, so do it again if you still mean it"
     )]
     Conflict {
-        /// The session's revision.
+        /// Present revision of the session.
         now: u64,
-        /// The requester's.
+        /// Revision that the requester saw.
         seen: u64,
     },
     /// The model file is not what was read.
@@ -51,7 +51,7 @@ pub enum WorkbenchError {
         "{} changed on disk since it was read, so what is shown is not about it; reload the model", path.display()
     )]
     ModelChanged {
-        /// The model file.
+        /// Path of the model file.
         path: PathBuf,
     },
     /// A log is not what it was.
@@ -59,10 +59,10 @@ pub enum WorkbenchError {
         "{} is not the log that the session knows: its content changed; take it out of the session and add it again", path.display()
     )]
     LogChanged {
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
     },
-    /// The log is there already.
+    /// The session has the log already.
     #[error("this log is in the session already, as {0}")]
     Twice(String),
     /// A name that no file may have.
@@ -88,12 +88,12 @@ pub enum WorkbenchError {
         model.display()
     )]
     OtherModel {
-        /// The session's folder.
+        /// Folder of the session.
         folder: PathBuf,
-        /// Its model.
+        /// Path of the session's model.
         model: PathBuf,
     },
-    /// The amended model would stand in the place of the one it was made of.
+    /// The amended model would replace the model from which it was made.
     #[error("{} is the model to start from, which stays as it is; move it out of the session's folder", .0.display())]
     OverModel(PathBuf),
     /// No effect joined the model.
@@ -104,18 +104,18 @@ pub enum WorkbenchError {
     /// A written fit is another one.
     #[error("the fit written to {} read back with another {what}; report this", folder.display())]
     Lost {
-        /// Its folder.
+        /// Folder of the written fit.
         folder: PathBuf,
-        /// What is not the same.
+        /// Part of the fit that differs.
         what: String,
     },
-    /// The program failed.
+    /// A failure inside the program, such as a panic of a job.
     #[error("a fault of the program, please report it: {0}")]
     Fault(String),
     /// Whoever waited has ended it.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
-    /// No model.
+    /// A new session was given no model.
     #[error(
         "a new session needs a model: name one, as in `greylag workbench --model params/x8/prior.toml`"
     )]
@@ -123,7 +123,7 @@ pub enum WorkbenchError {
     /// Nothing to take back or to do.
     #[error("there is nothing to {0}")]
     Nothing(&'static str),
-    /// The effect is there.
+    /// The session has the effect already.
     #[error("{0} is in the model already")]
     Present(String),
     /// The mapping is the user's own.
@@ -148,7 +148,7 @@ pub enum WorkbenchError {
     /// The effect is accepted.
     #[error("{0} is accepted; take it back first")]
     Accepted(String),
-    /// No manoeuvre tells two effects apart.
+    /// No manoeuvre of the menu distinguishes the two effects.
     #[error("no manoeuvre of the menu tells {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
     NotApart([String; 2]),
     /// A flight is on.
@@ -171,9 +171,9 @@ pub enum WorkbenchError {
     /// The session file is broken.
     #[error("cannot read the session {}: {why}; mend the file, or give --dir another folder", path.display())]
     Session {
-        /// The file.
+        /// Path of the session file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the file's content.
         why: String,
     },
     /// A file could not be read or a folder not be made.
@@ -181,7 +181,7 @@ pub enum WorkbenchError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A result has no place in JSON.
@@ -208,29 +208,29 @@ pub enum WorkbenchError {
     /// A file was not written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// No comparison.
+    /// The comparison of the models failed.
     #[error(transparent)]
     Compare(#[from] CompareError),
     /// A flight without a clock.
     #[error(transparent)]
     Clock(#[from] ClockError),
-    /// No diagnosis.
+    /// The diagnosis of the model failed.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
-    /// No fit.
+    /// The fit of the model failed.
     #[error(transparent)]
     Amend(#[from] AmendError),
     /// No controller for the model.
     #[error(transparent)]
     Control(#[from] greylag_control::SetupError),
-    /// No schedule.
+    /// The design of a schedule failed.
     #[cfg(feature = "sitl")]
     #[error(transparent)]
     Design(#[from] greylag_sim::design::DesignError),
 }
 
 impl WorkbenchError {
-    /// What kind of failure it is.
+    /// Kind of the failure.
     pub fn kind(&self) -> Kind {
         use WorkbenchError as E;
         match self {

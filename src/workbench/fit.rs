@@ -23,18 +23,18 @@ const ON_FIT: &str = "on_fit.json";
 /// Share of a first fit's time that tuning the prior takes.
 const TUNING: f64 = 0.4;
 
-/// A model with accepted effects, as it lies in the session's folder.
+/// A model fitted with accepted effects, as stored in the session's folder.
 pub struct Fitted {
-    /// The model.
+    /// The model with the fitted coefficients.
     pub model: GreyBox,
-    /// What the command `amend` writes as `amend.json`.
+    /// Content of the file `amend.json` of the command `amend`.
     pub story: Value,
     /// Free-run errors over the flights that the fit saw, `given` and `amended`.
     pub on_fit: Value,
 }
 
 impl Fitted {
-    /// The fit in `folder`, if a whole one is there.
+    /// The fit in `folder`; `None` if it is missing or incomplete.
     pub fn read(folder: &Path) -> Option<Fitted> {
         let json = |name: &str| -> Option<Value> {
             serde_json::from_str(&fs::read_to_string(folder.join(name)).ok()?).ok()
@@ -56,7 +56,7 @@ impl Fitted {
     }
 }
 
-/// What a fit is made of.
+/// Inputs of a fit.
 struct Task {
     key: String,
     model: GreyBox,
@@ -83,7 +83,8 @@ impl Bench {
         Ok(())
     }
 
-    /// The fit of the first `count` effects; `None` if it is there, or they are no longer so many.
+    /// Inputs of the fit of the first `count` effects; `None` if it exists, or fewer effects are
+    /// accepted now.
     fn task(&self, count: usize) -> Result<Option<Task>, WorkbenchError> {
         let mut inner = self.lock();
         let Some(effects) = inner.session.effects.get(..count) else { return Ok(None) };

@@ -22,9 +22,9 @@ const STRIP: usize = 160;
 
 /// A log in memory.
 pub struct Loaded {
-    /// What the log says of itself.
+    /// Summary of the log by its reader.
     pub info: Info,
-    /// What is odd about the file, without what [`Info`] adds.
+    /// Findings about the file, without those that [`Info`] adds.
     pub findings: Vec<Finding>,
     /// The flight, deflections as recorded.
     pub flight: Reconstruction,
@@ -35,15 +35,15 @@ pub struct Loaded {
 /// The flight at a glance: a few values over its length.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Strip {
-    /// Angle of attack, °.
+    /// Angle of attack α, °.
     pub alpha: Vec<f32>,
-    /// Sideslip, °.
+    /// Angle of sideslip β, °.
     pub beta: Vec<f32>,
-    /// Airspeed, m/s.
+    /// True airspeed, m/s.
     pub airspeed: Vec<f32>,
-    /// Aileron, °.
+    /// Deflection of the aileron, °.
     pub aileron: Vec<f32>,
-    /// Elevator, °.
+    /// Deflection of the elevator, °.
     pub elevator: Vec<f32>,
 }
 

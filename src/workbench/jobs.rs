@@ -19,31 +19,31 @@ use greylag_sysid::progress::{FirstLook, Progress, Stage, part};
 /// The effects of files that a diagnosis has tried, in what the workbench keeps of it.
 pub(super) const TRIED: &str = "tried";
 
-/// What a job works out.
+/// Kind of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Work {
-    /// Which effect the model lacks.
+    /// Diagnosis of the effects that the model lacks.
     Diagnosis,
     /// The model with the accepted effects.
     Fit,
     /// A formula for what no effect explains.
     Proposal,
-    /// A schedule that tells two effects apart.
+    /// A flight schedule that distinguishes two effects.
     Schedule,
 }
 
-/// A job as the page sees it.
+/// A job as displayed by the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct Job {
-    /// Its number.
+    /// Id of the job.
     pub id: u64,
-    /// What it works out.
+    /// Kind of result that the job computes.
     pub work: Work,
-    /// What it works it out of: no second job does the same.
+    /// Key of the job's inputs: a second job with the same key is not started.
     #[serde(skip)]
     pub key: String,
-    /// What it does now.
+    /// Current stage of the job.
     pub doing: String,
     /// Share done, 0 to 1.
     pub fraction: f64,
@@ -53,7 +53,7 @@ pub struct Job {
     pub(super) stop: Stop,
 }
 
-/// Tells a job to end.
+/// Cancels a job at its next stage.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -63,7 +63,7 @@ impl Stop {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// What a stage of the job is answered.
+    /// `Break` once the job has been cancelled.
     pub fn answer(&self) -> ControlFlow<()> {
         match self.0.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
@@ -72,42 +72,42 @@ impl Stop {
     }
 }
 
-/// What the page is sent while it waits.
+/// Events for the pages that are connected.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// A job is further.
+    /// A job has made progress.
     Progress {
-        /// The job.
+        /// The job in its present state.
         job: Job,
     },
-    /// A flight is further.
+    /// A flight has new samples.
     Flight {
-        /// What came of it.
+        /// New part of the flight.
         part: Part,
     },
-    /// Something has changed: look at the state again.
+    /// The session or its results have changed: read the state again.
     Changed {
-        /// The session's revision.
+        /// Present revision of the session.
         revision: u64,
     },
 }
 
 impl Inner {
-    /// Ends the jobs of a kind, as far as anyone can see; each lets go of the processor at its next stage.
+    /// Removes the jobs of a kind from the list; each stops computing at its next stage.
     pub(super) fn supersede(&mut self, work: Work) {
         self.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
         self.jobs.retain(|job| job.work != work);
     }
 
-    /// Whether every fit of the accepted effects is there.
+    /// Whether every fit of the accepted effects exists.
     fn fitted(&self) -> bool {
         let all = &self.session.effects;
         (1..=all.len()).all(|count| self.fits.contains_key(&self.key("fit", &all[..count])))
     }
 }
 
-/// What came of a job; a panic of it is an error, so that it does not run for ever in the eyes of its user.
+/// Outcome of a job; a panic becomes an error, so that the job does not appear to run for ever.
 fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), WorkbenchError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let said = panic.downcast_ref::<&str>().map(ToString::to_string);
@@ -119,7 +119,7 @@ fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), Work
 impl Bench {
     /// Announces that results have changed, not the session.
     pub(super) fn changed(&self) {
-        (self.hear)(Event::Changed { revision: self.revision() });
+        (self.on_event)(Event::Changed { revision: self.revision() });
     }
 
     /// Starts a job, unless one does the same.
@@ -156,7 +156,7 @@ impl Bench {
         std::thread::spawn(move || bench.work(id, work, &stop));
     }
 
-    /// Ends the job `id` as far as anyone can see; it lets go of the processor at its next stage.
+    /// Removes the job `id` from the list; it stops computing at its next stage.
     pub(super) fn cancel(&self, id: u64) {
         let mut inner = self.lock();
         inner.jobs.iter().filter(|job| job.id == id).for_each(|job| job.stop.stop());
@@ -198,7 +198,7 @@ impl Bench {
         }
         let job = job.clone();
         drop(inner);
-        (self.hear)(Event::Progress { job });
+        (self.on_event)(Event::Progress { job });
     }
 
     /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
@@ -223,7 +223,7 @@ impl Bench {
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
         let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);
-        // what divides or tunes badly is said when an effect is ticked
+        // errors of dividing and tuning are reported when an effect is accepted
         if let (false, Ok(Divided { fit, .. })) = (there, divided)
             && let Ok(tuned) = tune(&model, &fit, &part(progress, [0.95, 1.0]))
         {
@@ -234,7 +234,7 @@ impl Bench {
 }
 
 impl Work {
-    /// What keys of its results begin with.
+    /// Prefix of the keys of its results.
     pub(super) fn word(self) -> &'static str {
         match self {
             Work::Diagnosis => "diagnosis",

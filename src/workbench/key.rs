@@ -9,7 +9,7 @@ use greylag_physics::formula::register;
 use greylag_sysid::amend::document::sha256;
 
 impl Inner {
-    /// What a result is about: model, how logs are read, flights by role, effects.
+    /// Key of a result's inputs: model, options for reading logs, flights by role, effects.
     pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
         // a result names its flights, and is of those that can be read
         let logs = |role: Role| -> String {

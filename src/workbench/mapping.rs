@@ -18,7 +18,7 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }
 
-/// Where a column of a log comes from, as a mapping says it.
+/// Field of the log that fills a column, in the syntax of a mapping.
 fn origin(flight: &Loaded, column: &str) -> String {
     let named = |c: &&greylag_logs::Channel| c.columns.iter().any(|own| own == column);
     match (flight.info.format, flight.info.channels.iter().find(named)) {
@@ -27,7 +27,8 @@ fn origin(flight: &Loaded, column: &str) -> String {
     }
 }
 
-/// The mapping `text` with one column more; a column that is there is scaled once more.
+/// The mapping `text` with one more column; the scale of a column that it has already is
+/// multiplied.
 fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<String> {
     let mut table: toml::Table = toml::from_str(text).ok()?;
     table.insert("schema".into(), 1.into());

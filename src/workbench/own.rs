@@ -38,20 +38,20 @@ pub struct OwnView {
     text: String,
 }
 
-/// What a text says, if it is an effect file.
+/// Content of an effect file that was checked.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
-    /// The effect's id.
+    /// Id of the effect.
     pub id: &'static str,
-    /// What it is.
+    /// Description of the effect.
     pub description: &'static str,
-    /// Its formula.
+    /// Formula of the effect.
     pub formula: &'static str,
-    /// Whether a model with it may fly.
+    /// Whether a model with it may be flown by a controller.
     pub status: Status,
 }
 
-/// What an effect file may name, with one to begin with.
+/// Names that an effect file may use, with a template to start from.
 pub fn grammar() -> Value {
     let variable = |v: &Variable| json!([v.name(), v.alias(), v.meaning()]);
     let functions = Function::ALL.iter().filter(|f| !f.is_operator());
@@ -71,7 +71,7 @@ pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
 }
 
 impl Bench {
-    /// Keeps an effect that was written as text; one of that id that is there is replaced.
+    /// Adds an effect that was written as text to the session; it replaces one of the same id.
     pub(super) fn write_effect(
         self: &std::sync::Arc<Self>,
         seen: u64,
@@ -146,7 +146,7 @@ impl Bench {
     }
 }
 
-/// What an effect makes of a channel, window by window.
+/// Contribution of an effect to a channel, window by window.
 struct Made {
     id: ChannelId,
     made: Vec<f64>,
@@ -155,7 +155,7 @@ struct Made {
 }
 
 impl Made {
-    /// What it makes, squared, by what the model without it leaves.
+    /// Energy of the contribution divided by that of the residual without the effect.
     fn weight(&self) -> f64 {
         let power = |list: &[f64]| list.iter().map(|x| x * x).sum::<f64>();
         power(&self.made) / power(&self.left).max(f64::MIN_POSITIVE)

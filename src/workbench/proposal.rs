@@ -1,4 +1,5 @@
-//! A formula for what no effect of the catalogue explains, and a schedule that tells two effects apart.
+//! A formula for what no effect of the catalogue explains, and a schedule that distinguishes two
+//! effects.
 
 use std::fs;
 use std::path::PathBuf;
@@ -17,22 +18,22 @@ use greylag_sysid::diagnose::{Options, propose};
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 use greylag_sysid::progress::Progress;
 
-/// A schedule that was made to tell two effects apart.
+/// A schedule that was made to distinguish two effects.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Designed {
-    /// Its name, and that of its file.
+    /// Name of the schedule and of its file.
     pub name: String,
-    /// The two effects.
+    /// Ids of the two effects.
     pub between: [String; 2],
-    /// The manoeuvre; empty if none tells the two apart.
+    /// Name of the manoeuvre; empty if none distinguishes the two effects.
     pub manoeuvre: String,
-    /// What it is for.
+    /// Purpose of the manoeuvre.
     pub description: String,
     /// Seconds of it that suffice.
     pub seconds: f64,
     /// How often it is flown.
     pub times: usize,
-    /// Its file.
+    /// Path of the schedule's file.
     pub file: PathBuf,
     /// The command that does the same.
     pub command: String,
@@ -63,7 +64,7 @@ impl Bench {
         known.map_or(Value::Null, |(_, value)| value.as_ref().clone())
     }
 
-    /// Starts making a schedule that tells two effects apart.
+    /// Starts making a schedule that distinguishes two effects.
     pub(super) fn start_design(
         self: &Arc<Self>,
         between: [String; 2],
@@ -77,7 +78,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Makes the schedule that tells the two effects of [`Bench::start_design`] apart.
+    /// Makes the schedule for the two effects of [`Bench::start_design`].
     #[cfg(feature = "sitl")]
     pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         use super::error::io;

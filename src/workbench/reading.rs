@@ -1,4 +1,5 @@
-//! How the session's logs are read: as its command line says, by the session's own mapping if that names none.
+//! Options for reading the session's logs: those of the command line, with the session's own
+//! mapping if it names none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,12 +13,12 @@ use greylag_logs::csv::Tolerance;
 use greylag_logs::mapping::Mapping;
 use greylag_logs::sources::Asked;
 
-/// How logs are read, as a command line says it.
+/// Options of a command line for reading logs.
 #[derive(Clone, Debug, Default)]
 pub struct Reading {
     /// The mapping that is named there.
     pub mapping: Option<PathBuf>,
-    /// What to do with many unusable rows.
+    /// How many unusable rows a log may have.
     pub tolerance: Tolerance,
     /// Whether logs are used in which wrong units, signs or axes were found.
     pub despite_problems: bool,
@@ -28,14 +29,14 @@ pub struct Reading {
 /// The mapping that logs are read by.
 #[derive(Clone, Debug, Default)]
 pub struct InUse {
-    /// Its file; none without a mapping.
+    /// Path of the mapping file; `None` without a mapping.
     pub file: Option<PathBuf>,
-    /// Its text.
+    /// Content of the mapping file.
     pub text: String,
 }
 
 impl Reading {
-    /// The same with a path that holds in any folder.
+    /// The options with absolute paths, valid in any working directory.
     pub(super) fn absolute(self) -> Result<Reading, WorkbenchError> {
         let whole = |path: PathBuf| fs::canonicalize(&path).map_err(|e| io(&path, e));
         Ok(Reading { mapping: self.mapping.map(whole).transpose()?, ..self })
@@ -51,7 +52,7 @@ impl Inner {
         self.read_by(&file, text)
     }
 
-    /// Reads logs by the mapping `text`, which stands, or will stand, in `file`.
+    /// Reads the logs by the mapping `text`, the present or future content of `file`.
     pub fn read_by(&mut self, file: &Path, text: String) -> Result<(), WorkbenchError> {
         self.options.mapping = Mapping::parse(&text, file)?;
         self.mapping = InUse { file: Some(file.into()), text };

@@ -1,6 +1,6 @@
-//! The session's logs by what they serve for, and what the commands of this program would call them.
+//! Roles of the session's logs, and their names in the commands of this program.
 //!
-//! Which role a log takes when it comes is said in `session.rs`, `Session::usual_role`.
+//! `Session::usual_role` in `session.rs` chooses the role of a new log.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,13 +14,13 @@ use greylag_logs::names;
 use greylag_sysid::amend::split;
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 
-/// The flights that a fit sees and those that it is judged by, with what is odd about their logs.
+/// The flights of a fit and those for its validation, with notes on findings in their logs.
 pub struct Divided {
     /// Flights that the fit sees.
     pub fit: Vec<Reconstruction>,
     /// Flights that judge it.
     pub held_out: Vec<Reconstruction>,
-    /// What is odd about their logs.
+    /// Notes on findings in the logs.
     pub notes: Vec<String>,
 }
 
@@ -50,7 +50,8 @@ impl Inner {
         }
     }
 
-    /// Gives a log another role. A test flight that nobody has seen can be seen then, which is recorded.
+    /// Gives a log another role. A test flight that was locked is opened by this, which is
+    /// recorded.
     pub fn give_role(&mut self, place: usize, role: Role) -> Result<(), WorkbenchError> {
         let log = self.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
         if role != Role::Test && self.locked(log) && self.flights[place].is_ok() {
@@ -70,7 +71,7 @@ impl Inner {
         Ok(())
     }
 
-    /// Whether a flight is a test that nobody has opened.
+    /// Whether a flight is a test flight that has not been opened.
     pub fn locked(&self, log: &LogEntry) -> bool {
         // sessions of before hashes know their flights by name
         let opened = self.session.openings.iter().any(|o| match o.sha256.is_empty() {
@@ -85,7 +86,7 @@ impl Inner {
         self.folder.join(&self.session.logs[place].path)
     }
 
-    /// What a command that names these logs calls their flights.
+    /// Names of the flights in the output of a command that reads these logs.
     pub fn names(&self, places: &[usize]) -> Vec<String> {
         names(&places.iter().map(|k| self.file(*k)).collect::<Vec<_>>())
     }
@@ -139,7 +140,7 @@ impl Inner {
         }
     }
 
-    /// What is odd about the logs at `places`, as a command notes it.
+    /// Findings in the logs at `places`, as a command prints them.
     fn findings(&self, places: &[usize]) -> Vec<String> {
         let of = |(k, name): (&usize, String)| {
             let all = self.flights[*k].iter().flat_map(|flight| flight.findings.clone());

@@ -1,4 +1,4 @@
-//! What a session remembers, as it stands in `session.toml`.
+//! Content of a session's file `session.toml`.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use greylag_report as report;
 
 /// The file in the session's folder.
 pub const FILE: &str = "session.toml";
-/// Its schema.
+/// Version of the file's schema.
 const SCHEMA: u32 = 1;
 
-/// What a flight serves for.
+/// Role of a flight in the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -21,14 +21,14 @@ pub enum Role {
     Fit,
     /// Effects are judged by it; the fit does not see it.
     HoldOut,
-    /// It stays unseen until the models are judged by it.
+    /// Locked until the models are judged by it.
     Test,
-    /// It serves for nothing.
+    /// Not used by any computation.
     Unused,
 }
 
 impl Role {
-    /// What the page calls it.
+    /// Name of the role on the page.
     pub fn word(self) -> &'static str {
         match self {
             Role::Fit => "Fit",
@@ -43,16 +43,16 @@ impl Role {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogEntry {
-    /// Its file; a relative path is below the session's folder.
+    /// Path of the log; a relative one is below the session's folder.
     pub path: PathBuf,
     /// SHA-256 of its content.
     pub sha256: String,
-    /// What it serves for.
+    /// Role of the flight.
     pub role: Role,
 }
 
 impl LogEntry {
-    /// What the flight is called: the file's name.
+    /// Name of the flight: that of its file.
     pub fn name(&self) -> String {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
@@ -62,7 +62,7 @@ impl LogEntry {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accepted {
-    /// Its id.
+    /// Id of the effect.
     pub id: String,
     /// Whether it stays though the data refuse it.
     #[serde(default)]
@@ -86,12 +86,12 @@ pub enum Occasion {
 pub struct Opening {
     /// When, seconds since 1970 (UTC).
     pub unix_s: u64,
-    /// Why.
+    /// Occasion on which the test flights were opened.
     #[serde(default)]
     pub occasion: Occasion,
     /// The effects that were in the model.
     pub effects: Vec<String>,
-    /// What the flights were called.
+    /// Names of the flights.
     pub flights: Vec<String>,
     /// SHA-256 of their logs, by which they are known.
     #[serde(default)]
@@ -99,7 +99,7 @@ pub struct Opening {
     /// Normalised root mean square error of the model as given at `horizon_s`; NaN if no run gets there, or no model
     /// was judged.
     pub given: f64,
-    /// The same of the amended model.
+    /// The same error of the amended model.
     pub amended: f64,
     /// Horizon of the free runs, s.
     pub horizon_s: f64,
@@ -109,13 +109,13 @@ pub struct Opening {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// It is being flown.
+    /// The flight is in progress.
     Flying,
-    /// It was flown to its end.
+    /// The flight reached its planned end.
     Flown,
-    /// It was stopped.
+    /// The user stopped it.
     Stopped,
-    /// It could not begin, or ended early.
+    /// The flight could not start, or ended early.
     Failed,
     /// The workbench ended before it.
     CutOff,
@@ -133,25 +133,25 @@ pub struct Flown {
     pub model: String,
     /// The effects that were accepted.
     pub effects: Vec<String>,
-    /// What was flown; empty of a watched flight.
+    /// Schedule that was flown; empty for a watched flight.
     #[serde(default)]
     pub schedule: String,
     /// The command that flies the same; empty of a watched flight.
     #[serde(default)]
     pub command: String,
-    /// How it went.
+    /// Outcome of the flight.
     pub outcome: Outcome,
     /// Time in the recording, s.
     pub seconds: f64,
-    /// What the models' monitors said, each with its time and model.
+    /// Warnings of the models' monitors, each with its time and model.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// What the flying program said last.
+    /// Last line of the flying program.
     #[serde(default)]
     pub said: String,
 }
 
-/// A session.
+/// A session, as its file `session.toml` holds it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
@@ -163,7 +163,7 @@ pub struct Session {
     pub model: PathBuf,
     /// SHA-256 over its files: with airframe, residual and effects of files.
     pub model_sha256: String,
-    /// The logs.
+    /// Logs of the session with their roles.
     #[serde(default)]
     pub logs: Vec<LogEntry>,
     /// The accepted effects, in order.
@@ -178,7 +178,7 @@ pub struct Session {
     /// Ids of effects that were written as text, in the folder `effects`.
     #[serde(default)]
     pub own: Vec<String>,
-    /// Flights, in order.
+    /// Flights of the session, in the order flown.
     #[serde(default)]
     pub flown: Vec<Flown>,
 }
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_session_is_said_and_kept() {
+    fn a_file_that_is_no_session_is_reported_and_kept() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(FILE), "schema = 1\nrevison = 3\n").unwrap();
         let error = Session::read(folder.path()).unwrap_err().to_string();

@@ -39,7 +39,7 @@ struct FlightView<'a> {
     about: Option<About<'a>>,
 }
 
-/// What is known of a flight that can be used.
+/// Summary of a usable flight.
 #[derive(Serialize)]
 struct About<'a> {
     format: Format,
@@ -56,7 +56,7 @@ struct About<'a> {
     strip: Option<Strip>,
 }
 
-/// An accepted effect with what its fit says.
+/// An accepted effect with the results of its fit.
 #[derive(Serialize)]
 struct StepView {
     id: String,
@@ -106,7 +106,7 @@ struct FailingView<'a> {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
-    /// The flight.
+    /// Index of the flight in the session.
     pub flight: usize,
     /// Where it starts, s on the log's clock.
     pub time_s: f64,
@@ -124,7 +124,7 @@ pub struct FreeRun {
 /// A free run of one model.
 #[derive(Clone, Debug, Serialize)]
 pub struct OneRun {
-    /// The model.
+    /// Name of the model.
     pub model: String,
     /// Time on the log's clock, s.
     pub time_s: Vec<f64>,
@@ -251,7 +251,7 @@ impl Bench {
     }
 }
 
-/// Whether a result is there, or why not.
+/// Whether a result exists, with the error of its job.
 fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Value {
     let key = inner.key(work.word(), &[]);
     let known = known.as_ref().filter(|(of, _)| *of == key);
@@ -271,7 +271,7 @@ fn design_failure(inner: &Inner) -> Option<&String> {
     inner.failures.get(&(inner.key(Work::Schedule.word(), &[]) + &pair))
 }
 
-/// What can be flown, and what is.
+/// Available schedules and the state of the present flight.
 fn fly_view(inner: &Inner) -> Value {
     let flying = inner.flying.as_ref();
     json!({

@@ -111,7 +111,7 @@ impl Bench {
         self.desk.poll(self.host, &mut self.up);
         let up = std::mem::take(&mut self.up);
         if !self.cut && self.signer.is_none() {
-            self.controller.hear(&up);
+            self.controller.receive(&up);
         }
         assert_eq!(self.controller.fly().unwrap(), None, "the flight is over");
         self.host += STEP;

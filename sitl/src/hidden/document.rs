@@ -40,7 +40,6 @@ impl Axis {
     }
 }
 
-/// A control surface.
 #[derive(Clone, Copy)]
 pub(super) enum Surface {
     Aileron,
@@ -87,12 +86,12 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The throttle position.
+    /// Property of the throttle position, as a JSBSim expression.
     pub(super) fn throttle(&self) -> String {
         property(&self.properties.throttle_position)
     }
 
-    /// `expression` with the properties of the positions in the places that stand for them.
+    /// `expression` with its placeholders replaced by the properties of the positions.
     pub(super) fn with_positions(&self, expression: &str) -> String {
         expression
             .replace("{aileron}", &self.properties.aileron_position)
@@ -365,7 +364,7 @@ impl<'a> Document<'a> {
         Ok((start, end))
     }
 
-    /// Renames a property within `range`, where it stands alone.
+    /// Renames a property within `range`, whole names only.
     fn rename(&mut self, range: std::ops::Range<usize>, from: &str, to: &str) {
         let part = |c: char| c.is_ascii_alphanumeric() || "_-/[]".contains(c);
         let old = &self.xml[range.clone()];

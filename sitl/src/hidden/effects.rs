@@ -6,7 +6,6 @@ use super::expression::{abs, product, property, sum, value};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Metres per foot.
 const FT: f64 = 0.3048;
 /// Airspeed at which speed-dependent effects vanish, m/s: that of the neutral start.
 const V0_MPS: f64 = 16.67;

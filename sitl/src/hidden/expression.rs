@@ -1,6 +1,6 @@
 //! Expressions of JSBSim's functions, as XML.
 
-/// The expression `<property>name</property>`.
+/// A reference to the JSBSim property `name`: `<property>name</property>`.
 pub(super) fn property(name: &str) -> String {
     format!("<property>{name}</property>")
 }

@@ -32,12 +32,12 @@ const MOMENTS: [&str; 3] = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "mom
 /// Lengths by which they are compared.
 const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"];
 
-/// What was found.
+/// Result of the discovery of an aircraft's properties.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The properties through which the aircraft flies.
     pub properties: Properties,
-    /// What was assumed, one sentence each.
+    /// Assumptions made, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
     })
 }
 
-/// A loaded aircraft that stands still in the air.
+/// A loaded aircraft that is held at rest in the air.
 struct Bench {
     fdm: Fdm,
     start: Snapshot,
@@ -134,7 +134,8 @@ impl Bench {
         Ok(Seen { moments, positions })
     }
 
-    /// What is seen once all stands where `command` puts it; `None` where that gives no number.
+    /// Response once everything has settled at `value` of `command`; `None` where it is not a
+    /// number.
     fn at(&mut self, command: Option<NodeId>, value: f64) -> Result<Option<Seen>, PlantError> {
         self.fdm.restore(&self.start).map_err(jsbsim("going back to the loaded aircraft"))?;
         self.fdm.set_dt(STILL_S);

@@ -43,7 +43,7 @@ impl Linked {
         Ok(Linked(parts(text).into_iter().map(node).collect::<Result<_, PlantError>>()?))
     }
 
-    /// The same if all are there.
+    /// The linked properties of `text`; `None` if one of them does not exist.
     pub fn look(fdm: &Fdm, text: &str) -> Option<Linked> {
         Linked::find(fdm, "", text).ok()
     }

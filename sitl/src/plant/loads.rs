@@ -13,7 +13,7 @@ const AT_REST: usize = 50;
 /// Movement in one step that is none, rad.
 const STILL_RAD: f64 = 1e-12;
 
-/// What the air does to an aircraft in a state.
+/// Aerodynamic force and moment on an aircraft in a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loads {
     /// Aerodynamic force, body axes, N.
@@ -27,7 +27,7 @@ pub struct Loads {
 /// Mass properties as JSBSim has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// Mass, kg.
+    /// Mass of aircraft, fuel and payload, kg.
     pub mass_kg: f64,
     /// Jx, Jy, Jz and Jxz (the inertia matrix holds −Jxz), kg m².
     pub inertia_kgm2: [f64; 4],
@@ -202,7 +202,7 @@ impl Plant {
     /// Mass and inertia at the start, as the aircraft's file loads it.
     ///
     /// # Errors
-    /// [`PlantError::Property`] when JSBSim does not tell.
+    /// [`PlantError::Property`] if JSBSim lacks a property of the mass or inertia.
     pub fn mass_properties(&mut self) -> Result<MassProperties, PlantError> {
         const SLUG: f64 = LBF / 0.3048;
         const SLUG_FT2: f64 = SLUG * 0.3048 * 0.3048;

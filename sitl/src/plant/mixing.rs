@@ -8,13 +8,13 @@ use super::{Inputs, Properties};
 /// A surface or motor of the aircraft.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moved {
-    /// Its name.
+    /// Name of the surface or motor.
     pub name: String,
     /// Property of its command; `None` if the aircraft makes it of the usual commands itself.
     pub command: Option<String>,
     /// Property of its position, rad, 0..1 of a motor.
     pub position: String,
-    /// Its command for one of aileron, elevator, rudder, throttle.
+    /// Command per unit of aileron, elevator, rudder and throttle.
     pub gains: [f64; 4],
     /// Deflections at −1 and 1, rad; `None` is a motor.
     pub travel: Option<[f64; 2]>,
@@ -42,7 +42,7 @@ impl Moved {
     }
 }
 
-/// Which surfaces and motors an aircraft has.
+/// Surfaces and motors of an aircraft, with their shares of the controls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixing {
     moved: Vec<Moved>,
@@ -57,7 +57,7 @@ impl Mixing {
     /// The mixing of `moved`.
     ///
     /// # Errors
-    /// In words, when the positions do not say what the controls do.
+    /// A message: a control moves no surface or motor, or two controls move the surfaces alike.
     pub fn new(moved: Vec<Moved>) -> Result<Mixing, String> {
         let used: [bool; 4] = std::array::from_fn(|j| moved.iter().any(|m| m.gains[j] != 0.0));
         if let Some(j) = [0, 1, 3].into_iter().find(|j| !used[*j]) {
@@ -101,7 +101,7 @@ impl Mixing {
         self.has_rudder
     }
 
-    /// What each is given.
+    /// Commands of the surfaces and motors, in their order.
     pub(super) fn mix(&self, inputs: &Inputs) -> impl Iterator<Item = f64> {
         let asked = [inputs.aileron, inputs.elevator, inputs.rudder, inputs.throttle];
         let sum = move |m: &Moved| m.gains.iter().zip(asked).map(|(g, c)| g * c).sum::<f64>();

@@ -12,7 +12,6 @@ use crate::air::Gust;
 const FT: f64 = 0.3048;
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Kilograms per slug.
 const SLUG: f64 = LBF / FT;
 /// Pascals per pound per square foot.
 const PSF: f64 = LBF / (FT * FT);
@@ -78,7 +77,7 @@ impl Nodes {
         })
     }
 
-    /// Writes the commands.
+    /// Writes the commands to their JSBSim properties.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
         settling::hold(fdm, &self.held)?;
         self.steering.command(fdm, inputs)
@@ -94,8 +93,8 @@ impl Nodes {
         self.steering.is_shared()
     }
 
-    /// Starts every engine that can stand still; the number of the first that does not run then.
-    /// JSBSim starts them at full power, from where they follow the throttle.
+    /// Starts every engine that can be off; `Some` with the number of the first that does not run
+    /// then. JSBSim starts them at full power, from where they follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {
         if self.running.is_empty() {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! What a plant is made from.
+//! Options from which a plant is made.
 
 use std::path::PathBuf;
 
@@ -7,20 +7,20 @@ use crate::air::Air;
 use crate::aircraft;
 use crate::hidden::Hidden;
 
-/// Which aircraft to fly, in what air, with what hidden in it.
+/// The aircraft to fly, its air, and the effects hidden in it.
 #[derive(Clone, Debug)]
 pub struct PlantOptions {
     /// Folder that holds `NAME/NAME.xml`; `None` is one of those built into the program.
     pub aircraft_dir: Option<PathBuf>,
-    /// The aircraft's name.
+    /// Name of the aircraft: the folder and file below `aircraft_dir`, or a built-in one.
     pub aircraft: String,
     /// The properties through which the aircraft is flown.
     pub properties: Properties,
     /// Surfaces and motors that are commanded one by one, in place of the aircraft's aileron, elevator and rudder.
     pub mixing: Option<Mixing>,
-    /// Properties that are held at a value while the aircraft flies: flaps, say.
+    /// Properties held at a value in flight, such as a flap command.
     pub held: Vec<(String, f64)>,
-    /// Wind, turbulence, gusts.
+    /// Wind, turbulence and gusts.
     pub air: Air,
     /// Effects hidden in the aircraft; empty flies the aircraft's file as it is.
     pub hidden: Vec<Hidden>,
@@ -61,21 +61,22 @@ impl Default for PlantOptions {
 /// Names of the JSBSim properties through which an aircraft is flown.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Properties {
-    /// Aileron command, −1..1.
+    /// Property of the aileron command, −1..1.
     pub aileron_command: String,
-    /// Elevator command, −1..1.
+    /// Property of the elevator command, −1..1.
     pub elevator_command: String,
-    /// Throttle command, 0..1.
+    /// Property of the throttle command, 0..1.
     pub throttle_command: String,
-    /// Aileron position, rad; where the aircraft lacks the default, `fcs/left-aileron-pos-rad`.
+    /// Property of the aileron position, rad; where the aircraft lacks the default,
+    /// `fcs/left-aileron-pos-rad`.
     pub aileron_position: String,
-    /// Elevator position, rad.
+    /// Property of the elevator position, rad.
     pub elevator_position: String,
-    /// Throttle position, 0..1.
+    /// Property of the throttle position, 0..1.
     pub throttle_position: String,
-    /// Rudder command, −1..1; an aircraft need not have one.
+    /// Property of the rudder command, −1..1; an aircraft may lack it.
     pub rudder_command: String,
-    /// Rudder position, rad.
+    /// Property of the rudder position, rad.
     pub rudder_position: String,
 }
 

@@ -1,4 +1,4 @@
-//! Frames in which the aircraft stands still while its systems come to rest.
+//! Frames in which the aircraft is held while its systems come to rest.
 
 use jsbsim::{Error, Fdm, NodeId};
 

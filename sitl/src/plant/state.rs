@@ -1,4 +1,4 @@
-//! What goes into a plant and what it shows of itself, in SI units.
+//! Inputs and observable state of a plant, in SI units.
 
 /// Deflection of the X8's surfaces at full command, rad (read back from the public simulator).
 #[allow(clippy::approx_constant)] // Not π/6: the aircraft's file says 0.5235.
@@ -69,7 +69,7 @@ pub struct Inputs {
     pub aileron: f64,
     /// Elevator, −1..1; positive pitches down.
     pub elevator: f64,
-    /// Throttle, 0..1.
+    /// Throttle command, 0..1.
     pub throttle: f64,
     /// Rudder, −1..1; positive yaws left.
     pub rudder: f64,
@@ -120,27 +120,27 @@ pub struct Truth {
     pub velocity_ned_mps: [f64; 3],
     /// Velocity of the air over the ground with gusts and turbulence, north-east-down, m/s.
     pub wind_ned_mps: [f64; 3],
-    /// Geodetic latitude, deg.
+    /// Geodetic latitude, deg, north positive.
     pub latitude_deg: f64,
-    /// Longitude, deg.
+    /// Geodetic longitude, deg, east positive.
     pub longitude_deg: f64,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
-    /// Air density, kg/m³.
+    /// Density of the air, kg/m³.
     pub air_density_kgpm3: f64,
-    /// Static pressure, Pa.
+    /// Static pressure of the air, Pa.
     pub static_pressure_pa: f64,
-    /// Aileron deflection, rad.
+    /// Deflection of the aileron, rad.
     pub aileron_rad: f64,
     /// Aileron rate, rad/s: the deflection's change over the last step by the step.
     pub aileron_rate_radps: f64,
-    /// Elevator deflection, rad.
+    /// Deflection of the elevator, rad.
     pub elevator_rad: f64,
     /// Elevator rate, rad/s: the deflection's change over the last step by the step.
     pub elevator_rate_radps: f64,
-    /// Throttle position, 0..1.
+    /// Position of the throttle, 0..1.
     pub throttle: f64,
-    /// Rudder deflection, rad.
+    /// Deflection of the rudder, rad.
     pub rudder_rad: f64,
     /// Rudder rate, rad/s: the deflection's change over the last step by the step.
     pub rudder_rate_radps: f64,

@@ -31,7 +31,7 @@ pub(super) struct Mixed {
     /// Command of each surface and motor; `None` follows the usual commands.
     commands: Vec<Option<NodeId>>,
     positions: Vec<NodeId>,
-    /// The usual commands, for what has none of its own: aileron, elevator, rudder.
+    /// The usual commands (aileron, elevator, rudder), for parts without a command of their own.
     usual: [Option<NodeId>; 3],
     throttles: Vec<NodeId>,
 }
@@ -78,7 +78,7 @@ impl Steering {
         }))
     }
 
-    /// Writes the commands.
+    /// Writes the commands to their JSBSim properties.
     pub(super) fn command(&self, fdm: &mut Fdm, inputs: &Inputs) -> Result<(), Error> {
         let values = [inputs.aileron, inputs.elevator, inputs.rudder];
         let throttles = match self {

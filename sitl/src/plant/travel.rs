@@ -26,7 +26,7 @@ pub struct Stops {
 }
 
 impl Stops {
-    /// The same to both sides, rad.
+    /// Stops of equal deflection on both sides, rad.
     pub const fn symmetric(most_rad: f64) -> Stops {
         Stops { least_rad: -most_rad, most_rad }
     }
@@ -40,16 +40,16 @@ impl Stops {
 /// Deflections at full command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travel {
-    /// Of the aileron.
+    /// Stops of the aileron.
     pub aileron: Stops,
-    /// Of the elevator.
+    /// Stops of the elevator.
     pub elevator: Stops,
-    /// Of the rudder, where there is one.
+    /// Stops of the rudder; `None` for an aircraft without one.
     pub rudder: Option<Stops>,
 }
 
 impl Travel {
-    /// That of the X8.
+    /// Travel of the X8's surfaces.
     pub const X8: Travel = Travel {
         aileron: Stops::symmetric(FULL_DEFLECTION_RAD),
         elevator: Stops::symmetric(FULL_DEFLECTION_RAD),
@@ -64,8 +64,8 @@ impl Default for Travel {
 }
 
 impl Plant {
-    /// Measures the travel of the surfaces: commands them fully both ways while the aircraft stands
-    /// still in its state, then goes back to where it was.
+    /// Measures the travel of the surfaces: commands them fully both ways with the aircraft held in
+    /// its state, then restores it.
     ///
     /// # Errors
     /// [`PlantError::Travel`] when a surface does not follow its command.

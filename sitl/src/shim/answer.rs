@@ -3,7 +3,7 @@
 use super::codec::HilActuatorControls;
 use crate::plant::Inputs;
 
-/// MAV_MODE_FLAG_SAFETY_ARMED.
+/// Bit MAV_MODE_FLAG_SAFETY_ARMED of `base_mode`.
 pub const ARMED: u8 = 128;
 
 /// An answer that can be flown: finite, within the actuators' ranges, zero when disarmed.

@@ -48,7 +48,7 @@ impl Bench {
         })
     }
 
-    /// What is wrong with the sensors from now on.
+    /// Distorts the sensors from now on.
     pub fn distort(&mut self, distortion: Distortion) {
         self.distorter.now = distortion;
     }
@@ -64,7 +64,7 @@ impl Bench {
     }
 
     /// Takes bytes that have arrived.
-    pub fn hear(&mut self, bytes: &[u8]) {
+    pub fn receive(&mut self, bytes: &[u8]) {
         let mut frames = Vec::new();
         self.parser.stream(bytes, &mut |frame| frames.push(frame));
         for frame in frames.iter().filter(|f| (f.system, f.component) == COMPANION) {
@@ -94,7 +94,7 @@ impl Bench {
         self.flight.advance(self.inputs)
     }
 
-    /// What was last measured, before it was distorted.
+    /// Last measurement, before it was distorted.
     pub fn measured(&self) -> Truth {
         self.measured
     }

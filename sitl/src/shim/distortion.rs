@@ -1,8 +1,8 @@
-//! What goes wrong with what is measured, apart from noise: sensors that stand still, lie or jump.
+//! Faults of the measurements apart from noise: sensors that freeze, err or jump.
 
 use crate::plant::Truth;
 
-/// What is wrong now.
+/// Present errors of the sensors and the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
     /// Every sensor shows what it showed when this began.
@@ -25,7 +25,7 @@ pub(super) struct Distorter {
 }
 
 impl Distorter {
-    /// What is shown of `measured`, and when it is said to be.
+    /// Distorted measurement and its time stamp, µs.
     pub(super) fn apply(&mut self, time_us: u64, measured: Truth) -> (u64, Truth) {
         let mut shown = match (self.now.frozen, self.held) {
             (true, Some(held)) => held,

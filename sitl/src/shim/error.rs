@@ -18,11 +18,11 @@ pub enum ShimError {
     /// A parameter that the played stack does not have.
     #[error("the {stack} personality has no parameter {name}; it has {known}")]
     Parameter {
-        /// The stack.
+        /// Name of the simulated stack.
         stack: &'static str,
-        /// The name.
+        /// The parameter as given.
         name: String,
-        /// What it has.
+        /// Parameters that the stack has.
         known: String,
     },
     /// A place without a known magnetic field.
@@ -31,11 +31,11 @@ pub enum ShimError {
          start between -1 and 850 km"
     )]
     Magnetism {
-        /// Latitude, deg.
+        /// Geodetic latitude of the start, deg.
         latitude_deg: f64,
-        /// Longitude, deg.
+        /// Longitude of the start, deg.
         longitude_deg: f64,
-        /// Altitude, m.
+        /// Altitude of the start above mean sea level, m.
         altitude_m: f64,
     },
     /// The plant could not be built, or could not go on.
@@ -44,18 +44,18 @@ pub enum ShimError {
     /// The link could not be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The truth file is there already.
+    /// The truth file exists.
     #[error("the truth file {} exists; choose another name with --truth, or allow overwriting with --force", path.display())]
     TruthExists {
-        /// The file.
+        /// Path of the truth file.
         path: PathBuf,
     },
     /// The truth file could not be written.
     #[error("cannot write the truth file {}: {source}; check the folder and the free space", path.display())]
     Truth {
-        /// The file.
+        /// Path of the truth file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

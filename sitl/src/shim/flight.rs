@@ -12,7 +12,7 @@ use crate::plant::{Inputs, Plant, Travel, Truth};
 /// Why a flight is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Over {
-    /// It has lasted as long as was asked.
+    /// The requested duration has been flown.
     Duration,
     /// The aircraft has come down to sea level.
     Ground,
@@ -79,7 +79,7 @@ impl Flight {
         self.travel
     }
 
-    /// What is to be known of the aircraft.
+    /// Notes on the aircraft, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         self.plant.notes()
     }
@@ -111,7 +111,7 @@ impl Flight {
         (StateFrame::new(time_us, &measured, self.travel), measured)
     }
 
-    /// Goes one frame on, flying `inputs` if launched; says when the flight is over.
+    /// Advances by one frame, flying `inputs` if launched; `Some` when the flight is over.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Option<Over>, ShimError> {
         let mut truth = self.pending.back().map_or_else(Truth::default, |(_, truth)| *truth);
         if self.launched {

@@ -5,7 +5,7 @@ use crate::shim::options::Launch;
 
 /// How long the catapult pulls, s: 1.7 g for 16.67 m/s, within 8.3 m.
 const PULL_S: f64 = 1.0;
-/// The catapult is let go at this throttle; PX4 and ArduPlane idle below it before a take-off.
+/// The catapult is released at this throttle; PX4 and ArduPlane idle below it before a take-off.
 const LAUNCH_THROTTLE: f64 = 0.1;
 /// Radius of the earth's equator, m, and its first eccentricity squared (WGS 84).
 const EQUATOR_M: f64 = 6_378_137.0;
@@ -15,7 +15,7 @@ const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Stand,
-    /// Steps since the catapult was let go.
+    /// Steps since the catapult was released.
     Catapult(u64),
     Flight,
 }
@@ -79,12 +79,12 @@ impl Launcher {
         self.plant.travel()
     }
 
-    /// What is to be known of the aircraft.
+    /// Notes on the aircraft, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         self.plant.notes()
     }
 
-    /// The state now.
+    /// Present state of the aircraft.
     pub fn truth(&self) -> Truth {
         self.shown
     }
@@ -94,7 +94,7 @@ impl Launcher {
         self.phase == Phase::Flight
     }
 
-    /// Lets the catapult go when it is wanted; says whether it has just been.
+    /// Releases the catapult if armed with open throttle; `true` in the call that releases it.
     pub fn let_go(&mut self, armed: bool, throttle: f64) -> bool {
         let wanted = self.phase == Phase::Stand && armed && throttle > LAUNCH_THROTTLE;
         if wanted {

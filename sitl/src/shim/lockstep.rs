@@ -36,7 +36,7 @@ pub fn fly(
         session.use_answer(&answer);
         if answer.armed && !flight.is_launched() {
             flight.launch();
-            session.tell(Event::Launched);
+            session.notify(Event::Launched);
         }
         if let Some(over) = flight.advance(answer.inputs)? {
             return Ok(Some(over));
@@ -71,7 +71,7 @@ fn ask(
         if let Some(answer) = pick(session, frame.time_us, answers) {
             session.counts.latency.record(asking.sent.elapsed());
             if asking.paused {
-                session.tell(Event::Resumed);
+                session.notify(Event::Resumed);
             }
             return Some(answer);
         }
@@ -79,7 +79,7 @@ fn ask(
         session.watch(now);
         if !asking.paused && session.is_alive() && now - asking.since >= REPEAT {
             asking.paused = true;
-            session.tell(Event::Paused);
+            session.notify(Event::Paused);
         }
     }
     None

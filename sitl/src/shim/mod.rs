@@ -56,8 +56,8 @@ use flight::Flight;
 use link::{Link, Wait};
 use session::Session;
 
-/// Flies until `stop` is set (seen within some 20 ms), the flight is over, or the plant fails;
-/// tells `observer` every change of state. Blocks the calling thread.
+/// Flies until `stop` is set (polled about every 20 ms), the flight is over, or the plant fails;
+/// reports every change of state to `observer`. Blocks the calling thread.
 ///
 /// Options are checked and the link is opened before the truth file is made, so that a run that
 /// cannot begin leaves nothing behind.

@@ -1,4 +1,4 @@
-//! What a run of the shim is asked to do.
+//! Options of a run of the shim.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use super::link::{Address, Transport};
 use super::px4_sim::Px4Options;
 use crate::plant::{PlantOptions, Start};
 
-/// What the shim's clock follows.
+/// Clock that paces the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// The wall clock: one frame every 10 ms whatever the companion does.
@@ -23,16 +23,16 @@ pub enum Pace {
 pub enum Launch {
     /// At the first armed answer; until then it stays at its start while time runs.
     WhenArmed,
-    /// At once.
+    /// In the first frame, without waiting for an armed answer.
     Immediate,
 }
 
-/// What to do with a truth file that exists.
+/// Treatment of a truth file that exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// Refuse to start.
+    /// Keep it and refuse to start.
     Keep,
-    /// Write over it.
+    /// Replace it without asking.
     Replace,
 }
 
@@ -41,7 +41,7 @@ pub enum Existing {
 pub struct TruthFile {
     /// A CSV file in the columns of the flight-log format.
     pub path: PathBuf,
-    /// What to do when it exists.
+    /// Treatment of a file that exists.
     pub existing: Existing,
 }
 
@@ -54,7 +54,7 @@ pub struct Noise {
     pub accelerometer_mps2: f64,
     /// Attitude, each Euler angle, rad.
     pub attitude_rad: f64,
-    /// True airspeed, m/s.
+    /// True airspeed, m/s, one draw a frame.
     pub airspeed_mps: f64,
     /// Angle-of-attack and sideslip vanes, rad.
     pub vane_rad: f64,
@@ -63,7 +63,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// No noise.
+    /// Sensors without noise.
     pub const NONE: Noise = Noise {
         gyro_radps: 0.0,
         accelerometer_mps2: 0.0,
@@ -96,7 +96,7 @@ impl Noise {
     }
 }
 
-/// Constant sensor errors.
+/// Constant (bias) and scale errors of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
     /// Added to p, q, r, rad/s.
@@ -126,7 +126,7 @@ impl Default for Bias {
     }
 }
 
-/// What befalls state frames on their way.
+/// Faults of the transmission of state frames.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct FrameFaults {
     /// Every frame comes this much late, ms. In lockstep, where only simulated time exists, it is
@@ -147,7 +147,7 @@ pub struct FrameFaults {
 pub struct ShimOptions {
     /// Where the companion is met.
     pub link: Address,
-    /// What the clock follows.
+    /// Clock that paces the run.
     pub pace: Pace,
     /// When the aircraft begins to fly.
     pub launch: Launch,
@@ -161,13 +161,13 @@ pub struct ShimOptions {
     pub seed: u64,
     /// Where the truth goes, if anywhere.
     pub truth: Option<TruthFile>,
-    /// White sensor noise.
+    /// Standard deviations of the white sensor noise.
     pub noise: Noise,
-    /// Constant sensor errors.
+    /// Constant and scale errors of the sensors.
     pub bias: Bias,
-    /// What befalls state frames.
+    /// Faults of the transmission of state frames.
     pub faults: FrameFaults,
-    /// Which flight stack to play; `None` speaks the profile `sitl`.
+    /// Flight stack to simulate; `None` uses the profile `sitl`.
     pub personality: Option<Personality>,
     /// Parameters of the played stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
@@ -304,7 +304,7 @@ impl ShimOptions {
         Ok(())
     }
 
-    /// Whether nothing befalls state frames.
+    /// Whether state frames have no faults.
     fn frames_are_spared(&self) -> bool {
         let FrameFaults { delay_ms, drop_probability, jitter_ms, late_probability, .. } =
             self.faults;

@@ -1,4 +1,4 @@
-//! Which output of a flight controller moves what.
+//! Assignment of a flight controller's outputs to the aircraft's controls.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,13 +13,13 @@ enum Effector {
     Aileron,
     LeftAileron,
     RightAileron,
-    /// Positive pitches up.
+    /// Elevator; positive pitches up.
     Elevator,
     LeftElevon,
     RightElevon,
-    /// Positive yaws right.
+    /// Rudder; positive yaws right.
     Rudder,
-    /// 0 to 1.
+    /// Throttle, 0 to 1.
     Throttle,
 }
 
@@ -39,7 +39,7 @@ impl Effector {
         Effector::ALL.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
     }
 
-    /// What a positive output does to roll (right) and to pitch (up).
+    /// Effect of a positive output on roll (right) and on pitch (up).
     fn acts(self) -> (f64, f64) {
         match self {
             Effector::Aileron | Effector::RightAileron => (1.0, 0.0),
@@ -155,7 +155,7 @@ impl FromStr for OutputMap {
     }
 }
 
-/// What the outputs ask for together.
+/// Commands of all outputs combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mixed {
     /// Commands of the plant.
@@ -202,9 +202,9 @@ impl OutputMap {
 /// The range of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
-    /// −1..1.
+    /// A surface's range, −1..1.
     Surface,
-    /// 0..1.
+    /// The throttle's range, 0..1.
     Throttle,
 }
 
@@ -223,7 +223,7 @@ impl Effector {
     }
 }
 
-/// The mean of what several outputs do: left and right elevon, say.
+/// Mean of several outputs that move one control, such as left and right elevon.
 #[derive(Default)]
 struct Mean {
     sum: f64,

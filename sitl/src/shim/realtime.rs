@@ -9,7 +9,7 @@ use super::answer::Answer;
 use super::error::ShimError;
 use super::faults::{Faults, milliseconds};
 use super::flight::{Flight, Over};
-use super::session::{Heard, Session};
+use super::session::{Received, Session};
 use super::summary::Event;
 use super::telemetry::{FRAME_US, encode_slow};
 use crate::plant::Inputs;
@@ -70,7 +70,7 @@ pub fn fly(
                 inputs = answer.inputs;
                 if answer.armed && !flight.is_launched() {
                     flight.launch();
-                    cycle.session.tell(Event::Launched);
+                    cycle.session.notify(Event::Launched);
                 }
             }
             None => cycle.session.counts.unanswered_steps += u64::from(flight.is_launched()),
@@ -104,7 +104,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
         self.session.counts.late_cycles += u64::from(late > LATE);
         self.session.watch(now);
         if late > HOPELESS {
-            self.session.tell(Event::Skipped(late));
+            self.session.notify(Event::Skipped(late));
             return now;
         }
         deadline
@@ -168,11 +168,11 @@ impl<'s, 'o> Cycle<'s, 'o> {
     fn listen(&mut self) {
         for _ in 0..ARRIVALS {
             self.answers.clear();
-            let heard = self.session.receive(&mut self.answers);
+            let received = self.session.receive(&mut self.answers);
             for i in 0..self.answers.len() {
                 self.judge(self.answers[i]);
             }
-            if heard == Heard::Nothing {
+            if received == Received::Nothing {
                 return;
             }
         }

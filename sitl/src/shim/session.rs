@@ -1,4 +1,4 @@
-//! The conversation with the companion: who is heard, what is said, what is counted.
+//! Exchange of messages with the companion: its presence, its answers and their counts.
 
 use std::time::{Duration, Instant};
 
@@ -17,14 +17,14 @@ const SILENCE: Duration = Duration::from_secs(2);
 
 /// Whether a receive brought anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
-    /// Nothing.
+pub enum Received {
+    /// The wait ended without an arrival.
     Nothing,
     /// Bytes, or a change of the link.
     Something,
 }
 
-/// One run's conversation.
+/// Exchange of messages of one run.
 pub struct Session<'a> {
     link: Link,
     address: Address,
@@ -35,7 +35,7 @@ pub struct Session<'a> {
     pub counts: Summary,
     /// Simulated time that events are stamped with, µs.
     pub time_us: u64,
-    heard: Option<Instant>,
+    last_message: Option<Instant>,
     armed: bool,
     newly_reachable: bool,
     frames: Vec<Frame>,
@@ -54,25 +54,26 @@ impl<'a> Session<'a> {
             observer,
             counts: Summary::default(),
             time_us: 0,
-            heard: None,
+            last_message: None,
             armed: false,
             newly_reachable: false,
             frames: Vec::new(),
             batch: Vec::new(),
         };
-        session.tell(Event::Open(session.address.clone(), local));
-        session.tell(Event::Waiting(session.address.clone()));
+        session.notify(Event::Open(session.address.clone(), local));
+        session.notify(Event::Waiting(session.address.clone()));
         session
     }
 
-    /// Tells the observer.
-    pub fn tell(&mut self, event: Event) {
+    /// Reports `event` to the observer with the present simulated time.
+    pub fn notify(&mut self, event: Event) {
         (self.observer)(Notice { time_s: self.time_us as f64 * 1e-6, event });
     }
 
-    /// Whether the companion has been heard lately.
+    /// Whether the companion is present: it sent a message in the last two seconds, on an open
+    /// link.
     pub fn is_alive(&self) -> bool {
-        self.heard.is_some()
+        self.last_message.is_some()
     }
 
     /// Whether the companion has come within reach since this was last asked.
@@ -92,7 +93,7 @@ impl<'a> Session<'a> {
         self.counts.unsent_frames += u64::from(!self.link.send(bytes));
     }
 
-    /// Sends what `write` encodes, if it encodes anything, as a datagram of its own.
+    /// Sends the bytes that `write` encodes, if any, as a separate datagram.
     pub fn send_slow(&mut self, write: impl FnOnce(&mut Encoder, &mut Vec<u8>)) {
         self.batch.clear();
         write(&mut self.encoder, &mut self.batch);
@@ -101,13 +102,13 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends a heartbeat out of turn: a sign of life while simulated time stands still.
+    /// Sends an additional heartbeat while simulated time is stopped.
     pub fn send_heartbeat(&mut self) {
         self.send_slow(encode_heartbeat);
     }
 
     /// Takes what has arrived and appends the answers that can be flown to `answers`.
-    pub fn receive(&mut self, answers: &mut Vec<Answer>) -> Heard {
+    pub fn receive(&mut self, answers: &mut Vec<Answer>) -> Received {
         let mut frames = std::mem::take(&mut self.frames);
         frames.clear();
         let parser = &mut self.parser;
@@ -116,7 +117,7 @@ impl<'a> Session<'a> {
         match self.link.receive() {
             Arrival::Nothing => {
                 self.frames = frames;
-                return Heard::Nothing;
+                return Received::Nothing;
             }
             Arrival::Datagram(bytes, from) => {
                 parser.datagram(bytes, &mut keep);
@@ -133,13 +134,13 @@ impl<'a> Session<'a> {
             }
         }
         for frame in &frames {
-            self.hear(frame, sender, answers);
+            self.take(frame, sender, answers);
         }
         self.frames = frames;
-        Heard::Something
+        Received::Something
     }
 
-    fn hear(
+    fn take(
         &mut self,
         frame: &Frame,
         sender: Option<std::net::SocketAddr>,
@@ -166,22 +167,22 @@ impl<'a> Session<'a> {
         if let Some(sender) = sender {
             self.link.adopt(sender);
         }
-        if self.heard.replace(Instant::now()).is_none() {
+        if self.last_message.replace(Instant::now()).is_none() {
             self.newly_reachable = true;
-            self.tell(Event::Found);
+            self.notify(Event::Found);
         }
     }
 
     fn lose(&mut self) {
-        if self.heard.take().is_some() {
-            self.tell(Event::Lost);
-            self.tell(Event::Waiting(self.address.clone()));
+        if self.last_message.take().is_some() {
+            self.notify(Event::Lost);
+            self.notify(Event::Waiting(self.address.clone()));
         }
     }
 
     /// Notices a companion that has fallen silent.
     pub fn watch(&mut self, now: Instant) {
-        if self.heard.is_some_and(|heard| now.saturating_duration_since(heard) > SILENCE) {
+        if self.last_message.is_some_and(|last| now.saturating_duration_since(last) > SILENCE) {
             self.link.abandon();
             self.lose();
         }
@@ -193,11 +194,11 @@ impl<'a> Session<'a> {
         self.counts.limited_answers += u64::from(answer.limited);
         if answer.armed != self.armed {
             self.armed = answer.armed;
-            self.tell(if answer.armed { Event::Armed } else { Event::Disarmed });
+            self.notify(if answer.armed { Event::Armed } else { Event::Disarmed });
         }
     }
 
-    /// The counts, complete.
+    /// Ends the session and returns its counts.
     pub fn finish(mut self) -> Summary {
         self.counts.bad_frames = self.parser.bad();
         self.counts.foreign_frames += self.parser.unknown();

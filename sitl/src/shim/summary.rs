@@ -1,4 +1,4 @@
-//! What a run tells: its events while it goes on, its counts at the end.
+//! Events of a run and the counts at its end.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -14,13 +14,13 @@ use super::px4_sim::Px4Event;
 pub enum Event {
     /// The link is open; this side's own address where there is one.
     Open(Address, Option<SocketAddr>),
-    /// What is to be known of the aircraft.
+    /// A note on the aircraft.
     Note(String),
-    /// Nobody has been heard yet, or not any more.
+    /// No companion has sent a message yet, or the last one was lost.
     Waiting(Address),
-    /// The companion has been heard.
+    /// The first message of the companion has arrived.
     Found,
-    /// The companion has not been heard for two seconds, or has closed its stream.
+    /// The companion has sent nothing for two seconds, or has closed its stream.
     Lost,
     /// The first armed answer has come: the aircraft flies.
     Launched,
@@ -82,9 +82,9 @@ impl fmt::Display for Event {
 /// An event with the simulated time at which it happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// Simulated time, s.
+    /// Simulated time of the event, s.
     pub time_s: f64,
-    /// What happened.
+    /// Change of state that happened.
     pub event: Event,
 }
 
@@ -110,12 +110,12 @@ impl Latency {
         self.longest = self.longest.max(taken);
     }
 
-    /// Answers measured.
+    /// Number of answers measured.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The longest.
+    /// Longest time from frame to answer.
     pub fn longest(&self) -> Duration {
         self.longest
     }
@@ -143,7 +143,7 @@ pub struct Summary {
     pub repeated_frames: u64,
     /// State frames lost on purpose.
     pub dropped_frames: u64,
-    /// State frames that could not be sent: nobody there, or no room.
+    /// State frames that could not be sent: no peer, or no room.
     pub unsent_frames: u64,
     /// Answers that were flown (or, before the launch, would have been).
     pub answers: u64,
@@ -171,7 +171,7 @@ pub struct Summary {
     pub simulated_s: f64,
     /// Simulated time since the launch, s.
     pub flown_s: f64,
-    /// Wall time, s.
+    /// Wall time of the run, s.
     pub wall_s: f64,
     /// From sending a frame to receiving its answer.
     pub latency: Latency,

@@ -14,7 +14,7 @@ pub const FRAME_US: u64 = 10_000;
 /// Gas constant of dry air, J/(kg K), as the standard atmosphere has it.
 const AIR: f64 = 287.053;
 
-/// MAV_TYPE_FIXED_WING, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE.
+/// Heartbeat of the simulator: MAV_TYPE_FIXED_WING, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE.
 const HEARTBEAT: Heartbeat = Heartbeat {
     custom_mode: 0,
     kind: 1,
@@ -69,7 +69,7 @@ impl StateFrame {
     }
 }
 
-/// Appends HEARTBEAT.
+/// Appends the simulator's HEARTBEAT.
 pub fn encode_heartbeat(encoder: &mut Encoder, out: &mut Vec<u8>) {
     encoder.encode(&HEARTBEAT, out);
 }

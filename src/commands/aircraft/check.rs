@@ -23,14 +23,14 @@ pub struct Arguments {
     /// Model of the aircraft.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Write the page of the aircraft: three views, trim, modes, what the stick does.
+    /// Write the page of the aircraft: three views, trim, modes, and the response to the stick.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgument,
 }
 
-/// What was found, as JSON: SI units, angles in rad.
+/// Result of the check as JSON: SI units, angles in rad.
 #[derive(Serialize)]
 struct Document<'a> {
     model: &'a str,

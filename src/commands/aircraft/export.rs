@@ -26,8 +26,8 @@ enum To {
 /// The arguments of `greylag aircraft export jsbsim`.
 #[derive(Args)]
 struct Jsbsim {
-    /// The model. Repeat it for models of one aircraft in several conditions, flap settings say: the aircraft then
-    /// reads the property in which their airframes differ.
+    /// The model. Repeat it for models of one aircraft in several conditions, such as flap
+    /// settings: the aircraft then reads the property in which their airframes differ.
     #[arg(long, value_name = "FILE", required = true)]
     model: Vec<PathBuf>,
     /// Folder in which the aircraft's folder is made.
@@ -36,7 +36,7 @@ struct Jsbsim {
     name: String,
 }
 
-/// Writes the files, says what they do not have.
+/// Writes the aircraft's files and lists what the format cannot hold.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let To::Jsbsim(jsbsim) = &arguments.to;
     let Jsbsim { dir, name, .. } = jsbsim;

@@ -14,9 +14,9 @@ use crate::commands::{Command, command_of, given};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 
-/// Share of its own size up to which a coefficient's standard deviation leaves it known.
+/// A coefficient is known if its standard deviation is at most this share of its magnitude.
 const KNOWN: f64 = 0.3;
-/// What moves the coefficients of an effect, for those that the flights leave unknown.
+/// Manoeuvres that excite the coefficients of an effect, for those that the flights leave unknown.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
     ("pitch_linear", "elevator doublets at three airspeeds"),
@@ -32,10 +32,10 @@ const MANOEUVRES: [(&str, &str); 7] = [
 pub struct Arguments {
     /// Folder to make: the estimate in `prior`, the fitted aircraft beside it.
     folder: PathBuf,
-    /// Span.
+    /// Wing span.
     #[arg(long, value_name = "M")]
     span_m: f64,
-    /// Wing area.
+    /// Wing area, the reference area of the coefficients.
     #[arg(long, value_name = "M2")]
     area_m2: f64,
     #[command(flatten)]
@@ -44,7 +44,8 @@ pub struct Arguments {
     logs: LogArguments,
 }
 
-/// Writes the estimate, fits it, writes its page, says what to fly next.
+/// Writes the estimate from size, fits it to the logs, writes its page and recommends further
+/// flights.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Arguments { folder, span_m, area_m2, common, logs } = arguments;
     if folder.join("model.toml").exists() {
@@ -73,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(status)
 }
 
-/// Says what to fly, for what the flights leave unknown.
+/// Recommends manoeuvres for the coefficients that the flights leave unknown.
 fn next(folder: &Path, fitted: &Path) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;

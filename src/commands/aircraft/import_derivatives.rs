@@ -15,7 +15,7 @@ use crate::model::derivatives::{self, Beside};
 enum Angle {
     /// A degree, as AVL has it for a control of gain one.
     Deg,
-    /// A radian.
+    /// One radian of deflection.
     Rad,
 }
 
@@ -38,7 +38,8 @@ pub struct Derivatives {
     control_unit: Angle,
 }
 
-/// Reads, writes, says what is not of the file and what is not believed; the exit status is 3 for the latter.
+/// Imports the derivatives and lists what the file lacks and what is implausible; the exit status
+/// is 3 for the latter.
 pub fn run(arguments: &Derivatives) -> Result<ExitCode> {
     let Derivatives { file, out, common, unit_m, control_unit } = arguments;
     if !(*unit_m > 0.0 && *unit_m < 1e3) {

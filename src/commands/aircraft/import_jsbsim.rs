@@ -19,7 +19,7 @@ use crate::sim::import::{Imported, import};
 pub struct Jsbsim {
     /// Folder that holds NAME/NAME.xml.
     dir: PathBuf,
-    /// The aircraft.
+    /// The aircraft's name, that of its file.
     name: String,
     /// Folder to make, with airframe.toml and model.toml.
     #[arg(long, value_name = "FOLDER")]
@@ -30,16 +30,16 @@ pub struct Jsbsim {
     /// Altitude at which it is taken, above mean sea level.
     #[arg(long, value_name = "M", default_value_t = 600.0)]
     altitude_m: f64,
-    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does; without any, commands and surfaces of
-    /// their own names are found by trying all. NAME may be -NAME*SCALE,NAME,….
+    /// Name a property of the aircraft (may be repeated), as `greylag evaluate` does; without any,
+    /// unusual commands and surfaces are found by trying all. NAME may be -NAME*SCALE,NAME,….
     #[arg(long, value_name = "KEY=NAME", value_parser = property)]
     property: Vec<(String, String)>,
-    /// Hold a property at a value (may be repeated): flaps, say. The airframe file keeps it.
+    /// Hold a property at a value (may be repeated), for example flaps. The airframe file keeps it.
     #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
     set: Vec<(String, f64)>,
 }
 
-/// Imports, writes, says what is left out.
+/// Imports the aircraft, writes its files and lists what was left out.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let mut options = PlantOptions {
         aircraft_dir: Some(jsbsim.dir.clone()),

@@ -20,7 +20,7 @@ const THRUST: f64 = 0.5;
 /// Pitch speed by default, as a multiple of the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: f64 = 2.0;
 
-/// What balances the aircraft.
+/// Surface that trims the aircraft in pitch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum TailName {
     /// A tailplane and a fin.
@@ -34,26 +34,26 @@ enum TailName {
 pub struct Arguments {
     /// Folder to make, with airframe.toml and model.toml.
     folder: PathBuf,
-    /// Span.
+    /// Wing span.
     #[arg(long, value_name = "M")]
     span_m: f64,
-    /// Wing area.
+    /// Wing area, the reference area of the coefficients.
     #[arg(long, value_name = "M2")]
     area_m2: f64,
     #[command(flatten)]
     common: Common,
 }
 
-/// What is asked of any aircraft that is not measured.
+/// Measures that any aircraft needs without flight data.
 #[derive(clap::Args)]
 pub struct Common {
     /// The aircraft's name [default: the folder's].
     #[arg(long)]
     name: Option<String>,
-    /// Mass as flown.
+    /// Mass of the aircraft as flown.
     #[arg(long, value_name = "KG")]
     mass_kg: f64,
-    /// What balances it.
+    /// Surface that trims the aircraft in pitch.
     #[arg(long, value_enum, default_value = "conventional")]
     tail: TailName,
     /// The aircraft has no rudder; a flying wing has none anyway.
@@ -71,14 +71,15 @@ pub struct Common {
     pitch_speed_mps: Option<f64>,
 }
 
-/// Writes the files, then says what they make of the aircraft.
+/// Writes the files, then prints the estimated flight characteristics.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let measures =
         measures(&arguments.common, &arguments.folder, arguments.span_m, arguments.area_m2)?;
     write(&arguments.folder, &measures.airframe(), &measures.model())
 }
 
-/// Writes both files into `folder`, then says what they make of the aircraft; 3 if something is to be mended.
+/// Writes both files into `folder`, then prints the flight characteristics; exit status 3 if
+/// something needs correction.
 pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode> {
     let model = files(folder, airframe, model_text)?;
     println!("wrote {} and airframe.toml beside it", model.display());

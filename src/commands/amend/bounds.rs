@@ -11,7 +11,7 @@ pub struct Bound {
     bounds: [f64; 2],
 }
 
-/// `NAME=LEAST..MOST`.
+/// Parses `NAME=LEAST..MOST`.
 pub fn bound(text: &str) -> Result<Bound, String> {
     let parts =
         text.split_once('=').and_then(|(name, range)| Some((name, range.split_once("..")?)));
@@ -27,10 +27,10 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     }
 }
 
-/// `model` with `all` these bounds.
+/// `model` with these bounds.
 ///
 /// # Errors
-/// It has no such coefficient, or one that lies outside of them.
+/// It has no such coefficient, or one that lies outside of its bounds.
 pub fn given(mut model: GreyBox, all: &[Bound]) -> Result<GreyBox> {
     for Bound { name, bounds: [low, high] } in all {
         let Some(c) = model.coefficients().iter().find(|c| c.name == *name) else {

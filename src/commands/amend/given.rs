@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::sysid::amend::Added;
 
-/// What is read of it.
+/// The fields of the file that are used.
 #[derive(Deserialize)]
 struct Written {
     schema: String,

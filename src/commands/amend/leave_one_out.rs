@@ -56,7 +56,7 @@ pub fn run(
 ) -> Result<ExitCode> {
     let bar = Bar::new();
     let horizons_s = Options::default().horizons_s;
-    let scored = leave_one_out(model, flights, structures, &horizons_s, &|s| bar.hear(s))?;
+    let scored = leave_one_out(model, flights, structures, &horizons_s, &|s| bar.update(s))?;
     bar.go_on()?;
     drop(bar);
     println!("{}", table(&scored));

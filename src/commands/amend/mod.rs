@@ -63,18 +63,19 @@ pub struct Arguments {
     /// Add nothing: fit the model's own coefficients.
     #[arg(long, group = "what", conflicts_with_all = ["accept", "diagnosis", "effects"])]
     tune_only: bool,
-    /// Also try the model's other conventions (integrator, axes of the forces, the standard atmosphere), and take
-    /// those that the flights bear out, the atmosphere unless they deny it.
+    /// Also try the model's other conventions (integrator, axes of the forces, the standard
+    /// atmosphere), and adopt those that the flights support, the atmosphere unless they contradict
+    /// it.
     #[arg(long)]
     conventions: bool,
-    /// Take nothing from the model's coefficients but what is physically possible: all that it is linear in are free,
+    /// Use only physical bounds as prior: all coefficients in which the model is linear are free,
     /// zeros too. For a model whose numbers are guesses.
     #[arg(long)]
     from_scratch: bool,
     #[command(flatten)]
     per_flight: PerFlightArguments,
-    /// Let a coefficient be from LEAST to MOST in place of what is usual for an aircraft of this size, such as
-    /// lift_linear.CL0=-2..2; the amended model's file says so too.
+    /// Bound a coefficient by LEAST and MOST in place of what is usual for an aircraft of this
+    /// size, such as lift_linear.CL0=-2..2; the amended model's file records it.
     #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]
     bounds: Vec<bounds::Bound>,
     /// Write effects into the model that the data refuse, and a model that flies the flights held out worse.
@@ -83,12 +84,13 @@ pub struct Arguments {
     /// Fit to all logs: nothing is held out, so that the errors are those of the flights that were fitted.
     #[arg(long, conflicts_with = "hold_out")]
     fit_all: bool,
-    /// Write no model: predict each log by a fit to all others, for the model as given, tuned, with trims and axes of each
-    /// flight, from scratch and with each effect, and say which of these is the simplest within one standard error of
-    /// the best.
+    /// Write no model: predict each log by a fit to all others, for the model as given, tuned, with
+    /// trims and axes of each flight, from scratch and with each effect, and report the simplest of
+    /// these within one standard error of the best.
     #[arg(long, conflicts_with_all = ["hold_out", "fit_all", "conventions", "from_scratch", "report", "accept_anyway"])]
     leave_one_out: bool,
-    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; made if there is none.
+    /// Folder for model.toml, the airframe and amend.json, or for leave-one-out.json; created if
+    /// missing.
     #[arg(long)]
     out: PathBuf,
     /// Write the report, one HTML page.
@@ -124,16 +126,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Intake { flights, notes, mut in_doubt } = taken;
     let options = options(arguments, wanted(arguments, &effects, &model, &flights)?);
     let bar = Bar::new();
-    let hear = |stage: Stage<'_>| bar.hear(stage);
+    let on_stage = |stage: Stage<'_>| bar.update(stage);
     let [fitting, drawing] = shares(arguments.report.as_deref());
-    let mut amended = amend::amend(&model, &flights, &tests, &options, &part(&hear, fitting))?;
+    let mut amended = amend::amend(&model, &flights, &tests, &options, &part(&on_stage, fitting))?;
     let story = &mut amended.amendment;
     story.notes.splice(0..0, notes);
     in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
     let worse = story.worse().filter(|_| !arguments.accept_anyway);
     // drawn before anything is written, so that Ctrl-C leaves nothing behind
-    let draw = || page(arguments, &model, &amended, &tests, &places, &part(&hear, drawing));
+    let draw = || page(arguments, &model, &amended, &tests, &places, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && worse.is_none() => Some((path, draw()?)),
         _ => None,
@@ -160,13 +162,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// What comes next: whether the amended model still lacks something.
+/// The next step for the user: a diagnosis of what the amended model still lacks.
 fn next(arguments: &Arguments, places: &Places) -> String {
     let logs = &arguments.logs;
     format!("greylag diagnose --model {}{}", quoted(&places.model()), logs.words())
 }
 
-/// What the amendment is asked for, `effects` to be added.
+/// Options of the amendment, with `effects` to be added.
 fn options(arguments: &Arguments, effects: Vec<Added>) -> amend::Options {
     amend::Options {
         effects,
@@ -297,7 +299,7 @@ fn wanted(
         let (with, per_flight) = (own_effects(effects), arguments.per_flight.asked());
         let options = diagnose::Options { with, per_flight, ..Default::default() };
         let bar = Bar::new();
-        let diagnosis = diagnose(model, flights, &options, &|stage| bar.hear(stage))?;
+        let diagnosis = diagnose(model, flights, &options, &|stage| bar.update(stage))?;
         all.extend(diagnosis.effects.iter().filter(|c| c.asserted).map(Added::of));
         if all.is_empty() {
             let said = diagnosis.sentences.join(" ");

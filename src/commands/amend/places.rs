@@ -47,7 +47,7 @@ impl Places {
         Ok(places)
     }
 
-    /// The new model.
+    /// Path of the amended model.
     pub fn model(&self) -> PathBuf {
         self.folder.join(MODEL)
     }
@@ -77,7 +77,7 @@ impl Places {
     }
 }
 
-/// Whether the file at `path` is there with this text.
+/// Whether the file at `path` exists with this text.
 fn holds(path: &Path, text: &str) -> bool {
     fs::read_to_string(path).is_ok_and(|there| there == text)
 }

@@ -1,4 +1,4 @@
-//! What `greylag amend` prints.
+//! Output of `greylag amend` on the terminal.
 
 use comfy_table::Table;
 
@@ -34,7 +34,7 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
     table
 }
 
-/// What each flight has of its own; angles in degrees.
+/// Constants estimated for each flight; angles in degrees.
 fn own_table(flights: &[FittedFlight]) -> Table {
     let mut table =
         table(["flight", "its own", "value", "sd", "beside the flights' mean", "sd"], 1);
@@ -77,7 +77,7 @@ fn error(score: &HorizonScore) -> String {
     if score.runs > 0 { format!("{:.5}", score.rmse_scaled) } else { "–".into() }
 }
 
-/// Four significant figures.
+/// Formats `x` with four significant figures.
 fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".into(),

@@ -1,4 +1,5 @@
-//! What the cells of a campaign cost: as measured on cells of the same stage, else as their file says.
+//! Cost of the cells of a campaign: measured on cells of the same stage, else as the campaign file
+//! states.
 
 use anyhow::Result;
 
@@ -6,7 +7,7 @@ use crate::campaign::file::StageFile;
 use crate::campaign::{Plan, Store};
 use crate::num::statistics::quantile;
 
-/// What a cell of a stage costs.
+/// Cost of a cell of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// Time of a core, s.
@@ -18,9 +19,9 @@ pub struct Cost {
 /// How a cost is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The median of so many cells.
+    /// The median of this many cells.
     Measured(usize),
-    /// The campaign file says so.
+    /// As the campaign file states.
     Stated,
 }
 

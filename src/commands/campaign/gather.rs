@@ -1,4 +1,4 @@
-//! `greylag campaign gather`: join the results, say which cells are missing.
+//! `greylag campaign gather`: join the results and list the missing cells.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use crate::campaign::gather::{Gathered, Joined, gather, read_lines, write_lines}
 use crate::commands::files::{self, Overwrite};
 use crate::commands::status::IN_DOUBT;
 
-/// Cells of a kind that are named; of more only the number is said.
+/// Largest number of cells that are listed by name; of more, only the count is printed.
 const NAMED: usize = 20;
 
 /// Options of `greylag campaign gather`.
@@ -21,10 +21,11 @@ pub struct Arguments {
     /// Write the results as JSON lines: the same cells give the same file to the bit.
     #[arg(long, value_name = "FILE.jsonl")]
     results: Option<PathBuf>,
-    /// Write what each cell took, when, and on which processor.
+    /// Write the duration, date and processor of each cell.
     #[arg(long, value_name = "FILE.jsonl")]
     times: Option<PathBuf>,
-    /// Take the results of other machines for the cells that are not done here: files that `--results` wrote there.
+    /// Take the results of other machines for the cells that are not done here: files that
+    /// `--results` wrote on them.
     #[arg(long, value_name = "FILE.jsonl", num_args = 1..)]
     join: Vec<PathBuf>,
     /// Replace the files if they exist.
@@ -32,7 +33,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Joins what there is.
+/// Joins the results that exist.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.results.iter().chain(&arguments.times) {
@@ -47,9 +48,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         store.folder().display()
     );
     for path in &arguments.join {
-        say_joined(path, &all.join(&plan, read_lines(path)?));
+        print_joined(path, &all.join(&plan, read_lines(path)?));
     }
-    say(&all);
+    print_unfinished(&all);
     if let Some(path) = &arguments.results {
         write_lines(path, &all.records)?;
         println!("results in {}", path.display());
@@ -61,8 +62,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if all.is_whole() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) })
 }
 
-/// Says what became of the results in a file.
-fn say_joined(path: &Path, joined: &Joined) {
+/// Prints how the results of a file were joined.
+fn print_joined(path: &Path, joined: &Joined) {
     let path = path.display();
     println!("{} results taken from {path}", joined.taken);
     if joined.twice > 0 {
@@ -81,8 +82,8 @@ fn say_joined(path: &Path, joined: &Joined) {
     }
 }
 
-/// Names the cells that are not done.
-pub fn say(all: &Gathered) {
+/// Prints the cells that are not done.
+pub fn print_unfinished(all: &Gathered) {
     for (cell, failure) in &all.failed {
         println!("failed: {cell}: {}", failure.error);
     }

@@ -1,4 +1,5 @@
-//! All cells of a campaign on this machine: each in a process of its own, as a scheduler would run it.
+//! All cells of a campaign on this machine: each in a separate process, as a scheduler would run
+//! it.
 
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
@@ -26,16 +27,16 @@ const KILLS: u32 = 3;
 /// Where what the cells print goes, below the campaign's folder.
 const LOGS: &str = "logs";
 
-/// What becomes of cells that failed before.
+/// Treatment of cells that failed before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failed {
-    /// They are left.
+    /// Leave them as they are.
     Leave,
-    /// They are tried again.
+    /// Try them again.
     Again,
 }
 
-/// Where a cell stands in this run.
+/// State of a cell in this run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Waiting { not_before: Option<Instant>, kills: u32 },
@@ -89,7 +90,7 @@ fn begin(store: &Store, cell: &Cell, failed: Failed) -> Result<State> {
     })
 }
 
-/// Says what became of the cells.
+/// Prints the final state of the cells; exit status by whether all are done.
 fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
     let all = gather(plan, store)?;
     println!(
@@ -219,7 +220,8 @@ impl Local<'_> {
         let took = self.store.times(cell)?.map_or(String::new(), |t| time(t.seconds));
         let (done, cells) = (self.count(State::Done), self.states.len());
         let left = self.left()?.map_or(String::new(), |[_, left]| format!("{} left", time(left)));
-        self.bar.say(&format!("{done:>4}/{cells}  {:<40} {took:>7}  {left:>11}  {what}", cell.id));
+        self.bar
+            .print(&format!("{done:>4}/{cells}  {:<40} {took:>7}  {left:>11}  {what}", cell.id));
         Ok(())
     }
 
@@ -262,7 +264,7 @@ impl Local<'_> {
     fn show(&self) -> Result<bool> {
         let done = self.count(State::Done) as f64 / self.states.len() as f64;
         let doing = format!("running campaign {}", self.plan.file.name);
-        Ok(self.bar.hear(Stage::new(&doing, done)).is_break())
+        Ok(self.bar.update(Stage::new(&doing, done)).is_break())
     }
 
     /// Lets the processes come to their checkpoints; ends those that do not.

@@ -30,20 +30,20 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Say what a campaign holds: its cells, what each costs, what each writes.
+    /// Show what a campaign holds: its cells, what each costs, what each writes.
     Plan(plan::Arguments),
     /// Run cells: all on this machine, one, or by the script of a scheduler.
     Run(run::Arguments),
-    /// Join the results, and say which cells are missing.
+    /// Join the results, and list the cells that are missing.
     Gather(gather::Arguments),
     /// Write the tables and the page.
     Report(report::Arguments),
 }
 
-/// Which campaign.
+/// Campaign and folder that a subcommand works on.
 #[derive(clap::Args)]
 struct Which {
-    /// The campaign file.
+    /// File that defines the campaign.
     #[arg(value_name = "FILE.toml")]
     file: PathBuf,
     /// Folder of its cells [default: campaign-NAME].

@@ -12,7 +12,7 @@ use crate::campaign::harvest::harvest;
 use crate::campaign::store::{Claimed, Failure, Times};
 use crate::campaign::{Cell, Plan, Record, Standing, Store};
 use crate::commands::interruption::{Ended, Interruption};
-use crate::commands::{self, VERSION, said_once, status};
+use crate::commands::{self, VERSION, one_line, status};
 
 /// Subcommands that a cell may be, with what a program needs to have them.
 const KNOWN: [(&str, bool, &str); 3] = [
@@ -21,7 +21,8 @@ const KNOWN: [(&str, bool, &str); 3] = [
     ("train", cfg!(feature = "learn"), "learn"),
 ];
 
-/// Fails if the command of a stage is none of this program; what needs another build is only said when it is run.
+/// Fails if the command of a stage is unknown; a command that needs another build is reported when
+/// it is run.
 pub fn check(plan: &Plan, store: &Store, path: &Path) -> Result<()> {
     for cell in &plan.cells {
         let about = || format!("campaign file {}: stage {}", path.display(), cell.stage);
@@ -44,7 +45,7 @@ fn line(cell: &Cell, folder: &Path) -> Vec<OsString> {
     cell.words_in(folder).into_iter().map(OsString::from).collect()
 }
 
-/// Runs a cell, if it is not done; the status says whether a later attempt may succeed.
+/// Runs a cell, unless it is done; the exit status shows whether a later attempt may succeed.
 pub fn run(plan: &Plan, store: &Store, cell: &Cell) -> Result<ExitCode> {
     let id = &cell.id;
     if let Standing::Done(_) = store.standing(cell)? {
@@ -99,10 +100,10 @@ fn carry_out(plan: &Plan, store: &Store, cell: &Cell, claimed: &Claimed) -> Resu
         }
         Ok(None) => Ok(later(&format!("cell {} was interrupted", cell.id))),
         Err(error) if is_temporary(&error) => {
-            Ok(later(&format!("cell {}: {}", cell.id, said_once::said_once(&error))))
+            Ok(later(&format!("cell {}: {}", cell.id, one_line::one_line(&error))))
         }
         Err(error) => {
-            let said = said_once::said_once(&error);
+            let said = one_line::one_line(&error);
             claimed.fail(&Failure { error: said, program: program() })?;
             Err(error.context(format!("cell {}", cell.id)))
         }
@@ -144,7 +145,7 @@ fn times(cell: &Cell, claimed: &Claimed, seconds: f64) -> Times {
     }
 }
 
-/// Time of all cores that this process took, s, as Linux says.
+/// Processor time of all threads of this process, s, from Linux's /proc.
 fn core_seconds() -> Option<f64> {
     /// Ticks a second of the figures in /proc.
     const TICKS: f64 = 100.0;

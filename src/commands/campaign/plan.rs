@@ -94,7 +94,7 @@ fn done(plan: &Plan, store: &Store, stage: &str) -> Result<usize> {
     Ok(done)
 }
 
-/// What a command leaves for others.
+/// Output of a command that later stages read.
 fn written(command: &str) -> &'static str {
     let words: Vec<&str> = command.split_whitespace().take(2).collect();
     match words[..] {

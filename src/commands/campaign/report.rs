@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Take the results from a file that `greylag campaign gather` wrote, not from the cells' folders.
     #[arg(long, value_name = "FILE.jsonl")]
     results: Option<PathBuf>,
-    /// Write the page.
+    /// Write the tables and curves as a page.
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
     /// Write the tables as Markdown.
@@ -77,11 +77,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// The results of the plan's cells; what belongs to none is left out, and said.
+    /// The results of the plan's cells; results of other cells are dropped, with a note.
     fn records(&self, plan: &Plan, store: &Store) -> Result<Vec<Record>> {
         let Some(path) = &self.results else {
             let all = gather(plan, store)?;
-            super::gather::say(&all);
+            super::gather::print_unfinished(&all);
             return Ok(all.records);
         };
         let mut records = read_lines(path)?;

@@ -46,18 +46,18 @@ pub struct Arguments {
     options: String,
 }
 
-/// A scheduler.
+/// Schedulers that can run the cells.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Launch {
-    /// Arrays of Slurm.
+    /// Job arrays of Slurm.
     Slurm,
-    /// Arrays of HyperQueue.
+    /// Task arrays of HyperQueue.
     Hyperqueue,
-    /// GNU parallel.
+    /// One machine by GNU parallel.
     Parallel,
 }
 
-/// Attempts at a cell whose status says that a later one may succeed.
+/// Number of attempts at a cell whose exit status allows a later attempt.
 const ATTEMPTS: usize = 20;
 
 /// Runs what was asked for.

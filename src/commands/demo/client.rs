@@ -11,22 +11,22 @@ use crate::link::autopilot::Mode;
 use crate::link::offboard::{ARM, Heard, OffboardClient, SET_MODE};
 
 /// How long arming, or entering offboard, may take.
-const PATIENCE: Duration = Duration::from_secs(10);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 /// Between two setpoints: 50 Hz; 2 Hz would do.
 const SETPOINT_PERIOD: Duration = Duration::from_millis(20);
 
-/// What the client knows of the flight.
+/// State of the flight as received by the client.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct View {
     /// The autopilot's time since boot, s.
     pub time_s: f64,
-    /// Roll, rad.
+    /// Roll angle, rad.
     pub roll: f64,
-    /// Pitch, rad.
+    /// Pitch angle, rad.
     pub pitch: f64,
-    /// Airspeed, m/s.
+    /// Airspeed of VFR_HUD, m/s.
     pub airspeed: f64,
-    /// Altitude, m.
+    /// Altitude of VFR_HUD, m.
     pub altitude: f64,
     armed: bool,
     mode: Option<Mode>,
@@ -90,11 +90,13 @@ impl Client {
             let begun = Instant::now();
             while self.view.time_s - start < legs.seconds && !ended.load(Ordering::Relaxed) {
                 self.turn()?;
-                if begun.elapsed() > PATIENCE.mul_f64(2.0) + Duration::from_secs_f64(legs.seconds) {
-                    bail!("the companion has fallen silent: {}", self.last_words());
+                if begun.elapsed()
+                    > ANSWER_TIMEOUT.mul_f64(2.0) + Duration::from_secs_f64(legs.seconds)
+                {
+                    bail!("the companion has fallen silent: {}", self.last_text());
                 }
                 if self.view.mode != Some(Mode::Offboard) {
-                    bail!("the companion left offboard: {}", self.last_words());
+                    bail!("the companion left offboard: {}", self.last_text());
                 }
                 watch(k, self.view.time_s - start, &self.view);
             }
@@ -116,8 +118,8 @@ impl Client {
     ) -> Result<()> {
         let (start, mut due) = (Instant::now(), Instant::now());
         while !so(&self.view) {
-            if start.elapsed() > PATIENCE {
-                bail!("no {what} within {} s: {}", PATIENCE.as_secs(), self.last_words());
+            if start.elapsed() > ANSWER_TIMEOUT {
+                bail!("no {what} within {} s: {}", ANSWER_TIMEOUT.as_secs(), self.last_text());
             }
             // the companion wants a fresh setpoint before it enters offboard
             if Instant::now() >= due + Duration::from_millis(100) {
@@ -169,8 +171,8 @@ impl Client {
         let _ = self.socket.send(bytes);
     }
 
-    /// The last thing that it said beside that a request was done.
-    fn last_words(&self) -> &str {
+    /// The last text that does not merely confirm a request.
+    fn last_text(&self) -> &str {
         let done = |words: &str| words.starts_with("mode ") || words.starts_with("armed");
         let last = self.texts.iter().rev().find(|(_, words)| !done(words));
         last.map_or("it says no reason", |(_, words)| words)

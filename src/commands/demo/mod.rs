@@ -41,7 +41,7 @@ use schedule::Legs;
 /// FlightOptions of `greylag demo`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Controller that flies.
+    /// Controller that flies the schedule.
     #[arg(long, value_name = "NAME", default_value = fly::CONTROLLER, value_parser = choices::controller())]
     controller: ControllerKind,
     /// Model that the controller is designed from or plans with.
@@ -75,7 +75,7 @@ pub struct Arguments {
     faults: FaultArgs,
 }
 
-/// Flies the schedule; the exit status tells whether every target was tracked.
+/// Flies the schedule; the exit status is 0 if every target was tracked.
 ///
 /// # Errors
 /// If something cannot be opened, or the flight ends before the schedule does.
@@ -157,7 +157,7 @@ fn announce(
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
 }
 
-/// What was chosen, as the recording keeps it.
+/// Options of the flight, as the recording keeps them.
 fn chosen(arguments: &Arguments) -> Chosen<'_> {
     Chosen {
         controller: arguments.controller,
@@ -171,7 +171,7 @@ fn chosen(arguments: &Arguments) -> Chosen<'_> {
     }
 }
 
-/// Flies the legs as a client of the companion at `to`; the texts that it heard.
+/// Flies the legs as a client of the companion at `to`; the texts that it received.
 fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(f64, String)>> {
     let mut table = Live::begin(legs);
     let ended = arguments.attached.then(input_ends).unwrap_or_default();
@@ -236,7 +236,7 @@ fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
     Ok(plant)
 }
 
-/// Runs the shim on a thread of its own until `stop`.
+/// Runs the shim on a separate thread until `stop`.
 fn simulate(
     arguments: &Arguments,
     plant: PlantOptions,

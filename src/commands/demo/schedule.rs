@@ -7,9 +7,9 @@ use crate::report::Difficulty;
 /// One attitude of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
-    /// Commanded roll, degrees.
+    /// Commanded roll angle, degrees.
     pub roll_deg: f64,
-    /// Commanded pitch, degrees.
+    /// Commanded pitch angle, degrees.
     pub pitch_deg: f64,
     /// Easy or hard, Table II of the paper.
     pub difficulty: Difficulty,
@@ -37,12 +37,12 @@ const fn leg(roll_deg: f64, pitch_deg: f64, difficulty: Difficulty) -> Leg {
     Leg { roll_deg, pitch_deg, difficulty }
 }
 
-/// What the client asks for: legs of equal length.
+/// Attitude targets of the client: legs of equal length.
 #[derive(Clone, Debug)]
 pub struct Legs {
-    /// The attitudes.
+    /// Attitudes in the order flown.
     pub legs: Vec<Leg>,
-    /// The length of each, s.
+    /// Length of each leg, s.
     pub seconds: f64,
 }
 

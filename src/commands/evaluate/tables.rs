@@ -126,7 +126,8 @@ mod tests {
     use crate::sim::targets::TargetFile;
     use std::time::Duration;
 
-    /// A terminal of 100 columns bears five controllers with the longest names and all groups.
+    /// A terminal of 100 columns has room for five controllers with the longest names and all
+    /// groups.
     #[test]
     fn the_tables_fit_a_hundred_columns_and_hold_every_controller() {
         let rows = TargetFile::generate(1).rows;

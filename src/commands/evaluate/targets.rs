@@ -1,4 +1,4 @@
-//! What an evaluation flies: targets of a file, steps between attitudes.
+//! Targets of an evaluation: those of a file, or steps between attitudes.
 
 use anyhow::{Result, bail};
 
@@ -33,7 +33,7 @@ pub(super) fn rows(arguments: &Arguments) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The targets that the airframe's envelope allows; says how many it does not.
+/// The targets that the airframe's envelope allows; prints how many it excludes.
 pub(super) fn within_envelope(
     mut rows: Vec<Row>,
     arguments: &Arguments,

@@ -14,24 +14,24 @@ use crate::sim::faults::{Case, Cause, Fault, Finding, Found, Report, draw};
 /// A flight that was flown. Its faults follow from its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// Who steered.
+    /// Name of the controller.
     pub controller: String,
-    /// Through whom.
+    /// Name of the flight controller or simulator at the vehicle's link.
     pub counterpart: String,
-    /// The seed.
+    /// Seed of the flight's faults.
     pub seed: u64,
-    /// What was found.
+    /// Findings of the flight.
     pub findings: Vec<Note>,
 }
 
 /// A finding as it is noted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Note {
-    /// When, s.
+    /// Time of the finding, s.
     pub at_s: f64,
-    /// What.
+    /// Name of the finding.
     pub finding: String,
-    /// What explains it.
+    /// Name of the fault that explains it.
     pub cause: Option<String>,
 }
 
@@ -76,7 +76,7 @@ impl Note {
         Finding::ALL.iter().any(|f| f.name() == self.finding && f.is_own())
     }
 
-    /// What it is laid to.
+    /// Name of the cause to which the finding is attributed.
     pub fn standing(&self) -> &str {
         match &self.cause {
             Some(cause) => cause,
@@ -132,14 +132,14 @@ impl Ledger {
         Ok(Ledger { known, file: Mutex::new(file) })
     }
 
-    /// What an earlier run found.
+    /// Entry of an earlier run for the same case.
     pub fn find(&self, case: &Case) -> Option<Entry> {
         let key =
             (case.controller.name().to_owned(), case.counterpart.name().to_owned(), case.seed);
         self.known.get(&key).cloned()
     }
 
-    /// Notes a flight.
+    /// Appends a flight to the file.
     pub fn note(&self, entry: &Entry) -> Result<()> {
         let line = format!("{}\n", serde_json::to_string(entry)?);
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);

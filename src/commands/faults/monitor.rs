@@ -12,7 +12,7 @@ use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watch
 /// Share of healthy flights that may be accused: one in forty.
 const FALSE_ALARMS: f64 = 1.0 / 40.0;
 
-/// Flies and prints a table; the exit status tells whether too many healthy flights were accused.
+/// Flies and prints a table; the exit status shows whether too many healthy flights raised an alarm.
 ///
 /// # Errors
 /// If the aircraft cannot be made.

@@ -15,7 +15,7 @@ use crate::sim::faults::search::{Nearest, distances, search};
 use crate::sim::faults::{CompanionFactory, Counterpart, Scenario};
 use crate::sysid::progress::Stage;
 
-/// What a search is for.
+/// Inputs of a search for faults.
 pub(super) struct Search<'a> {
     pub(super) factory: &'a CompanionFactory,
     pub(super) counterparts: &'a [Counterpart],
@@ -49,7 +49,7 @@ pub(super) fn run(search_for: &Search) -> Result<ExitCode> {
     let bar = Bar::new();
     let found = search(factory, counterparts, flights, seed, &mut |flown, broken| {
         let doing = format!("searching; rules broken: {broken}");
-        bar.hear(Stage { doing: &doing, fraction: flown as f64 / flights as f64, ranking: &[] })
+        bar.update(Stage { doing: &doing, fraction: flown as f64 / flights as f64, ranking: &[] })
     })?;
     drop(bar);
     let rows = found.iter().map(row).collect();

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 pub enum Budget {
     /// Tens of seconds: to see it work.
     Quick,
-    /// Minutes of two cores: a controller worth flying.
+    /// A controller that flies acceptably, in minutes on two cores.
     Standard,
     /// The paper's numbers of flights and updates: hours with td3.
     Paper,
@@ -18,18 +18,18 @@ pub enum Budget {
 pub enum Algorithm {
     /// The gradient of the reward through the model, then critics of the policy found.
     Analytic,
-    /// The paper's TD3.
+    /// TD3 as in the paper.
     Td3,
 }
 
-/// What a budget buys before the policy.
+/// Amounts of a budget before the policy is trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// Random episodes.
+    /// Number of random episodes.
     pub episodes: u32,
-    /// Planned episodes of a round.
+    /// Number of planned episodes in a round.
     pub planned: u32,
-    /// Planned rounds.
+    /// Number of planned rounds.
     pub rounds: u32,
     /// Updates of a model that only flies the next round.
     pub passing_updates: u64,

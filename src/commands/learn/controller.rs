@@ -1,4 +1,4 @@
-//! The folder that flies: model and policy together, with a file that says where they come from.
+//! The folder of the learned controller: model and policy together, with a record of their origin.
 
 use std::path::Path;
 
@@ -12,9 +12,9 @@ use crate::model::GreyBox;
 use crate::model::residual::hash;
 use crate::sysid::amend::document::effect_file;
 
-/// Its name below the folder of a learning.
+/// Name of the controller's folder below that of a learning.
 pub const CONTROLLER: &str = "controller";
-/// The file that says where it comes from.
+/// Name of the record of origin.
 pub const ORIGIN: &str = "learned.toml";
 
 /// The files that fly, below the folder of the learning.

@@ -1,4 +1,4 @@
-//! What the controllers of a learned model and its policy reach in that model.
+//! Scores of the controllers of a learned model and its policy in that model.
 
 use std::path::Path;
 
@@ -15,16 +15,17 @@ use crate::sim::{Group, TargetFile};
 
 /// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
 const TARGETS: u64 = 3;
-/// One target in so many is flown: a planner takes milliseconds a step, and the LQI needs few to be judged.
+/// One of this many targets is flown: a planner takes milliseconds a step, and the LQI needs few to
+/// be judged.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
-/// What a controller reached in the model.
+/// Score of a controller in the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reached {
-    /// The controller's name.
+    /// Name of the controller.
     pub controller: String,
-    /// Targets flown.
+    /// Number of targets flown.
     pub targets: usize,
     /// Mean settled error on easy targets, degrees.
     pub easy_deg: f64,

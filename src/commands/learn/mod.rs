@@ -22,7 +22,7 @@ use crate::model::GreyBox;
 use crate::model::residual::hash;
 use budget::{Algorithm, Budget};
 use imagined::Reached;
-use plan::{Recent, Source, Stage, Wish};
+use plan::{Inputs, Recent, Source, Stage};
 use record::Record;
 
 /// Options of `greylag learn`.
@@ -39,9 +39,9 @@ pub struct Arguments {
     /// The prior: a model file that may be wrong.
     #[arg(long, value_name = "FILE", required_unless_present = "earlier")]
     prior: Option<PathBuf>,
-    /// Go on from what was learned before, with recent flights (--log): the folder of a learning, or of a model with its
-    /// policy, such as params/x8/learned. Its flights are learned from again if they are there, and its policy is trained
-    /// further; nothing in it is changed.
+    /// Continue an earlier learning with recent flights (--log): the folder of a learning, or of a
+    /// model with its policy, such as params/x8/learned. Its flights are used again if they exist,
+    /// and its policy is trained further; the folder is not changed.
     #[arg(long = "continue", value_name = "DIR", requires = "logs", conflicts_with_all = ["prior", "collect", "algorithm"])]
     earlier: Option<PathBuf>,
     /// With --continue: part of all samples that the recent flights make up; 1 forgets the earlier ones.
@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Learn from these flight logs instead; no rounds are flown.
     #[arg(long = "log", value_name = "LOG", num_args = 1..)]
     logs: Vec<PathBuf>,
-    /// Folder of everything that comes of it; a learning found there goes on.
+    /// Folder of all outputs; a learning found there is resumed.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Rounds of flights planned through the model learned so far [default: the budget's].
@@ -68,10 +68,10 @@ pub struct Arguments {
     /// Coefficients of the prior that are learned with the residual: full names, `all`, or `none`.
     #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "all", value_name = "NAME")]
     trainable: Vec<String>,
-    /// With --log: take nothing from the widths of the prior's coefficients, for a prior whose numbers are guesses.
+    /// With --log: ignore the widths of the prior's coefficients, for a prior whose numbers are guesses.
     #[arg(long, conflicts_with = "collect")]
     from_scratch: bool,
-    /// Seed of everything.
+    /// Seed of all random draws.
     #[arg(long, default_value_t = 1)]
     seed: u32,
     /// Folder that holds NAME/NAME.xml of the aircraft that flies in JSBSim.
@@ -126,7 +126,7 @@ impl Arguments {
             None => Source::Logs(self.logs.clone()),
         };
         let file = self.prior_file()?;
-        let wish = Wish {
+        let inputs = Inputs {
             prior: &file,
             out: &self.out,
             source,
@@ -137,7 +137,7 @@ impl Arguments {
             budget: self.budget,
             seed: self.seed,
         };
-        Ok(wish.stages())
+        Ok(inputs.stages())
     }
 
     /// The file of the prior, or of the model of the earlier learning.
@@ -149,7 +149,7 @@ impl Arguments {
         }
     }
 
-    /// What the learning in `folder` goes on with.
+    /// Results of the earlier learning in `folder` from which this one continues.
     fn recent(&self, folder: &Path) -> Result<Recent> {
         let policy = shipped(&flying(folder)?.join(plan::POLICY));
         if !policy.exists() {
@@ -169,7 +169,8 @@ impl Arguments {
         Ok(Recent { flights, policy, logs: self.logs.clone(), share: self.recent_share })
     }
 
-    /// Hashes of the files that a learning begins with: prior, airframe, logs, the policy that it goes on with.
+    /// Hashes of a learning's input files: prior, airframe, logs, the policy from which it
+    /// continues.
     fn inputs(&self, prior: &GreyBox) -> Result<Vec<String>> {
         let mut hashes = vec![prior.sha256.clone(), format!("{:?}", prior.airframe)];
         let mut files = self.logs.clone();
@@ -202,7 +203,8 @@ impl Arguments {
         }
     }
 
-    /// Which aircraft flies, from which airspeed: that of the prior, as the first round has no model to take it from.
+    /// Options that select the aircraft, its hidden effects and its airspeed, that of the prior, as
+    /// the first round has no model yet.
     fn aircraft_options(&self, prior: &GreyBox) -> Vec<OsString> {
         let mut words: Vec<OsString> = Vec::new();
         let mut add = |name: &str, value: OsString| words.extend([name.into(), value]);
@@ -216,7 +218,7 @@ impl Arguments {
         words
     }
 
-    /// Scores the result in its model, puts the folder that flies together, says what came of it.
+    /// Scores the result in its model, assembles the controller's folder and prints the result.
     fn finish(
         &self,
         prior: &GreyBox,
@@ -257,7 +259,7 @@ impl Arguments {
 /// Share of the targets that a controller may lose and still be called ready to fly: the LQI loses none.
 const LOST: f64 = 0.02;
 
-/// What the best controller of a learning is worth, in words, with how it is flown.
+/// Score of the best controller of a learning in words, with the command that flies it.
 fn worth(reached: &[Reached], options: &str) -> String {
     let lost = |name: &str| {
         let row = reached.iter().find(|r| r.controller == name)?;

@@ -17,35 +17,35 @@ pub const POLICY: &str = "policy";
 pub enum Source {
     /// JSBSim, with these further options of `greylag collect`.
     Simulator(Vec<OsString>),
-    /// Recorded logs.
+    /// Recorded logs at these paths.
     Logs(Vec<PathBuf>),
-    /// Recent logs that an earlier learning goes on with.
+    /// Recent logs with which an earlier learning is continued.
     Recent(Recent),
 }
 
-/// What an earlier learning goes on with.
+/// Results of an earlier learning from which this one continues.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recent {
-    /// Its folder of flights, if there is one.
+    /// Folder of its flights, if there is one.
     pub flights: Option<PathBuf>,
     /// The folder of its policy.
     pub policy: PathBuf,
-    /// The logs.
+    /// Paths of the logs.
     pub logs: Vec<PathBuf>,
     /// Part of all samples that they make up.
     pub share: f64,
 }
 
-/// What decides the stages.
+/// Inputs that determine the stages.
 #[derive(Clone, Debug)]
-pub struct Wish<'a> {
-    /// The prior's file.
+pub struct Inputs<'a> {
+    /// Path of the prior's model file.
     pub prior: &'a Path,
-    /// The folder of everything.
+    /// Folder of all outputs.
     pub out: &'a Path,
     /// Where flights come from.
     pub source: Source,
-    /// Planned rounds.
+    /// Number of planned rounds.
     pub rounds: u32,
     /// Coefficients of the prior that are learned; none leaves it frozen.
     pub trainable: &'a [String],
@@ -53,18 +53,18 @@ pub struct Wish<'a> {
     pub from_scratch: bool,
     /// How the policy is found.
     pub algorithm: Algorithm,
-    /// How much work.
+    /// Amount of computing work.
     pub budget: Budget,
-    /// Seed of everything.
+    /// Seed of all random draws.
     pub seed: u32,
 }
 
-/// A stage.
+/// One stage of a learning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
-    /// What it gives, in words.
+    /// Description of the stage's result.
     pub what: String,
-    /// Its command line, without the program's name.
+    /// Command line of the stage, without the program's name.
     pub line: Vec<OsString>,
 }
 
@@ -87,7 +87,7 @@ impl Line {
     }
 }
 
-impl Wish<'_> {
+impl Inputs<'_> {
     /// The stages in order: flights, model, flights planned through that model, model, …, policy.
     pub fn stages(&self) -> Vec<Stage> {
         let mut stages = Vec::new();
@@ -208,8 +208,8 @@ impl Stage {
 mod tests {
     use super::*;
 
-    fn wish(source: Source, trainable: &[String]) -> Vec<Stage> {
-        let wish = Wish {
+    fn stages_of(source: Source, trainable: &[String]) -> Vec<Stage> {
+        let inputs = Inputs {
             prior: Path::new("prior.toml"),
             out: Path::new("out"),
             source,
@@ -220,12 +220,12 @@ mod tests {
             budget: Budget::Quick,
             seed: 7,
         };
-        wish.stages()
+        inputs.stages()
     }
 
     #[test]
     fn every_round_is_flown_by_the_model_of_the_rounds_before() {
-        let stages = wish(Source::Simulator(vec!["--hide".into(), "gain=0.1".into()]), &[]);
+        let stages = stages_of(Source::Simulator(vec!["--hide".into(), "gain=0.1".into()]), &[]);
         let lines: Vec<String> = stages.iter().map(Stage::command).collect();
         assert_eq!(lines.len(), 7, "{lines:#?}");
         for (k, round) in [(0, 0), (2, 1), (4, 2)] {
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn logs_are_learned_from_once() {
         let names = ["roll_linear.Clp".into(), "roll_linear.Clda".into()];
-        let stages = wish(Source::Logs(vec!["a.ulg".into(), "b.ulg".into()]), &names);
+        let stages = stages_of(Source::Logs(vec!["a.ulg".into(), "b.ulg".into()]), &names);
         assert_eq!(stages.len(), 2);
         let line = stages[0].command();
         assert!(line.contains("--log a.ulg b.ulg --trainable roll_linear.Clp,roll_linear.Clda"));

@@ -1,4 +1,4 @@
-//! What a learning has done so far, on disk, so that it goes on where it was interrupted.
+//! Progress of a learning on disk, from which it resumes after an interruption.
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,12 @@ use super::plan::{FLIGHTS, Stage};
 use crate::commands::files::{self, Overwrite};
 use crate::model::residual::hash;
 
-/// The file's name.
+/// Name of the record's file.
 pub const RECORD: &str = "learn.json";
 /// The layout that this program reads and writes.
 const SCHEMA: &str = "greylag.learn/1";
 
-/// The file.
+/// Content of the record's file.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -29,9 +29,9 @@ struct File {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Done {
-    /// What it gave.
+    /// Description of the stage's result.
     pub what: String,
-    /// Its command.
+    /// Command line of the stage.
     pub command: String,
     /// How long it took in the session that ended it, s.
     pub seconds: f64,

@@ -1,8 +1,8 @@
-//! What was found of latency, delay and parameters, in lines.
+//! Results on latency, delay and parameters, as lines of text.
 
 use std::io::Write;
 
-use super::say;
+use super::print_to;
 use crate::link::vehicle::Real;
 use crate::link::vehicle::real::parameters::Standing;
 
@@ -13,8 +13,8 @@ pub(super) fn latency(real: &Real, out: &mut dyn Write) {
         trips[index].as_secs_f64() * 1e3
     };
     match trips.is_empty() {
-        true => say!(out, "latency     TIMESYNC is not answered"),
-        false => say!(
+        true => print_to!(out, "latency     TIMESYNC is not answered"),
+        false => print_to!(
             out,
             "latency     TIMESYNC there and back: median {:.1}, 95 % {:.1}, longest {:.1} ms ({} trips)",
             at(0.5),
@@ -25,18 +25,18 @@ pub(super) fn latency(real: &Real, out: &mut dyn Write) {
     }
 }
 
-/// What of the delay that the controller bears is left.
+/// Prints the delay margin of the controller that the link leaves.
 pub(super) fn delay(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     if let Some(words) = real.delay_words() {
-        say!(out, "\ndelay       {words}");
+        print_to!(out, "\ndelay       {words}");
     }
     missing.extend(real.delay_obstacle());
 }
 
 pub(super) fn parameters(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
-    say!(out, "\nparameters");
+    print_to!(out, "\nparameters");
     for (_, standing, words) in real.parameter_report() {
-        say!(out, "  {words}");
+        print_to!(out, "  {words}");
         if !matches!(standing, Standing::Good(_) | Standing::Absent) {
             missing.push(words);
         }

@@ -16,12 +16,12 @@ use crate::sim::imagined::Imagination;
 
 /// Updates between two evaluations.
 const LINE: u64 = 50;
-/// Updates of the critics between two lines.
+/// Updates of the critics between two lines of output.
 const CRITICS: u64 = 1000;
 
-/// Climbs the reward's slope in `model`, from the actor `from` where one is given; the curve of what `judge`
-/// says goes into `folder`. Gives the last actor, the learning rate having fallen to nothing, or `None` if
-/// interrupted: what takes minutes begins anew.
+/// Ascends the gradient of the reward in `model`, from the actor `from` where one is given; writes
+/// the curve of `judge`'s results into `folder`. Returns the last actor, at a learning rate of
+/// zero, or `None` if interrupted: a run of minutes is not resumed but repeated.
 ///
 /// # Errors
 /// If a parameter is no longer finite or the curve cannot be written.
@@ -73,7 +73,7 @@ pub fn climb(
     Ok(Some(Arc::new(trainer.actor()?)))
 }
 
-/// Learns what `actor` is worth in `world`; `None` if interrupted.
+/// Learns the value function of `actor` in `world`; `None` if interrupted.
 ///
 /// # Errors
 /// If a parameter is no longer finite.

@@ -22,7 +22,7 @@ pub struct Arguments {
     /// Also draw the curves as an HTML page.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Replace the page if it is there.
+    /// Replace the page if it exists.
     #[arg(long)]
     force: bool,
 }

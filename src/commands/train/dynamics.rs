@@ -27,24 +27,23 @@ const LINE: u64 = 500;
 const KEEP: u64 = 4;
 /// Horizons of the score, steps.
 const HORIZONS: [usize; 4] = [1, 10, 100, 500];
-/// The file that a training goes on from.
+/// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
 /// How the training went so far, for its report.
 const HISTORY: &str = "history.json";
-/// The report.
+/// File name of the report.
 const REPORT: &str = "training.html";
 
 /// Options of `greylag train dynamics`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The prior.
+    /// The prior's model file.
     #[arg(long)]
     prior: PathBuf,
     #[command(flatten)]
     flights: FlightArguments,
-    /// A model whose coefficients are the true ones, where they are known: to be shown beside the
-    /// learned ones.
+    /// A model with the true coefficients, where they are known: displayed beside the learned ones.
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Leave the prior's coefficients as they are (the default).
@@ -75,7 +74,7 @@ pub struct Arguments {
     /// Rollouts in a minibatch.
     #[arg(long, default_value_t = 64)]
     batch: usize,
-    /// Updates in all.
+    /// Updates of the training in all.
     #[arg(long, default_value_t = 20_000)]
     updates: u64,
     /// Learning rate at the start.
@@ -89,14 +88,15 @@ pub struct Arguments {
     /// paper.
     #[arg(long, default_value = "equation-error", value_parser = ["as-given", "equation-error"])]
     start: String,
-    /// With --start as-given, how the coefficients are learned along with the residual: by the gradient of the
-    /// rollouts (the paper's), by projection (every 500 updates what of the residual the prior can say moves into its
-    /// coefficients, stalls not counting), or least-squares (likewise, stalls counting).
+    /// With --start as-given, how the coefficients are learned along with the residual: by the
+    /// gradient of the rollouts (the paper's), by projection (every 500 updates the part of the
+    /// residual in the prior's span moves into its coefficients, outliers such as a stall weighted
+    /// down), or least-squares (likewise, all samples weighted alike).
     #[arg(long, default_value = "gradient", value_enum)]
     joint: Joint,
-    /// With --log: take nothing from the widths of the prior's coefficients, for a prior whose numbers are guesses. Else a
-    /// coefficient stays near its value as far as its width (15 % where none is stated) and the flights say, and one of
-    /// zero without a width is held.
+    /// With --log: ignore the widths of the prior's coefficients, for a prior whose numbers are
+    /// guesses. Else a coefficient is weighted toward its value by its width (15 % where none is
+    /// stated), and one of zero without a width is held.
     #[arg(long)]
     from_scratch: bool,
     /// λ0 of the penalty's weight 1/λ.
@@ -108,7 +108,7 @@ pub struct Arguments {
     /// Seed of the residual's start and of the minibatches.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder for model, checkpoint and scores; a training found there goes on.
+    /// Folder for model, checkpoint and scores; a training found there is resumed.
     #[arg(long)]
     out: PathBuf,
 }
@@ -147,7 +147,7 @@ struct Document<'a> {
     notes: Vec<String>,
 }
 
-/// Trains, prints what came of it, writes the model.
+/// Trains, prints the result, writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }
@@ -277,7 +277,7 @@ fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     Ok(trainer)
 }
 
-/// Says so if what was learned is worse than the prior, the farthest ahead that both go.
+/// Warning if the learned model is worse than the prior at the longest horizon that both reach.
 fn worse([before, after]: &[Vec<Horizon>; 2]) -> Option<String> {
     let farthest = before.iter().zip(after).rfind(|(_, learned)| learned.runs > 0);
     let (before, _) = farthest.filter(|(b, a)| a.rms > b.rms || a.lost > b.lost)?;
@@ -321,7 +321,7 @@ fn train(
     Ok(true)
 }
 
-/// What was said of the training up to `update`; nothing if it cannot be read, for nothing depends on it.
+/// History of the training up to `update`; empty if it cannot be read, for nothing depends on it.
 fn history(path: &Path, update: u64) -> Vec<Moment> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let mut history: Vec<Moment> = serde_json::from_str(&text).unwrap_or_default();

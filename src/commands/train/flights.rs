@@ -13,7 +13,7 @@ use crate::physics::{Controls, State};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// One track in so many is held out, where there are that many.
+/// One of this many tracks is held out, where there are that many.
 const HELD_OUT: usize = 10;
 /// Part of each recent flight, its end, that is held out.
 const HELD_OUT_PART: f64 = 0.2;
@@ -39,7 +39,7 @@ pub struct FlightArguments {
     recent_share: f64,
 }
 
-/// What there is to learn from.
+/// Flights for training and validation.
 pub struct Flights {
     /// Tracks to learn from.
     pub learn: Vec<Track>,
@@ -49,7 +49,7 @@ pub struct Flights {
     pub samples: usize,
     /// Time between samples of the slowest log, s.
     pub slowest_s: f64,
-    /// What the reader must know.
+    /// Notes for the reader of the report.
     pub notes: Vec<String>,
 }
 

@@ -40,7 +40,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     }
 }
 
-/// Trains.
+/// Runs the chosen training.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::run(arguments),

@@ -63,7 +63,7 @@ pub struct Arguments {
     /// Aircraft imagined at once.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     instances: u64,
-    /// Policies to train, each with a seed of its own, from --seed on; they share the cores.
+    /// Number of policies to train, with consecutive seeds from --seed on; they share the cores.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Seed of the first.
@@ -75,11 +75,11 @@ pub struct Arguments {
     /// Steps of random actions at the start.
     #[arg(long, default_value_t = 10_000)]
     warmup: u64,
-    /// Transitions remembered.
+    /// Capacity of the replay buffer, transitions.
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     replay: u64,
-    /// Folder of a policy whose actor is trained further by the analytic policy gradient; its layers stand in for
-    /// --actor.
+    /// Folder of a policy whose actor is trained further by the analytic policy gradient; its
+    /// layers replace --actor.
     #[arg(long, value_name = "DIR")]
     start: Option<PathBuf>,
     /// Units of the actor's hidden layers.
@@ -97,7 +97,7 @@ pub struct Arguments {
     /// Learning rate of actor and critics.
     #[arg(long, default_value_t = 3e-4)]
     rate: f64,
-    /// Discount per step.
+    /// Discount factor per step.
     #[arg(long, default_value_t = 0.99)]
     discount: f64,
     /// Standard deviation of the noise that explores.
@@ -113,19 +113,19 @@ pub struct Arguments {
     /// randomisation); 0: the model itself. The critics are those of the model itself.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4096))]
     draws: u64,
-    /// Steps between two evaluations, flown in what it is trained in.
+    /// Steps between two evaluations, flown in the training's simulation.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluate: u64,
     /// Steps between two checkpoints.
     #[arg(long, default_value_t = 50_000, value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: u64,
-    /// Folder for the policy, its learning curve and the checkpoint (seed-N below it for several seeds);
-    /// a training found there goes on.
+    /// Folder for the policy, its learning curve and the checkpoint (seed-N below it for several
+    /// seeds); a training found there is resumed.
     #[arg(long)]
     out: PathBuf,
 }
 
-/// What a policy is trained in.
+/// Simulation in which a policy is trained.
 #[derive(Clone, Debug)]
 enum Place {
     Model(PathBuf),
@@ -160,7 +160,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
     let seeds = arguments.seed..arguments.seed + arguments.seeds;
-    // RAYON_NUM_THREADS says how many cores a scheduler has given
+    // RAYON_NUM_THREADS holds the number of cores that a scheduler has given
     let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build()?;
     use rayon::prelude::*;
     let seeds: Vec<u64> = seeds.collect();
@@ -168,7 +168,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let page = arguments.out.join(REPORT);
     match curves::draw(&arguments.out, &page) {
         Ok(()) => println!("report in {}", page.display()),
-        // a training that failed at its start has said so
+        // a training that failed at its start has reported its error
         Err(error) if ended.is_ok() => eprintln!("no learning curves were drawn: {error:#}"),
         Err(_) => (),
     }
@@ -181,7 +181,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
 }
 
 impl Arguments {
-    /// What the same command does after an interruption.
+    /// Note on what the same command does after an interruption.
     fn next_time(&self) -> &'static str {
         match self.is_analytic() {
             true => "begins this policy anew",

@@ -86,7 +86,7 @@ const PX4: [Alias; 17] = [
     Alias("throttle_cmd", "control[3]", 1.0),
 ];
 
-/// Names of the time, with what one of their unit is, s; 0 where the steps must say it.
+/// Names of the time column, with the unit in s; 0 where the unit follows from the steps.
 const TIMES: [(&str, f64); 12] = [
     ("Time", 1.0),
     ("timestamp", 0.0),
@@ -117,27 +117,27 @@ const QUATERNIONS: [[&str; 4]; 6] = [
 pub(super) struct Found {
     /// The column of the log format.
     pub column: String,
-    /// The file's name of it.
+    /// Name of the column in the file.
     pub field: String,
-    /// Factor.
+    /// Factor from the file's unit.
     pub scale: f64,
-    /// Summand.
+    /// Offset that is added after the factor.
     pub offset: f64,
 }
 
-/// What the names of a header mean, beside those of the log format.
+/// Meaning of the header's names that are not those of the log format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Dialect {
     /// The columns under other names.
     pub found: Vec<Found>,
-    /// The quaternion's columns, w first unless the samples say otherwise.
+    /// The quaternion's columns, w first unless the samples show another order.
     pub quaternion: Option<[String; 4]>,
-    /// Whether the file's time is under another name whose unit its steps must say.
+    /// Whether the time column has an unknown unit, to be found from its steps.
     pub time_by_steps: bool,
 }
 
 impl Dialect {
-    /// What `names` mean for the columns that neither they nor the mapping name.
+    /// Meaning of `names` for the columns that neither they nor the mapping fill.
     pub fn of(names: &[String], mapping: &Mapping) -> Dialect {
         let has = |name: &str| names.iter().any(|n| n == name);
         let mut dialect = Dialect::default();
@@ -198,7 +198,7 @@ impl Dialect {
             || self.quaternion.as_ref().is_some_and(|q| q.iter().any(|n| n == name))
     }
 
-    /// What was read under other names.
+    /// Note on the columns that were found under other names.
     pub fn said(&self) -> Option<String> {
         let mut parts: Vec<String> =
             self.found.iter().map(|f| format!("{} from {}", f.column, f.field)).collect();
@@ -207,7 +207,7 @@ impl Dialect {
     }
 }
 
-/// What one of the unit of a time is, s, by its median step.
+/// Length of the time's unit, s, from its median step.
 pub(super) fn unit_of(step: f64) -> f64 {
     match step {
         s if s >= 5e6 => 1e-9,

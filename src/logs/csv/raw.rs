@@ -1,4 +1,4 @@
-//! A table as it stands in its file, before any row is judged.
+//! A table as read from its file, before rows are judged.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -12,12 +12,12 @@ use crate::mapping::{Mapping, TEXT};
 use crate::topics::period_s;
 use crate::{Sample, mixed, rows};
 
-/// A table as it stands in the file, before any row is judged.
+/// A table as read from its file, before rows are judged.
 #[derive(Default)]
 pub(crate) struct Raw {
     /// The rows that could be read and have a time.
     pub rows: Vec<Sample>,
-    /// How many of the file's rows stand before each of them.
+    /// Number of the file's rows before each row.
     places: Vec<usize>,
     /// The rows of the file that are its own, of which those left out on purpose count as none.
     range: Range<usize>,
@@ -26,7 +26,7 @@ pub(crate) struct Raw {
     pub missing: Vec<CsvError>,
     pub(super) unknown_columns: Vec<String>,
     pub(super) cut_short: bool,
-    /// What was read under other names.
+    /// Notes on columns that were found under other names.
     pub notes: Vec<String>,
 }
 
@@ -65,7 +65,8 @@ impl Raw {
         self.left_out.len() - before
     }
 
-    /// The recordings that stand one after the other: each begins where the time goes back and stays there.
+    /// The recordings that follow one another in the table: each begins where the time goes back
+    /// and stays there.
     pub fn recordings(self) -> Vec<Raw> {
         let times: Vec<f64> = self.rows.iter().map(|s| s.time_s).collect();
         let back = (BACK_PERIODS * period_s(&times)).max(BACK_S);
@@ -115,7 +116,7 @@ enum Part {
     OneOfSeveral,
 }
 
-/// What separates the columns of a table: commas, else semicolons or tabs.
+/// Separator of a table's columns: commas, else semicolons or tabs.
 fn separator(header: &[u8]) -> u8 {
     let count = |by: u8| header.iter().filter(|b| **b == by).count();
     if count(b',') > 0 && count(b';') <= count(b',') {
@@ -128,7 +129,7 @@ fn separator(header: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
-/// Reads the rows, taking columns under other names or in other units where `mapping` says so.
+/// Reads the rows; `mapping` may assign columns with other names or units.
 pub(crate) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
     let text = |source| CsvError::Text { path: path.to_owned(), source };
     // A row without its line end may miss digits: it is left out.

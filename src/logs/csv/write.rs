@@ -11,7 +11,7 @@ use crate::{Flight, Sample};
 /// read back to the bit.
 ///
 /// # Errors
-/// What the writer says.
+/// The error of `out`.
 pub fn write(flight: &Flight, out: impl Write) -> std::io::Result<()> {
     let mut rows = Rows::new(out, &[])?;
     flight.samples.iter().try_for_each(|sample| rows.row(sample, &[]))?;
@@ -39,7 +39,7 @@ impl<W: Write> Rows<W> {
     /// Writes the header: the columns of the format, then `extra`.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The error of `out`.
     pub fn new(mut out: W, extra: &[&str]) -> std::io::Result<Self> {
         let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).chain(extra.iter().copied()).collect();
         writeln!(out, "{}", names.join(","))?;
@@ -49,7 +49,7 @@ impl<W: Write> Rows<W> {
     /// Writes a sample, then the extra fields (free of commas and quotes) in the header's order.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The error of the writer.
     pub fn row(&mut self, sample: &Sample, extra: &[&str]) -> std::io::Result<()> {
         use std::fmt::Write as _;
         self.line.clear();
@@ -70,10 +70,10 @@ impl<W: Write> Rows<W> {
         self.out.write_all(self.line.as_bytes())
     }
 
-    /// Hands everything on to the file.
+    /// Flushes the writer.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The error of the writer.
     pub fn flush(&mut self) -> std::io::Result<()> {
         self.out.flush()
     }

@@ -10,13 +10,13 @@
 //! roll_rad = { from = "csv.roll_deg", scale = 0.0174533 }         # another column of a CSV
 //! ```
 //!
-//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` makes roll, pitch and yaw of a quaternion from
-//! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` says which part stands first.
+//! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion of
+//! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states which part is first.
 //!
 //! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
 //! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, by a
 //! parabola through so many seconds of rows. `[derive] body_rates_over_s` makes p, q, r from roll, pitch and
-//! yaw in the same way. `[sensors]` says what is known of sensors and wind, see [`Sensors`].
+//! yaw in the same way. `[sensors]` describes sensors and wind, see [`Sensors`].
 
 mod ardupilot;
 mod telemetry;
@@ -48,17 +48,17 @@ pub enum MappingError {
     /// The file cannot be read.
     #[error("cannot read mapping {}: {source}: check the path", path.display())]
     File {
-        /// The file.
+        /// Path of the mapping file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The text is no mapping.
     #[error("mapping {}: {text}", path.display())]
     Text {
-        /// The file.
+        /// Path of the mapping file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the content.
         text: String,
     },
 }
@@ -68,26 +68,26 @@ pub enum MappingError {
 pub struct Entry {
     /// The topic, message or record type.
     pub topic: String,
-    /// Its field.
+    /// Name of the field.
     pub field: String,
-    /// Factor.
+    /// Factor from the field's unit.
     pub scale: f64,
     /// Summand, in the column's unit.
     pub offset: f64,
     /// The topic's instance; the first one if none is named.
     pub instance: Option<u16>,
-    /// The column is the rate of change of the field, over so many s of rows.
+    /// Length of the parabola whose slope is the column, s; `None` takes the field itself.
     pub rate_over_s: Option<f64>,
 }
 
 /// A user's mapping, with the mixer of the aircraft.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
-    /// Sources by column.
+    /// Source of each mapped column.
     entries: BTreeMap<String, Entry>,
     /// Time over which body rates are made from the attitude, s.
     body_rates_over_s: Option<f64>,
-    /// What is known of sensors and wind.
+    /// Known properties of sensors and wind.
     sensors: Sensors,
     /// Where the attitude comes from as a quaternion.
     quaternion: Option<Turn>,
@@ -102,7 +102,7 @@ pub struct Turn {
     pub topic: String,
     /// The fields of its parts, as they are written.
     pub fields: [String; 4],
-    /// Which part comes first; found by the rates and gravity where it is not said.
+    /// Which part comes first; `None` finds it from the rates and gravity.
     pub order: Option<Order>,
 }
 
@@ -200,7 +200,7 @@ impl Mapping {
         Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, mixer: None })
     }
 
-    /// What is known of sensors and wind.
+    /// Known properties of sensors and wind.
     pub fn sensors(&self) -> &Sensors {
         &self.sensors
     }
@@ -215,7 +215,7 @@ impl Mapping {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
 
-    /// What a column of a CSV table is read from or made of.
+    /// Source of a column of a CSV table: a column of the file or a derivation.
     pub(super) fn origin(&self, column: &str) -> String {
         match self.get(column) {
             Some(e) if e.rate_over_s.is_some() => format!("rate of {}", e.field),
@@ -234,12 +234,12 @@ impl Mapping {
         }
     }
 
-    /// The same for an aircraft whose surfaces and motors the log names.
+    /// The mapping with the mixer of an aircraft whose surfaces and motors the log names.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Mapping {
         Mapping { mixer, ..self }
     }
 
-    /// Where the attitude comes from as a quaternion, if the mapping says so.
+    /// Source of the attitude as a quaternion, if the mapping has one.
     pub(super) fn quaternion(&self) -> Option<&Turn> {
         self.quaternion.as_ref()
     }

@@ -33,7 +33,7 @@ pub const TOPICS: [&str; 20] = [
     "vehicle_attitude_setpoint",
 ];
 
-/// The fields that the rules use; what ends with a bracket stands for all elements.
+/// Fields that the rules use; a name that ends with a bracket matches all elements.
 const FIELDS: [&str; 25] = [
     "q[",
     "q_d[",
@@ -158,7 +158,7 @@ fn motor(topics: &Topics) -> Option<Rule> {
     runs.then(|| Rule::sum("throttle_cmd", topic, vec![term]))
 }
 
-/// Commands from the servos' outputs by the torque that each is said to make (CA_SV_CSn_TRQ_*).
+/// Commands from the servos' outputs and the torque of each by its parameters CA_SV_CSn_TRQ_*.
 fn allocated(topics: &Topics) -> Vec<Rule> {
     let mut out = Vec::new();
     for (column, axis, sign) in

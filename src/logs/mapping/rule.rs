@@ -5,7 +5,7 @@ use crate::topics::Topic;
 /// How a field's value is shaped before it is summed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// As it is.
+    /// The value without a change.
     Linear,
     /// A servo's pulse to −1..1, each side of its trim by its own range.
     Surface {
@@ -51,20 +51,20 @@ impl Shape {
 /// A field's share in a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {
-    /// The field.
+    /// Name of the field.
     pub field: String,
-    /// Its factor, after the shape.
+    /// Factor after the shape.
     pub gain: f64,
-    /// What is done to it first.
+    /// Shape that is applied to the field first.
     pub shape: Shape,
 }
 
 /// An angle of a quaternion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tilt {
-    /// Its roll.
+    /// The roll angle.
     Roll,
-    /// Its pitch.
+    /// The pitch angle.
     Pitch,
 }
 
@@ -83,27 +83,27 @@ impl Tilt {
     }
 }
 
-/// What fills which columns.
+/// Columns of a rule, and how they are filled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fill {
     /// One column: the sum of terms plus an offset.
     Sum {
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// The terms.
+        /// Fields whose sum fills it.
         terms: Vec<Term>,
-        /// The offset.
+        /// Constant that is added.
         offset: f64,
     },
     /// Roll, pitch and yaw from a quaternion NED→FRD, w first.
     Quaternion([String; 4]),
     /// One column: the roll or the pitch of a quaternion NED→FRD, w first.
     Tilt {
-        /// The column.
+        /// Name of the column.
         column: &'static str,
-        /// Which angle.
+        /// The angle that fills it.
         angle: Tilt,
-        /// The quaternion's fields.
+        /// Fields of the quaternion, w first.
         fields: [&'static str; 4],
     },
     /// Air density from static pressure (times the factor in Pa) and temperature (factor, in °C).
@@ -118,15 +118,15 @@ pub enum Fill {
 /// One way to fill columns from a topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
-    /// The topic.
+    /// Name of the topic.
     pub topic: String,
-    /// Its instance, where no other one will do.
+    /// Instance of the topic; `None` accepts any.
     pub instance: Option<u16>,
     /// The instance that is usual for the vehicle's type, if it moves.
     pub preferred: Option<u16>,
-    /// What it fills.
+    /// Columns that it fills, and how.
     pub fill: Fill,
-    /// What the user should know if this rule is used.
+    /// Note to the user if this rule is used.
     pub note: Option<String>,
     /// Whether the airspeed is equivalent, to be made true by the density.
     pub equivalent: bool,
@@ -158,7 +158,7 @@ impl Rule {
         Rule::new(topic, Fill::Sum { column: column.into(), terms, offset: 0.0 })
     }
 
-    /// A quaternion's fields.
+    /// Roll, pitch and yaw from the four fields of a quaternion NED→FRD.
     pub fn quaternion(topic: &str, fields: [&str; 4]) -> Rule {
         Rule::new(topic, Fill::Quaternion(fields.map(str::to_owned)))
     }
@@ -168,7 +168,7 @@ impl Rule {
         Rule::new(topic, Fill::Tilt { column, angle, fields })
     }
 
-    /// Pressure with temperature.
+    /// Air density from a pressure and a temperature by the gas law.
     pub fn density(
         topic: &str,
         pressure: (&'static str, f64),
@@ -185,12 +185,12 @@ impl Rule {
         self
     }
 
-    /// Of an instance.
+    /// The rule for one instance of the topic only.
     pub fn of(self, instance: Option<u16>) -> Rule {
         Rule { instance, ..self }
     }
 
-    /// Of an instance, if it moves; else of one that does.
+    /// The rule for one instance if it moves; else for another one that does.
     pub fn preferring(self, preferred: Option<u16>) -> Rule {
         Rule { preferred, ..self }
     }
@@ -200,7 +200,7 @@ impl Rule {
         Rule { note: Some(note.into()), ..self }
     }
 
-    /// As equivalent airspeed.
+    /// The rule with its airspeed taken as equivalent airspeed.
     pub fn equivalent(self) -> Rule {
         Rule { equivalent: true, ..self }
     }
@@ -236,7 +236,7 @@ impl Rule {
         format!("{}.{}", self.topic, self.fields().join("+"))
     }
 
-    /// Its only field with the factor, where there is no more to it than that.
+    /// Field and factor of a rule that scales one field and adds nothing.
     pub fn factor(&self) -> Option<(&str, f64)> {
         match &self.fill {
             Fill::Sum { terms, offset: 0.0, .. } => match &terms[..] {

@@ -4,9 +4,9 @@ use super::rule::{Rule, Shape, Term};
 use crate::topics::Topics;
 use greylag_physics::mixer::{Does, Effector, Mixer};
 
-/// Channels of RCOU.
+/// Number of channels in the record RCOU.
 const CHANNELS: usize = 16;
-/// SERVOn_FUNCTION numbers.
+/// Values of the parameters SERVOn_FUNCTION.
 const AILERON: f64 = 4.0;
 const ELEVATOR: f64 = 19.0;
 const RUDDER: f64 = 21.0;
@@ -19,7 +19,7 @@ const ELEVON_RIGHT: f64 = 78.0;
 /// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
 /// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
 ///
-/// Where the airframe's `mixer` says which channel moves what, the commands are g⁺ of the pulses. A command of one is
+/// Where the airframe's `mixer` assigns the channels, the commands are g⁺ of the pulses. A command of one is
 /// the longest pulse there: the airframe describes the servos, not the functions that the controller has for them.
 pub fn rules(
     topics: &Topics,
@@ -50,7 +50,7 @@ pub fn rules(
         ("elevator_cmd", ELEVATOR, -1.0),
         ("rudder_cmd", RUDDER, -1.0),
     ] {
-        // Two servos of one function move alike: the first tells.
+        // Two servos of one function move alike: the first is used.
         if let Some(n) = channels(function).next() {
             out.push(Rule::sum(column, topic, vec![surface(n, gain)]).noting(note(column)));
         }

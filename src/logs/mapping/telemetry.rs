@@ -32,7 +32,7 @@ pub const TOPICS: [&str; 16] = [
 
 /// MAV_AUTOPILOT numbers of stacks whose VFR_HUD is not true airspeed.
 const EQUIVALENT: [f64; 2] = [3.0, 12.0];
-/// Milli-g, m/s².
+/// One milli-g in m/s².
 const MILLI_G: f64 = STANDARD_GRAVITY / 1000.0;
 /// Deflection of the simulator's X8 at a normalised position of 1, rad.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]

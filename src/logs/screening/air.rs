@@ -20,7 +20,7 @@ const GROUND_SPREAD: f64 = 0.25;
 const TURN_SPREAD: f64 = 0.5;
 /// Correlation from which a relation is believed.
 const CERTAIN: f64 = 0.8;
-/// Angle of attack beyond which nobody flies for a twentieth of the time, rad.
+/// Angle of attack that no aircraft exceeds for a twentieth of the time, rad.
 const VANE_LARGE: f64 = 1.0;
 
 /// Everything about the air.
@@ -45,7 +45,7 @@ fn airspeed(rows: &[Sample]) -> Option<Finding> {
         .or_else(|| other_unit(steady(&ground, GROUND_SPREAD), "the velocity over ground shows"))
 }
 
-/// The median, where the middle half of the values lies close together.
+/// The median, if the middle half of the values is close together.
 fn steady(ratios: &[f64], spread: f64) -> Option<f64> {
     let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(ratios, q));
     middle.filter(|m| high.zip(low).is_some_and(|(high, low)| high - low < spread * m))

@@ -10,7 +10,7 @@ const SUSPICIOUS_S: f64 = 0.9;
 /// Rows over which a turn is compared with the rates.
 const SPAN: usize = 20;
 
-/// Compares how far the roll angle goes with what the roll rate and the clock say.
+/// Compares the change of the roll angle with the integral of the roll rate over the clock.
 pub fn check(rows: &[Sample]) -> Option<Finding> {
     let times = values(rows, |s| s.time_s);
     let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();

@@ -19,10 +19,10 @@ use super::finding::{Cure, Finding, Severity};
 use super::lag;
 use super::phases::{self, Flying, PhaseKind};
 
-/// Rows below which nothing is said about units.
+/// Smallest number of rows for checks of units.
 const ENOUGH: usize = 50;
 
-/// Everything found in the rows of an aircraft that is known to fly as `flies` says.
+/// All findings in the rows of an aircraft with the flight limits `flies`.
 pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     if rows.is_empty() {
         return vec![Finding::problem("the log has no rows with all needed channels")];
@@ -43,7 +43,7 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     out
 }
 
-/// Units, signs and axes, in flight: what hangs from its lift motors or stands on the ground obeys other relations.
+/// Checks of units, signs and axes in wing-borne flight: hover and ground obey other relations.
 fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     if let Some(clock) = clock::check(rows) {
         return vec![clock];
@@ -85,7 +85,7 @@ fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// The problem `what`, which the mapping that multiplies `column` by `scale` puts right.
+/// The problem `what`, with the mapping that multiplies `column` by `scale` as its remedy.
 fn cured(what: String, column: &str, scale: f64) -> Finding {
     let cure = Cure { column: column.into(), scale };
     Finding { cure: Some(cure.clone()), ..Finding::problem(format!("{what}: {cure}")) }

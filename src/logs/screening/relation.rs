@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::Sample;
 use greylag_num::statistics;
 
-/// A pause of so many median periods ends a window.
+/// A gap of this many median periods ends a window.
 const PAUSE_PERIODS: f64 = 5.0;
 /// Fewest pairs that a relation is taken from.
 const FEWEST: usize = 12;
@@ -15,7 +15,7 @@ pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
     rows.iter().map(get).filter(|x| x.is_finite()).collect()
 }
 
-/// The value below which the share `q` of the values lies; `None` for fewer than [`super::ENOUGH`].
+/// Quantile `q` of the values; `None` for fewer than [`super::ENOUGH`].
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     (values.len() >= super::ENOUGH).then(|| statistics::quantile(values, q))
 }
@@ -25,7 +25,7 @@ pub fn near(x: f64, target: f64, tolerance: f64) -> bool {
     (x / target - 1.0).abs() < tolerance
 }
 
-/// Windows of about `length_s` without a pause, one after the other.
+/// Windows of about `length_s` without a gap, one after the other.
 pub fn windows(rows: &[Sample], length_s: f64) -> Vec<&[Sample]> {
     let times = values(rows, |s| s.time_s);
     let periods: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|p| *p > 0.0).collect();
@@ -62,9 +62,9 @@ pub fn change(window: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
 /// How y follows x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relation {
-    /// dy/dx.
+    /// Slope dy/dx.
     pub slope: f64,
-    /// Correlation, −1..1.
+    /// Correlation coefficient, −1..1.
     pub correlation: f64,
 }
 

@@ -15,7 +15,6 @@ const WINDOW_S: f64 = 0.1;
 /// Partial correlation beyond which a surface is taken to act the other way.
 const TURNED: f64 = 0.6;
 
-/// Reads a column.
 type Get = fn(&Sample) -> f64;
 
 /// Units, then polarity where the units and the axes are right.
@@ -94,7 +93,8 @@ fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     })
 }
 
-/// q̇ on q, α (or the normal force in its place) and the elevator: positive is nose down.
+/// Regression of q̇ on q, α (or the normal force in its place) and the elevator: positive is nose
+/// down.
 fn elevator(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("elevator_rad", |s| s.elevator_rad), ("elevator_cmd", |s| s.elevator_cmd)])?;

@@ -1,4 +1,4 @@
-//! Where the fields of a ULog message stand.
+//! Positions of the fields in a ULog message.
 
 use std::collections::BTreeMap;
 
@@ -77,16 +77,16 @@ pub(super) struct Field {
     pub offset: usize,
 }
 
-/// Where the fields of a message stand.
+/// Positions of a message's fields.
 pub(super) struct Layout {
     /// The fields that are read.
     pub fields: Vec<Field>,
-    /// Where `timestamp` and `timestamp_sample` stand.
+    /// Types and positions of `timestamp` and `timestamp_sample`.
     pub stamp: Option<(Kind, usize)>,
     pub sampled: Option<(Kind, usize)>,
     /// Bytes of a whole record, without the padding at its end, which PX4 does not write.
     pub size: usize,
-    /// The same with that padding.
+    /// Bytes of a whole record with that padding.
     pub padded: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What the report of an amendment is made from.
+//! Input of the report on an amendment.
 
 pub(super) mod page;
 
@@ -11,7 +11,7 @@ use greylag_sysid::compare::{Answer, Comparison};
 pub struct AmendmentReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// What was fitted, and what it was worth.
+    /// Result of the amendment: fit, evidence and scores.
     pub amendment: &'a Amendment,
     /// The amendment's answer with the command that comes next, where that is known.
     pub answer: Option<&'a Answer>,

@@ -9,10 +9,10 @@ use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
 
-/// Sentences that stand large at the top.
+/// Number of findings that are shown first.
 const LEADING: usize = 2;
 
-/// The page of `report`: the sentence first, then what bears it out.
+/// The page of `report`: the verdict first, then the evidence for it.
 pub fn amendment_page(report: &AmendmentReport) -> Page {
     let a = report.amendment;
     let answer = report.answer.unwrap_or(&a.answer).clone();
@@ -109,7 +109,7 @@ fn effects(a: &Amendment) -> Section {
     }
 }
 
-/// The coefficients of the effects, with what each flight says of them.
+/// Section on the coefficients of the added effects, with the estimate from each flight alone.
 fn added(a: &Amendment) -> Section {
     let columns =
         [("Coefficient", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
@@ -185,7 +185,8 @@ fn sensors(a: &Amendment) -> Section {
     Section::new("Sensors", &note, vec![Figure::Table(table)])
 }
 
-/// What, value with standard deviation, factor to the unit, unit.
+/// Name, value with standard deviation, factor to the displayed unit, and unit of each flight's
+/// constants.
 fn constants(f: &FittedFlight) -> [(&'static str, [f64; 2], f64, &'static str); 4] {
     let degree = 1f64.to_degrees();
     [

@@ -1,4 +1,4 @@
-//! What the report of a comparison is made from.
+//! Input of the report on a comparison.
 
 pub(super) mod page;
 pub(super) mod regimes;
@@ -13,7 +13,7 @@ use greylag_sysid::compare::Comparison;
 pub struct ComparisonReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// What was found.
+    /// Result of the comparison.
     pub comparison: &'a Comparison,
     /// The models' files, in the order of the comparison's models.
     pub model_files: Vec<String>,

@@ -8,12 +8,12 @@ use crate::{
 };
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
-/// Sentences of the first model that stand large at the top.
+/// Number of findings on the first model that are shown first.
 const LEADING: usize = 2;
 /// Sentences of each further model that are shown.
 const OF_OTHERS: usize = 2;
 
-/// The page of `report`: the sentence first, then what bears it out.
+/// The page of `report`: the verdict first, then the evidence for it.
 pub fn comparison_page(report: &ComparisonReport) -> Page {
     let c = report.comparison;
     let answer = Figure::Answer(Box::new(AnswerBox { answer: c.answer.clone() }));
@@ -64,7 +64,7 @@ fn subtitle(c: &Comparison) -> String {
     )
 }
 
-/// What a channel is called on buttons and in tables.
+/// Name of a channel on buttons and in tables.
 pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }

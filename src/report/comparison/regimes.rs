@@ -62,7 +62,7 @@ fn panels(c: &Comparison, id: ChannelId) -> Option<Intervals> {
         };
         found.push((explained, panel));
     }
-    // What tells most about the residual stands first.
+    // The variable that explains most of the residual is first.
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     (!found.is_empty()).then(|| Intervals {
         y_label: format!("Measured − model: {} ({})", id.name(), id.unit()),

@@ -41,7 +41,7 @@ pub(crate) fn summary(c: &Comparison) -> Section {
     Section::new("Free runs", note, figures)
 }
 
-/// The same free runs by forecasts without aerodynamics, which a model has to beat.
+/// Scores of forecasts without aerodynamics over the same free runs, which a model has to beat.
 pub(crate) fn baselines(c: &Comparison) -> Section {
     let columns = [
         ("Forecast", Align::Left),
@@ -93,7 +93,7 @@ fn state_cells(s: &StateScore) -> Vec<String> {
     cells
 }
 
-/// A state's name and unit as people say them, and the factor from its SI unit.
+/// Name and unit of a state as displayed, and the factor from its SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let (name, unit) = state.rsplit_once('_').unwrap_or((state, ""));
     let name = match name {

@@ -1,4 +1,5 @@
-//! Measured against predicted over time: telling stretches of the flights, then each as a whole.
+//! Measured against predicted states over time: selected stretches of the flights, then each flight
+//! as a whole.
 
 use crate::comparison::page::channel_name;
 use crate::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
@@ -10,7 +11,7 @@ const STRETCH_S: f64 = 30.0;
 const STRETCH_ROWS: usize = 1000;
 /// Values drawn of all whole flights together, so that the page stays near 2 MB.
 const WHOLE_VALUES: usize = 120_000;
-/// Whole flights drawn.
+/// Largest number of whole flights that are drawn.
 const WHOLE_FLIGHTS: usize = 6;
 /// Names and units of the states, in the order of `State::NAMES`, with the factor from SI.
 const STATES: [(&str, &str, f64); 8] = [
@@ -128,7 +129,7 @@ fn stretches(c: &Comparison) -> Vec<Stretch> {
             let end = first + time[first..].iter().take_while(|t| **t < last).count().max(1);
             let own: Vec<f64> =
                 errors[first..end].iter().copied().filter(|e| e.is_finite()).collect();
-            // A stretch that is mostly pause, or the short rest at the end, tells little.
+            // A stretch that is mostly a gap, or the short rest at the end, shows little.
             if time[end - 1] - time[first] > 0.5 * STRETCH_S && 2 * own.len() > end - first {
                 let error = own.iter().sum::<f64>() / own.len() as f64;
                 found.push(Stretch { flight, first, end, error });

@@ -1,4 +1,4 @@
-//! What the report of a diagnosis is made from.
+//! Input of the report on a diagnosis.
 
 pub(super) mod page;
 pub(super) mod proof;
@@ -9,12 +9,12 @@ use crate::Page;
 use greylag_sysid::compare::{Answer, Comparison};
 use greylag_sysid::diagnose::Diagnosis;
 
-/// A diagnosis of what a model lacks, with what bears it out.
+/// A diagnosis of a model's missing effects, with its evidence.
 #[derive(Clone, Debug)]
 pub struct DiagnosisReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// What was found.
+    /// Result of the diagnosis.
     pub diagnosis: &'a Diagnosis,
     /// By how much the error falls, and by what.
     pub answer: Option<&'a Answer>,
@@ -23,7 +23,7 @@ pub struct DiagnosisReport<'a> {
     /// Models in the order in which they improve (as given, tuned, with the asserted effects) against
     /// flights that no fit has seen.
     pub held_out: Option<&'a Comparison>,
-    /// The model's file.
+    /// Path of the model's file.
     pub model_file: String,
     /// The logs' files, as they were given.
     pub log_files: Vec<String>,

@@ -11,12 +11,12 @@ use crate::{
 use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
 
-/// Sentences that stand large at the top.
+/// Number of findings that are shown first.
 const LEADING: usize = 2;
 /// Share below which a cell of the map stays blank.
 const BLANK: f64 = 0.05;
 
-/// The page of `report`: the sentence first, then what bears it out.
+/// The page of `report`: the verdict first, then the evidence for it.
 pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     let d = report.diagnosis;
     let answer = report.answer.cloned();
@@ -109,7 +109,7 @@ fn maps(c: &Comparison) -> Option<Figure> {
     (!choice.options.is_empty()).then_some(Figure::Choice(choice))
 }
 
-/// Channels over regime variables: what each variable tells of a model's residual.
+/// Map of channels over regime variables: how far each variable explains a model's residual.
 fn map(model: &ModelResult) -> Option<Figure> {
     let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS

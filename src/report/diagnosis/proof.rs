@@ -1,4 +1,4 @@
-//! What bears a diagnosis out: what chance reaches, the error on flights that no fit has seen.
+//! Evidence for a diagnosis: the level that arises by chance, and the error on held-out flights.
 
 use crate::Align::{Left, Right};
 use crate::comparison::page::{growth, unexplained};
@@ -15,7 +15,8 @@ const DECOYS: usize = 8;
 /// The horizon that the sentence speaks of, s, where there is one.
 const SHOWN_S: f64 = 5.0;
 
-/// What chance reaches: nulls that lack nothing, columns that cannot be effects.
+/// Evidence that arises by chance: under nulls that lack nothing, and for columns that cannot be
+/// effects.
 pub(crate) fn chance(d: &Diagnosis) -> Section {
     let mut figures = Vec::new();
     let best = d.effects.iter().find(|c| c.asserted).or(d.effects.first());

@@ -59,7 +59,7 @@ pub(crate) fn ranking(d: &Diagnosis) -> Section {
     Section::new("Suspects", note, vec![Figure::Evidence(figure)])
 }
 
-/// An asserted effect with those that the data cannot tell from it.
+/// An asserted effect with the effects that the data cannot distinguish from it.
 fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> EvidenceGroup {
     let alike = |c: &&Candidate| found.indistinguishable_from.contains(&c.id);
     let others: Vec<&Candidate> = d.effects.iter().filter(alike).collect();
@@ -183,8 +183,8 @@ fn by_flight(c: &Candidate) -> Option<Whiskers> {
     Some(flight_by_flight(title, &first.unit, flights, (first.value, first.ci95)))
 }
 
-/// What each flight alone says of a value (flight, value, standard deviation), above what all say
-/// together (value with its 95 % interval).
+/// One flight's estimates of a value (flight, value, standard deviation) above the estimate from
+/// all flights together (value with its 95 % interval).
 pub(crate) fn flight_by_flight<'a>(
     title: String,
     unit: &str,

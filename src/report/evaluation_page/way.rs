@@ -1,4 +1,5 @@
-//! What happened on the way to the targets: error against surface travel, every measure, their definitions.
+//! Transients on the way to the targets: error against surface travel, every measure, their
+//! definitions.
 
 use super::{EvaluationReport, Left, Right, label, with_interval};
 use crate::kit::numbers::number;
@@ -7,7 +8,7 @@ use greylag_control::quality::{MEASURES, Measure};
 use greylag_sim::evaluation::{Evaluation, Score};
 use greylag_sim::summary::Spread;
 
-/// Controllers that colours tell apart; beyond, lines are wide.
+/// Number of controllers that get a colour each; with more, lines are wide.
 const COLOURS: usize = 4;
 
 /// The sections; none of an evaluation that was not measured.
@@ -109,7 +110,7 @@ fn push(
     table.push(std::iter::once(title).chain(cells).collect::<Vec<_>>());
 }
 
-/// Whether a measure says anything: a rudder that there is not moves nowhere.
+/// Whether a measure is ever non-zero: that of a rudder is zero for an aircraft without one.
 fn moves(scored: &[(&Evaluation, &Score)], m: &Measure) -> bool {
     scored.iter().any(|(_, score)| score.measures.get(m.id).is_some_and(|s| s.worst != 0.0))
 }

@@ -1,4 +1,4 @@
-//! What a flight report is made from.
+//! Input of a flight report.
 
 pub(super) mod page;
 pub(super) mod quality;
@@ -16,7 +16,7 @@ use greylag_sysid::compare::Comparison;
 pub struct FlightReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// The log.
+    /// Log of the flight.
     pub flight: &'a Flight,
     /// Name of the controller that flew.
     pub controller: String,
@@ -38,15 +38,15 @@ pub struct FlightReport<'a> {
     pub travel: SurfaceTravel,
     /// Durations of the control cycles; `None` when they were not recorded.
     pub timing: Option<LoopTiming>,
-    /// What happened, in time order.
+    /// Events of the flight, in time order.
     pub events: Vec<Event>,
     /// How well the model predicts this flight; `None` when they were not compared.
     pub comparison: Option<Comparison>,
-    /// What the planner saw at some ticks; empty when none flew.
+    /// Insight into the planner at some ticks; empty if no planner flew.
     pub sights: Vec<Sight>,
 }
 
-/// What a flight is measured against.
+/// Flight envelope with which a flight is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvelopeFlown {
     /// The limits of the aircraft.
@@ -58,9 +58,9 @@ pub struct EnvelopeFlown {
 /// Deflections at a command of +1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTravel {
-    /// Aileron, rad.
+    /// Deflection of the aileron, rad.
     pub aileron_rad: f64,
-    /// Elevator, rad.
+    /// Deflection of the elevator, rad.
     pub elevator_rad: f64,
 }
 
@@ -71,9 +71,9 @@ pub struct Segment {
     pub start_s: f64,
     /// When it ended, s.
     pub end_s: f64,
-    /// Commanded roll, rad.
+    /// Commanded roll angle, rad.
     pub roll_target_rad: f64,
-    /// Commanded pitch, rad.
+    /// Commanded pitch angle, rad.
     pub pitch_target_rad: f64,
     /// How far the target is from level flight.
     pub difficulty: Difficulty,
@@ -94,12 +94,12 @@ impl Segment {
 pub enum Difficulty {
     /// |roll| below 45° with |pitch| below 25°.
     Easy,
-    /// Anything beyond.
+    /// Any other target: |roll| from 45° up, or |pitch| from 25° up.
     Hard,
 }
 
 impl Difficulty {
-    /// Its name in tables.
+    /// Name of the group in tables.
     pub fn name(self) -> &'static str {
         match self {
             Difficulty::Easy => "easy",
@@ -113,25 +113,25 @@ impl Difficulty {
 pub struct Event {
     /// When, s, on the flight's clock.
     pub time_s: f64,
-    /// What kind of thing.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// What, in words.
+    /// Description of the event for the reader.
     pub text: String,
 }
 
-/// What kind of thing happened.
+/// Kinds of events in a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
-    /// The mode changed.
+    /// The flight controller changed its mode.
     Mode,
     /// A message was sent or received.
     Text,
-    /// A failsafe acted.
+    /// A failsafe took over.
     Failsafe,
 }
 
 impl EventKind {
-    /// Its name in tables.
+    /// Name of the kind in tables.
     pub fn name(self) -> &'static str {
         match self {
             EventKind::Mode => "mode",
@@ -155,7 +155,7 @@ impl FlightReport<'_> {
         Some(self.segments.iter().map(of).collect())
     }
 
-    /// What happened, in the sentence that leads the page.
+    /// Verdict on the flight in one sentence, which leads the page.
     pub fn page_sentence(&self) -> String {
         verdict::verdict(self).sentence
     }

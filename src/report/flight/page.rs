@@ -10,7 +10,7 @@ use crate::{
 };
 use greylag_logs::Sample;
 
-/// A pause longer than this breaks the lines, s: the log format splits a flight there.
+/// A gap longer than this interrupts the lines, s: the log format splits a flight there.
 const GAP_S: f64 = 0.1;
 /// Events up to this number are marked in the plots; more would hide the lines.
 const MARKED_EVENTS: usize = 40;

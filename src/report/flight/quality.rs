@@ -10,7 +10,7 @@ use greylag_logs::Sample;
 use greylag_physics::Command;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// A pause longer than this parts a flight, s.
+/// A gap longer than this splits a flight, s.
 const GAP_S: f64 = 0.1;
 
 /// A whole flight against its envelope.
@@ -44,7 +44,7 @@ fn moment(s: &Sample) -> Moment {
     }
 }
 
-/// What happened between the ends of a segment.
+/// Measures of a segment between its ends.
 pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits) -> Quality {
     let first = samples.partition_point(|s| s.time_s < segment.start_s);
     let end = samples.partition_point(|s| s.time_s <= segment.end_s).max(first);

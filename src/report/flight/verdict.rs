@@ -1,4 +1,4 @@
-//! The sentence that says what happened in a flight, with what bears it out.
+//! The verdict on a flight in one sentence, with the measurements behind it.
 
 use crate::flight::quality::{clause, kept, most};
 use crate::flight::{Difficulty, FlightReport, Segment};

@@ -3,14 +3,14 @@
 use crate::kit::html::escape;
 use greylag_sysid::compare::Answer;
 
-/// What an error is, said once on every page.
+/// Definition of the error, printed once on every page.
 const ERROR: &str = "Error: root mean square over the eight states of a free run on the recorded actuators, each state over its \
                      characteristic value x_c (NRMSE).";
 
-/// The box.
+/// Box with the answer to the page's question.
 #[derive(Clone, Debug)]
 pub struct AnswerBox {
-    /// The answer.
+    /// The answer that the box shows.
     pub answer: Answer,
 }
 

@@ -6,11 +6,11 @@ use crate::kit::html::escape;
 /// Groups of bars from zero.
 #[derive(Clone, Debug)]
 pub struct Bars {
-    /// What is shown.
+    /// Title of the figure.
     pub title: String,
     /// Unit of the values, such as `%`.
     pub unit: String,
-    /// What the bars of a group stand for, in their order.
+    /// Names of the bars of a group, in their order.
     pub keys: Vec<(String, Style)>,
     /// The groups, top to bottom.
     pub groups: Vec<BarGroup>,
@@ -18,10 +18,10 @@ pub struct Bars {
     pub full: f64,
 }
 
-/// Bars of one thing.
+/// Bars of one item, one for each key.
 #[derive(Clone, Debug)]
 pub struct BarGroup {
-    /// What it is.
+    /// Name of the item.
     pub label: String,
     /// One value for each key, in the unit of the figure; NaN where it cannot be determined.
     pub values: Vec<f64>,

@@ -6,20 +6,20 @@ use crate::kit::html::escape;
 /// Named alternatives behind a row of buttons; choices with the same label switch together.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// What a link points to: letters and hyphens, once a page.
+    /// Target of links: letters and hyphens, unique on the page.
     pub anchor: String,
-    /// What is chosen, for example `Channel`.
+    /// Name of the choice, for example `Channel`.
     pub label: String,
     /// The alternatives; the first is seen at first. A browser without scripts shows all.
     pub options: Vec<ChoiceOption>,
 }
 
-/// One alternative.
+/// One of the alternatives.
 #[derive(Clone, Debug)]
 pub struct ChoiceOption {
-    /// Its name on the button.
+    /// Label of its button.
     pub name: String,
-    /// What it shows.
+    /// Figures shown when it is selected.
     pub figures: Vec<Figure>,
 }
 

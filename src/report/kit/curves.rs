@@ -8,14 +8,14 @@ use crate::kit::html::{compact, escape};
 /// Lines over one horizontal quantity.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curves {
-    /// What is shown.
+    /// Title of the figure.
     #[serde(skip)]
     pub title: String,
     /// Name of the horizontal axis, with its unit.
     pub x_label: String,
     /// Name of the vertical axis, with its unit.
     pub y_label: String,
-    /// Horizontal values, ascending.
+    /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
     /// The lines; one value for each horizontal one, what the scale has no height for is a gap.
@@ -34,7 +34,7 @@ pub struct Range {
     /// Lower edge, as many values as horizontal ones.
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper edge, likewise.
+    /// Upper edge, as many values as horizontal ones.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
 }

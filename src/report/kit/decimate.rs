@@ -1,6 +1,6 @@
-//! Rows chosen for drawing: in time order, broken at pauses, thinned without losing a spike.
+//! Selection of rows for drawing: in time order, broken at gaps, thinned without losing extremes.
 
-/// Indices of the rows whose times ascend, with `None` where a pause longer than `gap_s` (s) lies
+/// Indices of the rows whose times ascend, with `None` where a gap longer than `gap_s` (s) lies
 /// between two of them.
 pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(time_s.len());
@@ -18,7 +18,7 @@ pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     rows
 }
 
-/// The times of `rows`; a pause gets the middle of its two neighbours.
+/// The times of `rows`, s; a gap gets the middle of its two neighbours.
 pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
     let at = |k: usize| rows.get(k).copied().flatten().map_or(f64::NAN, |i| time_s[i]);
     (0..rows.len())
@@ -29,7 +29,7 @@ pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The values of `rows`; NaN at a pause or where `values` ends early.
+/// The values of `rows`; NaN at a gap or where `values` ends early.
 pub(crate) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }

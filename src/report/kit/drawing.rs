@@ -5,13 +5,13 @@ use crate::kit::html::escape;
 /// A drawing; its parts have the classes `body`, `wing` and `surface`.
 #[derive(Clone, Debug)]
 pub struct Drawing {
-    /// What it is.
+    /// Title of the drawing.
     pub title: String,
-    /// The same for those who do not see it.
+    /// Text alternative for readers who cannot see the drawing.
     pub said: String,
     /// Width and height, in the unit of its coordinates.
     pub size: [f64; 2],
-    /// Its elements, as SVG that holds no text of a user's.
+    /// SVG elements of the drawing, without text from a user.
     pub svg: String,
 }
 

@@ -7,10 +7,10 @@ use crate::kit::numbers::evidence;
 /// Longest bars, in thresholds; longer ones are cut, and marked.
 const FULL: f64 = 6.0;
 
-/// Bars of evidence divided by threshold: a line through all of them stands at one.
+/// Bars of evidence divided by threshold, with one line through all of them at one.
 #[derive(Clone, Debug)]
 pub struct Evidence {
-    /// What is shown.
+    /// Title of the figure.
     pub title: String,
     /// The groups, top to bottom.
     pub groups: Vec<EvidenceGroup>,
@@ -19,7 +19,7 @@ pub struct Evidence {
 /// Things that belong together.
 #[derive(Clone, Debug)]
 pub struct EvidenceGroup {
-    /// What they have in common.
+    /// Property that the rows of the group share.
     pub title: String,
     /// A sentence on it; may be empty.
     pub note: String,
@@ -29,21 +29,21 @@ pub struct EvidenceGroup {
     pub rows: Vec<EvidenceRow>,
 }
 
-/// One thing.
+/// One candidate: its evidence and the threshold under the null.
 #[derive(Clone, Debug)]
 pub struct EvidenceRow {
-    /// What it is called.
+    /// Name of the candidate.
     pub label: String,
-    /// What else there is to say of it; may be empty.
+    /// Further text on the candidate; may be empty.
     pub detail: String,
-    /// Its evidence; NaN if it could not be determined.
+    /// Evidence; NaN if it could not be determined.
     pub value: f64,
-    /// What chance reaches; NaN if it is not known.
+    /// Threshold of the evidence under the null; NaN if it is not known.
     pub threshold: f64,
 }
 
 impl EvidenceRow {
-    /// Evidence in thresholds.
+    /// Evidence divided by its threshold; NaN without a positive threshold.
     fn ratio(&self) -> f64 {
         if self.threshold > 0.0 { self.value / self.threshold } else { f64::NAN }
     }

@@ -11,13 +11,13 @@ use crate::{
 /// One figure of a section.
 #[derive(Clone, Debug)]
 pub enum Figure {
-    /// A sentence that says how it went.
+    /// Verdict on a flight in one sentence.
     Verdict(Verdict),
     /// The answer, before anything else.
     Answer(Box<AnswerBox>),
     /// Lines and areas, to scale.
     Drawing(Drawing),
-    /// Panels over time.
+    /// Panels of curves over time.
     Time(TimeFigure),
     /// Points or paths of one quantity against another.
     Xy(XyFigure),
@@ -25,21 +25,21 @@ pub enum Figure {
     Histogram(Histogram),
     /// Rows and columns of text.
     Table(Table),
-    /// Sentences that say what was found.
+    /// Findings, one sentence each.
     Findings(Findings),
     /// Alternatives of which one is seen.
     Choice(Choice),
     /// Lines over a quantity, by decades.
     Curves(Curves),
-    /// Means in bins.
+    /// Means in bins with their intervals.
     Intervals(Intervals),
     /// A signed quantity over two others.
     HeatMap(HeatMap),
-    /// Horizontal bars.
+    /// Horizontal bars from zero.
     Bars(Bars),
-    /// Bars against thresholds.
+    /// Bars of evidence against thresholds.
     Evidence(Evidence),
-    /// Values with intervals.
+    /// Values with their intervals.
     Whiskers(Whiskers),
     /// A table coloured by weight.
     Grid(Grid),
@@ -48,7 +48,7 @@ pub enum Figure {
 /// How a verdict came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// What was asked for was reached.
+    /// The goal was reached.
     Reached,
     /// Something that was asked for was missed.
     Missed,
@@ -56,12 +56,12 @@ pub enum Outcome {
     Open,
 }
 
-/// A sentence that says how it went, with the details that bear it out.
+/// Verdict in one sentence, with the details behind it.
 #[derive(Clone, Debug)]
 pub struct Verdict {
     /// How it came out; shown as a word as well as a colour.
     pub outcome: Outcome,
-    /// The sentence.
+    /// The verdict as one sentence.
     pub sentence: String,
     /// Shorter lines under it, in order.
     pub details: Vec<String>,
@@ -84,31 +84,32 @@ impl Verdict {
     }
 }
 
-/// What a line or a point stands for; each has a colour that a colour-blind reader can tell.
+/// Meaning of a line or point; the colours are distinguishable with colour blindness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
-    /// What was asked for: orange, dashed.
+    /// Commanded value: orange, dashed.
     Command,
-    /// What happened: blue.
+    /// Actual value: blue.
     Actual,
-    /// A second thing that happened: green.
+    /// Second actual value: green.
     Second,
-    /// A third thing that happened: purple.
+    /// Third actual value: purple.
     Third,
-    /// A fourth: ochre.
+    /// Fourth actual value: ochre.
     Fourth,
-    /// What was measured, where others were predicted: grey, and wide enough to be seen under them.
+    /// Measured value beside predicted ones: grey, and wide enough to be visible under them.
     Measured,
 }
 
 impl Style {
-    /// Of several alike, such as models, the one at `index`; they repeat after the fourth.
+    /// Style of item `index` among items of one kind, such as models; the styles repeat after the
+    /// fourth.
     pub fn nth(index: usize) -> Style {
         [Style::Actual, Style::Second, Style::Third, Style::Fourth][index % 4]
     }
 
-    /// Its name in the style sheet.
+    /// Name of the style in the style sheet.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Style::Command => "command",
@@ -126,6 +127,6 @@ impl Style {
 pub struct Rule {
     /// Where, in the unit of the axis.
     pub value: f64,
-    /// What it is, a word or two.
+    /// Name of the value, a word or two.
     pub label: String,
 }

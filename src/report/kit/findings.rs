@@ -1,17 +1,17 @@
-//! Findings in plain words, each with a link to what bears it out.
+//! Findings in plain words, each with a link to its evidence.
 
 use crate::kit::html::escape;
 
 /// Sentences, the leading ones large.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
-    /// What the reader must know first.
+    /// Findings that are shown first.
     pub lead: Vec<Finding>,
     /// The rest, in order.
     pub rest: Vec<Finding>,
 }
 
-/// A sentence.
+/// One finding, as a sentence.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// The sentence, with its full stop.

@@ -2,34 +2,34 @@
 
 use crate::kit::html::escape;
 
-/// Rows and columns of numbers from nothing to much.
+/// Table of numbers whose cells are shaded by weight.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// What is shown.
+    /// Title of the figure.
     pub title: String,
-    /// What the numbers are.
+    /// Quantity of the numbers.
     pub unit: String,
-    /// What the rows are.
+    /// Name of the rows, in the corner of the table.
     pub corner: String,
-    /// Heads of the columns: a sign, with what it stands for.
+    /// Heads of the columns: a sign with its meaning.
     pub columns: Vec<(String, String)>,
     /// The rows, top to bottom.
     pub rows: Vec<GridRow>,
 }
 
-/// One row.
+/// One row of cells.
 #[derive(Clone, Debug)]
 pub struct GridRow {
-    /// What it is.
+    /// Name of the row.
     pub label: String,
-    /// Its cells, as many as columns.
+    /// Cells of the row, as many as columns.
     pub cells: Vec<GridCell>,
 }
 
-/// One cell.
+/// One cell of a row.
 #[derive(Clone, Debug)]
 pub struct GridCell {
-    /// What it says; empty for nothing.
+    /// Text of the cell; may be empty.
     pub text: String,
     /// How strongly it is coloured, 0..1.
     pub weight: f64,

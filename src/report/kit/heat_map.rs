@@ -7,7 +7,7 @@ use crate::kit::html::{compact, escape};
 /// Cells coloured from blue (negative) to orange (positive).
 #[derive(Clone, Debug, Serialize)]
 pub struct HeatMap {
-    /// What is shown.
+    /// Title of the figure.
     #[serde(skip)]
     pub title: String,
     /// Name of the horizontal axis, with its unit.
@@ -28,14 +28,14 @@ pub struct HeatMap {
     pub cells: Vec<HeatCell>,
 }
 
-/// One cell.
+/// One cell of the map.
 #[derive(Clone, Debug, Serialize)]
 pub struct HeatCell {
-    /// Column, from 0.
+    /// Column of the cell, from 0.
     pub x: usize,
-    /// Row, from 0.
+    /// Row of the cell, from 0.
     pub y: usize,
-    /// Its value, in the figure's unit.
+    /// Value of the cell, in the figure's unit.
     #[serde(serialize_with = "compact_one")]
     pub value: f64,
     /// Independent samples in it.

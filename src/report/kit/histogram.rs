@@ -11,12 +11,12 @@ const BINS_PER_DECADE: f64 = 20.0;
 /// Counts in bins, with both axes logarithmic: rare large values stay visible.
 #[derive(Clone, Debug, Serialize)]
 pub struct Histogram {
-    /// What is shown.
+    /// Title of the figure.
     #[serde(skip)]
     pub title: String,
     /// Name of the horizontal axis, with its unit.
     pub x_label: String,
-    /// What is counted, in the plural.
+    /// Name of the counted items, in the plural.
     pub counted: String,
     /// Edges of the bins, ascending, one more than counts.
     #[serde(serialize_with = "compact")]

@@ -1,4 +1,4 @@
-//! Text and data made safe to stand inside an HTML page.
+//! Text and data escaped for an HTML page.
 
 use serde::{Serialize, Serializer};
 
@@ -21,8 +21,8 @@ pub fn escape(text: &str) -> String {
     safe
 }
 
-/// `data` as JSON that may stand in a `<script>` element: no `<` is left in it, so neither
-/// `</script>` nor `<!--` can end it.
+/// `data` as JSON for a `<script>` element: no `<` is left in it, so neither `</script>` nor `<!--`
+/// can end it.
 pub(crate) fn script_json<T: Serialize>(data: &T) -> String {
     serde_json::to_string(data)
         .expect("figures are structs of strings and numbers, which JSON can hold")

@@ -13,18 +13,18 @@ pub struct Intervals {
     pub y_label: String,
     /// Unit of the means.
     pub unit: String,
-    /// What the lines of every panel stand for, in their order.
+    /// Names of the lines in every panel, in their order.
     pub keys: Vec<(String, Style)>,
-    /// The panels.
+    /// One panel for each quantity.
     pub panels: Vec<IntervalPanel>,
 }
 
 /// One quantity in bins.
 #[derive(Clone, Debug, Serialize)]
 pub struct IntervalPanel {
-    /// What was binned.
+    /// Name of the binned quantity.
     pub title: String,
-    /// Its unit; empty when it has none.
+    /// Unit of the quantity; empty for a dimensionless one.
     pub unit: String,
     /// Names at 0, 1, 2 …, when the bins are no intervals.
     pub names: Vec<String>,
@@ -44,13 +44,13 @@ pub struct IntervalBins {
     /// Where the mean is drawn.
     #[serde(serialize_with = "compact")]
     pub center: Vec<f64>,
-    /// The means.
+    /// Mean of each bin.
     #[serde(serialize_with = "compact")]
     pub mean: Vec<f64>,
     /// Lower ends of the 95 % intervals.
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper ends.
+    /// Upper ends of the 95 % intervals.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
     /// Independent samples in each.

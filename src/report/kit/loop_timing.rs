@@ -12,9 +12,9 @@ pub struct Cycle {
 /// How long each cycle of the control loop took.
 #[derive(Clone, Debug)]
 pub struct LoopTiming {
-    /// What was timed, such as "state frame to actuator command".
+    /// Name of the timed interval, such as "state frame to actuator command".
     pub measure: String,
-    /// What a cycle may take, µs; a cycle that takes longer is late.
+    /// Budget of a cycle, µs; a cycle that takes longer is late.
     pub budget_us: f64,
     /// The cycles, in time order.
     pub cycles: Vec<Cycle>,

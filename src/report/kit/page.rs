@@ -22,7 +22,7 @@ const THEME_SCRIPT: &str = include_str!("assets/theme.js");
 /// A page: a title over sections.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
-    /// Its title, also that of the browser's tab.
+    /// Title of the page, also that of the browser's tab.
     pub title: String,
     /// A line under the title.
     pub subtitle: String,
@@ -43,13 +43,13 @@ pub struct Section {
     pub folding: Folding,
 }
 
-/// Whether a section is seen at first.
+/// Whether a section is open at first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Folding {
-    /// It is.
+    /// Open when the page loads.
     #[default]
     Open,
-    /// Its heading is; a click opens it.
+    /// Closed when the page loads; a click on the heading opens it.
     Folded,
 }
 
@@ -104,7 +104,7 @@ impl Section {
         Section { title: title.into(), note: note.into(), figures, folding: Folding::Open }
     }
 
-    /// The same, of which the heading alone is seen at first.
+    /// The section closed at first, with its heading only.
     pub fn folded(self) -> Self {
         Section { folding: Folding::Folded, ..self }
     }

@@ -5,10 +5,10 @@ use crate::kit::html::escape;
 /// Letters above which a text of the last column is broken into lines of some width.
 const LONG: usize = 28;
 
-/// A table.
+/// A table of text with column heads.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
-    /// What it holds, read out before it and not shown; may be empty.
+    /// Caption for screen readers, not displayed; may be empty.
     pub caption: String,
     /// The columns, left to right.
     pub columns: Vec<Column>,
@@ -16,32 +16,32 @@ pub struct Table {
     pub rows: Vec<Row>,
 }
 
-/// A column's head.
+/// Head of a column.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// Its title, with the unit of its numbers.
+    /// Title of the column, with the unit of its numbers.
     pub title: String,
-    /// Where its text stands.
+    /// Alignment of the column's text.
     pub align: Align,
 }
 
-/// Where the text of a column stands.
+/// Alignment of a column's text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
-    /// Words.
+    /// Left, for words.
     Left,
-    /// Numbers.
+    /// Right, for numbers.
     Right,
 }
 
-/// One row.
+/// One row of a table.
 #[derive(Clone, Debug, Default)]
 pub struct Row {
     /// Text of each column.
     pub cells: Vec<String>,
     /// Start and end, s, of the time it speaks of: its first cell then zooms the time figures there.
     pub span_s: Option<[f64; 2]>,
-    /// What a link of the page calls it.
+    /// Name by which a link of the page finds the row.
     pub anchor: Option<String>,
     /// The anchor that its first cell leads to.
     pub link: Option<String>,

@@ -16,7 +16,7 @@ pub struct TimeFigure {
     pub tracks: Vec<Track>,
     /// Instants marked in every panel.
     pub marks: Vec<Mark>,
-    /// What stands under the panels: what was left out or thinned.
+    /// Notes under the panels on what was dropped or thinned.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
@@ -32,7 +32,7 @@ pub struct Track {
 /// One pair of axes over time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Panel {
-    /// What is shown.
+    /// Title of the panel.
     pub title: String,
     /// Unit of the values, empty when they have none.
     pub unit: String,
@@ -42,7 +42,7 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Shaded bands behind the lines.
     pub bands: Vec<Band>,
-    /// Levels.
+    /// Horizontal lines at fixed levels.
     pub rules: Vec<Rule>,
 }
 
@@ -64,7 +64,7 @@ impl Panel {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
-    /// Evenly.
+    /// Linear axis.
     Linear,
     /// By decades from `floor` (in the unit of the panel) up; smaller values are drawn at `floor`.
     Log {
@@ -76,9 +76,9 @@ pub enum Scale {
 /// One line of a panel.
 #[derive(Clone, Debug, Serialize)]
 pub struct Series {
-    /// Its name in the legend.
+    /// Name of the series in the legend.
     pub label: String,
-    /// What it stands for.
+    /// Meaning of the series, which sets its colour.
     pub style: Style,
     /// One value for each time of the track; what is not finite is a gap.
     #[serde(serialize_with = "compact")]
@@ -103,11 +103,11 @@ pub struct Band {
     pub around: usize,
     /// Distance from the line to either edge, in the unit of the panel.
     pub half_width: f64,
-    /// Its name in the legend.
+    /// Name of the band in the legend.
     pub label: String,
 }
 
-/// A marked instant.
+/// A marked instant of time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mark {
     /// When, s, on the page's clock.
@@ -117,11 +117,11 @@ pub struct Mark {
 }
 
 impl TimeFigure {
-    /// Adds panels sampled at `time_s` (s, ascending; rows out of order are left out).
+    /// Adds panels sampled at `time_s` (s, ascending; rows out of order are dropped).
     ///
-    /// A series without one finite value is left out, as is a panel without series; a pause longer
+    /// A series without one finite value is left out, as is a panel without series; a gap longer
     /// than `gap_s` breaks the lines; more than 20,000 rows are thinned to the extremes of equal
-    /// groups. Each of these is said in the notes.
+    /// groups. The notes state each of these.
     pub fn add_track(&mut self, time_s: &[f64], gap_s: f64, panels: Vec<Panel>) {
         let mut panels = self.without_missing(panels);
         if panels.is_empty() {

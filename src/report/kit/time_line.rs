@@ -23,7 +23,7 @@ const POINTS: usize = 800;
 /// States and lines over time.
 #[derive(Clone, Debug, Default)]
 pub struct TimeLine {
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
     /// Start and end, s.
     pub span_s: [f64; 2],
@@ -40,7 +40,7 @@ pub struct TimeLine {
 /// A row of states, one after the other.
 #[derive(Clone, Debug)]
 pub struct States {
-    /// Whose they are.
+    /// Name of the party whose states these are.
     pub label: String,
     /// The states, in order of time; between two may be nothing.
     pub spans: Vec<Span>,
@@ -51,42 +51,42 @@ pub struct States {
 pub struct Span {
     /// Start and end, s.
     pub time_s: [f64; 2],
-    /// Its name.
+    /// Name of the state.
     pub word: String,
-    /// What kind of state it is.
+    /// Kind of the state.
     pub tone: Tone,
 }
 
-/// What kind of state it is; each has a colour beside its word.
+/// Kind of a state; each has a colour beside its word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// Nothing is done.
+    /// No activity.
     Idle,
     /// On the way to something.
     Begins,
-    /// What was asked for is done.
+    /// The commanded activity.
     Asked,
-    /// Something safe is done in its place.
+    /// A safe activity in place of the commanded one.
     Safe,
-    /// Something is wrong.
+    /// A failure.
     Wrong,
 }
 
 /// Lines on one pair of axes.
 #[derive(Clone, Debug)]
 pub struct Traces {
-    /// What they show, with its unit.
+    /// Name of the vertical axis, with its unit.
     pub label: String,
     /// The lines, in drawing order.
     pub lines: Vec<TraceLine>,
 }
 
-/// A line.
+/// A curve over time.
 #[derive(Clone, Debug)]
 pub struct TraceLine {
-    /// Its name.
+    /// Name of the curve.
     pub label: String,
-    /// Its colour.
+    /// Colour and stroke of the curve.
     pub style: crate::Style,
     /// Time (s) and value; what is not finite is a gap.
     pub points: Vec<[f64; 2]>,
@@ -190,7 +190,7 @@ impl TimeLine {
         )
     }
 
-    /// What is shaded and marked behind lines.
+    /// SVG of shaded stretches and marks behind the lines.
     fn behind(&self) -> String {
         let shaded = self.shaded_s.map_or_else(String::new, |[from, to]| {
             let [from, to] = [from, to].map(|t| self.place(t));

@@ -7,18 +7,19 @@ use crate::{Scale, Style};
 /// Room beside the outermost intervals, in the width of all of them.
 const ROOM: f64 = 0.06;
 
-/// Values with intervals.
+/// Figure of values with intervals, one to a row.
 #[derive(Clone, Debug)]
 pub struct Whiskers {
-    /// What is shown.
+    /// Title of the figure.
     pub title: String,
     /// The unit of the scale.
     pub unit: String,
-    /// How values become places; what is not positive stands at the floor of a scale by decades.
+    /// Mapping of values to positions; on a logarithmic scale, values that are not positive are
+    /// drawn at its floor.
     pub scale: Scale,
-    /// Where upright lines stand behind the values, in the unit.
+    /// Positions of vertical lines behind the values, in the unit.
     pub lines: Vec<f64>,
-    /// What the lines stand for.
+    /// Explanation of the lines, under the figure.
     pub legend: String,
     /// The values, top to bottom.
     pub rows: Vec<Whisker>,
@@ -27,7 +28,7 @@ pub struct Whiskers {
 /// A value with its interval.
 #[derive(Clone, Debug)]
 pub struct Whisker {
-    /// What it is.
+    /// Name of the value.
     pub label: String,
     /// How it is drawn.
     pub style: Style,
@@ -35,7 +36,7 @@ pub struct Whisker {
     pub value: f64,
     /// The ends of its 95 % interval.
     pub interval: [f64; 2],
-    /// The same in words.
+    /// The value with its interval as text.
     pub text: String,
 }
 

@@ -9,7 +9,7 @@ use tempfile::{Builder, NamedTempFile};
 /// Why a file was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// A file of that name stands there.
+    /// A file of that name exists.
     #[error("{path} is already there, and was left as it is: choose another name, or move it away")]
     Exists {
         /// The file that was asked for.
@@ -22,7 +22,7 @@ pub enum WriteError {
     Io {
         /// The file that was asked for.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

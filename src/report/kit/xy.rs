@@ -8,7 +8,7 @@ use crate::kit::html::{compact, escape};
 /// A pair of axes with points or paths.
 #[derive(Clone, Debug, Serialize)]
 pub struct XyFigure {
-    /// What is shown.
+    /// Title of the figure.
     #[serde(skip)]
     pub title: String,
     /// Name of the horizontal axis, with its unit.
@@ -17,22 +17,22 @@ pub struct XyFigure {
     pub y_label: String,
     /// Shaded ranges behind what is drawn.
     pub bands: Vec<XyBand>,
-    /// What is drawn, in drawing order.
+    /// Points and paths, in drawing order.
     pub series: Vec<XySeries>,
 }
 
 /// A shaded range over the horizontal axis.
 #[derive(Clone, Debug, Serialize)]
 pub struct XyBand {
-    /// Its name in the legend.
+    /// Name of the band in the legend.
     pub label: String,
-    /// Horizontal values, ascending.
+    /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
     /// Lower edge, as many values as horizontal ones.
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper edge, likewise.
+    /// Upper edge, as many values as horizontal ones.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
 }
@@ -40,9 +40,9 @@ pub struct XyBand {
 /// Points of one kind.
 #[derive(Clone, Debug, Serialize)]
 pub struct XySeries {
-    /// Its name in the legend.
+    /// Name of the series in the legend.
     pub label: String,
-    /// What it stands for.
+    /// Meaning of the series, which sets its colour.
     pub style: Style,
     /// How it is drawn.
     pub mark: XyMark,
@@ -64,9 +64,9 @@ pub enum XyMark {
     Line,
     /// Small filled points, where there are many.
     Dots,
-    /// Open circles.
+    /// Open circles at the points.
     Circles,
-    /// Crosses.
+    /// Crosses at the points.
     Crosses,
 }
 

@@ -145,8 +145,8 @@ impl Aircraft {
 
     pub(super) fn hear(&mut self, bytes: &[u8]) {
         match self {
-            Aircraft::Sitl(bench) => bench.hear(bytes),
-            Aircraft::Real(controller) => controller.hear(bytes),
+            Aircraft::Sitl(bench) => bench.receive(bytes),
+            Aircraft::Real(controller) => controller.receive(bytes),
         }
     }
 

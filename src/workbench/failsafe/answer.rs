@@ -1,4 +1,4 @@
-//! What came of a flight, as HTML: verdict, time lines, what was said, rules, the scenario with its command.
+//! Result of a flight as HTML: verdict, time lines, texts, rules, the scenario with its command.
 
 use super::Flown;
 use super::verdict::Happened;
@@ -12,7 +12,7 @@ const FILE: &str = "scenario.json";
 /// A rule at this distance is far from broken.
 const FAR: f64 = 0.9995;
 
-/// What came of the flight.
+/// HTML of the result of a flight.
 pub(super) fn html(flown: &Flown) -> String {
     let close_up = flown.close_up().as_ref().map_or_else(String::new, TimeLine::html);
     format!(
@@ -26,7 +26,7 @@ pub(super) fn html(flown: &Flown) -> String {
     )
 }
 
-/// What the colours of the bands mean.
+/// Legend of the bands' colours, as HTML.
 const KEY: &str = "<ul class=\"tones\"><li><i class=\"tone-asked\"></i>flies what is asked</li>\
                    <li><i class=\"tone-safe\"></i>flies level by itself</li><li><i class=\"tone-begins\"></i>on the way, or a failsafe's mode</li>\
                    <li><i class=\"tone-wrong\"></i>fault, failsafe</li><li><i class=\"tone-idle\"></i>does nothing</li></ul>\n";

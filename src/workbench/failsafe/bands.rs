@@ -11,7 +11,7 @@ use greylag_sim::faults::{ControllerMode, Fault};
 /// Time before and after what happens first that is shown large, s.
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
-/// A decision as old as this says nothing of now, s.
+/// A decision older than this is no longer in force, s.
 const STALE_S: f64 = 0.2;
 /// A moment, such as a request, is drawn as long as this, s.
 const MOMENT_S: f64 = 0.1;
@@ -20,7 +20,7 @@ const MOMENT_S: f64 = 0.1;
 type Seen = Option<(String, Tone)>;
 
 impl Flown {
-    /// The whole flight.
+    /// Time line of the whole flight.
     pub(super) fn time_line(&self) -> TimeLine {
         let (shaded_s, marks_s) = (self.shaded(), self.marks());
         TimeLine {
@@ -71,7 +71,7 @@ impl Flown {
         rows
     }
 
-    /// What goes wrong and is asked for.
+    /// Band of the faults and requests.
     fn befalls(&self) -> States {
         let of_fault = |f: &Fault| Span {
             time_s: [f.from_s, f.to_s.max(f.from_s + MOMENT_S)],
@@ -150,7 +150,7 @@ pub(super) fn companion(s: &Sample) -> Seen {
     })
 }
 
-/// Whose command was decided on.
+/// Source of the actuator command in a sample.
 fn command(s: &Sample, controller: &str) -> Seen {
     let decision = s.decision.filter(|_| s.age_s <= STALE_S)?;
     let (word, tone) = match decision.source {
@@ -165,7 +165,7 @@ fn command(s: &Sample, controller: &str) -> Seen {
     Some((word.into(), tone))
 }
 
-/// Whose the aircraft is.
+/// Party in control of the aircraft in a sample.
 fn owner(s: &Sample, stack: &str) -> Seen {
     Some(match (s.engaged, s.steered) {
         (true, true) if s.confirmed => ("the companion's".into(), Tone::Asked),

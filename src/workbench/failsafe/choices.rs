@@ -1,4 +1,4 @@
-//! What can be chosen: counterparts, controllers, faults, requests, each with its words.
+//! Choices of the form with their texts: counterparts, controllers, faults, requests.
 
 use greylag_control::{ControllerKind, Pace};
 use greylag_sim::faults::{Asking, Counterpart, FaultKind};
@@ -7,7 +7,7 @@ use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 pub(super) const NOTHING: &str = "none";
 /// The client arms and asks for OFFBOARD once more.
 pub(super) const AGAIN: &str = "again";
-/// Requests: value, words.
+/// Requests of the client: form value, displayed text.
 pub(super) const REQUESTS: [(&str, &str); 7] = [
     (NOTHING, "Nothing"),
     (AGAIN, "Client arms, then OFFBOARD, again"),
@@ -26,7 +26,7 @@ pub(super) fn controllers() -> impl Iterator<Item = ControllerKind> {
     ControllerKind::ALL.iter().copied().filter(|kind| kind.pace() == Pace::Immediate)
 }
 
-/// What a counterpart is called.
+/// Name of a counterpart.
 pub(super) fn counterpart(counterpart: Counterpart) -> &'static str {
     match counterpart {
         Counterpart::Sitl => "Simulator",
@@ -59,7 +59,7 @@ pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Disk,
 ];
 
-/// What a fault is called, and what it does with strength from 0 to 100 %.
+/// Name of a fault, and its effect as the strength goes from 0 to 100 %.
 pub(super) fn fault(kind: FaultKind) -> (&'static str, &'static str) {
     match kind {
         FaultKind::Unplug => ("Link cut", "Nothing passes between companion and vehicle."),
@@ -98,7 +98,7 @@ pub(super) fn fault(kind: FaultKind) -> (&'static str, &'static str) {
     }
 }
 
-/// What a request is called where it happens.
+/// Text of a request in the list of events.
 pub(super) fn request(asking: Asking) -> &'static str {
     match asking {
         Asking::Offboard => "client asks for OFFBOARD",

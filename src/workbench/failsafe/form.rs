@@ -19,7 +19,7 @@ const LEVEL_DEG: f64 = 3.0;
 const HOLD_S: f64 = 8.0;
 /// Time from arming to asking for OFFBOARD, s.
 const AFTER_ARMING_S: f64 = 0.1;
-/// Largest seed.
+/// Largest seed that the form accepts.
 const SEED: u64 = 999_999;
 
 /// Names of the fields with their defaults: a link that is cut in a turn, and a client that asks again later.
@@ -84,11 +84,11 @@ pub(super) struct Form {
 pub(super) struct Wrong {
     /// The field; empty for one that the form has not.
     pub field: &'static str,
-    /// What is wrong, and what to do.
+    /// Error in words, with a remedy.
     pub why: String,
 }
 
-/// What is flown.
+/// A scenario and the controller that flies it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chosen {
     pub scenario: Scenario,
@@ -111,7 +111,7 @@ impl Form {
         (form, wrong)
     }
 
-    /// The value of a field as it was typed.
+    /// The value of a field as the user entered it.
     pub fn value(&self, field: &str) -> &str {
         self.values.iter().find(|(name, _)| *name == field).map_or("", |(_, value)| value)
     }
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_choice_is_said_with_what_to_do() {
+    fn an_invalid_choice_is_refused_with_a_remedy() {
         for (field, value, why) in [
             (
                 "from_s",

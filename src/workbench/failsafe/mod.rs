@@ -1,5 +1,6 @@
-//! Failsafes to click through: a flight under a fault is chosen on a page, flown by the companion's own pilot in lockstep,
-//! and shown: who flew when, what was said, which rules of flight held.
+//! Interactive failsafe scenarios. A page selects a fault, the companion's own pilot flies it in
+//! lockstep, and the page shows who was in control when, which texts were sent and which rules of
+//! flight held.
 
 mod answer;
 mod bands;
@@ -17,7 +18,7 @@ use greylag_sim::faults::policies::{Policy, policies};
 use greylag_sim::faults::search::judged;
 use greylag_sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
 
-/// Makes the companions with a controller, or says why it cannot.
+/// Makes the companions with a controller; the error is a message for the page.
 type Make = Box<dyn Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync>;
 /// Stack of the thread that designs a controller, bytes: dual numbers are large where nothing is optimised away.
 const STACK: usize = 16 << 20;
@@ -25,7 +26,7 @@ const STACK: usize = 16 << 20;
 /// Flies what the page asks for.
 pub struct Failsafes {
     make: Make,
-    /// What was made before: a design takes a moment.
+    /// Companions made so far, by controller: the design of one takes a moment.
     made: Mutex<HashMap<&'static str, Arc<CompanionFactory>>>,
 }
 
@@ -39,7 +40,7 @@ struct Flown {
     judged: Vec<Option<(f64, f64)>>,
 }
 
-/// What a request for the page is answered.
+/// Answer to a request for the page.
 #[derive(Debug)]
 pub struct Answer {
     /// The page, as HTML.
@@ -56,8 +57,8 @@ impl Failsafes {
         Failsafes { make: Box::new(make), made: Mutex::default() }
     }
 
-    /// The page for the choices in `query`, names and values as they come; what is not chosen is the default. A choice that
-    /// is none, or a flight that cannot be flown, is said on the page.
+    /// The page for the choices in `query` (names and values of the form's fields); a missing field has its default. The
+    /// page shows the error of an invalid choice, or of a flight that cannot be flown.
     pub fn page(&self, query: &[(String, String)]) -> Answer {
         let (form, unknown) = Form::of(query);
         let chosen = match unknown {

@@ -1,4 +1,4 @@
-//! The page: the choices, and beside them what came of them.
+//! The page: the choices, and beside them the result.
 
 use super::choices::{
     FAULTS, NOTHING, REQUESTS, TURBULENCE, controllers, counterpart, fault, file_name,
@@ -46,7 +46,7 @@ pub(super) fn render(form: &Form, wrong: Option<&Wrong>, shown: &str) -> String 
     )
 }
 
-/// What is shown where a choice is none.
+/// HTML in place of the result for an invalid choice.
 pub(super) fn refused(wrong: &Wrong) -> String {
     let (field, why) = (wrong.field, escape(&wrong.why));
     format!(
@@ -54,7 +54,7 @@ pub(super) fn refused(wrong: &Wrong) -> String {
     )
 }
 
-/// What is shown where a flight cannot be flown.
+/// HTML in place of the result for a flight that cannot be flown.
 pub(super) fn failed(why: &str) -> String {
     format!("<p class=\"bad\" role=\"alert\" id=\"wrong\">Cannot fly: {}</p>\n", escape(why))
 }
@@ -106,7 +106,7 @@ fn choices(form: &Form, wrong: Option<&Wrong>) -> String {
     )
 }
 
-/// What has to be known of every flight of the page.
+/// Conditions that all flights of the page share.
 const NOTE: &str = "60 s of the X8 as shipped. The attitude is asked for from 8 to 45 s; level before and after. The flight \
                     controllers are played: their modes, time-outs and rules, not their firmware.";
 
@@ -139,7 +139,7 @@ fn select(
     )
 }
 
-/// The faults; each says whether it has a length and a strength, and what it does.
+/// Options of the field `fault`, each with its length and strength fields and its description.
 fn faults(form: &Form, wrong: Option<&Wrong>) -> String {
     let chosen = form.value("fault");
     let nothing = if chosen == NOTHING { " selected" } else { "" };
@@ -192,7 +192,7 @@ fn group(name: &str, legend: &str, options: &[(&str, &str)], form: &Form) -> Str
     )
 }
 
-/// How a field says that it is wrong.
+/// HTML attribute that marks an invalid field.
 fn state(name: &str, wrong: Option<&Wrong>) -> &'static str {
     match wrong.is_some_and(|w| w.field == name) {
         true => " aria-invalid=\"true\"",

@@ -1,4 +1,4 @@
-//! What happened in a flight: the events by time, and the verdict in a sentence.
+//! Events of a flight in order of time, and the verdict in one sentence.
 
 use super::Flown;
 use super::bands::{companion, spans};
@@ -14,7 +14,7 @@ use greylag_sim::faults::{Asking, Fault, Finding, Found};
 const NAMED: usize = 4;
 /// Arming and asking for OFFBOARD within this time are one request, s.
 const TOGETHER_S: f64 = 0.2;
-/// What has not changed after this time did not, s.
+/// Time after a cause at which its effect is evaluated, s.
 const LATER_S: f64 = 2.0;
 
 /// A loss of altitude that the sentence mentions, m.
@@ -28,7 +28,7 @@ struct Cause {
     asked: Option<(f64, Asking)>,
 }
 
-/// Something that happened.
+/// One event of the flight, at its time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Happened {
     pub at_s: f64,
@@ -36,21 +36,21 @@ pub(super) struct Happened {
     pub what: String,
 }
 
-/// Who did or said it.
+/// Party that caused an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Who {
-    /// The scenario.
+    /// The injected fault of the scenario.
     Fault,
     /// The client, or a ground station.
     Client,
-    /// The companion.
+    /// The companion computer's program.
     Companion,
-    /// The flight controller.
+    /// The flight controller's firmware.
     Controller,
 }
 
 impl Who {
-    /// What the page calls it.
+    /// Name of the party on the page.
     pub fn name(self, stack: Option<&'static str>) -> &'static str {
         match self {
             Who::Fault => "fault",
@@ -62,7 +62,7 @@ impl Who {
 }
 
 impl Flown {
-    /// Everything that happened or was said, by time.
+    /// All events and texts of the flight, in order of time.
     pub(super) fn events(&self) -> Vec<Happened> {
         let mut all = self.befallen();
         let said = |(at_s, words): &(f64, String)| Happened {
@@ -111,7 +111,7 @@ impl Flown {
         })
     }
 
-    /// What was done, by time, as clauses.
+    /// Actions in order of time, as clauses.
     fn deeds(&self) -> Vec<(f64, String)> {
         let mut all: Vec<(f64, String)> = Vec::new();
         for (k, pair) in self.witnessed.samples.windows(2).enumerate() {
@@ -144,7 +144,8 @@ impl Flown {
         [companion, controller]
     }
 
-    /// What happened and what came of it: a sentence for each cause, how it ended, how the rules stand.
+    /// One sentence for each cause with its consequence, one on the end of the flight, one on the
+    /// rules.
     pub(super) fn sentence(&self) -> String {
         let causes = self.causes();
         let deeds = self.deeds();
@@ -169,7 +170,7 @@ impl Flown {
         format!("{text}{}{} {}", self.end(), self.lost(), self.rules_in_words())
     }
 
-    /// What goes wrong and what is asked for, by time.
+    /// Faults and requests in order of time.
     fn causes(&self) -> Vec<Cause> {
         let of_fault = |f: &Fault| {
             let (name, from, to) = (fault(f.kind).0, f.from_s, f.to_s);
@@ -199,7 +200,7 @@ impl Flown {
         all
     }
 
-    /// What a cause came to after which nothing changed hands.
+    /// Clause for a cause after which control did not change hands.
     fn nothing_changed(&self, cause: &Cause) -> String {
         match cause.asked.map(|(at_s, what)| self.answer(at_s, what)) {
             Some(Some(Verdict::Rejected(why) | Verdict::Denied(why))) => return why.clone(),
@@ -220,7 +221,7 @@ impl Flown {
         samples.get(((cause.at_s + LATER_S) / TICK_S) as usize).or(samples.last())
     }
 
-    /// Who is left with an aircraft that nobody flies, if so after a cause.
+    /// Party left with an aircraft that nobody controls after a cause; `None` if somebody does.
     fn left_alone(&self, cause: &Cause) -> Option<String> {
         let later = self.later(cause).filter(|s| s.shown.is_none() && s.steered)?;
         let counterpart = self.scenario.counterpart;
@@ -239,7 +240,7 @@ impl Flown {
         answers.find(|(at_s, what, _)| *what == asked && near(*at_s)).map(|(.., verdict)| verdict)
     }
 
-    /// How it ended.
+    /// How the flight ended, in one sentence.
     fn end(&self) -> String {
         let Some(last) = self.witnessed.samples.last() else { return String::new() };
         let found = |finding| self.witnessed.findings.iter().find(|f| f.finding == finding);
@@ -271,7 +272,7 @@ impl Flown {
         if lost < MUCH_M { String::new() } else { format!(" The aircraft lost {lost:.0} m.") }
     }
 
-    /// How the rules stand.
+    /// Sentence on the rules of flight: all hold, or which are broken.
     fn rules_in_words(&self) -> String {
         let judged = self.judged.iter().zip(&self.rules);
         let judged: Vec<_> =

@@ -28,18 +28,18 @@ pub struct Live {
     pub states: BTreeMap<&'static str, Column>,
     /// Specific force (m/s², body x, y, z), then angular acceleration (rad/s²), as measured.
     pub measured: [Column; 6],
-    /// What the models say of it.
+    /// Predictions of the models for this part.
     pub models: Vec<Watched>,
-    /// What their monitors said.
-    pub warnings: Vec<Heard>,
+    /// Warnings of the models' monitors.
+    pub warnings: Vec<Warning>,
 }
 
-/// What a model says of a flight, in the channels of [`Live::measured`].
+/// Predictions of one model, in the channels of [`Live::measured`].
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Watched {
-    /// The model.
+    /// Name of the model.
     pub model: String,
-    /// Predicted.
+    /// Predicted channels, in the units of [`Live::measured`].
     pub predicted: [Column; 6],
     /// Half width of the monitor's band, two standard deviations.
     pub band: [Column; 6],
@@ -49,14 +49,14 @@ pub struct Watched {
 
 /// A warning of a model's monitor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Heard {
+pub struct Warning {
     /// When, s on the vehicle's clock.
     pub time_s: f64,
     /// The model, by its place.
     pub model: usize,
     /// The channel, by its place.
     pub channel: usize,
-    /// What was said.
+    /// The warning in words.
     pub text: String,
 }
 
@@ -117,7 +117,7 @@ struct Point {
 }
 
 impl Watcher {
-    /// Watches with `models`.
+    /// A watcher with one monitor for each of `models`.
     pub fn new(models: &[GreyBox]) -> Watcher {
         let of = |model: &GreyBox| (model.name.clone(), Monitor::new(model.clone()));
         Watcher { models: models.iter().map(of).collect(), point: None }
@@ -142,7 +142,7 @@ impl Watcher {
             for (m, (_, monitor)) in self.models.iter_mut().enumerate() {
                 if let Some(warning) = monitor.see(&frame) {
                     let channel = Channel::ALL.iter().position(|c| *c == warning.channel);
-                    live.warnings.push(Heard {
+                    live.warnings.push(Warning {
                         time_s: row.time_s,
                         model: m,
                         channel: channel.unwrap_or_default(),
@@ -200,7 +200,7 @@ impl Point {
 }
 
 impl Live {
-    /// Takes on what came later; how many of the oldest points were let go.
+    /// Appends a later part; returns the number of oldest points that were dropped.
     pub fn append(&mut self, later: Live) -> usize {
         self.time_s.extend(later.time_s);
         for (name, column) in later.states {
@@ -238,7 +238,8 @@ impl Watched {
     }
 }
 
-/// A row as the monitor takes it. What is missing is a fault of the frame, which the monitor does not compare.
+/// A row converted for the monitor. A missing value is a fault of the frame, which the monitor does
+/// not compare.
 fn frame(row: &Sample) -> Telemetry {
     let [roll, pitch, yaw] = row.attitude_rad;
     let [p, q, r] = row.rates_radps;

@@ -14,7 +14,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 pub(super) use live::channels;
-pub use live::{Heard, Live};
+pub use live::{Live, Warning};
 pub use order::Order;
 pub(super) use order::{AIRCRAFT, SCHEDULES, controllers};
 
@@ -30,22 +30,22 @@ use program::Program;
 
 /// The folder of recordings, below the session's.
 const FLIGHTS: &str = "flights";
-/// The recording's log.
+/// File name of a recording's log.
 const LOG: &str = "flight.csv";
 /// Time between two looks at the recording.
 const LOOK: Duration = Duration::from_millis(100);
 /// Characters that are kept of a program's last line.
-const SAID: usize = 400;
+const LINE_LENGTH: usize = 400;
 
 /// The flight that is flown or watched, or that was last.
 pub struct Flying {
-    /// Its number.
+    /// Number of the flight, which names its folder.
     pub number: u64,
-    /// Its place among the session's flights.
+    /// Index of the flight in the session's list of flights.
     pub place: usize,
-    /// Whether it goes on.
+    /// Whether the flight is in progress.
     pub on: bool,
-    /// What was seen of it.
+    /// Samples, predictions and warnings so far.
     pub live: Live,
     /// Points dropped from the start of `live`, so that it stays short.
     pub gone: usize,
@@ -55,17 +55,17 @@ pub struct Flying {
 /// A part of a flight as a page is sent it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Part {
-    /// The flight's number.
+    /// Number of the flight.
     pub number: u64,
-    /// Whether it goes on.
+    /// Whether the flight is in progress.
     pub on: bool,
     /// Points of the flight before this part.
     pub from: usize,
-    /// The part.
+    /// Samples, predictions and warnings of the part.
     pub live: Live,
 }
 
-/// What a flight is flown or watched with.
+/// Inputs of the thread that follows a flight.
 struct Task {
     number: u64,
     log: PathBuf,
@@ -148,11 +148,11 @@ impl Bench {
             inner.flying = inner.flying.take().filter(|f| f.place < flown);
         })?;
         let bench = self.clone();
-        std::thread::spawn(move || bench.attend(task));
+        std::thread::spawn(move || bench.follow(task));
         Ok(())
     }
 
-    /// Ends the flight.
+    /// Stops the flight, or the watching of a recording.
     pub(super) fn stop_flight(&self) -> Result<(), WorkbenchError> {
         let inner = self.lock();
         let flying = inner.flying.as_ref().filter(|f| f.on);
@@ -185,7 +185,7 @@ impl Bench {
     }
 
     /// Follows the recording until its end.
-    fn attend(self: &Arc<Self>, mut task: Task) {
+    fn follow(self: &Arc<Self>, mut task: Task) {
         let mut watcher = Watcher::new(&task.models);
         let mut tail = Tail::default();
         let mut trouble = None;
@@ -215,8 +215,8 @@ impl Bench {
             }
         };
         self.seen(task.number, watcher.rest());
-        let said = trouble.or(task.program.as_ref().map(Program::last_words)).unwrap_or_default();
-        self.landed(task.number, outcome, &said, tail.seconds());
+        let last = trouble.or(task.program.as_ref().map(Program::last_line)).unwrap_or_default();
+        self.record_end(task.number, outcome, &last, tail.seconds());
     }
 
     /// Notes a part of the flight, and sends it to the pages.
@@ -229,21 +229,22 @@ impl Bench {
         let from = flying.gone + flying.live.time_s.len();
         flying.gone += flying.live.append(later.clone());
         drop(inner);
-        (self.hear)(Event::Flight { part: Part { number, on: true, from, live: later } });
+        (self.on_event)(Event::Flight { part: Part { number, on: true, from, live: later } });
     }
 
-    /// Records how the flight went.
-    fn landed(&self, number: u64, outcome: Outcome, said: &str, seconds: f64) {
+    /// Records the outcome of the flight in the session.
+    fn record_end(&self, number: u64, outcome: Outcome, last: &str, seconds: f64) {
         let recorded = self.amend_session(|inner| {
             let Some(flying) = inner.flying.as_mut().filter(|f| f.number == number) else { return };
             flying.on = false;
-            let name = |h: &Heard| flying.live.models.get(h.model).map_or("", |m| m.model.as_str());
-            let warning = |h: &Heard| format!("{:.1} s, {}: {}", h.time_s, name(h), h.text);
+            let name =
+                |w: &Warning| flying.live.models.get(w.model).map_or("", |m| m.model.as_str());
+            let warning = |w: &Warning| format!("{:.1} s, {}: {}", w.time_s, name(w), w.text);
             let warnings = flying.live.warnings.iter().map(warning).collect();
             let place = flying.place;
             let flown = &mut inner.session.flown[place];
             (flown.outcome, flown.seconds, flown.warnings) = (outcome, seconds, warnings);
-            flown.said = said.chars().take(SAID).collect();
+            flown.said = last.chars().take(LINE_LENGTH).collect();
         });
         if let Err(error) = recorded {
             tracing::warn!("the flight's end is not in the session: {error}");
@@ -276,7 +277,7 @@ fn free(folder: &Path) -> u64 {
     numbers.max().unwrap_or(0) + 1
 }
 
-/// What was read of a recording.
+/// State of reading a recording that grows.
 #[derive(Default)]
 struct Tail {
     growing: Growing,

@@ -41,9 +41,9 @@ pub struct Order {
 /// A schedule that can be chosen.
 #[derive(Clone, Debug, Serialize)]
 pub struct Choice {
-    /// What an [`Order`] calls it.
+    /// Identifier of the schedule in an [`Order`].
     pub id: String,
-    /// What it is for.
+    /// Purpose of the schedule.
     pub description: String,
 }
 

@@ -1,27 +1,28 @@
-//! The program that flies: this one, as `greylag demo`, in a process of its own.
+//! The process that flies: this program as `greylag demo`.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Lines that are kept of what it says.
+/// Number of output lines that are kept.
 const LINES: usize = 40;
-/// How long it may take to end by itself, with its report, once it is told to.
-const PATIENCE: Duration = Duration::from_secs(120);
-/// What `greylag demo` says once a flight is whole.
-const WHOLE: &str = "report: ";
+/// Time that the program gets to end by itself, with its report, after the request to stop.
+const STOP_TIMEOUT: Duration = Duration::from_secs(120);
+/// Start of the line that `greylag demo` prints when a flight is complete.
+const COMPLETE: &str = "report: ";
 
-/// A flight in a process of its own. It ends with this program, for its standard input ends then.
+/// A flight in a separate process, which ends with this program because its standard input is
+/// closed then.
 pub struct Program {
     child: Child,
     input: Option<ChildStdin>,
-    told: Option<Instant>,
-    said: [Arc<Mutex<Vec<String>>>; 2],
+    stop_requested: Option<Instant>,
+    output: [Arc<Mutex<Vec<String>>>; 2],
 }
 
 impl Program {
-    /// Starts this program with `words`.
+    /// Starts this program with the arguments `words`.
     ///
     /// # Errors
     /// The system refuses.
@@ -33,42 +34,42 @@ impl Program {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()?;
-        let said: [Arc<Mutex<Vec<String>>>; 2] = Default::default();
-        listen(child.stdout.take(), &said[0]);
-        listen(child.stderr.take(), &said[1]);
+        let output: [Arc<Mutex<Vec<String>>>; 2] = Default::default();
+        listen(child.stdout.take(), &output[0]);
+        listen(child.stderr.take(), &output[1]);
         let input = child.stdin.take();
-        Ok(Program { child, input, told: None, said })
+        Ok(Program { child, input, stop_requested: None, output })
     }
 
-    /// Tells it to end the flight.
+    /// Requests the end of the flight by closing the program's input.
     pub fn stop(&mut self) {
         self.input = None;
-        self.told.get_or_insert_with(Instant::now);
+        self.stop_requested.get_or_insert_with(Instant::now);
     }
 
-    /// How it ended, if it has. One that does not end in time is killed.
+    /// Exit status once the program has ended. It is killed [`STOP_TIMEOUT`] after the request to stop.
     pub fn ended(&mut self) -> Option<ExitStatus> {
-        if self.told.is_some_and(|told| told.elapsed() > PATIENCE) {
+        if self.stop_requested.is_some_and(|at| at.elapsed() > STOP_TIMEOUT) {
             let _ = self.child.kill();
         }
         self.child.try_wait().ok().flatten()
     }
 
-    /// Whether the flight was flown to the end that it was to have.
+    /// Whether the flight was flown to its planned end.
     pub fn is_whole(&self) -> bool {
-        self.lines(0).iter().any(|line| line.starts_with(WHOLE))
+        self.lines(0).iter().any(|line| line.starts_with(COMPLETE))
     }
 
-    /// What it said last: how targets were tracked, or why it failed.
-    pub fn last_words(&self) -> String {
+    /// Last useful line of output: how targets were tracked, or why the program failed.
+    pub fn last_line(&self) -> String {
         let [out, errors] = [self.lines(0), self.lines(1)];
         let words = if self.is_whole() { &out } else { &errors };
-        let mut useful = words.iter().filter(|l| !l.trim().is_empty() && !l.starts_with(WHOLE));
+        let mut useful = words.iter().filter(|l| !l.trim().is_empty() && !l.starts_with(COMPLETE));
         useful.next_back().cloned().unwrap_or_default()
     }
 
     fn lines(&self, of: usize) -> Vec<String> {
-        self.said[of].lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.output[of].lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
@@ -82,15 +83,15 @@ impl Drop for Program {
     }
 }
 
-/// Keeps the last lines of `from` in `said`, on a thread of its own.
-fn listen(from: Option<impl Read + Send + 'static>, said: &Arc<Mutex<Vec<String>>>) {
-    let (Some(from), said) = (from, said.clone()) else { return };
+/// Collects the last [`LINES`] lines of `from` in `output`, on a separate thread.
+fn listen(from: Option<impl Read + Send + 'static>, output: &Arc<Mutex<Vec<String>>>) {
+    let (Some(from), output) = (from, output.clone()) else { return };
     std::thread::spawn(move || {
         for line in BufReader::new(from).lines().map_while(Result::ok) {
-            let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
-            said.push(line);
-            let old = said.len().saturating_sub(LINES);
-            said.drain(..old);
+            let mut lines = output.lock().unwrap_or_else(PoisonError::into_inner);
+            lines.push(line);
+            let old = lines.len().saturating_sub(LINES);
+            lines.drain(..old);
         }
     });
 }

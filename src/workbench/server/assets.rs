@@ -26,7 +26,7 @@ const FILES: [(&str, &str, &str); 13] = [
 const CSS: &str = "text/css; charset=utf-8";
 const JS: &str = "text/javascript; charset=utf-8";
 
-/// The page.
+/// The main page of the workbench.
 pub async fn page() -> Html<&'static str> {
     Html(PAGE)
 }

@@ -1,4 +1,4 @@
-//! Who may ask: a page of this program on this machine, by its token.
+//! Access control: only pages of this program on this machine, by a token.
 
 use axum::extract::{Request, State};
 use axum::http::header::{
@@ -68,7 +68,7 @@ fn allowed(shared: &Shared, request: &Request) -> Result<Entry, Box<Response>> {
     Err(Box::new(failure(StatusCode::UNAUTHORIZED, why)))
 }
 
-/// The cookie `name`.
+/// Value of the cookie `name`.
 fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     let all = headers.get_all(COOKIE).into_iter().filter_map(|v| v.to_str().ok());
     all.flat_map(|line| line.split("; ")).find_map(|pair| {
@@ -77,7 +77,7 @@ fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     })
 }
 
-/// Whether two tokens are the same, in a time that does not tell where they differ.
+/// Whether two tokens are equal, compared in a time that does not depend on where they differ.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
 }

@@ -38,12 +38,12 @@ pub enum ServeError {
     Socket {
         /// The port that was asked for.
         port: u16,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// What all requests share.
+/// State shared by all requests.
 #[derive(Clone)]
 struct Shared {
     bench: Arc<Bench>,
@@ -53,10 +53,10 @@ struct Shared {
 }
 
 /// Serves the session of `given` on `port` of this machine (0 for any that is free) with `token`, until the
-/// program ends; `ready` hears the page's address.
+/// program ends; calls `ready` with the page's address.
 ///
 /// # Errors
-/// The session cannot be opened, or the port not be had.
+/// The session cannot be opened, or the port cannot be bound.
 pub fn serve(
     given: Given,
     port: u16,
@@ -71,20 +71,20 @@ pub fn serve(
         let address = listener.local_addr().map_err(socket)?;
         let (events, _) = broadcast::channel(LAG);
         let shout = events.clone();
-        let hear = move |event: Event| {
+        let on_event = move |event: Event| {
             if let Ok(text) = serde_json::to_string(&event) {
                 // nobody listens as long as no page is open
                 let _ = shout.send(text.into());
             }
         };
-        let bench = Bench::open(given, hear)?;
+        let bench = Bench::open(given, on_event)?;
         let shared = Shared { bench, events, token: token.into(), address };
         ready(&format!("http://{address}/?token={token}"));
         axum::serve(listener, router(shared)).await.map_err(socket)
     })
 }
 
-/// A token that nobody guesses, hexadecimal.
+/// A random token, hexadecimal.
 ///
 /// # Errors
 /// The system has no random numbers.

@@ -1,4 +1,4 @@
-//! What is answered to which request.
+//! Handlers of the HTTP routes.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ impl IntoResponse for WorkbenchError {
     }
 }
 
-/// Works on a thread of its own, so that other requests are answered meanwhile.
+/// Runs the work on a separate thread, so that other requests are answered meanwhile.
 async fn aside<T: Serialize + Send + 'static>(
     shared: Shared,
     work: impl FnOnce(&Arc<Bench>) -> Result<T, WorkbenchError> + Send + 'static,
@@ -54,7 +54,7 @@ async fn aside<T: Serialize + Send + 'static>(
     }
 }
 
-/// The session.
+/// The session as JSON, without its curves.
 pub async fn state(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.state()).await
 }
@@ -64,17 +64,17 @@ pub async fn failing(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.failing()).await
 }
 
-/// The diagnosis.
+/// The diagnosis as JSON; `null` without one.
 pub async fn diagnosis(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.diagnosis())).await
 }
 
-/// What a search for a formula found.
+/// Result of the search for a formula, as JSON.
 pub async fn proposal(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.proposal())).await
 }
 
-/// What an effect file may name.
+/// Names that an effect file may use, as JSON.
 pub async fn grammar() -> Response {
     Json(crate::grammar()).into_response()
 }
@@ -86,7 +86,7 @@ pub struct Text {
     text: String,
 }
 
-/// What an effect file says, or what is wrong with it.
+/// Description of an effect file, or its error.
 pub async fn check(Json(Text { text }): Json<Text>) -> Response {
     match crate::check(&text) {
         Ok(checked) => Json(checked).into_response(),
@@ -139,7 +139,7 @@ pub async fn take(
     body: Body,
 ) -> Response {
     let announced = headers.get(CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-    // one that says so is refused before it is sent
+    // a log of a declared length that is too large is refused before its body is read
     if announced.is_some_and(|bytes: usize| bytes > LARGEST_LOG) {
         return too_large(&sent.name);
     }
@@ -164,7 +164,7 @@ fn changed(revision: Option<u64>) -> Arc<str> {
     json!({ "event": "changed", "revision": revision }).to_string().into()
 }
 
-/// What happens, as it happens.
+/// Stream of events while the page is open.
 pub async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
@@ -178,7 +178,7 @@ pub async fn events(
     Sse::new(all).keep_alive(KeepAlive::default())
 }
 
-/// Any other request.
+/// Answer to a request for an unknown address.
 pub async fn nothing() -> Response {
     let body: Value = json!({ "error": "there is nothing of that name" });
     (StatusCode::NOT_FOUND, Json(body)).into_response()

@@ -7,13 +7,13 @@ use crate::aircraft;
 
 /// Names by what the aircraft's files do with them.
 pub(super) struct Names {
-    /// What its systems read and nothing of them writes: commands, and more.
+    /// Properties that the systems read and none of them writes: commands, and more.
     pub commands: Vec<String>,
-    /// What the aerodynamics read.
+    /// Properties that the aerodynamic functions read.
     pub read: Vec<String>,
 }
 
-/// JSBSim's own names, which need not stand in a file to be read by it.
+/// JSBSim's built-in properties, which exist without an entry in a file.
 const USUAL: [&str; 3] = ["fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm"];
 
 impl Names {

@@ -1,10 +1,10 @@
-//! Which of the commands that were tried is the aileron, the elevator, the rudder.
+//! Assignment of the tried commands to aileron, elevator and rudder.
 
 use super::Found;
 use super::document::Names;
 use crate::plant::{PlantError, Properties};
 
-/// What a command did.
+/// Response of the aircraft to a command that was tried.
 #[derive(Clone, Debug)]
 pub(super) struct Tried {
     pub command: String,

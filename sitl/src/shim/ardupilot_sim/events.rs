@@ -1,4 +1,4 @@
-//! What a run against ArduPilot tells.
+//! Events of a run against ArduPilot.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -11,9 +11,9 @@ use crate::shim::link::Address;
 pub enum ArdupilotEvent {
     /// Nobody has sent a servo packet yet.
     Waiting(Address, Home),
-    /// ArduPilot has been heard.
+    /// The first servo packet of ArduPilot has arrived.
     Connected {
-        /// From where.
+        /// Address from which ArduPilot sends.
         peer: SocketAddr,
         /// Channels that it sends.
         channels: usize,
@@ -24,7 +24,7 @@ pub enum ArdupilotEvent {
     },
     /// The frame count has gone back: the aircraft is at its start again.
     Restarted,
-    /// The catapult has been let go.
+    /// The catapult has been released.
     Catapult,
     /// No servo packet for a second.
     Stopped,

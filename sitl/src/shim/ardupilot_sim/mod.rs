@@ -36,10 +36,10 @@ const MOST_STEPS: u64 = 2;
 /// After this silence it is reported, and another ArduPilot is answered.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// What is special about a run against ArduPilot.
+/// Options of a run against ArduPilot only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArdupilotOptions {
-    /// Which channel moves what.
+    /// Assignment of the channels to the aircraft's controls.
     pub outputs: OutputMap,
     /// Pulse widths of channels that are not 1000 to 2000 µs.
     pub ranges: Vec<ChannelRange>,
@@ -56,15 +56,15 @@ impl Default for ArdupilotOptions {
 struct Client {
     peer: SocketAddr,
     frame_count: u32,
-    heard: Instant,
+    last_packet: Instant,
     silent: bool,
-    /// Its own time since its first packet, µs.
+    /// Simulated time of this client since its first packet, µs.
     time_us: u64,
-    /// What it was sent last.
+    /// The JSON line sent last.
     line: String,
 }
 
-/// A run.
+/// State of one run against ArduPilot.
 struct Run<'a> {
     link: Link,
     options: &'a ShimOptions,
@@ -128,9 +128,9 @@ pub(super) fn fly(
 
 impl Run<'_> {
     fn go(&mut self, stop: &AtomicBool) -> Result<Option<Over>, ShimError> {
-        self.tell(Event::Open(self.options.link.clone(), self.link.local()));
+        self.notify(Event::Open(self.options.link.clone(), self.link.local()));
         for note in self.launcher.notes() {
-            self.tell(Event::Note(note));
+            self.notify(Event::Note(note));
         }
         self.report(ArdupilotEvent::Waiting(self.options.link.clone(), self.home));
         while !stop.load(Ordering::Relaxed) {
@@ -143,31 +143,31 @@ impl Run<'_> {
                 self.refuse(from, length);
                 continue;
             };
-            if let Some(over) = self.hear(&packet, from)? {
+            if let Some(over) = self.take(&packet, from)? {
                 return Ok(Some(over));
             }
         }
         Ok(None)
     }
 
-    fn tell(&mut self, event: Event) {
+    fn notify(&mut self, event: Event) {
         (self.observer)(Notice { time_s: self.time_us as f64 * 1e-6, event });
     }
 
     fn report(&mut self, event: ArdupilotEvent) {
-        self.tell(Event::Ardupilot(event));
+        self.notify(Event::Ardupilot(event));
     }
 
-    /// Tells of an ArduPilot that has fallen silent.
+    /// Reports an ArduPilot that has sent nothing for [`SILENCE`].
     fn watch(&mut self) {
         let Some(client) = &mut self.client else { return };
-        if !client.silent && client.heard.elapsed() >= SILENCE {
+        if !client.silent && client.last_packet.elapsed() >= SILENCE {
             client.silent = true;
             self.report(ArdupilotEvent::Stopped);
         }
     }
 
-    /// Counts a datagram that is no servo packet, and tells of the first.
+    /// Counts a datagram that is no servo packet, and reports the first.
     fn refuse(&mut self, from: SocketAddr, length: usize) {
         self.counts.bad_frames += 1;
         if !std::mem::replace(&mut self.garbage_reported, true) {
@@ -176,8 +176,8 @@ impl Run<'_> {
         self.watch();
     }
 
-    /// Answers a servo packet.
-    fn hear(&mut self, packet: &ServoPacket, from: SocketAddr) -> Result<Option<Over>, ShimError> {
+    /// Answers a servo packet with the state after the step that it asks for.
+    fn take(&mut self, packet: &ServoPacket, from: SocketAddr) -> Result<Option<Over>, ShimError> {
         self.watch();
         match &self.client {
             Some(client) if client.peer != from && !client.silent => {
@@ -196,7 +196,7 @@ impl Run<'_> {
         self.step(packet)
     }
 
-    /// Counts packets of a second ArduPilot, and tells of the first.
+    /// Counts packets of a second ArduPilot, and reports the first.
     fn turn_away(&mut self, from: SocketAddr) {
         self.counts.foreign_frames += 1;
         if !std::mem::replace(&mut self.second_reported, true) {
@@ -218,7 +218,7 @@ impl Run<'_> {
 
     fn resume(&mut self) {
         let Some(client) = &mut self.client else { return };
-        client.heard = Instant::now();
+        client.last_packet = Instant::now();
         if std::mem::replace(&mut client.silent, false) {
             self.report(ArdupilotEvent::Resumed);
         }
@@ -236,7 +236,7 @@ impl Run<'_> {
         self.client = Some(Client {
             peer,
             frame_count: packet.frame_count,
-            heard: Instant::now(),
+            last_packet: Instant::now(),
             silent: false,
             time_us: 0,
             line: String::new(),
@@ -298,7 +298,7 @@ impl Run<'_> {
         self.time_us += STEP_US;
         self.flown_us += if was_flying { STEP_US } else { 0 };
         if self.launcher.is_flying() && !was_flying {
-            self.tell(Event::Launched);
+            self.notify(Event::Launched);
         }
         Ok(truth)
     }
@@ -321,7 +321,7 @@ impl Run<'_> {
 enum Meeting {
     /// Nobody was there before it, or another.
     New,
-    /// It was started again on the same port.
+    /// ArduPilot was started again on the same port.
     Again,
 }
 
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn steps_follow_the_rate_asked_for_and_stay_finer_than_the_sensors_need() {
-        // 1200 Hz is ArduPilot's default; 501 what it says while it is shown 500.
+        // 1200 Hz is ArduPilot's default; 501 is its request while it is shown 500.
         for (asked_hz, made) in
             [(1200, 1), (1000, 1), (800, 1), (501, 2), (500, 2), (50, 2), (0, 2)]
         {

@@ -6,7 +6,7 @@ const MAGIC_32: u16 = 29_569;
 /// Bytes before the channels: magic, frame rate, frame count.
 const HEAD: usize = 8;
 
-/// A servo packet.
+/// Servo packet of ArduPilot's JSON interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoPacket {
     /// Steps a second that ArduPilot asks for, Hz.

@@ -1,4 +1,4 @@
-//! What a pulse width commands.
+//! Conversion of pulse widths to normalised commands.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,12 +15,12 @@ pub struct PwmRange {
     high_us: u16,
 }
 
-/// A channel of its own range, or all of them; written as `3=1100:1500:1900` or `1000:1500:2000`.
+/// Range of one channel, or of all; written as `3=1100:1500:1900` or `1000:1500:2000`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelRange {
     /// The channel, from 1; `None` for all that have no range of their own.
     pub channel: Option<usize>,
-    /// Its range.
+    /// Pulse widths of the channel.
     pub range: PwmRange,
 }
 

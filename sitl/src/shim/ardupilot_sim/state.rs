@@ -12,9 +12,9 @@ const SEA_LEVEL_DENSITY: f64 = 1.225;
 /// The place from which positions count: ArduPilot's home.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Home {
-    /// Geodetic latitude, deg.
+    /// Geodetic latitude, deg, north positive.
     pub latitude_deg: f64,
-    /// Longitude, deg.
+    /// Geodetic longitude, deg, east positive.
     pub longitude_deg: f64,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
@@ -22,7 +22,7 @@ pub struct Home {
     pub heading_deg: f64,
 }
 
-/// What a line holds; names and units are ArduPilot's.
+/// Content of one JSON line; names and units are ArduPilot's.
 #[derive(Debug, Serialize)]
 struct State {
     timestamp: f64,

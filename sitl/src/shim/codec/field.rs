@@ -29,7 +29,7 @@ impl Writer {
     }
 }
 
-/// A payload that is being read; what lies beyond its end reads as zero.
+/// A payload that is being read; bytes beyond its end read as zero.
 #[derive(Debug)]
 pub struct Reader<'a> {
     rest: &'a [u8],
@@ -54,7 +54,7 @@ impl<'a> Reader<'a> {
 pub trait Field: Sized {
     /// Bytes on the wire.
     const SIZE: usize;
-    /// Appends the value.
+    /// Appends the value in little-endian order.
     fn put(&self, writer: &mut Writer);
     /// Takes the value off the front.
     fn take(reader: &mut Reader<'_>) -> Self;

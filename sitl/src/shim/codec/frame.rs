@@ -20,7 +20,7 @@ pub fn checksum(bytes: &[u8], crc_extra: u8) -> u16 {
     accumulate(crc, &crc_extra)
 }
 
-/// Which generation of MAVLink a frame came in.
+/// Version of MAVLink in which a frame was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
     /// MAVLink 1, magic 0xFE.
@@ -32,15 +32,15 @@ pub enum Version {
 /// A received frame whose checksum was right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// Generation.
+    /// Version of MAVLink, by the frame's magic byte.
     pub version: Version,
     /// Sequence number of the sender.
     pub sequence: u8,
-    /// Sender's system.
+    /// System ID of the sender.
     pub system: u8,
-    /// Sender's component.
+    /// Component ID of the sender.
     pub component: u8,
-    /// Message identifier.
+    /// Identifier of the message, 24 bits.
     pub id: u32,
     pub(super) length: u8,
     pub(super) payload: [u8; 255],

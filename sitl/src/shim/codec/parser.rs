@@ -12,11 +12,11 @@ pub struct Parser {
     unknown: u64,
 }
 
-/// What lies at the front of some bytes.
+/// Content at the front of a byte sequence.
 enum Front {
-    /// A good frame of so many bytes.
+    /// A valid frame of this many bytes.
     Frame(Box<Frame>, usize),
-    /// A frame of so many bytes whose message this link does not know.
+    /// A frame of this many bytes whose message this link does not know.
     Unknown(usize),
     /// The beginning of what may become a frame.
     Unfinished,
@@ -95,7 +95,7 @@ struct Layout {
     version: Version,
     header: usize,
     id: u32,
-    /// System and component stand at this offset.
+    /// Offset of the system and component IDs.
     from: usize,
     signature: usize,
 }

@@ -1,4 +1,4 @@
-//! What a ground station asks a flight controller for when it connects.
+//! Requests of a ground station when it connects to a flight controller, and their answers.
 
 use super::modes::Mode;
 use super::{FlightController, Personality, SYSTEM};

@@ -1,4 +1,4 @@
-//! What a real controller puts between the aircraft and a companion: filtered gyros, late surfaces.
+//! Delays of a real controller between aircraft and companion: filtered gyros, late surfaces.
 
 use std::collections::VecDeque;
 

@@ -10,7 +10,7 @@ use crate::plant::{DT_S, Inputs, Travel, Truth};
 const GRAVITY: f64 = 9.81;
 /// Airspeed error (m/s) and its integral to throttle.
 const AIRSPEED: [f64; 2] = [0.2, 0.1];
-/// What is held when flying by itself, m/s.
+/// Airspeed that is held in the autonomous modes, m/s.
 const CRUISE_MPS: f64 = 20.0;
 /// Throttle in level flight.
 const THROTTLE: f64 = 0.2;
@@ -37,7 +37,7 @@ struct Gains {
     forward: f64,
 }
 
-/// What a stack's parameters make of an aircraft like the X8.
+/// Gains of the control law by a stack's parameters, for an aircraft like the X8.
 #[derive(Clone, Copy, Debug)]
 struct Stack {
     roll: Gains,

@@ -35,9 +35,9 @@ use parameters::Table;
 use sticks::Sticks;
 use streams::{Equipment, Streams};
 
-/// The system that the played controller is.
+/// System ID of the simulated controller.
 pub const SYSTEM: u8 = 1;
-/// MAV_COMP_ID_AUTOPILOT1.
+/// Component ID MAV_COMP_ID_AUTOPILOT1.
 const COMPONENT: u8 = 1;
 /// ArduPilot reads its channels every second step: 50 Hz.
 const SAMPLE_EVERY: u64 = 2;
@@ -50,17 +50,17 @@ const STICKS_SEEN_S: f64 = 0.15;
 const FAILSAFE_LAG_S: f64 = 0.2;
 /// A radio with its sticks released, µs: idle throttle.
 const RADIO_US: [u16; 3] = [1500, 1500, 1000];
-/// MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
+/// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
 const RECEIVER: u32 = 1 << 16;
 /// The bank at which ArduPilot turns back to where GUIDED was entered, rad: 45° to 55° were seen.
 const TURN_BACK: f64 = 50.0 * std::f64::consts::PI / 180.0;
 
-/// A flight stack.
+/// Flight stack whose behaviour is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Personality {
-    /// PX4, fixed wing.
+    /// PX4 with a fixed-wing airframe.
     Px4,
-    /// ArduPilot Plane.
+    /// ArduPilot's fixed-wing firmware, ArduPlane.
     Ardupilot,
 }
 
@@ -73,7 +73,7 @@ impl fmt::Display for Personality {
     }
 }
 
-/// What the played controller has counted.
+/// Counts of the simulated controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Stick positions or overrides that were taken.
@@ -90,14 +90,13 @@ pub struct Counts {
 
 /// An attitude to be flown, with its thrust.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Wish {
+struct Setpoint {
     at_us: u64,
     roll: f64,
     pitch: f64,
     thrust: Option<f64>,
 }
 
-/// HEARTBEAT.
 const HEARTBEAT: u32 = 0;
 
 /// The played flight controller with the aircraft it flies.
@@ -116,7 +115,7 @@ pub struct FlightController {
     station_us: Option<u64>,
     /// Where aileron and elevator stick, if they do.
     jammed: [Option<f64>; 2],
-    wish: Option<Wish>,
+    setpoint: Option<Setpoint>,
     mode: Mode,
     armed: bool,
     /// Latitude and longitude of the start, degrees.
@@ -128,11 +127,11 @@ pub struct FlightController {
     now_us: u64,
     measured: Truth,
     inputs: Inputs,
-    /// What was commanded last, before what makes it late.
+    /// Last command, before the delay of the servos.
     commanded: Inputs,
-    /// What waits to be sent with the next step.
+    /// Bytes that are sent with the next step.
     waiting: Vec<u8>,
-    /// What was counted.
+    /// Counts of accepted and ignored messages.
     pub counts: Counts,
 }
 
@@ -167,7 +166,7 @@ impl FlightController {
             sticks: Sticks::default(),
             station_us: None,
             jammed: [None; 2],
-            wish: None,
+            setpoint: None,
             mode: Mode::Hold,
             armed: true,
             home: None,
@@ -205,13 +204,13 @@ impl FlightController {
         self.steps += 1;
     }
 
-    /// What is wrong with what the companion receives from now on.
+    /// Distorts what the companion receives from now on.
     pub fn distort(&mut self, distortion: Distortion) {
         self.distorter.now = distortion;
     }
 
     /// Takes bytes that have arrived.
-    pub fn hear(&mut self, bytes: &[u8]) {
+    pub fn receive(&mut self, bytes: &[u8]) {
         let mut frames = Vec::new();
         self.parser.stream(bytes, &mut |frame| frames.push(frame));
         frames.iter().for_each(|frame| self.take(frame));
@@ -222,7 +221,7 @@ impl FlightController {
         self.parser.restart();
     }
 
-    /// Flies one step on what was heard.
+    /// Flies one step with the commands received so far.
     ///
     /// # Errors
     /// If the plant cannot go on.
@@ -250,7 +249,7 @@ impl FlightController {
         self.inputs
     }
 
-    /// What was last measured: the truth, without sensor errors in the options.
+    /// Last measurement: the truth, without sensor errors in the options.
     pub fn measured(&self) -> Truth {
         self.measured
     }
@@ -383,7 +382,7 @@ impl FlightController {
                 let result = self.streams.set(m.param[0] as u32, m.param[1], denied);
                 if result == streams::DENIED {
                     self.counts.denied += 1;
-                    self.say(3, b"Requested rate too fast");
+                    self.send_text(3, b"Requested rate too fast");
                 }
                 result
             }
@@ -413,7 +412,7 @@ impl FlightController {
         let refused = match mode {
             // PX4 wants to see the stream first.
             Mode::Manual => self.personality == Personality::Px4 && !self.manual_allowed,
-            Mode::Guided => self.personality == Personality::Px4 && !self.wish_alive(),
+            Mode::Guided => self.personality == Personality::Px4 && !self.setpoint_alive(),
             Mode::Hold | Mode::Return | Mode::Circle => false,
         };
         if refused {
@@ -457,7 +456,7 @@ impl FlightController {
         }
         let thrust = f64::from(m.thrust);
         let thrust = (m.type_mask & 64 == 0 && thrust.is_finite()).then(|| thrust.clamp(0.0, 1.0));
-        self.wish = Some(Wish { at_us: self.now_us, roll, pitch, thrust });
+        self.setpoint = Some(Setpoint { at_us: self.now_us, roll, pitch, thrust });
         self.counts.targets += 1;
     }
 
@@ -469,23 +468,24 @@ impl FlightController {
         self.sticks.age_s(self.now_us).is_some_and(|age| age <= timeout)
     }
 
-    fn wish_alive(&self) -> bool {
+    fn setpoint_alive(&self) -> bool {
         let timeout = match self.personality {
             Personality::Px4 => self.parameters.get("COM_OF_LOSS_T"),
             Personality::Ardupilot => self.parameters.get("GUIDED_TIMEOUT"),
         };
-        self.wish.is_some_and(|wish| (self.now_us - wish.at_us) as f64 * 1e-6 <= timeout)
+        self.setpoint
+            .is_some_and(|setpoint| (self.now_us - setpoint.at_us) as f64 * 1e-6 <= timeout)
     }
 
-    /// Says a line of at most 25 bytes.
-    fn say(&mut self, severity: u8, words: &[u8]) {
+    /// Sends STATUSTEXT with a text of at most 25 bytes.
+    fn send_text(&mut self, severity: u8, words: &[u8]) {
         let mut text = [0; 25];
         text[..words.len()].copy_from_slice(words);
         let line = StatusText { severity, text, ..StatusText::default() };
         self.encoder.encode(&line, &mut self.waiting);
     }
 
-    /// The stack's failsafes.
+    /// Checks the stack's failsafes and changes the mode if one triggers.
     fn watch(&mut self) {
         if self.steps.is_multiple_of(LOOK_EVERY) {
             let steady = self.sticks.steady_s(self.now_us).is_some_and(|s| s >= STICKS_SEEN_S);
@@ -497,7 +497,7 @@ impl FlightController {
         };
         if let Some((mode, words)) = failsafe {
             self.counts.failsafes += 1;
-            self.say(2, words);
+            self.send_text(2, words);
             self.set_mode(mode);
         }
     }
@@ -511,7 +511,7 @@ impl FlightController {
     /// setpoints do. On its way home it goes on.
     fn px4_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
         if self.mode == Mode::Guided {
-            let lost = self.settled() && !self.wish_alive();
+            let lost = self.settled() && !self.setpoint_alive();
             return lost.then_some((Mode::Hold, b"Offboard control lost"));
         }
         if self.sticks.age_s(self.now_us).is_none() || self.sticks_alive() {
@@ -554,7 +554,7 @@ impl FlightController {
     /// Whether GUIDED has no target any more, so that ArduPilot turns back to where it was entered.
     pub fn turns_back(&self) -> bool {
         let ardupilot = self.personality == Personality::Ardupilot;
-        ardupilot && self.mode == Mode::Guided && !self.wish_alive()
+        ardupilot && self.mode == Mode::Guided && !self.setpoint_alive()
     }
 
     fn command(&mut self) -> Inputs {
@@ -572,9 +572,9 @@ impl FlightController {
                 false => self.commanded,
             };
         }
-        let wish = self.wish.filter(|_| self.mode == Mode::Guided && self.wish_alive());
-        match wish {
-            Some(Wish { roll, pitch, thrust, .. }) => {
+        let setpoint = self.setpoint.filter(|_| self.mode == Mode::Guided && self.setpoint_alive());
+        match setpoint {
+            Some(Setpoint { roll, pitch, thrust, .. }) => {
                 self.law.attitude(&self.measured, roll, pitch, thrust)
             }
             None if self.turns_back() => self.law.attitude(&self.measured, TURN_BACK, 0.0, None),

@@ -12,7 +12,7 @@ pub enum Mode {
     Guided,
     /// The controller flies by itself: HOLD, LOITER.
     Hold,
-    /// The same, after a failsafe: RTL. (It flies level here; the way home is not played.)
+    /// Return mode after a failsafe: RTL. (It flies level here; the way home is not simulated.)
     Return,
     /// ArduPilot's short failsafe: CIRCLE. (It flies level here; PX4 has none and is never in it.)
     Circle,

@@ -1,10 +1,10 @@
-//! The parameter server of the played stacks: a small table of what bears on a companion.
+//! The parameter server of the simulated stacks: a small table of what concerns a companion.
 
 use super::Personality;
 use crate::shim::codec::{Encoder, ParamRequestRead, ParamSet, ParamValue};
 use crate::shim::error::ShimError;
 
-/// MAV_PARAM_TYPE_INT32 and _REAL32.
+/// MAV_PARAM_TYPE_INT32, and MAV_PARAM_TYPE_REAL32 below.
 const INT: u8 = 6;
 const REAL: u8 = 9;
 

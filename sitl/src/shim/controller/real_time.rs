@@ -95,10 +95,10 @@ fn converse_until(link: &mut Link, controller: &mut FlightController, deadline: 
             match link.receive() {
                 Arrival::Nothing => break,
                 Arrival::Datagram(bytes, from) => {
-                    controller.hear(bytes);
+                    controller.receive(bytes);
                     link.adopt(from);
                 }
-                Arrival::Bytes(bytes) => controller.hear(bytes),
+                Arrival::Bytes(bytes) => controller.receive(bytes),
                 Arrival::Connected(_) | Arrival::Closed => controller.restart_stream(),
             }
         }

@@ -5,7 +5,7 @@ use super::parameters::Table;
 use crate::plant::Inputs;
 use crate::shim::codec::{ManualControl, RcChannelsOverride};
 
-/// The sticks last heard.
+/// Stick positions received last, with their times in µs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sticks {
     manual: Option<(u64, [i16; 3])>,
@@ -36,14 +36,14 @@ impl Sticks {
         self.channels = (!given_back).then_some((now_us, [one, two, three]));
     }
 
-    /// Seconds since the sticks were last heard.
+    /// Seconds since the last stick message; `None` before the first.
     pub(super) fn age_s(&self, now_us: u64) -> Option<f64> {
         let manual = self.manual.map(|(at, _)| at);
         let channels = self.channels.map(|(at, _)| at);
         manual.or(channels).map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// The command that the actuators get; `standing` when no stick was ever heard.
+    /// Actuator command from the sticks; `standing` before the first stick message.
     pub(super) fn inputs(
         &self,
         personality: Personality,

@@ -1,4 +1,4 @@
-//! What the played controller sends by itself: nothing much until it is asked.
+//! Streams of the simulated controller: few until they are requested.
 
 use crate::plant::{Travel, Truth};
 use crate::shim::codec::{AoaSsa, Encoder, ServoOutputRaw, VfrHud};
@@ -7,7 +7,7 @@ use crate::shim::telemetry::{self, FRAME_US, StateFrame};
 /// Sea-level density of the standard atmosphere, kg/m³.
 const SEA_LEVEL: f64 = 1.225;
 
-/// MAV_RESULT_DENIED.
+/// Command result MAV_RESULT_DENIED.
 pub(super) const DENIED: u8 = 2;
 
 /// A stream with the time between its messages, µs, and the next one's.
@@ -18,7 +18,7 @@ struct Row {
     due_us: u64,
 }
 
-/// What the streams say of the aircraft's equipment.
+/// Equipment of the aircraft that the streams report.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equipment {
     /// Travel of the surfaces.

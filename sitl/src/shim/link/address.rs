@@ -3,16 +3,16 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Which protocol, with which side beginning.
+/// Transport protocol, with the side that opens it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// Datagrams; listens, answers whom it hears.
+    /// UDP: listens, and answers the sender of the first frame of the companion.
     UdpIn,
-    /// Datagrams; sends to a fixed address.
+    /// UDP: sends to a fixed address.
     UdpOut,
-    /// Stream; listens.
+    /// TCP: listens for one connection.
     TcpIn,
-    /// Stream; connects, again and again until it succeeds.
+    /// TCP: connects, and retries until it succeeds.
     TcpOut,
     /// Stream over a serial port, `DEVICE:BAUD`.
     Serial,
@@ -34,7 +34,7 @@ impl Transport {
 /// A link address: transport, host, port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
-    /// Protocol and side.
+    /// Transport protocol and the side that opens it.
     pub transport: Transport,
     /// `host:port`, the host a name or a number; `device:baud` of a serial port; the name of a
     /// pseudo-terminal.

@@ -35,7 +35,7 @@ pub enum LinkError {
     Resolve {
         /// The address as written.
         address: Address,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The port is taken.
@@ -51,17 +51,17 @@ pub enum LinkError {
     Serial {
         /// The address as written.
         address: Address,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
-        /// What to do.
+        /// Advice to the operator.
         remedy: &'static str,
     },
-    /// Anything else.
+    /// Any other failure of opening the link.
     #[error("cannot open {address}: {source}; check the address given with --link")]
     Open {
         /// The address as written.
         address: Address,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -104,14 +104,14 @@ pub enum Arrival<'a> {
     Closed,
 }
 
-/// An open link.
+/// An open link of any transport.
 #[derive(Debug)]
 pub enum Link {
-    /// Datagrams.
+    /// Link over UDP datagrams.
     Udp(UdpLink),
-    /// A stream.
+    /// Link over a TCP stream.
     Tcp(TcpLink),
-    /// A wire.
+    /// Link over a serial port or pseudo-terminal.
     Serial(SerialLink),
 }
 
@@ -142,7 +142,7 @@ impl Link {
         }
     }
 
-    /// Sends one batch of whole frames; `false` when there is nobody or no room for it.
+    /// Sends one batch of whole frames; `false` without a peer or without room for it.
     pub fn send(&mut self, bytes: &[u8]) -> bool {
         match self {
             Link::Udp(link) => link.send(bytes),
@@ -160,7 +160,7 @@ impl Link {
         }
     }
 
-    /// The companion was heard from `sender`: a listening UDP link answers there from now on.
+    /// Fixes `sender` as the companion's address: a listening UDP link answers there from now on.
     pub fn adopt(&mut self, sender: SocketAddr) {
         if let Link::Udp(link) = self {
             link.adopt(sender);

@@ -13,7 +13,7 @@ use super::{Address, Arrival, LinkError, PATIENCE, Transport, Wait};
 /// How often a port that has gone is opened again.
 const RETRY: Duration = Duration::from_millis(100);
 
-/// What the wire hangs on.
+/// Device behind the link.
 #[derive(Debug)]
 enum End {
     /// A port of this machine.

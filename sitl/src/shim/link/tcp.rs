@@ -18,7 +18,7 @@ const CONNECT: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 enum Source {
     Listener(TcpListener),
-    /// Connects in a thread of its own, so that a slow network costs no cycle.
+    /// Connects in a separate thread, so that a slow network costs no cycle.
     Connector {
         to: SocketAddr,
         attempt: Option<Receiver<io::Result<TcpStream>>>,
@@ -210,7 +210,7 @@ pub(super) fn flush(stream: &mut impl Write, unsent: &mut Vec<u8>) -> io::Result
     Ok(())
 }
 
-/// Whether an error only says that nothing can be done right now.
+/// Whether an error is temporary: would block, timed out or interrupted.
 pub(super) fn is_lull(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), WouldBlock | TimedOut | Interrupted)

@@ -1,13 +1,13 @@
-//! What an actuator message of PX4 asks for.
+//! Decoded actuator message of PX4.
 
 use crate::plant::Inputs;
 use crate::shim::codec::HilActuatorControls;
 use crate::shim::outputs::OutputMap;
 
-/// MAV_MODE_FLAG_SAFETY_ARMED.
+/// Bit MAV_MODE_FLAG_SAFETY_ARMED of `mode`.
 const ARMED: u8 = 128;
 
-/// What an actuator message asks for.
+/// Decoded actuator message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuation {
     /// The controller's time, µs.

@@ -1,4 +1,4 @@
-//! One connected client: what it has said, what it is owed.
+//! One connected client: messages received from it and messages due to it.
 
 use std::time::Instant;
 
@@ -13,9 +13,9 @@ use crate::shim::outputs::OutputMap;
 use crate::shim::session::SHIM;
 use crate::shim::summary::Summary;
 
-/// MAV_AUTOPILOT_PX4.
+/// Autopilot number MAV_AUTOPILOT_PX4.
 const PX4: u8 = 12;
-/// MAV_CMD_SET_MESSAGE_INTERVAL.
+/// Command number MAV_CMD_SET_MESSAGE_INTERVAL.
 const SET_MESSAGE_INTERVAL: u16 = 511;
 /// The version of MAVLink's dialects that HEARTBEAT carries.
 const DIALECT: u8 = 3;
@@ -27,7 +27,7 @@ const OTHER_DIALECT: &str = "the client's HEARTBEAT has a MAVLink version other 
 const OTHER_STACK: &str = "the client's HEARTBEAT is not of PX4 (MAV_AUTOPILOT 12): its outputs \
                            may mean something else; see --px4-outputs";
 
-/// A client.
+/// A connected client, which should be PX4.
 pub(super) struct Client {
     pub(super) parser: Parser,
     pub(super) encoder: Encoder,
@@ -41,8 +41,8 @@ pub(super) struct Client {
     /// Whether the step that was shown last is answered.
     pub(super) answered: bool,
     /// When an actuator message last came.
-    pub(super) heard: Option<Instant>,
-    /// Its silence has been reported.
+    pub(super) last_actuation: Option<Instant>,
+    /// Whether its silence has been reported.
     pub(super) silent: bool,
     reported: Vec<&'static str>,
     state_interval_us: Option<u64>,
@@ -59,7 +59,7 @@ impl Client {
             actuation: None,
             lockstep: false,
             answered: false,
-            heard: None,
+            last_actuation: None,
             silent: false,
             reported: Vec::new(),
             state_interval_us: None,
@@ -139,10 +139,10 @@ impl Client {
         }
         counts.answers += 1;
         counts.limited_answers += u64::from(actuation.limited);
-        self.heard = Some(Instant::now());
+        self.last_actuation = Some(Instant::now());
         self.actuation = Some(actuation);
         if std::mem::take(&mut self.silent) {
-            events.push(if self.lockstep { Px4Event::Resumed } else { Px4Event::Heard });
+            events.push(if self.lockstep { Px4Event::Resumed } else { Px4Event::SilenceEnded });
         }
     }
 

@@ -1,28 +1,28 @@
-//! Which step an actuator message answers, by the controller's own clock.
+//! Assignment of actuator messages to steps by the controller's own clock.
 
 use super::{FIRST_US, STEP_US};
 
-/// How the controller's clock stands to the simulated one.
+/// Relation of the controller's clock to simulated time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Clock {
-    /// No message yet.
+    /// No message has arrived yet.
     #[default]
     Unknown,
     /// It shows simulated time less so much, µs: nothing, or the time at which it was started, as
     /// PX4 counts from the first HIL_SENSOR that it sees.
     Behind(u64),
-    /// It shows something else: messages are counted instead, as Gazebo's plugin does.
+    /// Another clock: messages are counted instead, as Gazebo's plugin does.
     Foreign,
 }
 
-/// Which step a message answers.
+/// Step that a message answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
     /// The one that was shown last.
     Present,
-    /// An earlier one.
+    /// An earlier step than the last.
     Past,
-    /// None that was shown.
+    /// No step that was sent.
     Nothing,
 }
 

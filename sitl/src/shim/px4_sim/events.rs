@@ -1,4 +1,4 @@
-//! What a run against PX4 tells.
+//! Events of a run against PX4.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use crate::shim::link::Address;
 /// A change of state of a run against PX4.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Px4Event {
-    /// Nobody is connected.
+    /// The simulator listens and no client is connected.
     Waiting(Address),
     /// A client has connected.
     Connected(SocketAddr),
@@ -18,16 +18,16 @@ pub enum Px4Event {
     Lockstep,
     /// The client's times are of another clock: its messages are counted instead.
     ForeignClock,
-    /// The catapult has been let go.
+    /// The catapult has been released.
     Catapult,
-    /// Lockstep: no answer for a second; simulated time stands still.
+    /// Lockstep: no answer for a second; simulated time is stopped.
     Stopped,
     /// Lockstep: the answer has come after all.
     Resumed,
     /// Real time: no actuator message for a second; the outputs stay as they are.
     Silent,
     /// Real time: actuator messages come again.
-    Heard,
+    SilenceEnded,
     /// The client is not what this side speaks to; why, and what to do.
     Refused(&'static str),
 }
@@ -60,7 +60,7 @@ impl fmt::Display for Px4Event {
                 "no actuator message for 1 s: the outputs stay as they are; see whether PX4 is \
                  stopped"
             ),
-            Px4Event::Heard => write!(f, "actuator messages come again"),
+            Px4Event::SilenceEnded => write!(f, "actuator messages come again"),
             Px4Event::Refused(why) => write!(f, "{why}"),
         }
     }

@@ -36,7 +36,7 @@ use sensors::Sensors;
 pub const STEP_US: u64 = 4_000;
 /// Simulated time of the first step, µs; not 0, see the clock's judgement of an answer.
 pub const FIRST_US: u64 = 1_000_000_000;
-/// HIL_GPS comes every so many steps: 10 Hz.
+/// HIL_GPS is sent every this many steps: 10 Hz.
 const GPS_EVERY: u64 = 25;
 const STEP: Duration = Duration::from_micros(STEP_US);
 /// After this silence it is reported.
@@ -51,10 +51,10 @@ const SPIN: Duration = Duration::from_micros(300);
 const LOOK: Duration = Duration::from_micros(100);
 const IDLE: Duration = Duration::from_millis(5);
 
-/// What is special about a run against PX4.
+/// Options of a run against PX4 only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Px4Options {
-    /// Which output moves what.
+    /// Assignment of the outputs to the aircraft's controls.
     pub outputs: OutputMap,
     /// Sensor noise; biases are those of [`ShimOptions::bias`].
     pub noise: Px4Noise,
@@ -67,7 +67,7 @@ impl Default for Px4Options {
     }
 }
 
-/// A run.
+/// State of one run against PX4.
 struct Run<'a> {
     link: Link,
     options: &'a ShimOptions,
@@ -77,7 +77,7 @@ struct Run<'a> {
     sensors: Sensors,
     log: Option<TruthLog>,
     client: Option<Client>,
-    /// Counts connections.
+    /// Number of connections so far.
     connection: u64,
     counts: Summary,
     time_us: u64,
@@ -134,7 +134,7 @@ pub(super) fn fly(
 
 impl Run<'_> {
     fn go(&mut self, stop: &AtomicBool) -> Result<Option<Over>, ShimError> {
-        self.tell(Event::Open(self.options.link.clone(), self.link.local()));
+        self.notify(Event::Open(self.options.link.clone(), self.link.local()));
         self.wait();
         let mut deadline = Instant::now();
         while !stop.load(Ordering::Relaxed) {
@@ -155,12 +155,12 @@ impl Run<'_> {
         Ok(None)
     }
 
-    fn tell(&mut self, event: Event) {
+    fn notify(&mut self, event: Event) {
         (self.observer)(Notice { time_s: (self.time_us - FIRST_US) as f64 * 1e-6, event });
     }
 
     fn wait(&mut self) {
-        self.tell(Event::Px4(Px4Event::Waiting(self.options.link.clone())));
+        self.notify(Event::Px4(Px4Event::Waiting(self.options.link.clone())));
     }
 
     /// Sends the sensors of this step; HIL_SENSOR, which moves PX4's clock, comes last.
@@ -194,7 +194,7 @@ impl Run<'_> {
         let lockstep = self.client.as_ref().is_some_and(|client| client.lockstep);
         if late > HOPELESS || (lockstep && late > STEP) {
             if !lockstep {
-                self.tell(Event::Skipped(late));
+                self.notify(Event::Skipped(late));
             }
             return now + STEP;
         }
@@ -231,18 +231,18 @@ impl Run<'_> {
         Ok(false)
     }
 
-    /// Tells of a client that has fallen silent, and lets another take its place.
+    /// Reports a client that has fallen silent, and lets another take its place.
     fn watch(&mut self, now: Instant) {
         let Some(client) = &mut self.client else { return };
-        let Some(heard) = client.heard.filter(|_| !client.silent) else { return };
-        let since = if client.lockstep { heard.max(self.sent) } else { heard };
+        let Some(last) = client.last_actuation.filter(|_| !client.silent) else { return };
+        let since = if client.lockstep { last.max(self.sent) } else { last };
         if now.saturating_duration_since(since) < SILENCE {
             return;
         }
         client.silent = true;
         let event = if client.lockstep { Px4Event::Stopped } else { Px4Event::Silent };
         self.link.abandon();
-        self.tell(Event::Px4(event));
+        self.notify(Event::Px4(event));
     }
 
     /// Takes everything that has arrived.
@@ -264,13 +264,13 @@ impl Run<'_> {
                     self.connection += 1;
                     self.launcher.begin_anew()?;
                     self.client = Some(Client::new(self.time_us));
-                    self.tell(Event::Px4(Px4Event::Connected(peer)));
+                    self.notify(Event::Px4(Px4Event::Connected(peer)));
                     return Ok(());
                 }
                 Arrival::Closed => {
                     self.client = None;
                     self.launcher.begin_anew()?;
-                    self.tell(Event::Px4(Px4Event::Gone));
+                    self.notify(Event::Px4(Px4Event::Gone));
                     self.wait();
                     return Ok(());
                 }
@@ -293,7 +293,7 @@ impl Run<'_> {
         if !reply.is_empty() {
             self.link.send(&reply);
         }
-        events.into_iter().for_each(|event| self.tell(Event::Px4(event)));
+        events.into_iter().for_each(|event| self.notify(Event::Px4(event)));
     }
 
     /// Makes a step with what was last asked for.
@@ -301,7 +301,7 @@ impl Run<'_> {
         let actuation = self.client.as_ref().and_then(|client| client.actuation);
         let (armed, inputs) = actuation.map_or((false, Inputs::default()), |a| (a.armed, a.inputs));
         if self.launcher.let_go(armed, inputs.throttle) {
-            self.tell(Event::Px4(Px4Event::Catapult));
+            self.notify(Event::Px4(Px4Event::Catapult));
         }
         let was_flying = self.launcher.is_flying();
         if let (true, Some(log)) = (was_flying, &mut self.log) {
@@ -311,7 +311,7 @@ impl Run<'_> {
         self.time_us += STEP_US;
         self.flown += u64::from(was_flying);
         if self.launcher.is_flying() && !was_flying {
-            self.tell(Event::Launched);
+            self.notify(Event::Launched);
         }
         if truth.altitude_m <= 0.0 {
             return Ok(Some(Over::Ground));

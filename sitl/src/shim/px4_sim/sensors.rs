@@ -29,7 +29,7 @@ const INERTIAL: u32 = 0x0007 | 0x0038;
 const MAGNETIC: u32 = 0x01C0;
 const DIFFERENTIAL: u32 = 0x0400;
 const BAROMETRIC: u32 = 0x0200 | 0x0800 | 0x1000;
-/// The latter come every so many steps: 50 Hz.
+/// Period of the slow sensors in steps: 50 Hz.
 pub const SLOW_EVERY: u64 = 5;
 
 /// Standard deviations of white noise, one draw a message.
@@ -41,13 +41,13 @@ pub struct Px4Noise {
     pub gyro_radps: f64,
     /// Magnetometer, by axis, gauss.
     pub magnetometer_gauss: [f64; 3],
-    /// Barometer, Pa.
+    /// Static pressure of the barometer, Pa.
     pub static_pressure_pa: f64,
-    /// Differential pressure, Pa.
+    /// Differential pressure of the airspeed sensor, Pa.
     pub differential_pressure_pa: f64,
     /// GPS position, north and east, m.
     pub gps_horizontal_m: f64,
-    /// GPS altitude, m.
+    /// Altitude of the GPS receiver, m.
     pub gps_altitude_m: f64,
     /// GPS velocity, north, east, down, m/s.
     pub gps_velocity_mps: [f64; 3],
@@ -87,10 +87,10 @@ impl Px4Noise {
 pub struct Sensors {
     noise: Px4Noise,
     bias: Bias,
-    /// North-east-down, gauss.
+    /// Magnetic field, north-east-down, gauss.
     field: [f64; 3],
     random: ChaCha8Rng,
-    /// What was shown last, for fields that are not measured anew.
+    /// Last message, for fields that are not measured anew.
     last: HilSensor,
 }
 

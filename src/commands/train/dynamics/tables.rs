@@ -21,7 +21,7 @@ pub(super) fn line(p: &Progress, trainer: &Trainer, ms: f64) -> String {
     text
 }
 
-/// What the residual adds, channel by channel.
+/// Contribution of the residual, channel by channel.
 pub(super) fn shares(residual_map: &ResidualMap) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

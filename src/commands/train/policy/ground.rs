@@ -44,7 +44,7 @@ impl Ground {
 /// Seed of the targets that a training is judged by: none of those that policies are scored on.
 const JUDGE_SEED: u64 = 2;
 
-/// What came of flights in JSBSim, where the policy was trained there.
+/// Results of flights in JSBSim, where the policy was trained there.
 #[cfg(feature = "demo")]
 pub(super) fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
     let plant = greylag_sitl::plant::PlantOptions::default();

@@ -22,12 +22,12 @@ use crate::model::residual::hash;
 use crate::sim::imagined::Imagination;
 use crate::sim::world::World;
 
-/// The file that a training goes on from.
+/// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
-/// Part of the imagined episodes that may be lost before it is said to be too many.
+/// Largest share of lost imagined episodes without a warning.
 const MANY: f64 = 0.2;
 
-/// What a run says of itself beside its curve.
+/// Record of a run beside its curve.
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -168,7 +168,7 @@ impl Run<'_> {
     }
 }
 
-/// Says so if many episodes end outside the envelope.
+/// Warns if many episodes end outside the envelope.
 fn warn(seed: u64, progress: &PolicyProgress) {
     let part = progress.lost as f64 / progress.episodes.max(1) as f64;
     if progress.updates > 0 && part > MANY {
@@ -181,7 +181,7 @@ fn warn(seed: u64, progress: &PolicyProgress) {
     }
 }
 
-/// A point of the curve that says what was reached, and nothing else.
+/// A point of the curve with the evaluation only.
 pub fn reached(e: Evaluated) -> CurvePoint {
     let Evaluated { easy_deg, hard_deg, divergence_rate, .. } = e;
     CurvePoint { easy_deg, hard_deg, divergence_rate, ..CurvePoint::default() }

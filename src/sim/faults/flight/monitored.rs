@@ -168,7 +168,7 @@ impl Bench {
                 self.watched.said.push((at_s, text.words));
             }
         }
-        self.controller.hear(&up);
+        self.controller.receive(&up);
         matches!(self.controller.fly(), Ok(None))
     }
 

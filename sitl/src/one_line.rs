@@ -1,7 +1,7 @@
-//! An error with its causes in one line, each said once.
+//! One-line text of an error and its causes without repetition.
 
-/// `error` with those of its causes that its text does not hold already.
-pub fn said_once(error: &anyhow::Error) -> String {
+/// Text of `error` and of its causes, leaving out a cause that the text already contains.
+pub fn one_line(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |said, cause| {
         match (said.is_empty(), said.contains(&cause)) {
             (true, _) => cause,
