@@ -1,4 +1,4 @@
-//! The diagnosis itself: flights in, answer out.
+//! The diagnosis, from flights to the result.
 
 use crate::compare::{self, ChannelId};
 use crate::diagnose::answer::advice;
@@ -26,23 +26,24 @@ use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
-/// Least share of the error beyond noise that must be learnable before something is said to be missing:
-/// what the reconstruction leaves is no effect.
+/// Least share of the error beyond noise that must be learnable before the verdict is that something is
+/// missing; errors of the reconstruction leave less.
 const WORTH_SAYING: f64 = 0.1;
-/// The same where an effect of the catalogue was refused for its shape or its flights.
+/// The same share where an effect of the catalogue was refused for its shape or its flights.
 const REFUSED: f64 = 0.01;
-/// What is refused beside a figure that cannot be.
+/// Reason to refuse effects beside a physically impossible figure.
 const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
-/// What is refused of an effect whose amount another one took over.
+/// Reason to refuse an effect whose contribution another one accounts for.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
-/// Says which effects of the catalogue `model` lacks according to `flights`, which must have been
-/// reconstructed with their deflections as recorded; `progress` hears what is being done.
+/// Determines which effects of the catalogue `model` lacks according to `flights`, which must have been
+/// reconstructed with their deflections as recorded; reports to `progress`, which may cancel.
 ///
 /// # Errors
-/// There is too little flight or nothing in it moves, an id to be left out is unknown, or a flight has
-/// no clock, or `progress` ended it.
+///
+/// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or
+/// `progress` cancelled.
 pub fn diagnose(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -112,14 +113,15 @@ fn settings(options: &Options) -> Settings {
     }
 }
 
-/// What speaks against effects beside the search's own checks.
+/// Objections to effects beyond the search's own checks.
 struct Judged {
     abstained: [Option<String>; 6],
     tuned: Vec<Tuned>,
     doubtful: Vec<String>,
 }
 
-/// Refuses effects where the flights cannot judge, whose amount may be zero, or beside figures that cannot be.
+/// Refuses effects in channels that the flights cannot judge, effects whose amount may be zero, and all
+/// effects beside impossible figures.
 fn judge(
     found: &mut Found,
     model: &GreyBox,
@@ -138,7 +140,7 @@ fn judge(
     Judged { abstained, tuned, doubtful }
 }
 
-/// The verdict as it is spoken: nothing is said beside what cannot be, or where no channel can be judged.
+/// The verdict to report: unknown beside impossible figures or where no channel can be judged.
 fn spoken(found: &Found, doubtful: &[String], channels: &[ChannelLeft]) -> Verdict {
     match verdict(found) {
         _ if !doubtful.is_empty() => Verdict::Unknown,
@@ -147,7 +149,7 @@ fn spoken(found: &Found, doubtful: &[String], channels: &[ChannelLeft]) -> Verdi
     }
 }
 
-/// Why these flights cannot judge `model` as given in a channel, as `compare` has it.
+/// Reasons why these flights cannot judge `model` as given in a channel, from the comparison.
 fn abstained(model: &GreyBox, flights: &[&Reconstruction], seed: u64) -> [Option<String>; 6] {
     let flights: Vec<Reconstruction> = flights.iter().map(|f| (*f).clone()).collect();
     let all = compare::abstentions(model, &flights, seed).unwrap_or_default();
@@ -157,7 +159,7 @@ fn abstained(model: &GreyBox, flights: &[&Reconstruction], seed: u64) -> [Option
     })
 }
 
-/// Whether every id is one of the catalogue.
+/// Checks that every id is one of the catalogue.
 pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     match ids.iter().find(|id| physics::catalogue::describe(id).is_none()) {
         None => Ok(()),
@@ -165,10 +167,10 @@ pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     }
 }
 
-/// The problem, the flights it is made of, what the reader must know.
+/// The problem, the flights it is made from, and notes for the reader.
 pub type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
-/// The flights on the model's clock, with what was left out.
+/// Resamples the flights to the model's clock; flights that cannot be used are noted.
 pub fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
@@ -203,7 +205,7 @@ pub fn problem<'a>(
     Ok((problem, used, notes))
 }
 
-/// The verdict on what the search found: an effect, something unexplained, or an adequate model.
+/// The verdict on the search's result: an effect, something unexplained, or an adequate model.
 pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
@@ -219,7 +221,7 @@ pub fn verdict(found: &Found) -> Verdict {
     }
 }
 
-/// Ids of the candidates that a model lacks and that can be searched for.
+/// Ids of the candidate effects that a model lacks and that can be searched for.
 pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
     catalogue::candidates(model, &[], without).iter().map(|e| e.about.id).collect()
 }

@@ -1,4 +1,4 @@
-//! Forward selection: the effect with the best evidence joins the model, and again, until none passes.
+//! Forward selection: adds the effect with the best evidence to the model, until no candidate passes.
 
 mod examine;
 mod found;
@@ -26,22 +26,24 @@ use examine::examine;
 use greylag_model::{GreyBox, RUDDER};
 use run_off::run_off;
 
-/// Share of the search that is done once all candidates have been ranked.
+/// Share of the work done once all candidates have been ranked.
 const RANKED: f64 = 0.3;
-/// Most effects that are asserted together.
+/// Largest number of asserted effects.
 const MOST: usize = 6;
-/// Most passes of tuning after an effect has joined. A product of two coefficients, as of a saturation and the
-/// effectiveness that saturates, takes more of them than [`SETTLING`]: each is tuned with the other held.
+/// Largest number of tuning passes after an effect has joined. A product of two coefficients, such as a
+/// saturation and the effectiveness that saturates, needs more of them than [`SETTLING`], since each is tuned
+/// with the other held.
 const MOST_SETTLING: usize = 12;
-/// Largest change of a coefficient, in its standard deviations, of a model that is settled.
+/// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
 const SETTLED: f64 = 0.2;
-/// Most candidates that are refused beside what has joined before the search ends.
+/// Largest number of candidates refused beside the joined effects before the search ends.
 const MOST_ASIDE: usize = 4;
 
-/// Searches for what `model` lacks.
+/// Searches for the effects that `model` lacks.
 ///
 /// # Errors
-/// The flights do not hold the model at all, or `progress` ended the search.
+///
+/// The model cannot be evaluated over the flights, or `progress` cancelled.
 pub fn search(
     problem: &Problem,
     model: &GreyBox,
@@ -92,7 +94,7 @@ pub fn search(
     Ok(found)
 }
 
-/// Lets the best candidates join one after the other, until none passes; returns those that were refused beside them.
+/// Adds the best candidates one by one until none passes; returns those that were refused.
 fn select(
     problem: &Problem,
     model: &GreyBox,
@@ -115,7 +117,7 @@ fn select(
             (None, false) => "is refused",
         };
         say(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
-        // several things may be missing: what is refused beside one of them does not hide the next
+        // several things may be missing: a refused candidate does not prevent the next one
         if !passed && found.last.is_some() && aside.len() < MOST_ASIDE {
             found.scores.remove(0);
             aside.push(winner);
@@ -130,7 +132,7 @@ fn select(
     Ok(aside)
 }
 
-/// The candidates as the first ranking has them.
+/// The candidates in the first ranking, for progress reports.
 fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<FirstLook> {
     let of = |(trial, score): &(usize, Score)| FirstLook {
         id: round.trials[*trial].id,
@@ -140,7 +142,7 @@ fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<F
     scores.iter().map(of).collect()
 }
 
-/// `current` without the effect `id`, which `given` does not have either.
+/// `current` without the effect `id`, which `given` does not contain either.
 fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
     let mut model = given.clone();
     let joined: Vec<&'static str> =
@@ -164,9 +166,9 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
 }
 
 impl Found {
-    /// Joins the effect selected last to the model and ranks what is left.
-    /// An earlier one that is nothing beside it goes. `false` if it cannot join, or the model with it cannot be
-    /// linearised: the search ends.
+    /// Adds the effect selected last to the model and ranks the remaining candidates. An earlier effect that
+    /// becomes insignificant is removed. `false` if the effect cannot join or the model with it cannot be
+    /// linearised; the search then ends.
     fn join(
         &mut self,
         problem: &Problem,
@@ -197,8 +199,8 @@ impl Found {
         Ok(true)
     }
 
-    /// `model`, with the effect selected last, once its coefficients move no more; an earlier effect that is nothing beside it
-    /// goes, and ends that. `None` if the model cannot be linearised.
+    /// `model`, with the effect selected last, tuned to convergence; an earlier effect that becomes
+    /// insignificant is removed and ends the tuning. `None` if the model cannot be linearised.
     fn settle(
         &mut self,
         problem: &Problem,
@@ -227,7 +229,7 @@ impl Found {
         Ok(Round::new(problem, model, &[]))
     }
 
-    /// Share of the search that is done; how many effects will be selected is not known.
+    /// Estimated share of the work done; the number of effects to be selected is not known in advance.
     fn fraction(&self) -> f64 {
         let left = 0.5_f64.powi(self.selected.len() as i32);
         RANKED + (0.9 - RANKED) * (1.0 - left)
