@@ -9,8 +9,7 @@ pub struct Stage<'a> {
     pub doing: &'a str,
     /// Share of the whole task that is done, 0 to 1; never decreases.
     pub fraction: f64,
-    /// Candidates of a diagnosis in the present ranking, the best first; empty before the ranking and in
-    /// other tasks.
+    /// Candidates of a diagnosis in the present ranking, the best first; empty before the ranking and in other tasks.
     pub ranking: &'a [FirstLook],
 }
 
@@ -26,8 +25,7 @@ impl<'a> Stage<'a> {
 pub struct FirstLook {
     /// Identifier of the effect.
     pub id: &'static str,
-    /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic,
-    /// dimensionless.
+    /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
     pub evidence: f64,
     /// Evidence that the best candidate reaches by chance where nothing is missing.
     pub threshold: f64,
@@ -49,7 +47,6 @@ pub struct Cancelled;
 /// Reports a stage.
 ///
 /// # Errors
-///
 /// [`Cancelled`] if the listener answered `Break`.
 pub fn say(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
     said(progress(Stage::new(doing, fraction)))

@@ -6,8 +6,8 @@ use greylag_logs::rudder::RudderMotion;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::airframe::Yaw;
 
-/// Channels of a rudder's forces and moments: it yaws the aircraft, and its deflection with the resulting
-/// sideslip causes drag.
+/// Channels of a rudder's forces and moments: it yaws the aircraft, and its deflection with the resulting sideslip
+/// causes drag.
 pub const CHANNELS: [ChannelId; 4] =
     [ChannelId::Drag, ChannelId::Side, ChannelId::Roll, ChannelId::Yaw];
 

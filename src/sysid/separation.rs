@@ -22,12 +22,11 @@ pub struct Separation {
     pub apart: f64,
 }
 
-/// Distance by which `flight`, flown by the aircraft `truth`, separates it from `others`, when `base` lacks
-/// both effects: `others` are the ways in which the other effect may be fitted, each a set of models whose
-/// differences from `base` may be scaled freely.
+/// Distance by which `flight`, flown by the aircraft `truth`, separates it from `others`, when `base` lacks both
+/// effects: `others` are the ways in which the other effect may be fitted, each a set of models whose differences
+/// from `base` may be scaled freely.
 ///
-/// The coefficients of `base` are refitted within their prior widths, and so are constant errors in every
-/// channel.
+/// The coefficients of `base` are refitted within their prior widths, and so are constant errors in every channel.
 pub fn separation(
     base: &GreyBox,
     truth: &GreyBox,
@@ -94,8 +93,8 @@ fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<D
     all
 }
 
-/// Squared length of `gap` after projection onto `prior` (each with a unit pseudo-observation) and `free` has
-/// been subtracted.
+/// Squared length of `gap` after projection onto `prior` (each with a unit pseudo-observation) and `free` has been
+/// subtracted.
 fn remaining(prior: &[DVector<f64>], free: Vec<DVector<f64>>, gap: &DVector<f64>) -> f64 {
     let free = free.into_iter().filter(|column| column.norm_squared() > 0.0);
     let columns: Vec<DVector<f64>> = prior.iter().cloned().chain(free).collect();

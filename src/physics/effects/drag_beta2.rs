@@ -1,4 +1,4 @@
-//! Drag of flying sideways.
+//! Drag due to sideslip.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,5 +1,4 @@
-//! The amendment: tunes the prior coefficients, then adds effects one by one, each judged by held-out
-//! flights.
+//! The amendment: tunes the prior coefficients, then adds effects one by one, each judged by held-out flights.
 
 mod selection;
 
@@ -80,8 +79,8 @@ pub struct Options {
     pub conventions: bool,
     /// Constants estimated for each flight beside those of its sensors.
     pub per_flight: PerFlight,
-    /// The model tuned to the same flights without any effect ([`tune`](super::tune)), if that has been
-    /// computed already.
+    /// The model tuned to the same flights without any effect ([`tune`](super::tune)), if that has been computed
+    /// already.
     pub tuned: Option<Fit>,
 }
 
@@ -130,11 +129,10 @@ fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
     named.filter_map(|c| Some((c.name.clone(), after.replaced(&c.name)?))).collect()
 }
 
-/// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; reports to
-/// `progress`, which may cancel.
+/// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; reports to `progress`, which
+/// may cancel.
 ///
 /// # Errors
-///
 /// An effect cannot join the model, the flights do not allow a fit, or `progress` cancelled.
 pub fn amend(
     model: &GreyBox,
@@ -215,8 +213,8 @@ fn usual_start(about: &Description) -> Vec<f64> {
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 
-/// Notes for the reader of an amendment of `model`: on the fit, on coefficients left unchanged, on
-/// contradictions between flights.
+/// Notes for the reader of an amendment of `model`: on the fit, on coefficients left unchanged, on contradictions
+/// between flights.
 fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     let mut notes = fit.notes.clone();
     notes.extend(

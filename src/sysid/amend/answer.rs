@@ -51,7 +51,6 @@ pub struct Diagnosed {
 /// Evaluates tuning and the asserted effects of `diagnosis` on its own `flights`.
 ///
 /// # Errors
-///
 /// An effect cannot join the model, or a flight has no clock.
 pub fn diagnosed(
     model: &GreyBox,
@@ -163,8 +162,8 @@ struct Log {
 }
 
 impl Origin {
-    /// The amendment beside the model file `model`; `None` if there is none, or if the model was not made
-    /// from `before`.
+    /// The amendment beside the model file `model`; `None` if there is none, or if the model was not made from
+    /// `before`.
     pub fn beside(model: &Path, before: &GreyBox) -> Option<Origin> {
         let text = std::fs::read_to_string(model.parent()?.join(STORY)).ok()?;
         let origin: Origin = serde_json::from_str(&text).ok()?;
@@ -178,8 +177,8 @@ impl Origin {
         self.tuned.iter().all(set).then_some(tuned)
     }
 
-    /// The answer of a comparison between the model before and the one after; `tuned` holds the free-run
-    /// errors of the tuned model.
+    /// The answer of a comparison between the model before and the one after; `tuned` holds the free-run errors of
+    /// the tuned model.
     pub fn answer(&self, c: &Comparison, tuned: &[HorizonScore], logs: &[PathBuf]) -> Answer {
         let stage =
             |k: usize, way| Stage { way, model: &c.models[k].name, scores: &c.models[k].free_run };

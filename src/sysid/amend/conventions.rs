@@ -8,8 +8,7 @@ use greylag_model::{GreyBox, Integrator};
 use greylag_physics::atmosphere::Density;
 use greylag_physics::rigid_body::ForceAxes;
 
-/// Standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong
-/// 1989).
+/// Standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
 const CLEARLY: f64 = 1.96;
 /// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
@@ -85,10 +84,10 @@ impl Convention {
         }
     }
 
-    /// Whether the alternative is adopted, given that it fits its own flights `closer` by so many standard
-    /// errors and takes the held-out error from the first to the second of `error`. Integrator and axes are
-    /// choices of the simulator or the author and need positive evidence; air does thin with height, so the
-    /// standard atmosphere only needs to be not contradicted.
+    /// Whether the alternative is adopted, given that it fits its own flights `closer` by so many standard errors and
+    /// takes the held-out error from the first to the second of `error`. Integrator and axes are choices of the
+    /// simulator or the author and need positive evidence; air does thin with height, so the standard atmosphere only
+    /// needs to be not contradicted.
     pub(super) fn is_borne_out(self, closer: f64, error: [f64; 2]) -> bool {
         let fall = 1.0 - error[1] / error[0];
         match self {

@@ -108,11 +108,10 @@ impl Original {
     }
 }
 
-/// The files of an amended model, name and text: airframe, effects, model, result. `logs` are those fitted to
-/// and those held out.
+/// The files of an amended model, name and text: airframe, effects, model, result. `logs` are those fitted to and
+/// those held out.
 ///
 /// # Errors
-///
 /// The original is no model file, or the result holds a number that JSON cannot represent.
 pub fn files(
     original: &Original,
@@ -175,8 +174,7 @@ fn short(log: &Hashed) -> String {
     format!("{name} (sha256 {})", &log.sha256[..PREFIX])
 }
 
-/// The first coefficient that differs in any bit between `read` and `meant`, or convention that differs, in
-/// words.
+/// The first coefficient that differs in any bit between `read` and `meant`, or convention that differs, in words.
 pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
     if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
         return Some(other.key().join("."));

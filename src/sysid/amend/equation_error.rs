@@ -31,8 +31,7 @@ pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f
     search(model, free, flights, theta, ITERATIONS).1
 }
 
-/// Starting points: the model's own values, and those of the catalogue for the shape constants of added
-/// effects.
+/// Starting points: the model's own values, and those of the catalogue for the shape constants of added effects.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {

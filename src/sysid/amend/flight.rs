@@ -12,20 +12,20 @@ pub(super) const SENSORS: usize = 8;
 pub(super) const SKEW: usize = 0;
 /// Index of the state that each constant after the delay offsets; that of the airspeed is relative.
 pub(super) const OFFSETS: [usize; SENSORS - 2] = [2, 3, 4, 5, 6, 7];
-/// Index of the actuators' blur, the last constant: half the variance, in squared samples, of the interval
-/// over which a recorded deflection is averaged.
+/// Index of the actuators' blur, the last constant: half the variance, in squared samples, of the interval over which
+/// a recorded deflection is averaged.
 pub(super) const BLUR: usize = SENSORS - 1;
 /// Index of the airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
-/// Least standard deviation of the actuators' delay estimated from forces, s (against simulated truth its
-/// root mean square error is 0.3 ms).
+/// Least standard deviation of the actuators' delay estimated from forces, s (against simulated truth its root mean
+/// square error is 0.3 ms).
 pub(super) const SKEW_LEAST: f64 = 5e-4;
-/// Prior standard deviation of the actuators' delay against the gyros, s: that of ±1.5 samples, both recorded
-/// 0 to 10 ms late.
+/// Prior standard deviation of the actuators' delay against the gyros, s: that of ±1.5 samples, both recorded 0 to 10
+/// ms late.
 const SKEW_SD: f64 = 7.7e-3;
-/// Prior standard deviations where the reconstruction gives none: airspeed scale (relative), body rates
-/// (rad/s), α and β (rad).
+/// Prior standard deviations where the reconstruction gives none: airspeed scale (relative), body rates (rad/s), α
+/// and β (rad).
 const DOUBT: [f64; 6] = [0.003, 2e-4, 2e-4, 2e-4, 0.002, 0.002];
 /// The reconstruction's names of those constants, in the same order.
 const NAMES: [&str; 6] =
@@ -68,9 +68,8 @@ impl Own {
 pub struct Flight {
     /// The flight on the models' clock, deflections as recorded.
     pub prepared: Prepared,
-    /// Prior means and standard deviations: the actuators' delay (s), the airspeed's scale (relative), the
-    /// biases of p, q, r (rad/s), α and β (rad) that remain after reconstruction, and the actuators' blur
-    /// (squared samples).
+    /// Prior means and standard deviations: the actuators' delay (s), the airspeed's scale (relative), the biases of
+    /// p, q, r (rad/s), α and β (rad) that remain after reconstruction, and the actuators' blur (squared samples).
     pub doubt: [[f64; 2]; SENSORS],
     /// Uncertainty of the measured forces and moments.
     pub(super) forces: Doubt,
@@ -80,7 +79,6 @@ impl Flight {
     /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    ///
     /// It has no clock.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Flight, ClockError> {
         let mut doubt = [[0.0, SKEW_SD]; SENSORS];

@@ -18,12 +18,12 @@ impl Covariance {
     }
 }
 
-/// The covariance at the optimum from `information` (the prior's included, whose diagonal is `prior`) and
-/// `scores`, the gradients of the data's cost over blocks of data taken as independent.
+/// The covariance at the optimum from `information` (the prior's included, whose diagonal is `prior`) and `scores`,
+/// the gradients of the data's cost over blocks of data taken as independent.
 ///
-/// The inverse information is the covariance if the weights are right; with many blocks, the sandwich
-/// estimator needs no such assumption. With few blocks the sandwich is biased low and uncertain, so each
-/// unknown's variance is the larger of the two, the sandwich multiplied by B/(B − 1).
+/// The inverse information is the covariance if the weights are right; with many blocks, the sandwich estimator needs
+/// no such assumption. With few blocks the sandwich is biased low and uncertain, so each unknown's variance is the
+/// larger of the two, the sandwich multiplied by B/(B − 1).
 pub(super) fn covariance(
     information: &DMatrix<f64>,
     prior: &DVector<f64>,

@@ -13,15 +13,15 @@ use greylag_model::GreyBox;
 pub const JUDGED_AT_S: f64 = 5.0;
 /// Least relative fall of the held-out error for an effect to join.
 pub(super) const IMPROVED: f64 = 0.01;
-/// An effect that lowers the held-out error below this share joins although the search has not converged with
-/// it: convergence may need further effects.
+/// An effect that lowers the held-out error below this share joins although the search has not converged with it:
+/// convergence may need further effects.
 pub const SETTLED_OR_NOT: f64 = 0.5;
 /// An effect's coefficient must differ from zero by this many standard deviations.
 const CLEAR: f64 = 1.96;
 /// The same for effects of more than three coefficients, of which one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
-/// Flights disagree if one flight's estimate differs from the common one by this many standard deviations and
-/// by [`DISAGREE_SHARE`] too.
+/// Flights disagree if one flight's estimate differs from the common one by this many standard deviations and by
+/// [`DISAGREE_SHARE`] too.
 const DISAGREE: f64 = 4.0;
 /// Least relative difference at which flights disagree.
 const DISAGREE_SHARE: f64 = 0.3;
@@ -211,8 +211,8 @@ fn wider(bound: f64) -> String {
     format!("-{far}..{far}")
 }
 
-/// Coefficients whose fitted sign is significantly opposite to their prior's, by more than the prior's width,
-/// in words.
+/// Coefficients whose fitted sign is significantly opposite to their prior's, by more than the prior's width, in
+/// words.
 pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
     let turned = |p: &&Parameter| {
         !p.added

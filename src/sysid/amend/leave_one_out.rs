@@ -1,5 +1,5 @@
-//! Selection of a model's structure by leave-one-out cross-validation: each flight is predicted by a fit to
-//! all others.
+//! Selection of a model's structure by leave-one-out cross-validation: each flight is predicted by a fit to all
+//! others.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -103,8 +103,7 @@ pub fn leave_one_out(
     Ok(all)
 }
 
-/// Baselines without aerodynamics: constant state, straight flight, and a linear model fitted to the other
-/// flights.
+/// Baselines without aerodynamics: constant state, straight flight, and a linear model fitted to the other flights.
 fn black_boxes(model: &GreyBox, flights: &[Flight], at: f64) -> Vec<Scored> {
     let prepared: Vec<Prepared> = flights.iter().map(|f| f.prepared.clone()).collect();
     let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];
@@ -192,8 +191,8 @@ fn mean_with_error(x: &[f64]) -> [f64; 2] {
     [mean, (variance / n).sqrt()]
 }
 
-/// Marks the simplest structure within one standard error of the best, or within the least improvement for
-/// which an effect joins.
+/// Marks the simplest structure within one standard error of the best, or within the least improvement for which an
+/// effect joins.
 fn choose(all: &mut [Scored]) {
     let best = all.iter().min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
     let Some(best) = best.filter(|b| b.mean.is_finite()) else { return };

@@ -171,8 +171,8 @@ pub(super) fn run(
     shooting::residuals(flight, shot, own, &model.scale(), &path)
 }
 
-/// Derivatives of the residuals of shot `index`: columns for the free coefficients, the flight's constants
-/// and its initial state; eight rows for each sample.
+/// Derivatives of the residuals of shot `index`: columns for the free coefficients, the flight's constants and its
+/// initial state; eight rows for each sample.
 pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],

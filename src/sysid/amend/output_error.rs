@@ -1,9 +1,9 @@
 //! Output-error estimation by multiple shooting: fits the coefficients so that free runs follow the flights.
 //!
-//! Each shot starts from a reconstructed state, whose error is an unknown eliminated from the normal
-//! equations; the sensors' remaining biases and the actuators' delay are unknowns of each flight. Residuals
-//! are weighted by their variance and by one common correlation length, both re-estimated during the search.
-//! Priors are Gaussian, with [`Named::width`](greylag_model::Named::width).
+//! Each shot starts from a reconstructed state, whose error is an unknown eliminated from the normal equations; the
+//! sensors' remaining biases and the actuators' delay are unknowns of each flight. Residuals are weighted by their
+//! variance and by one common correlation length, both re-estimated during the search. Priors are Gaussian, with
+//! [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
 mod gauss_newton;
@@ -29,8 +29,7 @@ use greylag_num::statistics::quantile;
 pub const LEAST_S: f64 = 10.0;
 /// Convergence tolerance: largest change of a coefficient in its standard deviations.
 const SETTLED: f64 = 0.03;
-/// Derivatives are renewed until the renewal changes no coefficient by more than this many standard
-/// deviations.
+/// Derivatives are renewed until the renewal changes no coefficient by more than this many standard deviations.
 const RENEWED: f64 = 0.1;
 /// The same tolerance for all shot lengths but the last.
 const NEAR: f64 = 5.0;
@@ -82,8 +81,7 @@ pub struct Fit {
     pub(super) weights: Weights,
     /// Number of iterations made.
     pub iterations: usize,
-    /// The parameter that had not converged when the search ended, in words; all intervals are widened by its
-    /// change.
+    /// The parameter that had not converged when the search ended, in words; all intervals are widened by its change.
     pub unsettled: Option<String>,
     /// Notes for the reader.
     pub notes: Vec<String>,
@@ -103,7 +101,6 @@ pub(super) struct Left {
 /// Fits the free coefficients of `model` to `flights`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-///
 /// There is too little flight, nothing is free, nothing is excited, runs diverge at once, the search does not
 /// converge, or `progress` cancelled.
 pub fn fit(
@@ -158,8 +155,8 @@ pub fn fit(
     search.finish(model)
 }
 
-/// The actuators' delays estimated with an effect on the deflections in the model, since free runs cannot
-/// distinguish the two.
+/// The actuators' delays estimated with an effect on the deflections in the model, since free runs cannot distinguish
+/// the two.
 fn clocks(
     model: &GreyBox,
     free: &[Free],
@@ -197,8 +194,8 @@ struct Search<'a> {
     iterations: usize,
     /// Largest change of the last step in standard deviations, and the coefficient's index.
     change: (f64, usize),
-    /// Whether that step was rejected: no fraction of it lowers the cost, for example where a run that stalls
-    /// or does not makes the cost jump.
+    /// Whether that step was rejected: no fraction of it lowers the cost, for example where a run that stalls or does
+    /// not makes the cost jump.
     stuck: bool,
 }
 
@@ -286,9 +283,9 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Iterates to convergence, weights included. The derivatives, the most expensive part, are renewed once
-    /// the search has converged under the old ones, until a renewal changes nothing by more than `tolerance`
-    /// standard deviations. `step` receives the share of the renewals that is done.
+    /// Iterates to convergence, weights included. The derivatives, the most expensive part, are renewed once the
+    /// search has converged under the old ones, until a renewal changes nothing by more than `tolerance` standard
+    /// deviations. `step` receives the share of the renewals that is done.
     fn settle(
         &mut self,
         renewals: usize,

@@ -6,16 +6,16 @@ use greylag_physics::effects::Description;
 use greylag_physics::formula::register;
 use greylag_physics::inputs;
 
-/// Coefficients of added effects that are held at their starting values: fractions that cannot be identified
-/// beside the shape they scale.
+/// Coefficients of added effects that are held at their starting values: fractions that cannot be identified beside
+/// the shape they scale.
 const HELD: &[&str] = &["lift_stall.k"];
-/// Effects without a formula of their own (curves), whose ordinates have a narrow prior about zero where few
-/// data lie.
+/// Effects without a formula of their own (curves), whose ordinates have a narrow prior about zero where few data
+/// lie.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
 /// Prior width of an ordinate of those effects, as a share of its range.
 const SLIGHT_SHARE: f64 = 0.1;
-/// Pairs of such an effect and the effect whose shape it takes over: the constants of that formula are held,
-/// since the curve can represent any change of them.
+/// Pairs of such an effect and the effect whose shape it takes over: the constants of that formula are held, since
+/// the curve can represent any change of them.
 const TAKES_OVER: &[(&str, &str)] = &[("lift_curve", "lift_stall")];
 /// Finite-difference step of a coefficient with a prior, as a share of its prior width.
 const STEP: f64 = 1e-3;
@@ -46,8 +46,8 @@ pub(super) struct Free {
     pub linear: bool,
     /// Whether it belongs to an input effect, between measured and acting deflections.
     pub input: bool,
-    /// Whether it changes the acting deflections for given measured ones, or the state of a formula's lags
-    /// and delays.
+    /// Whether it changes the acting deflections for given measured ones, or the state of a formula's lags and
+    /// delays.
     pub acting: bool,
     /// Whether it belongs to an effect that is being added.
     pub added: bool,
@@ -65,8 +65,8 @@ fn remembers(id: &str) -> bool {
 
 /// The free coefficients of `model`; `added` are the ids of new effects.
 ///
-/// A coefficient with a prior is held if its width is zero; one of a new effect has no prior but its bounds,
-/// or a share of them. Constants of a formula whose shape a curve takes over are held.
+/// A coefficient with a prior is held if its width is zero; one of a new effect has no prior but its bounds, or a
+/// share of them. Constants of a formula whose shape a curve takes over are held.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -111,8 +111,8 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
         .collect()
 }
 
-/// `model` with physical bounds as its only prior: every coefficient that the model is linear in has a prior
-/// as wide as its bounds, zero or not.
+/// `model` with physical bounds as its only prior: every coefficient that the model is linear in has a prior as wide
+/// as its bounds, zero or not.
 pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     let linear = model.linear();
     let names: Vec<&str> = model.coefficients().iter().map(|c| c.name.as_str()).collect();
@@ -127,8 +127,7 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     model.clone().with_widths(range)
 }
 
-/// Coefficients of `model` that no fit changes, because they are zero and their file states no standard
-/// deviation.
+/// Coefficients of `model` that no fit changes, because they are zero and their file states no standard deviation.
 pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     let held = model.coefficients().iter().filter(|c| c.width() == 0.0 && c.sd.is_none());
     let known =
@@ -153,8 +152,8 @@ pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
     changed
 }
 
-/// The models perturbed in coefficient `place` of `values`, and the difference between them: central for
-/// coefficients that the model is not linear in, else one-sided with `None` for the present model.
+/// The models perturbed in coefficient `place` of `values`, and the difference between them: central for coefficients
+/// that the model is not linear in, else one-sided with `None` for the present model.
 pub(super) fn beside(
     model: &GreyBox,
     free: &[Free],

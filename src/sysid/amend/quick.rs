@@ -26,7 +26,6 @@ pub struct Estimate {
 /// Tunes `model` to `flights`, no effect added: the value of [`Options::tuned`].
 ///
 /// # Errors
-///
 /// The flights do not allow a fit, or `progress` cancelled.
 pub fn tune(
     model: &GreyBox,
@@ -39,7 +38,6 @@ pub fn tune(
 /// Estimates `model` with `effects` by equation error over `flights` and scores its free runs on `held_out`.
 ///
 /// # Errors
-///
 /// An effect cannot join the model, or a flight has no clock.
 pub fn estimate(
     model: &GreyBox,

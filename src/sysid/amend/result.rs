@@ -34,8 +34,8 @@ pub struct Parameter {
     pub at_bound: bool,
     /// Estimates of each flight alone, to first order.
     pub by_flight: Vec<FlightEstimate>,
-    /// The model's own coefficient that this one of an added effect is confounded with (error correlation
-    /// beyond 0.9), if there is one.
+    /// The model's own coefficient that this one of an added effect is confounded with (error correlation beyond
+    /// 0.9), if there is one.
     pub same_as: Option<String>,
 }
 

@@ -50,8 +50,8 @@ pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
     shots
 }
 
-/// Deflections that act during each model step of each segment of a flight under `model`, the record
-/// corrected for the delay and blur in `sensors`.
+/// Deflections that act during each model step of each segment of a flight under `model`, the record corrected for
+/// the delay and blur in `sensors`.
 pub(super) fn acting(
     model: &GreyBox,
     flight: &Prepared,
@@ -82,8 +82,8 @@ fn act(
     (0..segment.len() * flight.substeps).map(one).collect()
 }
 
-/// Deflections at `place` (samples) by cubic interpolation, whose derivative is continuous, less `blur` times
-/// the second difference, which undoes the recording's average.
+/// Deflections at `place` (samples) by cubic interpolation, whose derivative is continuous, less `blur` times the
+/// second difference, which undoes the recording's average.
 fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     let last = segment.len() as f64 - 1.0;
     let place = place.clamp(0.0, last);
@@ -183,8 +183,8 @@ pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     error
 }
 
-/// Predicted − measured after each sample of a shot, the sensors' offsets included; after divergence the last
-/// error is held. `scale` is x_c.
+/// Predicted − measured after each sample of a shot, the sensors' offsets included; after divergence the last error
+/// is held. `scale` is x_c.
 pub(super) fn residuals(
     flight: &Prepared,
     shot: &Shot,

@@ -69,8 +69,8 @@ pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
 
-/// Mean residual and its 95 % interval: block bootstrap, widened by the uncertainty of the sensor errors;
-/// `path` selects the bootstrap's random stream.
+/// Mean residual and its 95 % interval: block bootstrap, widened by the uncertainty of the sensor errors; `path`
+/// selects the bootstrap's random stream.
 pub fn mean_interval<'a>(
     residuals: impl Iterator<Item = &'a Residual> + Clone,
     seed: u64,
@@ -189,8 +189,8 @@ fn tail(independent: usize) -> f64 {
     (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
 }
 
-/// Share of the variance that a straight line over `values` explains; bins are too coarse where a few extreme
-/// values carry the error.
+/// Share of the variance that a straight line over `values` explains; bins are too coarse where a few extreme values
+/// carry the error.
 fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     let (mx, my) =
         (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
@@ -205,8 +205,8 @@ fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     if share.is_finite() && count > 2.0 { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Round edges that divide the range between the quantiles `tail` and 1 − `tail` into about `bins` bins;
-/// `None` for a constant variable.
+/// Round edges that divide the range between the quantiles `tail` and 1 − `tail` into about `bins` bins; `None` for a
+/// constant variable.
 fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
     let (low, high) = (quantile(values, tail), quantile(values, 1.0 - tail));
     let width = round_width((high - low) / bins);

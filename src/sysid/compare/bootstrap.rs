@@ -36,8 +36,8 @@ pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     blocks
 }
 
-/// 95 % percentile interval of the mean by resampling whole `blocks`; `seed` and `path` select the random
-/// stream. NaN for fewer than two blocks.
+/// 95 % percentile interval of the mean by resampling whole `blocks`; `seed` and `path` select the random stream. NaN
+/// for fewer than two blocks.
 pub fn interval(blocks: &[Block], seed: u64, path: &[u64]) -> [f64; 2] {
     if blocks.len() < 2 {
         return [f64::NAN; 2];

@@ -1,8 +1,8 @@
 //! Effect of uncertain sensor errors on each channel's residual.
 //!
-//! An error of a bias estimated by the reconstruction shifts every window of its flight alike, so a bootstrap
-//! over windows does not cover it. The constants are taken as independent, with the standard deviations of
-//! the reconstruction.
+//! An error of a bias estimated by the reconstruction shifts every window of its flight alike, so a bootstrap over
+//! windows does not cover it. The constants are taken as independent, with the standard deviations of the
+//! reconstruction.
 
 use crate::flight_path::reconstruction::{Instant, Nuisance};
 use crate::weak_form::channels::ChannelId;
@@ -46,8 +46,8 @@ pub type Shift = [f64; COUNT];
 
 /// Shifts of every channel's residual, `[window][channel]` in the order of [`ChannelId::ALL`].
 ///
-/// They are evaluated at the middle of each window, where the kernel is largest. Zero for a constant that
-/// `nuisances` does not hold.
+/// They are evaluated at the middle of each window, where the kernel is largest. Zero for a constant that `nuisances`
+/// does not hold.
 pub fn shifts(
     model: &GreyBox,
     flight: &Prepared,
@@ -92,8 +92,8 @@ fn controls_rate(samples: &[Instant], k: usize) -> Controls {
     }
 }
 
-/// Standard deviation that the constants add to a mean of residuals, from pairs of flight and shift: shifts
-/// add up within a flight and are independent between flights.
+/// Standard deviation that the constants add to a mean of residuals, from pairs of flight and shift: shifts add up
+/// within a flight and are independent between flights.
 pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     let mut sums: Vec<Shift> = Vec::new();
     let mut count = 0.0;

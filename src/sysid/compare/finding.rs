@@ -1,5 +1,5 @@
-//! The worst regime of a channel: the variable that best separates the residual, with the range in which the
-//! model fails.
+//! The worst regime of a channel: the variable that best separates the residual, with the range in which the model
+//! fails.
 
 use super::bins::{self, Residual, SUPPORT};
 use super::discovery;

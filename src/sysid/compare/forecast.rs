@@ -10,8 +10,8 @@ use crate::weak_form::prepared::Prepared;
 
 /// Regressors of the linear model: the eight states, the four deflections, one.
 const REGRESSORS: usize = 13;
-/// Singular values below this share of the largest are treated as zero, for example those of a rudder that
-/// never moves.
+/// Singular values below this share of the largest are treated as zero, for example those of a rudder that never
+/// moves.
 const RANK: f64 = 1e-9;
 
 /// Free-run error of a baseline forecast, over the same starts as those of the models.
@@ -29,8 +29,8 @@ enum Forecast {
     Hold,
     /// Attitude, airspeed and flow angles are held at the initial values, rates are zero.
     Straight,
-    /// A first-order linear model with the deflections as inputs (ARX), fitted by least squares to the
-    /// flights it is judged on, so its error is optimistic.
+    /// A first-order linear model with the deflections as inputs (ARX), fitted by least squares to the flights it is
+    /// judged on, so its error is optimistic.
     Linear(DMatrix<f64>),
 }
 

@@ -13,8 +13,8 @@ use greylag_physics::State;
 
 /// Time between starts, s.
 pub const START_EVERY_S: f64 = 3.0;
-/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this:
-/// as if every state were off by its whole scale, 1 rad, V0, 2 V0/b and so on.
+/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this: as if
+/// every state were off by its whole scale, 1 rad, V0, 2 V0/b and so on.
 pub const DIVERGENCE_BOUND: f64 = 1.0;
 /// Number of points of the growth curve.
 pub const GROWTH_POINTS: usize = 25;

@@ -1,7 +1,7 @@
 //! The result of a comparison, as plain data for the terminal, the JSON and the report.
 //!
-//! Residuals are measured − model: a positive one means that the model is too low. A number that does not
-//! exist is NaN, which JSON writes as `null`.
+//! Residuals are measured − model: a positive one means that the model is too low. A number that does not exist is
+//! NaN, which JSON writes as `null`.
 
 use serde::Serialize;
 
@@ -176,8 +176,8 @@ pub struct ChannelResult {
     /// explains everything) upwards (over 1: worse than a constant). NaN if the flights do not move
     /// the channel above the noise.
     pub unexplained_fraction: f64,
-    /// Rate of the scaled state error (error / x_c) caused by the residual beyond noise, RMS, 1/s. Comparable
-    /// between channels.
+    /// Rate of the scaled state error (error / x_c) caused by the residual beyond noise, RMS, 1/s. Comparable between
+    /// channels.
     pub effect_per_s: f64,
     /// Share of the mean square residual due to a constant offset, 0..1.
     pub offset_share: f64,
@@ -202,8 +202,8 @@ pub struct RegimeBins {
     pub name: &'static str,
     /// Display unit of the variable: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
     pub unit: &'static str,
-    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger,
-    /// adjusted for their number of parameters, 0..1.
+    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, adjusted for
+    /// their number of parameters, 0..1.
     pub explained: f64,
     /// Bins in ascending order; for the variable flight, one each in the flights' order.
     pub bins: Vec<Bin>,
@@ -222,11 +222,11 @@ pub struct Bin {
     pub label: String,
     /// Mean residual (measured − model), in the channel's unit.
     pub mean: f64,
-    /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated
-    /// by the reconstruction.
+    /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated by the
+    /// reconstruction.
     pub interval: [f64; 2],
-    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model at
-    /// least as significant as this one; NaN without support. The model fails in cells of at most 0.05.
+    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model at least as
+    /// significant as this one; NaN without support. The model fails in cells of at most 0.05.
     pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
@@ -277,8 +277,8 @@ pub struct Regime {
     pub mean: f64,
     /// 95 % interval of `mean`.
     pub interval: [f64; 2],
-    /// Relative error, model − measured over the measured mean there, %; NaN if the measured channel passes
-    /// through zero there.
+    /// Relative error, model − measured over the measured mean there, %; NaN if the measured channel passes through
+    /// zero there.
     pub relative_percent: f64,
     /// Number of independent samples.
     pub independent: usize,
@@ -342,8 +342,8 @@ pub struct FlightTrace {
 /// A model's predictions for one flight.
 #[derive(Clone, Debug, Default)]
 pub struct ModelTrace {
-    /// States of free runs restarted from the reconstruction every [`Settings::start_every_s`], at the times
-    /// of [`FlightTrace::time_s`]; NaN where there is none.
+    /// States of free runs restarted from the reconstruction every [`Settings::start_every_s`], at the times of
+    /// [`FlightTrace::time_s`]; NaN where there is none.
     pub states: [Vec<f64>; 8],
     /// The channels in weak form.
     pub channels: Vec<ChannelTrace>,

@@ -52,9 +52,8 @@ impl Default for Options {
 /// Compares `models` with reconstructed `flights`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-///
-/// No model or flight is given, no log holds a usable flight, a flight has no clock, a horizon is not usable,
-/// or `progress` cancelled.
+/// No model or flight is given, no log holds a usable flight, a flight has no clock, a horizon is not usable, or
+/// `progress` cancelled.
 pub fn compare(
     models: &[GreyBox],
     flights: &[Reconstruction],
@@ -108,7 +107,6 @@ pub fn compare(
 /// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s).
 ///
 /// # Errors
-///
 /// A flight's clock does not fit.
 pub fn scores(
     model: &GreyBox,
@@ -214,11 +212,10 @@ fn one_model(
     }
 }
 
-/// Reasons why `flights` cannot judge `model`, channel by channel; `None` where they can, or where a channel
-/// was not measured.
+/// Reasons why `flights` cannot judge `model`, channel by channel; `None` where they can, or where a channel was not
+/// measured.
 ///
 /// # Errors
-///
 /// No flight can be compared.
 pub fn abstentions(
     model: &GreyBox,

@@ -1,9 +1,8 @@
-//! Diagnosis: finds the physical effect that a model lacks, by ranked candidates with thresholds from null
-//! flights.
+//! Diagnosis: finds the physical effect that a model lacks, by ranked candidates with thresholds from null flights.
 //!
-//! The method is described in `docs/explanation/diagnosis.md`. Flights must be reconstructed with their
-//! deflections as recorded ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)), because the
-//! diagnosis itself separates clock errors from physical effects.
+//! The method is described in `docs/explanation/diagnosis.md`. Flights must be reconstructed with their deflections
+//! as recorded ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)), because the diagnosis itself
+//! separates clock errors from physical effects.
 
 mod answer;
 mod error;

@@ -1,11 +1,11 @@
 //! Delay of the recorded actuators behind the gyros, estimated from the moments they cause.
 //!
-//! The kinematics do not depend on the actuators, but the angular accelerations do. Roll and pitch
-//! accelerations are regressed on rates, flow angles, inertial coupling, deflection and rate of deflection,
-//! with averages over a short kernel so that nothing is differentiated: the ratio of the last coefficient to
-//! the one before it is the delay. A lag of the surfaces that the record does not show is confounded with it.
-//! Both sides are high-pass filtered at half a second, because slower variations contain the errors of
-//! unmeasured flow angles, up to 0.2° with PX4, and no information on a delay.
+//! The kinematics do not depend on the actuators, but the angular accelerations do. Roll and pitch accelerations are
+//! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, with averages over a short
+//! kernel so that nothing is differentiated: the ratio of the last coefficient to the one before it is the delay. A
+//! lag of the surfaces that the record does not show is confounded with it. Both sides are high-pass filtered at half
+//! a second, because slower variations contain the errors of unmeasured flow angles, up to 0.2° with PX4, and no
+//! information on a delay.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,12 +19,12 @@ const KERNEL: f64 = 0.15;
 const BLOCK: usize = 14;
 /// Number of windows of the moving mean that is subtracted: about 0.5 s.
 const SLOW: usize = 7;
-/// Systematic error of the regression's delay, s: the largest one on 16 axes of noise-free flights of the X8
-/// in calm air.
+/// Systematic error of the regression's delay, s: the largest one on 16 axes of noise-free flights of the X8 in calm
+/// air.
 const SYSTEMATIC: f64 = 2e-5;
-/// Additional standard deviation due to gusts, s for each m/s of their level: they rotate the aircraft and
-/// the autopilot responds, so deflections follow moments that no term explains. Measured: 2.2 ms rms against
-/// a stated 1.1 ms on 20 flights of the X8 in light turbulence, level 2.4 m/s.
+/// Additional standard deviation due to gusts, s for each m/s of their level: they rotate the aircraft and the
+/// autopilot responds, so deflections follow moments that no term explains. Measured: 2.2 ms rms against a stated 1.1
+/// ms on 20 flights of the X8 in light turbulence, level 2.4 m/s.
 const BY_GUSTS: f64 = 8e-4;
 /// Share of the extrapolated bias correction that may be wrong because the extrapolation is linear.
 const CURVED: f64 = 0.5;
@@ -45,12 +45,11 @@ type Rate = fn(&Instant) -> f64;
 /// Regressors of the rate's derivative.
 type Terms = fn(&Instant) -> Vec<f64>;
 
-/// Delay of the recorded deflections from roll and pitch together with the prior of ±1.5 samples, in gusts of
-/// level `gusts` (m/s).
+/// Delay of the recorded deflections from roll and pitch together with the prior of ±1.5 samples, in gusts of level
+/// `gusts` (m/s).
 ///
-/// Errors in the regressors bias the coefficients. `erring` holds copies of the flight with an additional
-/// error like its own: the additional bias in them is subtracted (simulation extrapolation, Cook and
-/// Stefanski 1994, linear).
+/// Errors in the regressors bias the coefficients. `erring` holds copies of the flight with an additional error like
+/// its own: the additional bias in them is subtracted (simulation extrapolation, Cook and Stefanski 1994, linear).
 pub fn estimate(
     segments: &[Segment],
     erring: &[Vec<Segment>],
@@ -77,8 +76,7 @@ pub fn estimate(
     Skew { late: weighted / information, deviation }
 }
 
-/// The delay corrected for the bias from the states' errors, given the additional bias in the copies,
-/// `again`.
+/// The delay corrected for the bias from the states' errors, given the additional bias in the copies, `again`.
 fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     if again.len() < 2 {
         return skew;

@@ -1,8 +1,8 @@
 //! Normal equations that are block-tridiagonal in time, bordered by constants.
 //!
-//! The right-hand side is carried as an additional constant, the last column: elimination turns it into the
-//! solution, and its last entry in the corner is the least sum of squares. Both ends of a stretch are
-//! eliminated towards its middle at once, at the same cost as in sequence.
+//! The right-hand side is carried as an additional constant, the last column: elimination turns it into the solution,
+//! and its last entry in the corner is the least sum of squares. Both ends of a stretch are eliminated towards its
+//! middle at once, at the same cost as in sequence.
 
 /// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];
@@ -64,8 +64,8 @@ impl<const W: usize> Left<W> {
     }
 }
 
-/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`, where x' is that of its neighbour
-/// nearer the middle and p the constants.
+/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`, where x' is that of its neighbour nearer
+/// the middle and p the constants.
 #[derive(Clone, Copy, Debug)]
 struct Eliminated<const N: usize, const W: usize> {
     factor: Block<N>,
@@ -171,8 +171,8 @@ fn transposed<const N: usize>(a: &Block<N>) -> Block<N> {
 
 /// Eliminates the instants `0..count` of a stretch; `None` if a block is not positive definite.
 ///
-/// `instant(k, node, corner)` adds the equations of instant `k`, `link(k, corner)` makes those that couple it
-/// to the next one.
+/// `instant(k, node, corner)` adds the equations of instant `k`, `link(k, corner)` makes those that couple it to the
+/// next one.
 pub fn eliminate<const N: usize, const W: usize>(
     count: usize,
     instant: impl Fn(usize, &mut Node<N, W>, &mut Corner<W>) + Sync,

@@ -1,18 +1,17 @@
 //! Rare instrument errors, freed one by one where a flight shows them significantly.
 //!
-//! Gains of gyros, accelerometers and vanes, an offset of airspeed or heading, a delay far beyond a sample:
-//! if they were free in every flight, the biases would be less certain in all of them. Each is therefore held
-//! until its estimate without a prior differs significantly from zero (a score test with the path and all
-//! other constants fitted along; Klein and Morelli, Aircraft System Identification, section 5.3.3) and large
-//! enough to matter.
+//! Gains of gyros, accelerometers and vanes, an offset of airspeed or heading, a delay far beyond a sample: if they
+//! were free in every flight, the biases would be less certain in all of them. Each is therefore held until its
+//! estimate without a prior differs significantly from zero (a score test with the path and all other constants
+//! fitted along; Klein and Morelli, Aircraft System Identification, section 5.3.3) and large enough to matter.
 
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
     self, AIRSPEED_OFFSET, COUNT, HEADING, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VELOCITY,
 };
 
-/// Standard deviations for significance; high because fifteen errors are tested in every flight, whose noise
-/// is not quite white.
+/// Standard deviations for significance; high because fifteen errors are tested in every flight, whose noise is not
+/// quite white.
 const BEYOND_DOUBT: f64 = 6.0;
 /// Least relevant size: of a gain, an airspeed (m/s), a heading (rad).
 const GAIN: f64 = 0.01;

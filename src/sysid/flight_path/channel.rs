@@ -30,10 +30,9 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// The finite ones of `samples` (time in s, value). If many values repeat the previous one, the log holds
-    /// a slower sensor's value, and repeats are dropped. Of a value that persists longer than that sensor's
-    /// period, such as a coarsely quantised one, some repeats are kept, always including the last one. Angles
-    /// are unwrapped.
+    /// The finite ones of `samples` (time in s, value). If many values repeat the previous one, the log holds a
+    /// slower sensor's value, and repeats are dropped. Of a value that persists longer than that sensor's period,
+    /// such as a coarsely quantised one, some repeats are kept, always including the last one. Angles are unwrapped.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Interpolation) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();

@@ -29,8 +29,8 @@ pub struct Found {
     pub values: Values,
     /// Standard deviations of the constants.
     pub deviations: Values,
-    /// Prior standard deviations of the constants, wider for those that were freed because the data shows
-    /// them significantly.
+    /// Prior standard deviations of the constants, wider for those that were freed because the data shows them
+    /// significantly.
     pub widths: Values,
     /// Noise levels of the sensors.
     pub levels: Levels,
@@ -63,8 +63,8 @@ pub struct Solved<const N: usize> {
     pub readings: Vec<Vec<Reading>>,
 }
 
-/// A kinematic step is down-weighted beyond this many times the measurements' bound: a launcher, an impact or
-/// an estimator that aligns itself moves the logged path by more than gyros and accelerometers show.
+/// A kinematic step is down-weighted beyond this many times the measurements' bound: a launcher, an impact or an
+/// estimator that aligns itself moves the logged path by more than gyros and accelerometers show.
 const PROCESS: f64 = 1.5;
 
 impl Problem<'_> {
@@ -78,8 +78,8 @@ impl Problem<'_> {
         self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
     }
 
-    /// −2 ln L of the path and the constants at fixed noise levels, up to a constant: the merit function of
-    /// the line search.
+    /// −2 ln L of the path and the constants at fixed noise levels, up to a constant: the merit function of the line
+    /// search.
     pub fn merit(&self, found: &Found, bound: f64) -> f64 {
         let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
         let pairs = self.log.tracks.par_iter().zip(&found.paths);
@@ -107,8 +107,8 @@ impl Problem<'_> {
         measured + between.sum::<f64>()
     }
 
-    /// Residuals of the kinematic steps in the assumed standard deviations of gyros and accelerometers:
-    /// robust scale for each axis of rotation and velocity. Below one, the assumed noise suffices.
+    /// Residuals of the kinematic steps in the assumed standard deviations of gyros and accelerometers: robust scale
+    /// for each axis of rotation and velocity. Below one, the assumed noise suffices.
     pub fn strain(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
@@ -123,8 +123,8 @@ impl Problem<'_> {
         left.map(|mut left| noise::level(&mut left))
     }
 
-    /// Root mean square difference between measured and estimated roll, pitch and yaw averaged over blocks of
-    /// `block` (s), rad; zero where they were not measured.
+    /// Root mean square difference between measured and estimated roll, pitch and yaw averaged over blocks of `block`
+    /// (s), rad; zero where they were not measured.
     pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
         let vanes_at = self.log.sensors.vanes_at();
         let mut sums = [(0.0, 0.0); 3];
@@ -153,8 +153,8 @@ impl Problem<'_> {
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
     }
 
-    /// Information on the constants from prior and data (the last columns but one); from the prior alone
-    /// where the log carries none.
+    /// Information on the constants from prior and data (the last columns but one); from the prior alone where the
+    /// log carries none.
     fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
         let first = W.checked_sub(WIDTH)?;
         Some(SMatrix::from_fn(|i, j| {
@@ -164,8 +164,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// Estimate of each of `places` without a prior, with its standard deviation, one at a time; NaN where
-    /// the data carries no information on it.
+    /// Estimate of each of `places` without a prior, with its standard deviation, one at a time; NaN where the data
+    /// carries no information on it.
     pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
         let (_, _, left) = self.eliminate::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
         let bound = self.information(&left)?;
@@ -343,11 +343,10 @@ fn weigh<const N: usize, const W: usize, const D: usize>(
 }
 
 impl<const N: usize> Solved<N> {
-    /// Changes the path and the constants by a `part` of the step; returns the largest change of a constant
-    /// in its standard deviation.
+    /// Changes the path and the constants by a `part` of the step; returns the largest change of a constant in its
+    /// standard deviation.
     ///
     /// # Errors
-    ///
     /// The path is not finite.
     pub fn apply(
         &self,

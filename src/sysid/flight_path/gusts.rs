@@ -1,8 +1,8 @@
 //! Uncertainty of the constants due to gusts of the estimated level, by simulation.
 //!
-//! The constants are fitted as if the air-data sensors had white noise, wide enough to cover the gusts. Gusts
-//! persist for many seconds, so this neither covers the error of a mean wind nor shows that a delay is better
-//! known than a bias. Draws of gusts passed through the equations of the fit do both.
+//! The constants are fitted as if the air-data sensors had white noise, wide enough to cover the gusts. Gusts persist
+//! for many seconds, so this neither covers the error of a mean wind nor shows that a delay is better known than a
+//! bias. Draws of gusts passed through the equations of the fit do both.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -19,8 +19,8 @@ const PAIRS: usize = OTHERS / 2;
 /// Number of sets of equations: 32 pairs determine a standard deviation to an eighth of itself.
 const SETS: u64 = 4;
 
-/// Standard deviations of the constants of the calm fit `found` if its noise were that of `rough`: gusts of
-/// that level in addition to white noise of the air-data sensors.
+/// Standard deviations of the constants of the calm fit `found` if its noise were that of `rough`: gusts of that
+/// level in addition to white noise of the air-data sensors.
 pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
     let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
     for set in 0..SETS {
@@ -45,8 +45,8 @@ pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -
     }))
 }
 
-/// Residuals of airspeed, α, β along a path: with the noise that the fit assumes, and, from the same random
-/// numbers, with white noise and gusts.
+/// Residuals of airspeed, α, β along a path: with the noise that the fit assumes, and, from the same random numbers,
+/// with white noise and gusts.
 fn draws(
     problem: &Problem,
     path: &Path,

@@ -122,7 +122,6 @@ impl Track {
 /// Reads a log: resamples to one clock, splits at gaps, holds commands.
 ///
 /// # Errors
-///
 /// A required channel is missing, the log contains no flight, or no stretch is long enough.
 pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructError> {
     let channels = Channels::of(flight);

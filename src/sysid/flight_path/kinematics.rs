@@ -12,8 +12,8 @@ use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
 
-/// Correlation time of gusts, s: the length scale of turbulence some hundred metres up over the airspeed of a
-/// small aircraft.
+/// Correlation time of gusts, s: the length scale of turbulence some hundred metres up over the airspeed of a small
+/// aircraft.
 const GUST_TIME: f64 = 20.0;
 
 /// Share of a gust that remains after `step`, s.
@@ -41,15 +41,15 @@ pub const MOTION: usize = 6;
 /// Number of unknowns of an instant with the gust's three components.
 pub const MOTION_AND_GUST: usize = 9;
 
-/// Difference between the propagated state of one sample and that of the next one, with its derivatives: rows
-/// of attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
+/// Difference between the propagated state of one sample and that of the next one, with its derivatives: rows of
+/// attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
 pub struct Step<const N: usize, const D: usize> {
     /// Derivatives with respect to the first sample.
     pub first: Block<N>,
     /// Derivatives with respect to the second sample.
     pub second: Block<N>,
-    /// Derivatives with respect to the constants that act between samples, then the negated difference: the
-    /// last `D` columns of the equations.
+    /// Derivatives with respect to the constants that act between samples, then the negated difference: the last `D`
+    /// columns of the equations.
     pub rest: Wide<N, D>,
 }
 
@@ -179,8 +179,8 @@ fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples` with a delay of `late` samples removed by cubic interpolation through four of them, and the
-/// derivative of each with respect to the delay.
+/// `samples` with a delay of `late` samples removed by cubic interpolation through four of them, and the derivative
+/// of each with respect to the delay.
 pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);

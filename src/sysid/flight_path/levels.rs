@@ -12,16 +12,16 @@ const FORCE_FLOOR: f64 = 5e-3;
 /// Smallest noise levels of the measured channels.
 const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
 /// Least level of a channel, relative to the path's change between two samples due to noise of gyros or
-/// accelerometers. With a smaller level the path would follow every single measurement, and the most likely
-/// delay would be half a sample, whatever the true one, because interpolation there averages neighbours.
+/// accelerometers. With a smaller level the path would follow every single measurement, and the most likely delay
+/// would be half a sample, whatever the true one, because interpolation there averages neighbours.
 const CARRIED: f64 = 30.0;
 /// Levels used where too few samples allow an estimate: rad, m/s, rad, m/s.
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
-/// Largest levels, colour included: the largest plausible errors of attitude, airspeed, vanes and velocity.
-/// Without a limit, a path that departs from a sensor would lower that sensor's weight and depart further.
+/// Largest levels, colour included: the largest plausible errors of attitude, airspeed, vanes and velocity. Without a
+/// limit, a path that departs from a sensor would lower that sensor's weight and depart further.
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
-/// Scaled residual of the kinematic steps above which gyros or accelerometers have larger errors than their
-/// noise; that of a launch is 8.
+/// Scaled residual of the kinematic steps above which gyros or accelerometers have larger errors than their noise;
+/// that of a launch is 8.
 const STRAINED: f64 = 2.0;
 /// Standard deviation of the acceleration where no accelerometer measures it, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
@@ -31,9 +31,8 @@ pub const CALM: f64 = 0.002;
 const AIRSPEED: usize = 3;
 /// Lengths of the blocks over which residuals are averaged to detect coloured noise, s.
 const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
-/// Slow error of a dynamic pressure sensor, Pa, and its correlation time, s: the sensor's zero drifts, and
-/// the static port errs with attitude. An assumption, 0.3 % of the airspeed at 17 m/s; no sensor was
-/// measured.
+/// Slow error of a dynamic pressure sensor, Pa, and its correlation time, s: the sensor's zero drifts, and the static
+/// port errs with attitude. An assumption, 0.3 % of the airspeed at 17 m/s; no sensor was measured.
 const PITOT: (f64, f64) = (1.0, 30.0);
 /// Air density for converting it to a speed, kg/m³; sufficient because the error is known to its order only.
 const NEAR_THE_GROUND: f64 = 1.2;
@@ -49,18 +48,17 @@ pub struct Levels {
     pub gusts: f64,
     /// Noise of the measured channels, in their units.
     pub measured: [f64; CHANNELS],
-    /// Least levels of the channels: the white part of the measurements, where the sampling rate is high
-    /// enough to estimate it. A path that can follow the measurements closely has residuals that are too
-    /// small.
+    /// Least levels of the channels: the white part of the measurements, where the sampling rate is high enough to
+    /// estimate it. A path that can follow the measurements closely has residuals that are too small.
     pub white: [f64; CHANNELS],
     /// Ratio of the scatter of the channels' block means to that of white noise.
     pub colour: [f64; CHANNELS],
     /// Whether the user or the airframe states a level, which is then not estimated.
     pub stated: [bool; CHANNELS],
-    /// White noise of the airspeed whose means scatter like its slow error, m/s. Zero where a vane measures α
-    /// or no velocity over ground was logged: otherwise the mean vertical wind, and with it α, follows from
-    /// the change of airspeed with climb. In 13 minutes of a PX4 flight without wind, 0.01 m/s of such an
-    /// error was estimated as 0.18 ± 0.04 m/s of wind.
+    /// White noise of the airspeed whose means scatter like its slow error, m/s. Zero where a vane measures α or no
+    /// velocity over ground was logged: otherwise the mean vertical wind, and with it α, follows from the change of
+    /// airspeed with climb. In 13 minutes of a PX4 flight without wind, 0.01 m/s of such an error was estimated as
+    /// 0.18 ± 0.04 m/s of wind.
     slow_airspeed: f64,
 }
 
@@ -134,8 +132,8 @@ impl Levels {
         self
     }
 
-    /// Raises the levels of gyros and accelerometers whose kinematic residuals exceed chance, one level for
-    /// the three axes of each. Returns the largest relative change.
+    /// Raises the levels of gyros and accelerometers whose kinematic residuals exceed chance, one level for the three
+    /// axes of each. Returns the largest relative change.
     pub fn loosen(&mut self, strain: &[f64; 6]) -> f64 {
         let worst = |of: &[f64]| {
             let worst = of.iter().copied().fold(1.0, f64::max);

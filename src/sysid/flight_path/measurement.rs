@@ -137,8 +137,7 @@ pub fn readings(
     (0..n).into_par_iter().with_min_len(1000).map(read).collect()
 }
 
-/// Value of a sensor without errors a fraction `part` of a sample after sample `j`, and its slope (per
-/// sample).
+/// Value of a sensor without errors a fraction `part` of a sample after sample `j`, and its slope (per sample).
 fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f64, f64) {
     let (here, last) = (shown[j][channel], shown.len() as isize - 1);
     let beside = |i: isize| turn(channel, shown[i.clamp(0, last) as usize][channel] - here);
@@ -153,8 +152,7 @@ fn turn(channel: usize, x: f64) -> f64 {
     if channel < 3 { wrap(x) } else { x }
 }
 
-/// Value of a sensor with its errors where the error-free value is `h`, and its derivative with respect to
-/// `h`.
+/// Value of a sensor with its errors where the error-free value is `h`, and its derivative with respect to `h`.
 fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     match channel {
         2 => (h + values[HEADING], 1.0),
@@ -166,8 +164,8 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
 }
 
 /// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the channels; a
-/// residual beyond `bound` of them is down-weighted. The first columns are `others`, additional residuals of
-/// the air-data sensors; then come the constants that act at instants, none if `M` is 1.
+/// residual beyond `bound` of them is down-weighted. The first columns are `others`, additional residuals of the
+/// air-data sensors; then come the constants that act at instants, none if `M` is 1.
 #[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
 pub fn add<const N: usize, const W: usize, const M: usize>(
     path: &Path,

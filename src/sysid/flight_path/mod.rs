@@ -1,7 +1,7 @@
 //! Flight-path reconstruction (data compatibility check): estimates states without sensor errors from a log.
 //!
-//! Kinematics need no aerodynamics, so sensor errors and wind are estimated here, before any model of the
-//! aircraft is used.
+//! Kinematics need no aerodynamics, so sensor errors and wind are estimated here, before any model of the aircraft is
+//! used.
 
 pub mod measurement_effects;
 pub mod reconstruction;
@@ -41,11 +41,11 @@ use greylag_physics::airframe::ActuatorFigures;
 /// Clock of the reconstructed deflections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActuatorClock {
-    /// The gyros' clock: recorded deflections are shifted if their delay is significant. A time delay or a
-    /// lag of the surfaces that the record does not show is confounded with it, so it is removed too.
+    /// The gyros' clock: recorded deflections are shifted if their delay is significant. A time delay or a lag of the
+    /// surfaces that the record does not show is confounded with it, so it is removed too.
     Estimated,
-    /// The log's clock: deflections stay as recorded, so that a later search for missing effects can separate
-    /// clock errors from physics. `skew_actuators` is estimated nevertheless, for information.
+    /// The log's clock: deflections stay as recorded, so that a later search for missing effects can separate clock
+    /// errors from physics. `skew_actuators` is estimated nevertheless, for information.
     AsRecorded,
 }
 
@@ -58,8 +58,8 @@ pub struct Options {
     pub actuators: ActuatorFigures,
     /// Effective gravity at the site, m/s².
     pub gravity: f64,
-    /// Meaning of a rate sample; `None` to read it from the log's column `rate_hold_s`, or to infer it from
-    /// the log's clocks. Clock skews are relative to the gyros' samples thus defined.
+    /// Meaning of a rate sample; `None` to read it from the log's column `rate_hold_s`, or to infer it from the log's
+    /// clocks. Clock skews are relative to the gyros' samples thus defined.
     pub sampling: Option<Sampling>,
     /// Clock of the reconstructed deflections.
     pub actuators_clock: ActuatorClock,
@@ -162,13 +162,11 @@ pub enum ReconstructError {
     },
 }
 
-/// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors
-/// and wind.
+/// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors and wind.
 ///
 /// # Errors
-///
-/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its
-/// sensors contradict one another.
+/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors
+/// contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));

@@ -22,8 +22,8 @@ pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     if median > 0.0 { median } else { mean_square.sqrt() / gain }
 }
 
-/// Root mean square of `residuals` with outliers limited to four times the median level; NaN for too few.
-/// Reorders the slice.
+/// Root mean square of `residuals` with outliers limited to four times the median level; NaN for too few. Reorders
+/// the slice.
 pub fn level(residuals: &mut [f64]) -> f64 {
     if residuals.len() < FEWEST {
         return f64::NAN;
@@ -36,8 +36,8 @@ pub fn level(residuals: &mut [f64]) -> f64 {
     (sum / residuals.len() as f64).sqrt()
 }
 
-/// Ratio of the scatter of block means of `residuals` to that for white noise: ratio of standard deviations,
-/// at least 1, for blocks of `block` values.
+/// Ratio of the scatter of block means of `residuals` to that for white noise: ratio of standard deviations, at least
+/// 1, for blocks of `block` values.
 pub fn colour(residuals: &[f64], block: usize) -> f64 {
     let count = residuals.len() / block.max(1);
     if block < 2 || count < FEWEST {

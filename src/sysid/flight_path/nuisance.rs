@@ -37,22 +37,20 @@ pub const GYRO: usize = 14;
 pub const FORCE: usize = 17;
 /// Index of the accelerometers' delay.
 pub const SKEW_FORCE: usize = 20;
-/// Index of the drifts of the gyro biases p, q, r: their rate of change, rad/s². A gyro that warms up drifts
-/// by 0.05°/s a minute (so does ArduPilot's SITL): with a constant bias, the heading error was 1.5° in four
-/// minutes.
+/// Index of the drifts of the gyro biases p, q, r: their rate of change, rad/s². A gyro that warms up drifts by
+/// 0.05°/s a minute (so does ArduPilot's SITL): with a constant bias, the heading error was 1.5° in four minutes.
 pub const DRIFT: usize = 21;
 /// Index of the gains of the gyros p, q, r less one.
 pub const GYRO_GAIN: usize = 24;
 /// Index of the gains of the accelerometers x, y, z less one.
 pub const FORCE_GAIN: usize = 27;
-/// Index of the changes of the drifts, rad/s², at the inner knots of the flight, p, q, r of each. The drift
-/// of ArduPilot's SITL reverses after five minutes.
+/// Index of the changes of the drifts, rad/s², at the inner knots of the flight, p, q, r of each. The drift of
+/// ArduPilot's SITL reverses after five minutes.
 pub const BEND: usize = 30;
 /// Number of inner knots, equally spaced between the ends of the flight.
 const KNOTS: usize = 3;
-/// Index of the Earth's rate north and down, rad/s. A log without a latitude does not determine it, and the
-/// Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice the uncertainty of an accelerometer bias after a
-/// minute.
+/// Index of the Earth's rate north and down, rad/s. A log without a latitude does not determine it, and the Coriolis
+/// acceleration, 0.003 m/s² at 20 m/s, is twice the uncertainty of an accelerometer bias after a minute.
 pub const EARTH: usize = 39;
 
 /// Order of the constants in the result.
@@ -81,14 +79,14 @@ pub const NAMES: [(&str, &str); COUNT] = {
     all
 };
 
-/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: its filter is
-/// about as long as its period.
+/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: its filter is about as
+/// long as its period.
 const SKEW_PERIODS: f64 = 0.5;
 
 /// Usual drift of a gyro's bias, rad/s²: somewhat more than ArduPilot's SITL has (0.05°/s a minute, 1.45e-5).
 const DRIFTING: f64 = 2e-5;
-/// Time over which a drift changes by about its own size, s: the better one of 300 and 3000 on ArduPlane's
-/// logs, whose slow heading errors would otherwise be followed.
+/// Time over which a drift changes by about its own size, s: the better one of 300 and 3000 on ArduPlane's logs,
+/// whose slow heading errors would otherwise be followed.
 const STEADY: f64 = 3000.0;
 
 impl Span {
@@ -101,8 +99,8 @@ impl Span {
 /// Share of its usual width used for a constant that is known exactly, which keeps the equations regular.
 const HELD: f64 = 1e-4;
 
-/// Rare instrument errors, held at zero until a flight shows them significantly (see `calibration`), with
-/// their prior widths from then on.
+/// Rare instrument errors, held at zero until a flight shows them significantly (see `calibration`), with their prior
+/// widths from then on.
 const SELDOM: [(usize, f64); 10] = [
     (VANE_GAIN, 0.2),
     (VANE_GAIN + 1, 0.2),
@@ -170,9 +168,9 @@ fn usual_widths(log: &Log) -> Values {
     width
 }
 
-/// Prior means of the constants: those stated for the log's sensors, else zero except for the Earth's rate,
-/// 7.29e-5 rad/s at any latitude from −65° to 65°, whose north component is never negative. Its standard
-/// deviations cover the same latitudes.
+/// Prior means of the constants: those stated for the log's sensors, else zero except for the Earth's rate, 7.29e-5
+/// rad/s at any latitude from −65° to 65°, whose north component is never negative. Its standard deviations cover the
+/// same latitudes.
 pub fn prior_means(log: &Log) -> Values {
     let mut mean = [0.0; COUNT];
     mean[EARTH] = 5.8e-5;
@@ -209,8 +207,8 @@ pub fn gyro_bias(values: &Values, time: f64, span: &Span) -> [f64; 3] {
     })
 }
 
-/// `measured` on three axes corrected for their gains, whose indices start at `first`: measured = (1 + gain)
-/// · (true + bias).
+/// `measured` on three axes corrected for their gains, whose indices start at `first`: measured = (1 + gain) · (true
+/// + bias).
 pub fn without_gain(values: &Values, first: usize, measured: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| measured[axis] / (1.0 + values[first + axis]))
 }
@@ -235,9 +233,9 @@ pub fn concerned(place: usize, has: &Present) -> bool {
     }
 }
 
-/// Whether a constant is unobservable in the log. Without accelerometers and velocity over ground, no
-/// air-data sensor is related to another one: only the smoothness of the path remains, which favours slower
-/// flight (an airspeed scale of four in a flight without any error).
+/// Whether a constant is unobservable in the log. Without accelerometers and velocity over ground, no air-data sensor
+/// is related to another one: only the smoothness of the path remains, which favours slower flight (an airspeed scale
+/// of four in a flight without any error).
 pub fn unseeable(place: usize, has: &Present) -> bool {
     let of_the_air = place < SKEW_ATTITUDE
         || place == SKEW_AIRSPEED

@@ -31,10 +31,10 @@ const CORRECTED: f64 = 0.25;
 /// Time scale from which a difference between path and measured attitude is no noise, s.
 const DISAGREEING: f64 = 4.0;
 
-/// Uncertainty of a flight controller's pitch and heading over a whole flight, rad: the board is levelled by
-/// hand, the compass calibrated, and an estimator that attributes an accelerometer bias to pitch corrects the
-/// accelerations accordingly, so that the log is consistent. PX4 in SITL: 0.14° to 0.22° of pitch, 0.11° to
-/// 0.30° of heading (docs/validation/real-firmware.md); a calibration by hand is assumed to be no better.
+/// Uncertainty of a flight controller's pitch and heading over a whole flight, rad: the board is levelled by hand,
+/// the compass calibrated, and an estimator that attributes an accelerometer bias to pitch corrects the accelerations
+/// accordingly, so that the log is consistent. PX4 in SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading
+/// (docs/validation/real-firmware.md); a calibration by hand is assumed to be no better.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -44,7 +44,6 @@ const DRAWS: usize = 3;
 /// Assembles the reconstruction.
 ///
 /// # Errors
-///
 /// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
 pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
     let Problem { log, options, .. } = *problem;
@@ -190,8 +189,8 @@ fn segment(
     Segment { instants: (0..track.len()).map(instant).collect() }
 }
 
-/// Specific force of a path without accelerometers: acceleration less gravity, body axes; NaN where no
-/// velocity was measured, and at the ends.
+/// Specific force of a path without accelerometers: acceleration less gravity, body axes; NaN where no velocity was
+/// measured, and at the ends.
 fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector3<f64>> {
     let nan = Vector3::repeat(f64::NAN);
     let down = Vector3::new(0.0, 0.0, gravity);
@@ -253,11 +252,11 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// Uncertainty of α and β where no vane measures them: from the wind, the path, the slow difference between
-/// its pitch and heading and the measured ones, and the alignment of those. Their values are zero.
+/// Uncertainty of α and β where no vane measures them: from the wind, the path, the slow difference between its pitch
+/// and heading and the measured ones, and the alignment of those. Their values are zero.
 ///
-/// A heading for which gyros and compass differ by a degree for half a minute is not known better than that,
-/// whatever the noise of either; the error of β includes it.
+/// A heading for which gyros and compass differ by a degree for half a minute is not known better than that, whatever
+/// the noise of either; the error of β includes it.
 fn unmeasured_angles(
     problem: &Problem,
     smoothed: &Found,

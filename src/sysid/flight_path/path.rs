@@ -68,8 +68,7 @@ impl Path {
         path
     }
 
-    /// Wind implied by the measured ground velocities of `track` for this path: sum and number of the
-    /// differences.
+    /// Wind implied by the measured ground velocities of `track` for this path: sum and number of the differences.
     pub fn wind_left(&self, track: &Track) -> (Vector3<f64>, f64) {
         let mut sum = (Vector3::zeros(), 0.0);
         for (measured, own) in track.velocity.iter().zip(&self.velocity) {
@@ -87,8 +86,8 @@ impl Path {
         self.velocity.iter_mut().for_each(|v| *v += wind);
     }
 
-    /// Changes sample `k` by a rotation (rad, body axes), a velocity and, if `by` has nine components, a gust
-    /// (m/s, earth axes).
+    /// Changes sample `k` by a rotation (rad, body axes), a velocity and, if `by` has nine components, a gust (m/s,
+    /// earth axes).
     pub fn shift<const N: usize>(&mut self, k: usize, by: &[f64; N]) {
         let three = |i: usize| Vector3::new(by[i], by[i + 1], by[i + 2]);
         self.attitude[k] = rotation::orthonormal(&(self.attitude[k] * rotation::exp(&three(0))));

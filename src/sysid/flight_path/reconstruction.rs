@@ -35,8 +35,8 @@ pub struct Segment {
 
 /// A sensor error or a component of the wind, as estimated together with the path.
 ///
-/// The wind is the steady one, about which gusts vary; its standard deviation covers the difference to a mean
-/// over the flight. The velocity through the air at an instant includes the gust.
+/// The wind is the steady one, about which gusts vary; its standard deviation covers the difference to a mean over
+/// the flight. The velocity through the air at an instant includes the gust.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
     /// Name, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
@@ -72,12 +72,12 @@ pub struct Reconstruction {
     pub segments: Vec<Segment>,
     /// Sensor errors and wind estimated along with the path.
     pub nuisances: Vec<Nuisance>,
-    /// Standard deviations of the measurement noise as logged, before smoothing, in the order roll, pitch,
-    /// airspeed, p, q, r, alpha, beta (units of [`State`]).
+    /// Standard deviations of the measurement noise as logged, before smoothing, in the order roll, pitch, airspeed,
+    /// p, q, r, alpha, beta (units of [`State`]).
     pub noise: [f64; 8],
-    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the same order:
-    /// rates are the gyros' less their biases, not smoothed; the other errors are slow, over tenths of
-    /// seconds. The constant part of the errors is covered by [`Self::nuisances`], not here.
+    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the same order: rates are
+    /// the gyros' less their biases, not smoothed; the other errors are slow, over tenths of seconds. The constant
+    /// part of the errors is covered by [`Self::nuisances`], not here.
     pub left: [f64; 8],
     /// Standard deviation of the accelerometers' noise, m/s².
     pub force_noise: [f64; 3],
@@ -88,8 +88,8 @@ pub struct Reconstruction {
 }
 
 impl Reconstruction {
-    /// Standard deviation of the constant `name`, in its unit; without a vane that of `alpha_bias` is the
-    /// uncertainty of α, and likewise for β. `None` if it was not estimated.
+    /// Standard deviation of the constant `name`, in its unit; without a vane that of `alpha_bias` is the uncertainty
+    /// of α, and likewise for β. `None` if it was not estimated.
     pub fn deviation(&self, name: &str) -> Option<f64> {
         let angle = match name {
             "alpha_bias" => "alpha_path",

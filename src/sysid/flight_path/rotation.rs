@@ -49,8 +49,7 @@ pub fn to_euler(r: &Matrix3<f64>) -> [f64; 3] {
     [r.m32.atan2(r.m33), (-r.m31).clamp(-1.0, 1.0).asin(), r.m21.atan2(r.m11)]
 }
 
-/// Derivatives of roll, pitch and yaw with respect to a small rotation in body axes; `None` close to the
-/// vertical.
+/// Derivatives of roll, pitch and yaw with respect to a small rotation in body axes; `None` close to the vertical.
 pub fn euler_by_turn(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (sp, cp) = (-r.m31, r.m32.hypot(r.m33));
     (cp > 0.05).then(|| {

@@ -1,11 +1,10 @@
 //! Sampling of a log's rates, as stated in the log or as inferred from its clocks.
 //!
-//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. Interpreted as a
-//! sample at an instant, that rate is half a sample period early, and every other sensor seems delayed by as
-//! much. A log that does not state its sampling is therefore first interpreted as samples at instants. If all
-//! its clocks then agree on half a period, and agree on zero with held rates, the rates are held. Means over
-//! a sample period need no case of their own: their gyros are delayed by half a period, which the estimated
-//! clock skews absorb.
+//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. Interpreted as a sample
+//! at an instant, that rate is half a sample period early, and every other sensor seems delayed by as much. A log
+//! that does not state its sampling is therefore first interpreted as samples at instants. If all its clocks then
+//! agree on half a period, and agree on zero with held rates, the rates are held. Means over a sample period need no
+//! case of their own: their gyros are delayed by half a period, which the estimated clock skews absorb.
 
 use crate::flight_path::ReconstructError;
 use crate::flight_path::equations::{Found, Problem};
@@ -20,8 +19,8 @@ use greylag_logs::Sampling;
 const FEWEST: usize = 2;
 /// A clock counts as known if its standard deviation is below this share of the sample period.
 const KNOWN: f64 = 0.1;
-/// Largest difference between the clocks of one simulator, as a share of the sample period, due to
-/// interpolation errors.
+/// Largest difference between the clocks of one simulator, as a share of the sample period, due to interpolation
+/// errors.
 const AGREE: f64 = 0.03;
 /// The same limit in standard deviations of each clock.
 const DEVIATIONS: f64 = 3.0;
@@ -39,7 +38,6 @@ pub struct Chosen {
 /// Smooths the log of `problem` under the sampling `declared`, or under the one that its clocks support.
 ///
 /// # Errors
-///
 /// [`ReconstructError::NoPath`] if the search has no finite result.
 pub fn choose(problem: &Problem, declared: Option<Sampling>) -> Result<Chosen, ReconstructError> {
     let under = |sampling| smooth(&Problem { sampling, ..*problem });

@@ -1,11 +1,11 @@
 //! Misaligned measured axes: rotated against the body by a small constant angle.
 //!
-//! ε (rad, body axes) is the rotation from the body's axes to those of the board or the markers. The
-//! coordinates of a vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and
-//! Johnson, Aircraft Control and Simulation, section 1.3): this applies to body rates, specific force and the
-//! velocity through the air. The path is smoothed in the axes of gyros and attitude, so α and β are of these
-//! axes too. Vanes measure in the body's axes: the reconstruction attributes the mean effect of the
-//! misalignment on α and β to their bias, and the path follows the vanes otherwise.
+//! ε (rad, body axes) is the rotation from the body's axes to those of the board or the markers. The coordinates of a
+//! vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft
+//! Control and Simulation, section 1.3): this applies to body rates, specific force and the velocity through the air.
+//! The path is smoothed in the axes of gyros and attitude, so α and β are of these axes too. Vanes measure in the
+//! body's axes: the reconstruction attributes the mean effect of the misalignment on α and β to their bias, and the
+//! path follows the vanes otherwise.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
@@ -20,15 +20,15 @@ pub fn vector(x: [f64; 3]) -> [[f64; 3]; 3] {
     [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
 }
 
-/// Change of α and β (rad) for a unit of each angle: those of the velocity V (cos α cos β, sin β, sin α cos
-/// β), rotated like any vector.
+/// Change of α and β (rad) for a unit of each angle: those of the velocity V (cos α cos β, sin β, sin α cos β),
+/// rotated like any vector.
 pub fn flow(alpha: f64, beta: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_beta) = (alpha.sin_cos(), beta.tan());
     [[-cos * tan_beta, sin], [1.0, 0.0], [-sin * tan_beta, -cos]]
 }
 
-/// Change of roll and pitch (rad) for a unit of each angle, away from vertical flight: a rotation about body
-/// axes, as by body rates.
+/// Change of roll and pitch (rad) for a unit of each angle, away from vertical flight: a rotation about body axes, as
+/// by body rates.
 pub fn attitude(roll: f64, pitch: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_pitch) = (roll.sin_cos(), pitch.tan());
     [[1.0, 0.0], [tan_pitch * sin, cos], [tan_pitch * cos, -sin]]

@@ -1,9 +1,8 @@
-//! Constants that differ from flight to flight of one aircraft: its trims, and the misalignment of its
-//! measured axes.
+//! Constants that differ from flight to flight of one aircraft: its trims, and the misalignment of its measured axes.
 //!
-//! Loading, the setting of a surface, a battery or a propeller change between flights; an autopilot's board
-//! and the markers of motion capture are mounted again. Neither is an effect that the model lacks. Both are
-//! estimated only on request, for each flight beside the coefficients common to all flights.
+//! Loading, the setting of a surface, a battery or a propeller change between flights; an autopilot's board and the
+//! markers of motion capture are mounted again. Neither is an effect that the model lacks. Both are estimated only on
+//! request, for each flight beside the coefficients common to all flights.
 
 pub mod askew;
 pub mod trims;
@@ -13,12 +12,11 @@ use serde::Serialize;
 /// Selection of the constants estimated for each flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PerFlight {
-    /// Trims, with this multiple of the widths of [`trims::TRIMS`]; `None` for one set of trims for all
-    /// flights.
+    /// Trims, with this multiple of the widths of [`trims::TRIMS`]; `None` for one set of trims for all flights.
     #[serde(rename = "flight_trims", skip_serializing_if = "Option::is_none")]
     pub trims: Option<f64>,
-    /// Misalignment of the measured axes: prior standard deviation of each of three angles, °; `None` for
-    /// aligned axes.
+    /// Misalignment of the measured axes: prior standard deviation of each of three angles, °; `None` for aligned
+    /// axes.
     #[serde(rename = "axes_askew_deg", skip_serializing_if = "Option::is_none")]
     pub askew_deg: Option<f64>,
 }

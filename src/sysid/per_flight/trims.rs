@@ -18,8 +18,8 @@ const fn trim(name: &'static str, width: f64) -> Trim {
     Trim { name, width }
 }
 
-/// The trims in the order of the effect's coefficients, with their usual standard deviations between flights
-/// of one aircraft.
+/// The trims in the order of the effect's coefficients, with their usual standard deviations between flights of one
+/// aircraft.
 ///
 /// Lift: half a degree of a wing that is put on anew, at a slope of 4 to 5 per rad. Pitch: a centre of gravity that is
 /// off by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator. Roll and yaw: a degree of

@@ -5,8 +5,8 @@ use serde::Serialize;
 /// A channel in which a model is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum ChannelId {
-    /// Drag less thrust along the airflow, N, positive backwards. An effect's `physics::Channel::Drag` is
-    /// drag alone: accelerometers do not distinguish it from thrust.
+    /// Drag less thrust along the airflow, N, positive backwards. An effect's `physics::Channel::Drag` is drag alone:
+    /// accelerometers do not distinguish it from thrust.
     #[serde(rename = "D")]
     Drag,
     /// Lift, thrust's part included, N, positive upwards.

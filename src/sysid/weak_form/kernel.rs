@@ -7,9 +7,9 @@ pub const KERNEL_S: f64 = 0.37;
 
 /// A Hann window over `steps` time steps, that is `steps + 1` samples.
 ///
-/// Multiplying ẋ = f by the kernel K and summing by parts moves the difference from the data onto K: Σ K (x₊
-/// − x)/Δt = −Σ K′ x. The sums are exact for the discrete steps, so the residual of a model with the flight's
-/// own integrator is zero.
+/// Multiplying ẋ = f by the kernel K and summing by parts moves the difference from the data onto K: Σ K (x₊ − x)/Δt
+/// = −Σ K′ x. The sums are exact for the discrete steps, so the residual of a model with the flight's own integrator
+/// is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
     /// Weights K of the steps, which sum to 1.

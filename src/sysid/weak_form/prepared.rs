@@ -39,8 +39,8 @@ pub struct Prepared {
     pub sampling: Sampling,
     /// Stretches in flight without gaps.
     pub segments: Vec<Vec<Instant>>,
-    /// Remaining noise of roll, pitch, airspeed, p, q, r, α, β after reconstruction, in the units of the
-    /// state; zero where unknown.
+    /// Remaining noise of roll, pitch, airspeed, p, q, r, α, β after reconstruction, in the units of the state; zero
+    /// where unknown.
     pub noise: [f64; 8],
     /// Noise of the accelerometers, m/s²; zero where unknown.
     pub force_noise: [f64; 3],
@@ -69,7 +69,6 @@ impl Prepared {
     /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    ///
     /// It has no clock.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, ClockError> {
         let substeps = substeps(flight)?;
@@ -153,8 +152,8 @@ impl Prepared {
         Cow::Owned(acting)
     }
 
-    /// `model` with the integrator that matches this flight's sampling: its own if the log holds a
-    /// simulator's held rates, RK4 for samples at instants.
+    /// `model` with the integrator that matches this flight's sampling: its own if the log holds a simulator's held
+    /// rates, RK4 for samples at instants.
     pub fn stepping<'a>(&self, model: &'a GreyBox) -> Cow<'a, GreyBox> {
         match (self.sampling, model.integrator) {
             (Sampling::Instants, Integrator::Jsbsim) => {
@@ -166,8 +165,8 @@ impl Prepared {
         }
     }
 
-    /// State of `model`, which must be [`Self::stepping`], one sample after `state`; the deflections are
-    /// those of sample `at` until the next one, `next`.
+    /// State of `model`, which must be [`Self::stepping`], one sample after `state`; the deflections are those of
+    /// sample `at` until the next one, `next`.
     pub fn advance(
         &self,
         model: &GreyBox,
@@ -217,8 +216,8 @@ fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
     Ok(((step_s / STEP).round() as usize).max(1))
 }
 
-/// Samples of a stretch at intervals of `dt` (s): unchanged if they have that interval, else linearly
-/// interpolated, deflections held.
+/// Samples of a stretch at intervals of `dt` (s): unchanged if they have that interval, else linearly interpolated,
+/// deflections held.
 fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     if (step_s / dt - 1.0).abs() < 1e-6 {
         return instants.to_vec();

@@ -59,9 +59,9 @@ pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
     ChannelId::ALL.iter().enumerate().skip(forces).map(series).collect()
 }
 
-/// Measured − predicted of forces (N) and moments (N m) alone, a row for each window, channels D, L, Y, l, m,
-/// n: the residual of an equation-error fit, at a fraction of the cost of [`channels`]. Forces are NaN where
-/// they are not measured.
+/// Measured − predicted of forces (N) and moments (N m) alone, a row for each window, channels D, L, Y, l, m, n: the
+/// residual of an equation-error fit, at a fraction of the cost of [`channels`]. Forces are NaN where they are not
+/// measured.
 pub fn force_and_moment_residuals(model: &GreyBox, flight: &Prepared) -> Vec<[f64; 6]> {
     let flight = &*flight.acting(model);
     let residual = |w: &Window| {
@@ -220,8 +220,7 @@ fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Ve
     (0..segment.len()).map(&mut rate).collect()
 }
 
-/// Variances of each channel's residual due to sensor noise, taken as white, in the order of
-/// [`ChannelId::ALL`].
+/// Variances of each channel's residual due to sensor noise, taken as white, in the order of [`ChannelId::ALL`].
 fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     let kernel = &flight.kernel;
     let squares = |w: &[f64]| w.iter().map(|x| x * x).sum::<f64>();
@@ -268,8 +267,8 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     variance
 }
 
-/// Predicted less the part of the measured side that depends on the state: forces rotated by α and β,
-/// gyroscopic moments.
+/// Predicted less the part of the measured side that depends on the state: forces rotated by α and β, gyroscopic
+/// moments.
 pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());
@@ -286,15 +285,15 @@ pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
 pub struct Columns {
     /// Names of the coefficients, as in the model.
     pub names: Vec<String>,
-    /// Contributions `values[coefficient][channel][window]`, channels D, L, Y, l, m, n. Weighted by the
-    /// coefficients, their sum is [`Series::predicted`].
+    /// Contributions `values[coefficient][channel][window]`, channels D, L, Y, l, m, n. Weighted by the coefficients,
+    /// their sum is [`Series::predicted`].
     pub values: Vec<[Vec<f64>; 6]>,
 }
 
 /// Columns of `model` over the windows of `flight`, as regressors for the measured channels.
 ///
-/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not linear
-/// in them, or they act on the measured side.
+/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not linear in them,
+/// or they act on the measured side.
 pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
     let flight = &*flight.acting(model);
     let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();

@@ -41,8 +41,8 @@ pub(super) struct Ask<'a> {
 }
 
 impl Ask<'_> {
-    /// Selects the effects that improve `model`: first those that a diagnosis found together, jointly, then
-    /// the others one by one.
+    /// Selects the effects that improve `model`: first those that a diagnosis found together, jointly, then the
+    /// others one by one.
     pub(super) fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
         let tuned = match &self.options.tuned {
             Some(known) => known.clone(),
@@ -65,8 +65,8 @@ impl Ask<'_> {
         self.rest(model, first)
     }
 
-    /// Tries, one by one, the effects of `model` that the selection `so_far` lacks. An effect refused while
-    /// another was missing is tried again once that one has joined.
+    /// Tries, one by one, the effects of `model` that the selection `so_far` lacks. An effect refused while another
+    /// was missing is tried again once that one has joined.
     fn rest(&self, model: &GreyBox, so_far: Selection) -> Result<Selection, AmendError> {
         let Options { effects, refused, .. } = self.options;
         let mut best = (so_far.fit, so_far.after);
@@ -100,9 +100,9 @@ impl Ask<'_> {
         Ok(Selection { tuned: so_far.tuned, fit: best.0, after: best.1, accepted, effects })
     }
 
-    /// Fits the effects that a diagnosis found together in one model, less those that the flights refuse even
-    /// so, if held-out flights are predicted better with them: the gain of one effect alone can be lost
-    /// beside a gross error that another one corrects. `None` if there are fewer than two.
+    /// Fits the effects that a diagnosis found together in one model, less those that the flights refuse even so, if
+    /// held-out flights are predicted better with them: the gain of one effect alone can be lost beside a gross error
+    /// that another one corrects. `None` if there are fewer than two.
     fn together(
         &self,
         model: &GreyBox,
@@ -146,8 +146,8 @@ impl Ask<'_> {
         Ok(None)
     }
 
-    /// Tries the other conventions of `model`, whose selection is `best`, one by one; a convention that was
-    /// refused is tried again once another has been adopted.
+    /// Tries the other conventions of `model`, whose selection is `best`, one by one; a convention that was refused
+    /// is tried again once another has been adopted.
     pub(super) fn with_conventions(
         &self,
         model: &GreyBox,
@@ -184,8 +184,8 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
-    /// The selection for `other`, the model under another convention, with the accepted effects; the
-    /// remaining effects are tried again only if that is promising.
+    /// The selection for `other`, the model under another convention, with the accepted effects; the remaining
+    /// effects are tried again only if that is promising.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
         let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
@@ -234,8 +234,8 @@ impl Ask<'_> {
         output_error::fit(model, self.train, &options, &progress)
     }
 
-    /// Shares of the whole work done before and after the next fit. Some effects are tried twice, so the last
-    /// share stays below one.
+    /// Shares of the whole work done before and after the next fit. Some effects are tried twice, so the last share
+    /// stays below one.
     fn done(&self) -> [f64; 2] {
         let begun = self.begun.load(Ordering::Relaxed) as f64;
         let planned = 1.0 + self.options.effects.len() as f64;

@@ -24,8 +24,7 @@ const UNSETTLED: f64 = 0.5;
 const LOST: f64 = 5.0;
 
 impl Search<'_> {
-    /// Completes the fit with intervals. Its model is `given` with the fitted coefficients, without trims of
-    /// flights.
+    /// Completes the fit with intervals. Its model is `given` with the fitted coefficients, without trims of flights.
     pub(super) fn finish(self, given: &GreyBox) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
@@ -146,8 +145,8 @@ impl Search<'_> {
         self.free.iter().enumerate().map(one).collect()
     }
 
-    /// Estimates of each flight alone, to first order: one step from the common optimum with that flight's
-    /// equations and the prior.
+    /// Estimates of each flight alone, to first order: one step from the common optimum with that flight's equations
+    /// and the prior.
     fn by_flight(&self, system: &System) -> Vec<Vec<FlightEstimate>> {
         let count = self.free.len();
         let mut all = vec![Vec::new(); count];
@@ -180,9 +179,9 @@ impl Search<'_> {
         all
     }
 
-    /// Factor by which intervals widen for disagreement between flights (Birge ratio, at least 1): the root
-    /// mean square of the flights' own estimates less the common one, in standard deviations of the
-    /// difference. It covers errors that are constant within a flight, such as that of a clock.
+    /// Factor by which intervals widen for disagreement between flights (Birge ratio, at least 1): the root mean
+    /// square of the flights' own estimates less the common one, in standard deviations of the difference. It covers
+    /// errors that are constant within a flight, such as that of a clock.
     fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (k, f) in self.free.iter().enumerate() {

@@ -5,8 +5,8 @@ use crate::amend::normal::Place;
 use crate::amend::shooting;
 use greylag_num::statistics::{correlation_length, quantile};
 
-/// Least standard deviations of residuals, in the units of the state: the error of the models' steps and of
-/// the interpolated deflections without noise.
+/// Least standard deviations of residuals, in the units of the state: the error of the models' steps and of the
+/// interpolated deflections without noise.
 const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
 /// A shot is down-weighted if its mean square residual exceeds the typical one by this factor.
 const OUTLYING: f64 = 6.0;
@@ -15,8 +15,8 @@ impl Search<'_> {
     /// Sets the weights from the present residuals: the inverse variance of each state, all divided by one
     /// correlation length.
     ///
-    /// With a correlation length for each state the iteration of weights has no useful fixed point: a state
-    /// that drifts has a longer correlation, so a lower weight, so it drifts more, until the fit ignores it.
+    /// With a correlation length for each state the iteration of weights has no useful fixed point: a state that
+    /// drifts has a longer correlation, so a lower weight, so it drifts more, until the fit ignores it.
     pub(super) fn reweigh(&mut self) {
         let residuals = self.residuals();
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
@@ -41,9 +41,8 @@ impl Search<'_> {
         }
     }
 
-    /// Restarts at `given`, the model's own coefficients, if its shots of `length_s` follow the flights more
-    /// closely than those from the equation-error estimate, which a kink of a table or a delayed sensor can
-    /// mislead.
+    /// Restarts at `given`, the model's own coefficients, if its shots of `length_s` follow the flights more closely
+    /// than those from the equation-error estimate, which a kink of a table or a delayed sensor can mislead.
     pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];

@@ -5,8 +5,7 @@ use crate::compare::forecast::ForecastResult;
 use crate::compare::result::ModelResult;
 use crate::weak_form::prepared::Prepared;
 
-/// The answer about `models` over `flights`; a single model is compared with the best forecast without
-/// aerodynamics.
+/// The answer about `models` over `flights`; a single model is compared with the best forecast without aerodynamics.
 pub fn between(
     models: &[ModelResult],
     flights: &[Prepared],

@@ -1,5 +1,5 @@
-//! The answer box: by how much the error falls, by which effect, and what remains. Composed here for
-//! terminal, page, workbench and JSON.
+//! The answer box: by how much the error falls, by which effect, and what remains. Composed here for terminal, page,
+//! workbench and JSON.
 
 pub(super) mod between;
 mod numbers;
@@ -18,8 +18,8 @@ pub const ANSWER_S: f64 = 5.0;
 pub struct Answer {
     /// Fall of the error, step by step, with the flights it was measured on.
     pub error: String,
-    /// Description of the effect, its decisive coefficient and the change of the predictions; empty if
-    /// nothing was added.
+    /// Description of the effect, its decisive coefficient and the change of the predictions; empty if nothing was
+    /// added.
     pub effect: String,
     /// Largest remaining prediction error.
     pub left: String,

@@ -28,8 +28,7 @@ pub struct Step {
     pub model: String,
     /// Free-run error at the horizon: NRMSE, the root mean square over the eight states, each over its scale x_c.
     pub error: f64,
-    /// Change against the step before, or for an independent model against the first one, %. `None` for the
-    /// first.
+    /// Change against the step before, or for an independent model against the first one, %. `None` for the first.
     pub change_percent: Option<f64>,
 }
 
@@ -156,8 +155,7 @@ impl Numbers {
     }
 }
 
-/// The longest horizon up to [`ANSWER_S`] that runs of every model reach; without one, the shortest that they
-/// reach.
+/// The longest horizon up to [`ANSWER_S`] that runs of every model reach; without one, the shortest that they reach.
 fn horizon(stages: &[Stage]) -> Option<f64> {
     let first = stages.first()?;
     let reached = |s: &&HorizonScore| {

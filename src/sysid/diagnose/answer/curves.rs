@@ -7,15 +7,14 @@ use crate::diagnose::search::round::Round;
 
 /// Number of bins of equal count, by which the variable is chosen.
 const PLACES: usize = 12;
-/// Number of bins of equal width, in which the curve is drawn; bins of equal count end where windows are
-/// sparse.
+/// Number of bins of equal width, in which the curve is drawn; bins of equal count end where windows are sparse.
 const WIDTHS: usize = 24;
 /// Variables that describe the circumstances rather than the flight state, and are not plotted.
 const NOT_SHOWN: [RegimeVariable; 3] =
     [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
 
-/// The curve of `contribution` (flight by flight) in the first of `channels`. `relative` is its standard
-/// deviation relative to itself; `left` states whether the round's residual still contains it.
+/// The curve of `contribution` (flight by flight) in the first of `channels`. `relative` is its standard deviation
+/// relative to itself; `left` states whether the round's residual still contains it.
 pub fn curve(
     round: &Round,
     contribution: &[Column],
@@ -42,10 +41,9 @@ pub fn curve(
     over_the_best(id, made, scatter, &regimes, relative)
 }
 
-/// The curve of an effect in a channel over the regime variable that shows it best, from values at each
-/// window: its contribution (`made`), measured less the model without it (`scatter`), both in the channel's
-/// unit, and the window's regime. `relative` is the standard deviation of the contribution relative to
-/// itself.
+/// The curve of an effect in a channel over the regime variable that shows it best, from values at each window: its
+/// contribution (`made`), measured less the model without it (`scatter`), both in the channel's unit, and the
+/// window's regime. `relative` is the standard deviation of the contribution relative to itself.
 pub fn over_the_best(
     id: ChannelId,
     made: Vec<f64>,

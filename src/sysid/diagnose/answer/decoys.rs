@@ -17,8 +17,8 @@ use greylag_num::stream::{Stream, stream};
 const DECOYS: u64 = 84;
 /// Largest number of candidates turned into decoys.
 const MOST: usize = 6;
-/// Longest series, in windows, that is transformed at once; longer ones are randomized in pieces, to bound
-/// the cost of the transform.
+/// Longest series, in windows, that is transformed at once; longer ones are randomized in pieces, to bound the cost
+/// of the transform.
 const PIECE: usize = 256;
 
 /// The decoys of the best linear candidates of the last round with their evidence.

@@ -1,9 +1,8 @@
 //! The smallest amount of an effect that the flights would have shown.
 //!
-//! For an effect that is linear in its constants, their standard deviations suffice. An effect on the
-//! deflections is not linear near zero: a lag is confounded with a clock error there, and a dead zone has no
-//! effect. It is evaluated at increasing amounts on the flights' own deflections, with all nuisances
-//! projected out each time.
+//! For an effect that is linear in its constants, their standard deviations suffice. An effect on the deflections is
+//! not linear near zero: a lag is confounded with a clock error there, and a dead zone has no effect. It is evaluated
+//! at increasing amounts on the flights' own deflections, with all nuisances projected out each time.
 
 use std::collections::BTreeMap;
 
@@ -27,8 +26,8 @@ const POWERS: [f64; 2] = [0.5, 4.0];
 const CLOSE: f64 = 0.1;
 
 /// For each candidate of `round`, the smallest amount of its first free coefficient whose evidence would have
-/// exceeded `threshold` with a probability of five in six. Candidates without such an amount are left out:
-/// shapes that have no small amount, and effects that would not show at any possible amount.
+/// exceeded `threshold` with a probability of five in six. Candidates without such an amount are left out: shapes
+/// that have no small amount, and effects that would not show at any possible amount.
 pub fn detectable(round: &Round, threshold: f64) -> BTreeMap<&'static str, f64> {
     let straight = round.trials.iter().filter(|t| t.points[0].contribution.is_none());
     let mut all: BTreeMap<&'static str, f64> =
@@ -62,8 +61,8 @@ impl Shown {
         Some(Shown { alone, scatter: (robust / alone).max(1.0), penalty })
     }
 
-    /// The amount, in standard deviations, at which gain and Wald statistic both exceed `threshold` even if
-    /// noise lowers it by one standard deviation.
+    /// The amount, in standard deviations, at which gain and Wald statistic both exceed `threshold` even if noise
+    /// lowers it by one standard deviation.
     fn needed(&self, threshold: f64) -> f64 {
         let threshold = threshold.max(0.0);
         let by_gain = (threshold + self.penalty).sqrt();
@@ -204,8 +203,7 @@ mod tests {
     use super::*;
     use greylag_physics::inputs::Kind;
 
-    /// Searches for the amount of the effect `id`, if its evidence is a power of its size and sufficient at
-    /// `amount`.
+    /// Searches for the amount of the effect `id`, if its evidence is a power of its size and sufficient at `amount`.
     fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {
         let entry = Entry { about: Kind::from_id(id)?.describe(), operator: true };
         let id = entry.about.id;

@@ -1,13 +1,12 @@
-//! Checks for physically impossible figures of a flight; with one of them, no statement about forces is
-//! valid.
+//! Checks for physically impossible figures of a flight; with one of them, no statement about forces is valid.
 
 use crate::diagnose::answer::result::Tuned;
 use crate::diagnose::answer::sentences::with_interval;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_num::statistics::mean;
 
-/// Range of airspeed scales (measured over true) of a working pitot tube; a badly placed static port causes
-/// 10 to 15 %.
+/// Range of airspeed scales (measured over true) of a working pitot tube; a badly placed static port causes 10 to 15
+/// %.
 const SCALES: [f64; 2] = [0.8, 1.25];
 /// Largest mean vertical wind over a flight, m/s: thermals have up- and downdraughts that average out.
 const VERTICAL_MPS: f64 = 3.0;

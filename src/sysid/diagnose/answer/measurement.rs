@@ -3,8 +3,8 @@
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// Kinds of constants: name prefix, id in the catalogue, nominal value, and the deviation that is negligible
-/// because it is within the filters' own errors or a trim.
+/// Kinds of constants: name prefix, id in the catalogue, nominal value, and the deviation that is negligible because
+/// it is within the filters' own errors or a trim.
 const KINDS: [(&str, &str, f64, f64); 15] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
@@ -25,8 +25,8 @@ const KINDS: [(&str, &str, f64, f64); 15] = [
 /// Standard deviations beyond which a constant differs from its nominal value.
 const CLEARLY: f64 = 4.0;
 
-/// Sensor errors and wind of each flight. Late actuators may equally be a property of the aircraft, which the
-/// search for effects decides, so they are never asserted here.
+/// Sensor errors and wind of each flight. Late actuators may equally be a property of the aircraft, which the search
+/// for effects decides, so they are never asserted here.
 pub fn measurement(flights: &[&Reconstruction]) -> Vec<Measurement> {
     let of = |flight: &&Reconstruction| {
         let name = flight.name.clone();

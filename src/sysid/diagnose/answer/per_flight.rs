@@ -1,5 +1,4 @@
-//! Constants of each flight, fitted beside the aerodynamics: its trims, and the misalignment of its measured
-//! axes.
+//! Constants of each flight, fitted beside the aerodynamics: its trims, and the misalignment of its measured axes.
 
 use std::collections::HashSet;
 
@@ -10,13 +9,12 @@ use crate::per_flight::{Constant, askew};
 
 /// Standard deviations beyond which a constant differs from zero.
 const CLEARLY: f64 = 4.0;
-/// Prior standard deviations beyond which a constant is implausible: it probably compensates for a missing
-/// effect.
+/// Prior standard deviations beyond which a constant is implausible: it probably compensates for a missing effect.
 const BELIEVED: f64 = 3.0;
 /// Misalignment within the accuracy of mounting, rad.
 const MOUNTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
-/// Least standard deviation of a misalignment angle, rad: in simulated flights with aligned axes the
-/// estimates were 0.05° off, beside a flight with misaligned axes up to 0.34°.
+/// Least standard deviation of a misalignment angle, rad: in simulated flights with aligned axes the estimates were
+/// 0.05° off, beside a flight with misaligned axes up to 0.34°.
 const LEAST: f64 = 0.15 * std::f64::consts::PI / 180.0;
 /// A trim below this share of its usual standard deviation is negligible.
 const MATTERS: f64 = 0.2;
@@ -85,8 +83,8 @@ impl Fitted {
     }
 }
 
-/// Flights for which nothing is asserted: where one constant compensates for another cause, the constants
-/// correlated with it are not reliable either.
+/// Flights for which nothing is asserted: where one constant compensates for another cause, the constants correlated
+/// with it are not reliable either.
 fn astray(fitted: &[Fitted]) -> HashSet<String> {
     fitted.iter().filter(|f| f.strains()).map(|f| f.flight.clone()).collect()
 }
@@ -124,8 +122,8 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         .collect()
 }
 
-/// Ratio of the flight's residual to its noise, at least 1: with a missing effect, estimates are less certain
-/// than noise alone suggests.
+/// Ratio of the flight's residual to its noise, at least 1: with a missing effect, estimates are less certain than
+/// noise alone suggests.
 fn misfit(round: &Round, flight: usize) -> f64 {
     let of = round.projected.by_channel.iter().zip(&round.cells.flight_of_block);
     let own = of.filter(|(_, of)| **of == flight).flat_map(|(channels, _)| channels);

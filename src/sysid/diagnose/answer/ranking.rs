@@ -58,8 +58,8 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     list
 }
 
-/// Ids of asserted effects whose constants may all be zero (95 %) in the joint fit of all effects, because
-/// another effect accounts for the same residual. Shape constants do not count.
+/// Ids of asserted effects whose constants may all be zero (95 %) in the joint fit of all effects, because another
+/// effect accounts for the same residual. Shape constants do not count.
 pub fn void(found: &Found, options: &Options) -> Vec<String> {
     let lean = Options { detail: Detail::Lean, ..options.clone() };
     let asserted = found.selected.iter().filter(|s| s.refused.is_empty());
@@ -130,8 +130,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     })
 }
 
-/// Value of a coefficient that has joined the model, its standard deviation from the noise, and that from the
-/// sums over samples.
+/// Value of a coefficient that has joined the model, its standard deviation from the noise, and that from the sums
+/// over samples.
 fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
     let round = found.round();
     let full = format!("{id}.{name}");

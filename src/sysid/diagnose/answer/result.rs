@@ -14,25 +14,25 @@ pub enum Verdict {
     Adequate,
     /// Something is missing, but no effect of the catalogue explains it.
     Unexplained,
-    /// The flights allow no verdict: one of their figures is impossible, or remaining sensor errors may
-    /// account for the whole residual.
+    /// The flights allow no verdict: one of their figures is impossible, or remaining sensor errors may account for
+    /// the whole residual.
     Unknown,
 }
 
 /// The result of a diagnosis of one model over one or several flights.
 ///
-/// It is plain data: [`diagnose`](crate::diagnose::diagnose) computes it whole and nothing changes it later.
-/// Read `verdict` first, then `doubtful`: if that is not empty, figures of the flights are physically
-/// impossible, `verdict` is [`Verdict::Unknown`] and no effect is asserted. Then read `effects`, whose
-/// `asserted` entries stand first in the order of selection. `sentences` state the same results in words, the
-/// most important first. The optional parts are filled as the options requested them: `trims` and the axes'
-/// angles in `measurement` if constants of each flight were estimated, `decoys` and the candidates' curves
-/// with [`Detail::Full`](crate::diagnose::Detail::Full).
+/// It is plain data: [`diagnose`](crate::diagnose::diagnose) computes it whole and nothing changes it later. Read
+/// `verdict` first, then `doubtful`: if that is not empty, figures of the flights are physically impossible,
+/// `verdict` is [`Verdict::Unknown`] and no effect is asserted. Then read `effects`, whose `asserted` entries stand
+/// first in the order of selection. `sentences` state the same results in words, the most important first. The
+/// optional parts are filled as the options requested them: `trims` and the axes' angles in `measurement` if
+/// constants of each flight were estimated, `decoys` and the candidates' curves with
+/// [`Detail::Full`](crate::diagnose::Detail::Full).
 ///
-/// Units are SI and stand beside the values; channels D, L, Y are forces (N), l, m, n moments (N m). A number
-/// that does not exist is NaN, which JSON writes as `null`. Times and lengths of the flights are not repeated
-/// here: flights are named by their file. For equal inputs, options and version the result is equal, since
-/// `settings.seed` determines all random draws.
+/// Units are SI and stand beside the values; channels D, L, Y are forces (N), l, m, n moments (N m). A number that
+/// does not exist is NaN, which JSON writes as `null`. Times and lengths of the flights are not repeated here:
+/// flights are named by their file. For equal inputs, options and version the result is equal, since `settings.seed`
+/// determines all random draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// Schema of the document, `greylag.diagnosis/1`.
@@ -65,8 +65,8 @@ pub struct Diagnosis {
     pub nulls: Nulls,
     /// Decoys, columns that cannot be effects, as a check on the level of chance.
     pub decoys: Vec<Decoy>,
-    /// Share of the residual's variance beyond noise that a flexible model, trained on the other flights,
-    /// could still remove after the asserted effects; NaN (null) if it was not computed.
+    /// Share of the residual's variance beyond noise that a flexible model, trained on the other flights, could still
+    /// remove after the asserted effects; NaN (null) if it was not computed.
     pub learnable_remainder: f64,
     /// Further notes for the reader.
     pub notes: Vec<String>,
@@ -85,8 +85,8 @@ pub struct Candidate {
     pub asserted: bool,
     /// Classification of the evidence.
     pub status: Status,
-    /// The smaller of its penalised gain and its block-robust Wald statistic, in the round that selected it,
-    /// or in the last one.
+    /// The smaller of its penalised gain and its block-robust Wald statistic, in the round that selected it, or in
+    /// the last one.
     pub evidence: f64,
     /// Evidence that chance reaches in the null flights.
     pub threshold: f64,
@@ -212,8 +212,7 @@ pub struct Measurement {
 pub struct FlightTrim {
     /// Name of the flight.
     pub flight: String,
-    /// Name of the trim: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's
-    /// thrust.
+    /// Name of the trim: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's thrust.
     pub name: String,
     /// Prior standard deviation, about zero.
     pub prior_sd: f64,
@@ -253,9 +252,8 @@ pub struct Advice {
     pub between: Option<[String; 2]>,
 }
 
-/// Null flights, which determine the thresholds: the flights under the tuned model with the noise of the
-/// richest fit, its sign drawn at random block by block, and with prior errors drawn within the prior's
-/// widths.
+/// Null flights, which determine the thresholds: the flights under the tuned model with the noise of the richest fit,
+/// its sign drawn at random block by block, and with prior errors drawn within the prior's widths.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
     /// Number of null flights.

@@ -26,8 +26,8 @@ use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
-/// Least share of the error beyond noise that must be learnable before the verdict is that something is
-/// missing; errors of the reconstruction leave less.
+/// Least share of the error beyond noise that must be learnable before the verdict is that something is missing;
+/// errors of the reconstruction leave less.
 const WORTH_SAYING: f64 = 0.1;
 /// The same share where an effect of the catalogue was refused for its shape or its flights.
 const REFUSED: f64 = 0.01;
@@ -37,13 +37,12 @@ const CANNOT_BE: &str =
 /// Reason to refuse an effect whose contribution another one accounts for.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
-/// Determines which effects of the catalogue `model` lacks according to `flights`, which must have been
-/// reconstructed with their deflections as recorded; reports to `progress`, which may cancel.
+/// Determines which effects of the catalogue `model` lacks according to `flights`, which must have been reconstructed
+/// with their deflections as recorded; reports to `progress`, which may cancel.
 ///
 /// # Errors
-///
-/// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or
-/// `progress` cancelled.
+/// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or `progress`
+/// cancelled.
 pub fn diagnose(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -120,8 +119,8 @@ struct Judged {
     doubtful: Vec<String>,
 }
 
-/// Refuses effects in channels that the flights cannot judge, effects whose amount may be zero, and all
-/// effects beside impossible figures.
+/// Refuses effects in channels that the flights cannot judge, effects whose amount may be zero, and all effects
+/// beside impossible figures.
 fn judge(
     found: &mut Found,
     model: &GreyBox,

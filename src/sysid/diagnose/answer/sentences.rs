@@ -39,8 +39,8 @@ pub struct Said<'a> {
     pub trims: &'a [FlightTrim],
 }
 
-/// The sentences, the most important first: impossible figures, instruments where they explain the flights,
-/// the aircraft.
+/// The sentences, the most important first: impossible figures, instruments where they explain the flights, the
+/// aircraft.
 pub fn sentences(said: &Said) -> Vec<String> {
     let Said { verdict, doubtful, effects, channels, measurement, .. } = *said;
     let mut all: Vec<String> = doubtful.to_vec();
@@ -99,8 +99,7 @@ fn answer(said: &Said) -> Option<String> {
     }
 }
 
-/// Sentence that an effect is missing, with the closest effect of the catalogue if one explains most of the
-/// error.
+/// Sentence that an effect is missing, with the closest effect of the catalogue if one explains most of the error.
 fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     let close = |c: &&Candidate| c.status == Status::Refused && c.heldout_error_reduction > CLOSEST;
     match effects.iter().find(close) {

@@ -14,14 +14,14 @@ use greylag_physics::Channel;
 
 /// A formula is in doubt if a flexible model can still remove this share of what the formula removed.
 const MATERIAL: f64 = 0.02;
-/// A simpler form may remove less than the best one by this share: even an exact formula of a strong effect
-/// leaves a residual of that order, from errors of the reconstructed path.
+/// A simpler form may remove less than the best one by this share: even an exact formula of a strong effect leaves a
+/// residual of that order, from errors of the reconstructed path.
 const BEHIND: f64 = 0.01;
 /// A larger formula must lower the squared error by this much more than a smaller one.
 const WORTH: f64 = 10.0;
 
-/// Why and in which channels free forms are tried; `None` if the library's formula leaves nothing that a
-/// flexible model could remove.
+/// Why and in which channels free forms are tried; `None` if the library's formula leaves nothing that a flexible
+/// model could remove.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {
@@ -56,11 +56,10 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Searches free forms in `channels` of the residual of `tuned`, together with the library's best ones.
-/// `None` if the model cannot be evaluated over the flights.
+/// Searches free forms in `channels` of the residual of `tuned`, together with the library's best ones. `None` if the
+/// model cannot be evaluated over the flights.
 ///
 /// # Errors
-///
 /// `progress` cancelled.
 pub(super) fn beyond(
     ask: &Ask,
@@ -121,9 +120,8 @@ fn as_of_library(form: Form) -> Form {
     of.into_iter().find(same).unwrap_or(form)
 }
 
-/// Whether the formula with free forms replaces the library's: it removes more, or it removes as much and is
-/// simpler, or it is the same with other constants, which the library takes from quantiles of the flights and
-/// does not fit.
+/// Whether the formula with free forms replaces the library's: it removes more, or it removes as much and is simpler,
+/// or it is the same with other constants, which the library takes from quantiles of the flights and does not fit.
 pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     let taken = |c: &Climbed| c.removed() * library.excess;
     let more = taken(free) - taken(library);

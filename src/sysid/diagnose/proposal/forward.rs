@@ -26,8 +26,7 @@ const SETTLING: usize = 2;
 /// A channel is searched from this share of its variance beyond noise; below it the diagnosis calls the model
 /// adequate.
 const FAILING: f64 = 5e-4;
-/// The same relative to the worst channel: a smaller deficit is searched for after the worst one has been
-/// corrected.
+/// The same relative to the worst channel: a smaller deficit is searched for after the worst one has been corrected.
 const BESIDE: f64 = 0.05;
 /// Standard deviations by which joint tuning may change a coefficient; a larger change shows that terms are
 /// confounded.
@@ -100,8 +99,8 @@ pub(super) struct Ask<'a> {
     pub forms: &'a [(Form, Entry)],
     /// Channels whose error counts, in the order of the regression.
     pub channels: [bool; 6],
-    /// Least evidence of the first term, whatever chance reaches among `forms`; used if these were
-    /// preselected from more.
+    /// Least evidence of the first term, whatever chance reaches among `forms`; used if these were preselected from
+    /// more.
     pub least: f64,
     /// Share of what the best form removes by which a simpler one may remove less.
     pub behind: f64,
@@ -132,8 +131,8 @@ pub(super) struct Climbed {
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
-    /// Whether a further term was significant and removed enough of the error but was not added: the present
-    /// terms then compensate for another form.
+    /// Whether a further term was significant and removed enough of the error but was not added: the present terms
+    /// then compensate for another form.
     pub significant_left_out: bool,
     first_fall: f64,
 }
@@ -159,8 +158,8 @@ struct Stage<'a> {
 }
 
 impl Ask<'_> {
-    /// Adds terms to `model` one by one while each is significant and removes enough. `None` if the model
-    /// cannot be evaluated over the flights.
+    /// Adds terms to `model` one by one while each is significant and removes enough. `None` if the model cannot be
+    /// evaluated over the flights.
     pub(super) fn climb(&self, model: GreyBox) -> Option<Climbed> {
         let given = model.clone();
         let excess = self.excess(&model)?.max(1.0);
@@ -204,8 +203,8 @@ impl Ask<'_> {
         Some(c)
     }
 
-    /// Records the best form of a round in the front and, if it passes, adds it to the terms and the model;
-    /// returns whether it was added. `None` if the model with it cannot be evaluated over the flights.
+    /// Records the best form of a round in the front and, if it passes, adds it to the terms and the model; returns
+    /// whether it was added. `None` if the model with it cannot be evaluated over the flights.
     fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
         let &Stage { round, scores, place, threshold } = stage;
         let (trial, score) = &scores[place];
@@ -218,8 +217,7 @@ impl Ask<'_> {
         c.said.front.push(Rung {
             formula: draft::formula(&c.terms),
             complexity: c.complexity(),
-            // a term also frees the coefficients that compensated for its absence, which are counted in its
-            // fall
+            // a term also frees the coefficients that compensated for its absence, which are counted in its fall
             removed: (before + score.fall / c.excess).min(1.0),
             evidence: score.evidence,
             threshold,
@@ -277,8 +275,7 @@ impl Ask<'_> {
         Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
 
-    /// The model of `round` with a trial added, all coefficients tuned together; `Some(None)` if it cannot
-    /// join.
+    /// The model of `round` with a trial added, all coefficients tuned together; `Some(None)` if it cannot join.
     fn tuned(&self, round: &Round, trial: usize, score: &Score) -> Option<Option<GreyBox>> {
         let mut model = round.with(score);
         if model.join_most(round.trials[trial].id, &score.values).is_err() {
@@ -290,8 +287,7 @@ impl Ask<'_> {
         Some(Some(model))
     }
 
-    /// Share of the block bootstraps in which the form at index `place`, or one indistinguishable from it, is
-    /// best.
+    /// Share of the block bootstraps in which the form at index `place`, or one indistinguishable from it, is best.
     fn selected(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> f64 {
         let alike = checks::class(round, scores, place);
         let members: Vec<usize> =
@@ -330,8 +326,8 @@ impl Ask<'_> {
         simpler.min_by_key(|k| (size(*k), *k)).or(Some(best))
     }
 
-    /// Forms that these flights cannot distinguish from the one at index `place`, with their evidence. If the
-    /// forms were preselected from more, larger ones are excluded, since one always exists.
+    /// Forms that these flights cannot distinguish from the one at index `place`, with their evidence. If the forms
+    /// were preselected from more, larger ones are excluded, since one always exists.
     fn alike(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> Vec<(Form, f64)> {
         let own = self.form(round.trials[scores[place].0].id).map_or(0, |f| f.shape.complexity());
         checks::class(round, scores, place)
@@ -346,8 +342,8 @@ impl Ask<'_> {
             .collect()
     }
 
-    /// Whether a form similar to the winner removes significantly more for its size: the simpler form is as
-    /// good in practice but is not the true one.
+    /// Whether a form similar to the winner removes significantly more for its size: the simpler form is as good in
+    /// practice but is not the true one.
     fn surpassed(&self, stage: &Stage) -> bool {
         let &Stage { round, scores, place, .. } = stage;
         let size = |k: usize| {

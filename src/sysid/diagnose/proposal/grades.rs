@@ -1,5 +1,5 @@
-//! Properties that a form shares with those that the flights cannot distinguish from it, and their
-//! description in words.
+//! Properties that a form shares with those that the flights cannot distinguish from it, and their description in
+//! words.
 
 use super::free::{self, trend::plain};
 use super::library::{Form, Shape};
@@ -17,8 +17,7 @@ fn trend(form: &Form) -> Option<String> {
     free::trend::trend(&shape.text(None))
 }
 
-/// The properties that `best` and all of `alike`, which these flights cannot distinguish from it, have in
-/// common.
+/// The properties that `best` and all of `alike`, which these flights cannot distinguish from it, have in common.
 pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     let same = |of: &dyn Fn(&Form) -> bool| alike.iter().all(of);
     let variables = sorted(best);

@@ -13,8 +13,8 @@ use crate::diagnose::search::stepwise::HELD_OUT;
 use greylag_model::GreyBox;
 use greylag_physics::formula::Written;
 
-/// Share of the error beyond noise in `channels` that `after` removes from that of `before`. Both use the
-/// noise level of `after`, since a better model would otherwise be penalised for its smaller noise.
+/// Share of the error beyond noise in `channels` that `after` removes from that of `before`. Both use the noise level
+/// of `after`, since a better model would otherwise be penalised for its smaller noise.
 pub(super) fn removed(
     problem: &Problem,
     before: &GreyBox,

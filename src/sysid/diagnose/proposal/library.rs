@@ -62,8 +62,7 @@ pub enum Shape {
     Above(Variable, f64),
     /// Excess of v over a dead band, with its sign.
     Beyond(Variable, f64),
-    /// The control v through a first-order lag of that many seconds; as a candidate, the time constant is
-    /// free.
+    /// The control v through a first-order lag of that many seconds; as a candidate, the time constant is free.
     Lagged(Variable, f64),
     /// An expression of the free forms.
     Free(&'static Free),
@@ -209,7 +208,6 @@ impl Form {
     /// The effect of this form alone with a fixed threshold; a lag's time constant is free.
     ///
     /// # Errors
-    ///
     /// Its file cannot be read, which does not happen for the library's forms.
     pub fn effect(&self) -> Result<&'static Written, String> {
         match self.shape {
@@ -237,7 +235,6 @@ impl Form {
     /// The effect of this form alone with all its constants fixed.
     ///
     /// # Errors
-    ///
     /// As [`Form::effect`].
     pub fn fixed(&self) -> Result<&'static Written, String> {
         if let Shape::Lagged(v, tau) = self.shape {

@@ -1,5 +1,4 @@
-//! Proposal of a formula for an effect outside the catalogue: searched, tested on other flights, described in
-//! words.
+//! Proposal of a formula for an effect outside the catalogue: searched, tested on other flights, described in words.
 
 mod beyond;
 mod draft;

@@ -26,11 +26,10 @@ const LAGS: f64 = 0.5;
 const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
-/// Proposes a formula for the effect that `model` lacks according to `flights`, if a diagnosis leaves it
-/// unexplained, and tests it on `held_out`; reports to `progress`, which may cancel.
+/// Proposes a formula for the effect that `model` lacks according to `flights`, if a diagnosis leaves it unexplained,
+/// and tests it on `held_out`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-///
 /// As [`diagnose`](crate::diagnose::diagnose).
 pub fn propose(
     model: &GreyBox,
@@ -92,8 +91,7 @@ pub fn propose(
     Ok(proposal)
 }
 
-/// Channels in which a formula is searched for; without those that a rudder drives if the model has no
-/// rudder.
+/// Channels in which a formula is searched for; without those that a rudder drives if the model has no rudder.
 fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
     let mut channels = failing(found);
@@ -101,9 +99,9 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     channels
 }
 
-/// Whether a free form fits better than the adopted formula of the library although that is simpler and
-/// removes hardly less error: the form is then uncertain. The evidences are from two rounds of tuning, so
-/// this only withholds a grade.
+/// Whether a free form fits better than the adopted formula of the library although that is simpler and removes
+/// hardly less error: the form is then uncertain. The evidences are from two rounds of tuning, so this only withholds
+/// a grade.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);
@@ -143,8 +141,8 @@ fn empty(
     }
 }
 
-/// Completes the proposal with its sentences, and with the effect file if there is no objection; `from` names
-/// the flights searched.
+/// Completes the proposal with its sentences, and with the effect file if there is no objection; `from` names the
+/// flights searched.
 fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldOut, from: &str) {
     proposal.refused.extend(objection(&tested));
     proposal.sentences.extend(sentences(proposal, first, terms, &tested));

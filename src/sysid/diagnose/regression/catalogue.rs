@@ -37,8 +37,8 @@ impl Entry {
     }
 }
 
-/// The effects of the catalogue and those of files with ids in `with` that `model` lacks and that can be
-/// searched for, without those of `without`.
+/// The effects of the catalogue and those of files with ids in `with` that `model` lacks and that can be searched
+/// for, without those of `without`.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = on_air().map(|about| of(about, false));
@@ -69,8 +69,8 @@ pub struct Columns {
     pub columns: Vec<Vec<Column>>,
 }
 
-/// Columns of `entries` for `flights` under `model`; `refined` gives additional points at which the nonlinear
-/// ones are linearised.
+/// Columns of `entries` for `flights` under `model`; `refined` gives additional points at which the nonlinear ones
+/// are linearised.
 pub fn columns(
     model: &GreyBox,
     flights: &[Ready],
@@ -131,8 +131,8 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// `model` with all of `entries` that can join it, at zero or the bound nearest to it, and these entries with
-/// their values.
+/// `model` with all of `entries` that can join it, at zero or the bound nearest to it, and these entries with their
+/// values.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();
@@ -248,8 +248,8 @@ impl Columns {
     }
 }
 
-/// Columns of a nonlinear candidate at `values`: its contribution, then its derivatives with respect to its
-/// free coefficients, by flight; `None` if the values are not possible.
+/// Columns of a nonlinear candidate at `values`: its contribution, then its derivatives with respect to its free
+/// coefficients, by flight; `None` if the values are not possible.
 fn curved_columns(
     model: &GreyBox,
     flights: &[Ready],

@@ -12,10 +12,10 @@ use greylag_model::GreyBox;
 use greylag_physics::rigid_body::{self, RigidBody, Vector};
 use greylag_physics::{Channel, Wrench};
 
-/// Number of sensor-error columns: gyros p, q, r (rad/s), α, β (rad), airspeed (relative), accelerometers x,
-/// y, z (m/s²), then delays (s) of α, β, airspeed, accelerometers, of the angular accelerations behind the
-/// moments and of the recorded actuators, and the actuators' blur (half the variance, in squared samples, of
-/// the time over which a record is averaged).
+/// Number of sensor-error columns: gyros p, q, r (rad/s), α, β (rad), airspeed (relative), accelerometers x, y, z
+/// (m/s²), then delays (s) of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of
+/// the recorded actuators, and the actuators' blur (half the variance, in squared samples, of the time over which a
+/// record is averaged).
 pub const SENSORS: usize = 16;
 
 /// A flight evaluated under a model.
@@ -114,8 +114,8 @@ impl Ready {
         Ready { accelerating: model.cloned(), ..self }
     }
 
-    /// Predictions of one unit of each of the coefficients `wanted` of `model`, which must contain the
-    /// effects of the flight's model; shape constants and those of input effects have empty columns.
+    /// Predictions of one unit of each of the coefficients `wanted` of `model`, which must contain the effects of the
+    /// flight's model; shape constants and those of input effects have empty columns.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
         // a formula with a lag needs the past of the deflections, which the flight's own model may not remember
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
@@ -179,8 +179,8 @@ impl Ready {
         columns.pop().unwrap_or_default()
     }
 
-    /// Difference between the predictions of `model` and of the flight's model, from which it differs in an
-    /// input effect, to first order in deflections and throttle.
+    /// Difference between the predictions of `model` and of the flight's model, from which it differs in an input
+    /// effect, to first order in deflections and throttle.
     pub fn operator(&self, model: &GreyBox) -> Column {
         let other = self.measured.acting(model);
         let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
@@ -219,8 +219,7 @@ pub fn of_body(model: &GreyBox, index: usize) -> bool {
     changed_body(model, index).is_some()
 }
 
-/// The rigid body of `model` with the coefficient `index` perturbed, and the perturbation, if it changes the
-/// body.
+/// The rigid body of `model` with the coefficient `index` perturbed, and the perturbation, if it changes the body.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;
     let mut moved = model.clone();

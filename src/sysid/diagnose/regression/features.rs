@@ -16,13 +16,12 @@ use greylag_num::stream::{Stream, stream};
 const FEATURES: u64 = 81;
 /// Number of cosines.
 const COSINES: usize = 40;
-/// Number of their variables: α, β, V, p, q, r, deflections and throttle now, earlier deflections, the rate
-/// of α.
+/// Number of their variables: α, β, V, p, q, r, deflections and throttle now, earlier deflections, the rate of α.
 const VARIABLES: usize = 12;
 /// Number of features: the variables themselves and the cosines.
 pub const COUNT: usize = VARIABLES + COSINES;
-/// Standard deviation of the cosines' frequencies per standard deviation of a variable, so that a feature
-/// varies by about one half-period over the flights.
+/// Standard deviation of the cosines' frequencies per standard deviation of a variable, so that a feature varies by
+/// about one half-period over the flights.
 const BEND: f64 = 0.5;
 /// Time over which the rate of α is differenced, s; a shorter one would amplify noise.
 const SPAN_S: f64 = 0.06;
@@ -94,8 +93,8 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     ]
 }
 
-/// Mean and standard deviation over all flights of each variable; `of` extracts the variables from a flight,
-/// a segment and an index.
+/// Mean and standard deviation over all flights of each variable; `of` extracts the variables from a flight, a
+/// segment and an index.
 pub fn spread<const N: usize>(
     flights: &[Ready],
     of: impl Fn(&Prepared, usize, usize) -> [f64; N],

@@ -30,8 +30,8 @@ pub struct Place<'a> {
     pub controls: &'a Controls,
 }
 
-/// Averages the amounts that `evaluate` reports, as `add(column, channel, amount)`, over each window: forces
-/// over the samples; moments over integration steps, or over the samples if they are taken at instants.
+/// Averages the amounts that `evaluate` reports, as `add(column, channel, amount)`, over each window: forces over the
+/// samples; moments over integration steps, or over the samples if they are taken at instants.
 pub fn gather(
     flight: &Prepared,
     integrator: Integrator,

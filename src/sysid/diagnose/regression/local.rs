@@ -18,8 +18,8 @@ pub const ALPHA: usize = 3;
 /// Index of the aileron; elevator, throttle and rudder follow.
 pub const CONTROLS: usize = 6;
 
-/// Measured less predicted at one sample, without the angular acceleration's moment, which the kernel
-/// computes from the rates.
+/// Measured less predicted at one sample, without the angular acceleration's moment, which the kernel computes from
+/// the rates.
 #[derive(Clone, Copy, Debug)]
 pub struct Local {
     /// The residual; forces NaN where the log has no specific force.

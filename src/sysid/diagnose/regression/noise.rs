@@ -1,5 +1,4 @@
-//! Noise of each channel, from the residual of the richest plausible model: its spectrum, its level, its
-//! blocks.
+//! Noise of each channel, from the residual of the richest plausible model: its spectrum, its level, its blocks.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -19,8 +18,7 @@ const PASSES: usize = 2;
 pub struct Noise {
     /// Whitener of each channel.
     pub whiteners: [Whitener; CHANNELS],
-    /// Whitened residual of the rich fit, one list for each cell, each block corrected for the reduction by
-    /// the fit.
+    /// Whitened residual of the rich fit, one list for each cell, each block corrected for the reduction by the fit.
     pub residuals: Vec<Vec<f64>>,
 }
 
@@ -119,8 +117,8 @@ impl Fit {
         Some(Fit { scale, inverse, solution })
     }
 
-    /// The residual of `rows`, each block b multiplied by (I − H_bb)^(−1/2), so that its variance is that
-    /// before the fit (Bell and McCaffrey 2002, "CR2").
+    /// The residual of `rows`, each block b multiplied by (I − H_bb)^(−1/2), so that its variance is that before the
+    /// fit (Bell and McCaffrey 2002, "CR2").
     fn unshrunk(&self, cell: &Cell, rows: &Rows) -> Vec<f64> {
         let left = &rows.y - &rows.x * &self.solution;
         let mut out = vec![0.0; left.len()];

@@ -30,8 +30,8 @@ fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     }
 }
 
-/// Columns of the misalignment angles of gyros, accelerometers and path: all quantities measured in those
-/// axes rotate, the angular acceleration included.
+/// Columns of the misalignment angles of gyros, accelerometers and path: all quantities measured in those axes
+/// rotate, the angular acceleration included.
 fn of_axes(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let angles = askew::NAMES.len();
     let mut columns = gather(&flight.acting, model.integrator, angles, |place, add| {

@@ -34,8 +34,8 @@ pub struct Projected {
     pub total: DMatrix<f64>,
     /// Products of the candidate columns with the noise of each block.
     pub noise: Vec<DVector<f64>>,
-    /// Square root of `prior` for the candidates: multiplied by a unit normal vector, it gives a draw of the
-    /// prior's error.
+    /// Square root of `prior` for the candidates: multiplied by a unit normal vector, it gives a draw of the prior's
+    /// error.
     pub prior_root: DMatrix<f64>,
     /// Nuisance parameters fitted without any candidate, relative to the point of linearisation.
     pub tuned: DVector<f64>,
@@ -51,8 +51,8 @@ pub struct Projected {
 
 impl Projected {
     /// Projects the columns of `placed`: by flight, those of the nuisance parameters (from index 0), then the
-    /// candidates, and the residual at index `last`. `shared` is the part of their product with the residual
-    /// due to shared noise, by index, zero beyond its end.
+    /// candidates, and the residual at index `last`. `shared` is the part of their product with the residual due to
+    /// shared noise, by index, zero beyond its end.
     pub fn new(
         cells: &Cells,
         placed: &[Placed],
@@ -124,8 +124,8 @@ impl Projected {
         self.total.ncols() - 1
     }
 
-    /// Gram matrix of other columns at the candidates' indices, less their part along the nuisance
-    /// parameters; `whiteners` by channel.
+    /// Gram matrix of other columns at the candidates' indices, less their part along the nuisance parameters;
+    /// `whiteners` by channel.
     pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
         let (na, ny) = (self.taken.nrows(), self.taken.ncols());
         let mut gram = DMatrix::zeros(ny, ny);
@@ -185,8 +185,8 @@ fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     root
 }
 
-/// Products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny`
-/// columns behind them.
+/// Products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny` columns
+/// behind them.
 fn products_of_known(
     whitened: &[(Vec<usize>, DMatrix<f64>)],
     na: usize,

@@ -11,8 +11,8 @@ pub struct Point {
     pub values: Vec<f64>,
     /// Candidate column of its contribution there; `None` for a linear candidate, whose point is zero.
     pub contribution: Option<usize>,
-    /// Free coefficients: index in `values`, candidate column of the derivative, lowest and highest value
-    /// within which the linearisation is used.
+    /// Free coefficients: index in `values`, candidate column of the derivative, lowest and highest value within
+    /// which the linearisation is used.
     pub free: Vec<(usize, usize, [f64; 2])>,
 }
 
@@ -36,9 +36,9 @@ pub struct Score {
     pub evidence: f64,
     /// Block-robust Wald statistic of the free coefficients.
     pub wald: f64,
-    /// Ranking criterion: the evidence if it is not positive, else the geometric mean of penalised gain and
-    /// Wald statistic. Far above chance, the smaller of the two would rank by how evenly an effect is spread
-    /// over the blocks.
+    /// Ranking criterion: the evidence if it is not positive, else the geometric mean of penalised gain and Wald
+    /// statistic. Far above chance, the smaller of the two would rank by how evenly an effect is spread over the
+    /// blocks.
     pub order: f64,
     /// Reduction of the squared whitened error.
     pub fall: f64,
@@ -221,8 +221,8 @@ fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, squar
     if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
 }
 
-/// Standard deviations of the first of `columns` fitted together: from the noise alone, and from the scatter
-/// of the blocks of `null`.
+/// Standard deviations of the first of `columns` fitted together: from the noise alone, and from the scatter of the
+/// blocks of `null`.
 pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
     let inverse = scaled_inverse(&select(&p.total, columns))?;
     let zero = DVector::zeros(columns.len());

@@ -31,19 +31,19 @@ pub const LATE_PLACE: usize = SENSORS - 2;
 /// Index of the actuators' blur.
 pub const BLUR_PLACE: usize = SENSORS - 1;
 
-/// Least standard deviations (rad/s, rad, relative, m/s², s), since a filter's covariance covers only the
-/// errors it models.
+/// Least standard deviations (rad/s, rad, relative, m/s², s), since a filter's covariance covers only the errors it
+/// models.
 const FLOOR: [f64; SENSORS - 3] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
-/// Prior width of the delay of angular accelerations behind the moments, s: a simulator with explicit Euler
-/// steps at 400 Hz has 1.25 ms, a gyro's low-pass filter of 100 Hz 1.6 ms.
+/// Prior width of the delay of angular accelerations behind the moments, s: a simulator with explicit Euler steps at
+/// 400 Hz has 1.25 ms, a gyro's low-pass filter of 100 Hz 1.6 ms.
 const MOMENTS_LATE: f64 = 1.5e-3;
 /// The same if the log holds a simulator's own steps, which are compared as such.
 const MOMENTS_ON_TIME: f64 = 1e-6;
 /// Prior width of the actuators' delay, samples: its 95 % interval is ±1.5 samples.
 const SKEW_SAMPLES: f64 = 0.77;
-/// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a fraction
-/// of a sample lies between the present value and the mean of both neighbouring samples, whose blur is 1/8.
+/// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a fraction of a
+/// sample lies between the present value and the mean of both neighbouring samples, whose blur is 1/8.
 pub const BLURRED: [f64; 2] = [1.0 / 16.0, 1.0 / 24.0];
 
 /// Prior mean of each sensor error.

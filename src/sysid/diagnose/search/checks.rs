@@ -26,20 +26,19 @@ pub const CLOSE: f64 = 10.0;
 const UNSURE: f64 = 0.1;
 /// Standard deviations of the noise's square beyond which a remaining residual is significant.
 const DOUBT: f64 = 4.0;
-/// Least share of a flight's information on an amount that must come from its excitation rather than from
-/// noise in its columns.
+/// Least share of a flight's information on an amount that must come from its excitation rather than from noise in
+/// its columns.
 const LEAST_SIGNAL: f64 = 0.5;
-/// Reduction, in prior standard deviations, of the prior's misfit beyond which a candidate may merely replace
-/// an adjustment of existing coefficients.
+/// Reduction, in prior standard deviations, of the prior's misfit beyond which a candidate may merely replace an
+/// adjustment of existing coefficients.
 const STRAIN: f64 = 5.0;
 /// Least share of such a candidate's reduction that must be prior misfit for it to count as such.
 const RELIEF: f64 = 0.9;
 /// Number of candidates that compete in a bootstrap.
 const COMPETING: usize = 8;
 
-/// Share of the squared error beyond noise that `score` removes from segments that its amounts were not
-/// fitted to; segments have a block's length, every fifth one is held out in turn, in the channels in which
-/// the candidate acts.
+/// Share of the squared error beyond noise that `score` removes from segments that its amounts were not fitted to;
+/// segments have a block's length, every fifth one is held out in turn, in the channels in which the candidate acts.
 pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     let p = &round.projected;
     let last = p.width();
@@ -79,8 +78,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// The error of the model of `round`, which must have no candidates: a fit with all candidates' columns
-    /// follows their noise and leaves as little as half of it in the moments.
+    /// The error of the model of `round`, which must have no candidates: a fit with all candidates' columns follows
+    /// their noise and leaves as little as half of it in the moments.
     pub fn of(round: &Round) -> Beyond {
         let only = |c: usize| std::array::from_fn(|k| k == c);
         Beyond {
@@ -114,8 +113,7 @@ fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
     (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
 }
 
-/// Directions that may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a
-/// whole.
+/// Directions that may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
 fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     match trial.points[score.point].contribution {
         None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
@@ -123,9 +121,9 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     }
 }
 
-/// Whether the candidate mostly replaces an adjustment of existing coefficients: its reduction is the prior
-/// misfit of coefficients that the data moved far from their prior, and hardly any error of the flights,
-/// which those coefficients remove as well.
+/// Whether the candidate mostly replaces an adjustment of existing coefficients: its reduction is the prior misfit of
+/// coefficients that the data moved far from their prior, and hardly any error of the flights, which those
+/// coefficients remove as well.
 pub fn relieves(round: &Round, score: &Score) -> bool {
     let prior = &round.projected.prior;
     let last = round.projected.width();
@@ -141,8 +139,7 @@ pub fn likeness(round: &Round, a: &Score, b: &Score) -> f64 {
     of(a, b) / (of(a, a) * of(b, b)).sqrt()
 }
 
-/// Indices in `scores` of the effects that these data cannot distinguish from the one at `of`, itself
-/// included.
+/// Indices in `scores` of the effects that these data cannot distinguish from the one at `of`, itself included.
 pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> {
     let (_, own) = &scores[of];
     (0..scores.len())
@@ -156,8 +153,8 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
         .collect()
 }
 
-/// Share of `count` block bootstraps in which one of the trials of `class` ranks first among those of `open`,
-/// which are sorted from the best; blocks are drawn flight by flight.
+/// Share of `count` block bootstraps in which one of the trials of `class` ranks first among those of `open`, which
+/// are sorted from the best; blocks are drawn flight by flight.
 pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
     let seed = round.seed;
     let by_flight: Vec<Vec<usize>> = (0..round.flights.len())
@@ -190,10 +187,10 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// The first free coefficient estimated from each flight alone, with its standard deviation; NaN where a
-/// flight carries no information. Sensor errors are fitted anew for each flight; the other coefficients keep
-/// the estimates and uncertainties from all flights together. A flight with little excitation could not
-/// re-estimate them: noise in its regressors biases the coefficients toward zero (errors in variables).
+/// The first free coefficient estimated from each flight alone, with its standard deviation; NaN where a flight
+/// carries no information. Sensor errors are fitted anew for each flight; the other coefficients keep the estimates
+/// and uncertainties from all flights together. A flight with little excitation could not re-estimate them: noise in
+/// its regressors biases the coefficients toward zero (errors in variables).
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
     (0..round.flights.len())
         .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
@@ -256,8 +253,7 @@ fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// Nuisance parameters with the model's coefficients as estimated from all flights together with `score`'s
-/// effect.
+/// Nuisance parameters with the model's coefficients as estimated from all flights together with `score`'s effect.
 fn together(round: &Round, score: &Score) -> Vec<Known> {
     let p = &round.projected;
     let mut all = round.known.clone();
@@ -271,8 +267,7 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     all
 }
 
-/// Nuisance columns of one flight and the candidate columns `columns`, renumbered; the other flights have
-/// none.
+/// Nuisance columns of one flight and the candidate columns `columns`, renumbered; the other flights have none.
 fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
     let own = &placed[flight];
     let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
@@ -294,8 +289,8 @@ fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     a.iter().zip(b).map(of).collect()
 }
 
-/// Whether flights contradict the common `value`: significantly the other sign, or a significantly different
-/// amount by at least half of it.
+/// Whether flights contradict the common `value`: significantly the other sign, or a significantly different amount
+/// by at least half of it.
 pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
     flights.iter().any(|[own, sd]| {
         let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;

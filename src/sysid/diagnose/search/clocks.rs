@@ -1,8 +1,8 @@
 //! Delay of the recorded actuators, estimated from forces and moments together.
 //!
-//! A surface with a delay looks like a surface recorded early, but the throttle is recorded on the same
-//! clock: its effect on the forces distinguishes the two. Free runs, in which thrust is only an acceleration,
-//! do not distinguish them.
+//! A surface with a delay looks like a surface recorded early, but the throttle is recorded on the same clock: its
+//! effect on the forces distinguishes the two. Free runs, in which thrust is only an acceleration, do not distinguish
+//! them.
 
 use crate::diagnose::regression::columns::SENSORS;
 use crate::diagnose::regression::sensors;
@@ -41,9 +41,9 @@ pub struct Clocks {
     pub late: Vec<[f64; 2]>,
 }
 
-/// Fits `model` to `flights` together with their actuator delays and the constants of each flight that
-/// `per_flight` selects. The first `given` coefficients have their prior widths, the others have no prior.
-/// `None` if the model cannot be evaluated over the flights.
+/// Fits `model` to `flights` together with their actuator delays and the constants of each flight that `per_flight`
+/// selects. The first `given` coefficients have their prior widths, the others have no prior. `None` if the model
+/// cannot be evaluated over the flights.
 pub fn clocks(
     model: &GreyBox,
     given: usize,

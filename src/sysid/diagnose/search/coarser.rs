@@ -1,20 +1,19 @@
 //! Discretisation error of a fit, estimated by the same fit on every other sample.
 //!
-//! An interval covers noise only. Between two samples of 20 or 40 ms surfaces and rates move on, and the
-//! resulting error of a sum over samples is not noise: it is the same in every flight and does not average
-//! out.
+//! An interval covers noise only. Between two samples of 20 or 40 ms surfaces and rates move on, and the resulting
+//! error of a sum over samples is not noise: it is the same in every flight and does not average out.
 
 use crate::diagnose::search::round::{Problem, Round};
 use crate::diagnose::search::settling::SETTLING;
 use greylag_logs::Sampling;
 
-/// Share of the change between half and all samples that remains with all samples, used as a standard
-/// deviation. A third holds for sums whose error grows with the square of the sampling interval.
+/// Share of the change between half and all samples that remains with all samples, used as a standard deviation. A
+/// third holds for sums whose error grows with the square of the sampling interval.
 const LEFT: f64 = 1.0 / 3.0;
 
-/// Standard deviation of each coefficient of the model of `round` due to the discretisation, in the order of
-/// the model's list and in their units. Zero where it is not known, that is without a fit on half the
-/// samples, and for a simulator's own steps, whose sums are exact.
+/// Standard deviation of each coefficient of the model of `round` due to the discretisation, in the order of the
+/// model's list and in their units. Zero where it is not known, that is without a fit on half the samples, and for a
+/// simulator's own steps, whose sums are exact.
 pub fn left_by_sums(problem: &Problem, round: &Round) -> Vec<f64> {
     let fine = round.tuned();
     let none = vec![0.0; fine.coefficients().len()];

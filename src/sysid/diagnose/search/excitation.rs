@@ -21,7 +21,6 @@ const NEEDS: [Need; 4] = [
 /// Notes on variables with little excitation.
 ///
 /// # Errors
-///
 /// There is too little flight, or aileron, elevator and angle of attack all hardly move.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
@@ -45,8 +44,8 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .collect())
 }
 
-/// The variation of a variable in words; a variable that never moves indicates a missing channel rather than
-/// the manoeuvre.
+/// The variation of a variable in words; a variable that never moves indicates a missing channel rather than the
+/// manoeuvre.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
         true => format!(

@@ -12,8 +12,8 @@ use greylag_num::stream::stream;
 /// Random stream for the null flights.
 const NULLS: u64 = 80;
 
-/// Null flight `k`: the noise of each block with a random sign, and prior errors drawn within the prior's
-/// widths. The channels of a block share one sign.
+/// Null flight `k`: the noise of each block with a random sign, and prior errors drawn within the prior's widths. The
+/// channels of a block share one sign.
 pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
     let mut random = stream(seed, &[NULLS, k as u64]);
     let mut total = DVector::zeros(p.width());
@@ -47,8 +47,8 @@ pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64
     best
 }
 
-/// The quantile 1 − `level` of the distribution of `sample`, as a Gumbel law with the sample's mean and
-/// standard deviation, which approximates the maximum of many.
+/// The quantile 1 − `level` of the distribution of `sample`, as a Gumbel law with the sample's mean and standard
+/// deviation, which approximates the maximum of many.
 pub fn threshold(sample: &[f64], level: f64) -> f64 {
     let finite: Vec<f64> = sample.iter().copied().filter(|x| x.is_finite()).collect();
     let count = finite.len() as f64;

@@ -43,8 +43,8 @@ struct Fold {
     others: Vec<Cholesky<f64, Dyn>>,
 }
 
-/// Error that a flexible model could remove from the residual of `round`; the thresholds come from `count`
-/// draws of noise.
+/// Error that a flexible model could remove from the residual of `round`; the thresholds come from `count` draws of
+/// noise.
 pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
     let channels: Vec<Option<Channel>> =
         (0..6).into_par_iter().map(|c| channel(round, c)).collect();
@@ -112,8 +112,8 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
 /// Features, noise and residual of one cell.
 type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
 
-/// Whitened features of unit size, noise and residual of each cell, with the nuisance parameters projected
-/// out: by plain least squares, since otherwise a flexible model would pick up the bias from shared noise.
+/// Whitened features of unit size, noise and residual of each cell, with the nuisance parameters projected out: by
+/// plain least squares, since otherwise a flexible model would pick up the bias from shared noise.
 fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
     let na = round.known.len();
     let mut all = Vec::new();
@@ -165,8 +165,8 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> 
 }
 
 impl Channel {
-    /// Reduction of the squared error of held-out folds by the best ridge parameter, at least zero; for the
-    /// data, or for noise whose blocks have `signs`.
+    /// Reduction of the squared error of held-out folds by the best ridge parameter, at least zero; for the data, or
+    /// for noise whose blocks have `signs`.
     fn gain(&self, signs: Option<&[f64]>) -> f64 {
         let targets: Vec<DVector<f64>> = self
             .folds

@@ -27,8 +27,7 @@ const CURVATURES: usize = 2;
 const WORTH: f64 = 0.2;
 /// It is also linearised again if its evidence is within this of the largest one.
 const CLOSE: f64 = 40.0;
-/// A candidate was linearised near zero if its amount is more than this many times the one at the
-/// linearisation.
+/// A candidate was linearised near zero if its amount is more than this many times the one at the linearisation.
 const NOTHING: f64 = 1e3;
 
 /// Data that all rounds share.
@@ -53,8 +52,7 @@ pub struct Problem {
 pub struct Beside<'a> {
     /// The noise; estimated from this round if `None`.
     pub noise: Option<&'a Noise>,
-    /// Model that predicts the accelerations in the columns of mass and inertia, if the round's own is too
-    /// far off.
+    /// Model that predicts the accelerations in the columns of mass and inertia, if the round's own is too far off.
     pub accelerating: Option<&'a GreyBox>,
 }
 
@@ -91,8 +89,8 @@ pub struct Round {
     refined: Vec<(&'static str, Vec<f64>)>,
     /// Spurious products from shared noise, by index, by flight.
     pub shared: Vec<Vec<f64>>,
-    /// Columns of the nuisance parameters and the linear candidates for the flights disturbed again, at the
-    /// same indices.
+    /// Columns of the nuisance parameters and the linear candidates for the flights disturbed again, at the same
+    /// indices.
     pub disturbed: Vec<Placed>,
 }
 
@@ -160,8 +158,8 @@ impl Round {
         })
     }
 
-    /// Scores of all candidates, best evidence first; nonlinear ones near the top are linearised again at
-    /// their best fit.
+    /// Scores of all candidates, best evidence first; nonlinear ones near the top are linearised again at their best
+    /// fit.
     pub fn rank(&mut self) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
@@ -257,8 +255,7 @@ impl Round {
         })
     }
 
-    /// Wald statistic of all free constants of a joined effect against zero; `None` if its constants are not
-    /// amounts.
+    /// Wald statistic of all free constants of a joined effect against zero; `None` if its constants are not amounts.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");
         let operator = greylag_physics::inputs::Kind::from_id(id).is_some();

@@ -8,8 +8,8 @@ use greylag_model::GreyBox;
 
 /// Tuning passes after an effect has joined, in which nonlinear effects converge.
 pub const SETTLING: usize = 3;
-/// If a mass or inertia change moves by more than this share while it is tuned, it was estimated with
-/// accelerations of a model that is too far off.
+/// If a mass or inertia change moves by more than this share while it is tuned, it was estimated with accelerations
+/// of a model that is too far off.
 const ASTRAY: f64 = 0.1;
 
 /// A round with its candidates' scores.
@@ -24,8 +24,8 @@ pub struct Ranked {
     pub threshold: f64,
 }
 
-/// Ranks the candidates of `round`; those of mass and inertia with better accelerations if the model's own
-/// are too far off.
+/// Ranks the candidates of `round`; those of mass and inertia with better accelerations if the model's own are too
+/// far off.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -40,9 +40,9 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     }
 }
 
-/// The round with the accelerations of its model after the best change of mass or inertia has been added and
-/// tuned; `None` if that is not needed. With a grossly wrong inertia the model's accelerations are wrong, and
-/// so are the columns made from them: the estimates then differ between flights and are all too small.
+/// The round with the accelerations of its model after the best change of mass or inertia has been added and tuned;
+/// `None` if that is not needed. With a grossly wrong inertia the model's accelerations are wrong, and so are the
+/// columns made from them: the estimates then differ between flights and are all too small.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {

@@ -1,9 +1,9 @@
-//! Residual shape: products of states and deflections that still explain the residual beside an effect, which
-//! shows that the effect's formula differs from the true one.
+//! Residual shape: products of states and deflections that still explain the residual beside an effect, which shows
+//! that the effect's formula differs from the true one.
 //!
-//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects large
-//! errors only. Here a few terms, as in aerodynamic tables, are fitted to the same flights and compared with
-//! their reduction of noise.
+//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects large errors
+//! only. Here a few terms, as in aerodynamic tables, are fitted to the same flights and compared with their reduction
+//! of noise.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -33,8 +33,8 @@ const RIDGE: f64 = 1e-4;
 const DOUBT: f64 = 4.0;
 /// Squared error per row that the terms may remove because of remaining errors of sensors and path.
 const UNSURE: f64 = 0.1;
-/// Squared error per row above which the terms alone indicate a missing effect; without one, they remove 0.13
-/// at most.
+/// Squared error per row above which the terms alone indicate a missing effect; without one, they remove 0.13 at
+/// most.
 const ALARM: f64 = 0.15;
 /// Squared whitened error that second derivatives may remove; with right models up to 25.
 const BENDING: f64 = 30.0;
@@ -60,14 +60,13 @@ struct Taken {
 }
 
 impl Shape {
-    /// The term that correlates most with the residual of `channel`, if the residual indicates a missing
-    /// effect.
+    /// The term that correlates most with the residual of `channel`, if the residual indicates a missing effect.
     pub fn term(&self, channel: usize) -> Option<String> {
         self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
     }
 
-    /// Share that the terms remove in `channels` beside `fall`, the reduction by effects, if it is
-    /// significant, with the term that removes most.
+    /// Share that the terms remove in `channels` beside `fall`, the reduction by effects, if it is significant, with
+    /// the term that removes most.
     pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
         let left = self.left_in(channels, UNSURE)?;
         let own = channels.iter().map(|c| &self.channels[*c]);
@@ -75,8 +74,8 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// Largest share over the channels that second derivatives of the deflections remove beside `fall`, the
-    /// reduction by an effect; zero if it is not more than with right models.
+    /// Largest share over the channels that second derivatives of the deflections remove beside `fall`, the reduction
+    /// by an effect; zero if it is not more than with right models.
     pub fn bends_beside(&self, fall: f64) -> f64 {
         let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
         bent / (bent + fall).max(f64::MIN_POSITIVE)
@@ -93,8 +92,8 @@ impl Shape {
     }
 }
 
-/// Reduction by the terms of the residual of `round`, a model without candidates, compared with `count` draws
-/// of noise. `None` if the terms cannot be fitted.
+/// Reduction by the terms of the residual of `round`, a model without candidates, compared with `count` draws of
+/// noise. `None` if the terms cannot be fitted.
 pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     let na = round.known.len();
     let last = na + CHANNELS * TERMS;
@@ -122,8 +121,8 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     Some(Shape { channels: (0..CHANNELS).map(of).collect::<Option<_>>()? })
 }
 
-/// Reduction by terms with the Gram matrix `gram` and the products `measured` with a residual, compared with
-/// that of `draws` of noise.
+/// Reduction by terms with the Gram matrix `gram` and the products `measured` with a residual, compared with that of
+/// `draws` of noise.
 fn taken(
     gram: &DMatrix<f64>,
     measured: &DVector<f64>,

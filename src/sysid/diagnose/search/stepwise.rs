@@ -30,9 +30,9 @@ use run_off::run_off;
 const RANKED: f64 = 0.3;
 /// Largest number of asserted effects.
 const MOST: usize = 6;
-/// Largest number of tuning passes after an effect has joined. A product of two coefficients, such as a
-/// saturation and the effectiveness that saturates, needs more of them than [`SETTLING`], since each is tuned
-/// with the other held.
+/// Largest number of tuning passes after an effect has joined. A product of two coefficients, such as a saturation
+/// and the effectiveness that saturates, needs more of them than [`SETTLING`], since each is tuned with the other
+/// held.
 const MOST_SETTLING: usize = 12;
 /// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
 const SETTLED: f64 = 0.2;
@@ -42,7 +42,6 @@ const MOST_ASIDE: usize = 4;
 /// Searches for the effects that `model` lacks.
 ///
 /// # Errors
-///
 /// The model cannot be evaluated over the flights, or `progress` cancelled.
 pub fn search(
     problem: &Problem,
@@ -166,9 +165,9 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
 }
 
 impl Found {
-    /// Adds the effect selected last to the model and ranks the remaining candidates. An earlier effect that
-    /// becomes insignificant is removed. `false` if the effect cannot join or the model with it cannot be
-    /// linearised; the search then ends.
+    /// Adds the effect selected last to the model and ranks the remaining candidates. An earlier effect that becomes
+    /// insignificant is removed. `false` if the effect cannot join or the model with it cannot be linearised; the
+    /// search then ends.
     fn join(
         &mut self,
         problem: &Problem,
@@ -199,8 +198,8 @@ impl Found {
         Ok(true)
     }
 
-    /// `model`, with the effect selected last, tuned to convergence; an earlier effect that becomes
-    /// insignificant is removed and ends the tuning. `None` if the model cannot be linearised.
+    /// `model`, with the effect selected last, tuned to convergence; an earlier effect that becomes insignificant is
+    /// removed and ends the tuning. `None` if the model cannot be linearised.
     fn settle(
         &mut self,
         problem: &Problem,

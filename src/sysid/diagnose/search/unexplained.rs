@@ -37,8 +37,8 @@ fn mean_square(residual: &[Column], channel: usize) -> f64 {
     mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
 }
 
-/// Share of each channel's variance beyond noise that remains in `residual`, a column for each flight, under
-/// the model of `first`; NaN where the flights do not measure the channel.
+/// Share of each channel's variance beyond noise that remains in `residual`, a column for each flight, under the
+/// model of `first`; NaN where the flights do not measure the channel.
 pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {
@@ -49,8 +49,8 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     })
 }
 
-/// Share of each channel's variance beyond noise that `after` explains more than `before`; negative if it
-/// explains less, 0 where the flights do not measure the channel.
+/// Share of each channel's variance beyond noise that `after` explains more than `before`; negative if it explains
+/// less, 0 where the flights do not measure the channel.
 pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {

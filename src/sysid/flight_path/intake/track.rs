@@ -65,8 +65,8 @@ pub(super) fn track(
     track
 }
 
-/// Computes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that each altitude error
-/// enters once.
+/// Computes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that each altitude error enters
+/// once.
 fn climb(track: &mut Track, step: f64) {
     let half = (CLIMB_WINDOW / step / 2.0).round().max(1.0) as usize;
     let mut k = half;

@@ -3,8 +3,8 @@
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::{Expression, Function, Node};
 
-/// Values of `of` at `count` samples, `variable` giving those of each variable; NaN where a part of the
-/// expression depends on more than the present sample.
+/// Values of `of` at `count` samples, `variable` giving those of each variable; NaN where a part of the expression
+/// depends on more than the present sample.
 pub fn evaluate<'a>(
     of: &Expression,
     constants: &[f64],

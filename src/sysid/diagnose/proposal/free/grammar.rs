@@ -216,8 +216,7 @@ impl Grammar {
         }
     }
 
-    /// Adds the product of `parts` if each variable occurs once, it is small enough, and its units are
-    /// consistent.
+    /// Adds the product of `parts` if each variable occurs once, it is small enough, and its units are consistent.
     fn keep(&mut self, parts: Vec<usize>) {
         let atoms: Vec<&Atom> = parts.iter().map(|p| &self.atoms[*p]).collect();
         let of_one: Vec<Variable> =

@@ -65,8 +65,8 @@ impl Place<'_> {
         (Free { expression: free.expression.clone(), constants: best }, fall)
     }
 
-    /// Step of the constants by Kaufman's approximation: derivatives of the contribution with the part along
-    /// the column itself projected out.
+    /// Step of the constants by Kaufman's approximation: derivatives of the contribution with the part along the
+    /// column itself projected out.
     fn step(
         &self,
         free: &Free,

@@ -32,8 +32,7 @@ pub struct Samples {
     values: Vec<(Variable, Vec<f64>)>,
     /// Dynamic pressure times wing area, N.
     pressure: Vec<f64>,
-    /// Number of samples; for channels that average over integration steps, the steps' end values follow the
-    /// samples.
+    /// Number of samples; for channels that average over integration steps, the steps' end values follow the samples.
     count: usize,
     /// First sample of each segment of each flight.
     first: Vec<Vec<usize>>,
@@ -113,8 +112,7 @@ impl Samples {
         evaluate(expression, constants, self.pressure.len(), &|v| self.variable(v))
     }
 
-    /// Factor of a coefficient in `channel`: dynamic pressure times wing area, times a length for moments, or
-    /// one.
+    /// Factor of a coefficient in `channel`: dynamic pressure times wing area, times a length for moments, or one.
     pub fn factor(&self, channel: Channel, of_air: bool) -> Vec<f64> {
         let length = match channel {
             Channel::Roll | Channel::Yaw => self.lengths[0],
@@ -153,8 +151,8 @@ impl Samples {
         cell.windows.iter().map(of).collect()
     }
 
-    /// Means of all variables, then of dynamic pressure times wing area, over each window of flight `flight`
-    /// of `round`.
+    /// Means of all variables, then of dynamic pressure times wing area, over each window of flight `flight` of
+    /// `round`.
     pub fn means(&self, round: &Round, flight: usize) -> Vec<Vec<f64>> {
         let own = &round.flights[flight].acting;
         let of = |window: &Window| {

@@ -1,8 +1,8 @@
 //! Evaluation of all forms on the whitened residual of one channel, and on that of null flights.
 //!
-//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)) with
-//! the model's own coefficients projected out, except for noise shared between columns and residual, which
-//! the round corrects for the best forms.
+//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)) with the
+//! model's own coefficients projected out, except for noise shared between columns and residual, which the round
+//! corrects for the best forms.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;

@@ -1,5 +1,4 @@
-//! Search over free forms: evaluates a whole grammar, fits the best forms, and builds a front of size against
-//! fit.
+//! Search over free forms: evaluates a whole grammar, fits the best forms, and builds a front of size against fit.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -67,7 +66,6 @@ struct Side {
 /// Searches the free forms in `channel` of the residual of `round`; `None` if no flight measures it.
 ///
 /// # Errors
-///
 /// `progress` cancelled.
 pub fn searched(
     round: &Round,
@@ -183,8 +181,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Penalty of a form of `size` with `constants`: for its coefficients, and for the choice among all forms
-    /// of its size.
+    /// Penalty of a form of `size` with `constants`: for its coefficients, and for the choice among all forms of its
+    /// size.
     fn price(&self, size: usize, constants: usize) -> f64 {
         self.screen.price(constants) + 2.0 * (self.counts[size].max(1) as f64).ln()
     }
@@ -234,8 +232,7 @@ impl Search<'_> {
         Some(Fitted { form, size, fall: reached.fall, worth, evidence: reached.evidence })
     }
 
-    /// Best evidence of the search in each null flight; the constants of the best form are fitted as in the
-    /// flights.
+    /// Best evidence of the search in each null flight; the constants of the best form are fitted as in the flights.
     fn nulls(&self, sides: &[Side], options: &Options) -> Vec<f64> {
         let of = |k: usize| {
             let null = self.screen.null(options.seed, k);

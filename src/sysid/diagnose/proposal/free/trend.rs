@@ -15,8 +15,8 @@ const FLOWN: f64 = 0.3;
 /// Differences below this share of the largest value count as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The trend of `shape` with each of its variables, in words that are equal if the trends are; `None` if it
-/// is no formula. A rate counts as the same variable whether or not it is divided by the airspeed.
+/// The trend of `shape` with each of its variables, in words that are equal if the trends are; `None` if it is no
+/// formula. A rate counts as the same variable whether or not it is divided by the airspeed.
 pub fn trend(shape: &str) -> Option<String> {
     let expression = parser::parse(shape, &[]).ok()?;
     let variables = expression.variables();

@@ -11,8 +11,8 @@ use greylag_model::GreyBox;
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
-/// The nuisance parameters and their columns: free coefficients (from `linear_columns` where the model is
-/// linear in them), then each flight's own constants, then each flight's sensor errors.
+/// The nuisance parameters and their columns: free coefficients (from `linear_columns` where the model is linear in
+/// them), then each flight's own constants, then each flight's sensor errors.
 pub(super) fn known(
     problem: &Problem,
     model: &GreyBox,
@@ -63,9 +63,9 @@ pub(super) fn known(
     (known, coefficients, placed)
 }
 
-/// Sets the prior mean of every flight's blur to the second-order effect of its delay: a record of u that is
-/// late by λ samples is u − λu' + ½λ²u'', and the delay's column contains the first order alone. Without the
-/// second order, a delay of a sample leaves a curvature that would be attributed to a lag.
+/// Sets the prior mean of every flight's blur to the second-order effect of its delay: a record of u that is late by
+/// λ samples is u − λu' + ½λ²u'', and the delay's column contains the first order alone. Without the second order, a
+/// delay of a sample leaves a curvature that would be attributed to a lag.
 pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Projected) {
     let first = known.len().saturating_sub(problem.flights.len() * SENSORS);
     for (k, flight) in problem.flights.iter().enumerate() {

@@ -11,8 +11,8 @@ use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::noise::Noise;
 use greylag_model::GreyBox;
 
-/// Draws over which the product of shared noise is averaged. With a single draw, an inertia error that was
-/// not there reached an evidence of 3, 11 or 19 depending on the seed.
+/// Draws over which the product of shared noise is averaged. With a single draw, an inertia error that was not there
+/// reached an evidence of 3, 11 or 19 depending on the seed.
 const DRAWS: usize = 8;
 
 /// Inputs of a round.
@@ -40,9 +40,9 @@ pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
         .collect()
 }
 
-/// Spurious products from shared noise, by flight and index, of the nuisance parameters and the linear
-/// candidates, which come first: the mean of `DRAWS` draws if there are candidates to judge, one draw if a
-/// model is only settled. Also returns those columns with the noise of the first draw.
+/// Spurious products from shared noise, by flight and index, of the nuisance parameters and the linear candidates,
+/// which come first: the mean of `DRAWS` draws if there are candidates to judge, one draw if a model is only settled.
+/// Also returns those columns with the noise of the first draw.
 pub(super) fn shared(
     of: &Setting,
     cells: &Cells,

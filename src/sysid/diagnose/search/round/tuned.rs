@@ -97,8 +97,7 @@ impl Round {
         taken
     }
 
-    /// Channels in which `score` reduces the error by at least a tenth of its largest reduction, the largest
-    /// first.
+    /// Channels in which `score` reduces the error by at least a tenth of its largest reduction, the largest first.
     pub fn channels_of(&self, score: &Score) -> Vec<usize> {
         let taken = self.taken_by(score);
         let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
@@ -108,8 +107,8 @@ impl Round {
         channels
     }
 
-    /// The model with its coefficients as estimated from data and prior; those of asserted effects limited to
-    /// their bounds.
+    /// The model with its coefficients as estimated from data and prior; those of asserted effects limited to their
+    /// bounds.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
         let linear = model.linear();

@@ -11,8 +11,8 @@ use crate::diagnose::search::unexplained::explained;
 pub const HELD_OUT: f64 = 0.1;
 /// Least share of bootstraps in which the effect, or one indistinguishable from it, is best.
 pub const SELECTED: f64 = 0.8;
-/// Precision of the formula of a nonlinear effect: a later effect with a smaller share of its reduction may
-/// only correct the formula's error.
+/// Precision of the formula of a nonlinear effect: a later effect with a smaller share of its reduction may only
+/// correct the formula's error.
 const PRECISION: f64 = 2e-3;
 /// Least share of a channel's variance that a material effect explains. A delay of 10 ms explains 2e-4 of it.
 const MATERIAL: f64 = 1e-4;
@@ -94,10 +94,10 @@ fn class(found: &Found) -> Vec<usize> {
     class
 }
 
-/// A remark if a significant effect is immaterial: in no channel does it explain [`MATERIAL`] of the variance
-/// and [`MATERIAL_BESIDE`] of the tuned model's residual beyond noise. The measure is the reduction with the
-/// effect and all coefficients re-estimated, because the evidence also includes reductions of the prior's
-/// misfit and of column noise, which no channel shows.
+/// A remark if a significant effect is immaterial: in no channel does it explain [`MATERIAL`] of the variance and
+/// [`MATERIAL_BESIDE`] of the tuned model's residual beyond noise. The measure is the reduction with the effect and
+/// all coefficients re-estimated, because the evidence also includes reductions of the prior's misfit and of column
+/// noise, which no channel shows.
 fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     let taken = round.taken_by(score);
     let explained = explained(&found.first, &round.tuned_residual(), &round.residual_with(score));

@@ -8,8 +8,8 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::shape::Shape;
 use crate::diagnose::search::unexplained::unexplained;
 
-/// A channel is adequate if its unexplained share is below this; reconstruction and sampling leave as much
-/// with exact models.
+/// A channel is adequate if its unexplained share is below this; reconstruction and sampling leave as much with exact
+/// models.
 const ADEQUATE: f64 = 5e-4;
 
 /// Candidate selected by a round, with its checks.
@@ -39,8 +39,8 @@ pub struct Selected {
     pub slight: bool,
     /// Remark if it is significant but not material.
     pub trace: Option<String>,
-    /// Whether it mostly replaces an adjustment of existing coefficients, so that the remaining residual is
-    /// no argument against it.
+    /// Whether it mostly replaces an adjustment of existing coefficients, so that the remaining residual is no
+    /// argument against it.
     pub relieves: bool,
     /// Whether it is nonlinear in its constants.
     pub curved: bool,
@@ -76,8 +76,8 @@ pub struct Found {
     pub level: Vec<usize>,
     /// Asserted effects in the order of selection, then the refused ones.
     pub selected: Vec<Selected>,
-    /// Standard deviation of each coefficient of the last round's model due to discretisation; empty if
-    /// nothing was selected.
+    /// Standard deviation of each coefficient of the last round's model due to discretisation; empty if nothing was
+    /// selected.
     pub sums: Vec<f64>,
 }
 

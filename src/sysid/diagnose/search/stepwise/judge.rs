@@ -6,15 +6,15 @@ use greylag_physics::inputs::{Acts, Kind};
 
 /// Share of the removable error that an effect may leave in its channels.
 const LEFT: f64 = 0.3;
-/// The same share for products of the states; with right effects it is below 0.02, except for
-/// `unsteady_lift`, whose formula differs from the simulator's.
+/// The same share for products of the states; with right effects it is below 0.02, except for `unsteady_lift`, whose
+/// formula differs from the simulator's.
 const SHAPELESS: f64 = 0.1;
 /// The same share for second derivatives of the deflections beside an input effect.
 const BENT: f64 = 0.02;
 
 impl Found {
-    /// Refuses effects that leave much of the removable error in their own channels, that is of their own
-    /// reduction plus what a flexible model could remove, or of the error beyond noise.
+    /// Refuses effects that leave much of the removable error in their own channels, that is of their own reduction
+    /// plus what a flexible model could remove, or of the error beyond noise.
     pub(super) fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
         let real = |s: &&Selected| s.refused.is_empty() && !s.relieves;

@@ -12,9 +12,9 @@ const CONTENDING_LIKENESS: f64 = 0.6;
 /// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
-/// Ranks the best of several close contenders first, after each has been added to the model and tuned under
-/// the same noise, and separates those that are clearly worse from those that are equally good: the
-/// linearisation at the model without them cannot distinguish them.
+/// Ranks the best of several close contenders first, after each has been added to the model and tuned under the same
+/// noise, and separates those that are clearly worse from those that are equally good: the linearisation at the model
+/// without them cannot distinguish them.
 pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
