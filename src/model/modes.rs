@@ -79,7 +79,7 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
 pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
     let trim = Trim::straight(model, airspeed, altitude)?;
     let a = rates(model, &trim, altitude).a;
-    // the search for eigenvalues does not end on what is no number
+    // the eigenvalue iteration does not end on NaN
     if !a.iter().all(|x| x.is_finite()) {
         return Err(TrimError {
             model: model.name.clone(),

@@ -121,7 +121,7 @@ fn fingerprinted(airframe: &Airframe) -> String {
          {surface:?}, throttle: {throttle:?}, deflection_max: {deflection_max:?}, step: {step:?} }}",
         airframe.name
     );
-    if !says_all(&airframe.actuators) {
+    if !fits_schema_1(&airframe.actuators) {
         let rudder = airframe.actuators.rudder;
         text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
     }
@@ -133,7 +133,7 @@ fn fingerprinted(airframe: &Airframe) -> String {
 }
 
 /// Whether schema 1 can represent `figures`: surfaces alike, symmetric travel, no rate limit, no rudder.
-fn says_all(figures: &ActuatorFigures) -> bool {
+fn fits_schema_1(figures: &ActuatorFigures) -> bool {
     let ActuatorFigures { aileron, elevator, rudder, .. } = figures;
     let plain = aileron.travel.is_symmetric() && aileron.rate_max.is_none();
     plain && elevator == aileron && rudder.is_none()
@@ -263,7 +263,7 @@ impl Residual {
             return Err(ResidualError::Airframe { path: path.into(), airframe });
         }
         let whitening = weights::matrix(&bytes, ENVELOPE).map_err(content)?;
-        // a network of another shape is refused before it is asked for its features
+        // a network of another shape is rejected before its features are computed
         let residual = Residual::new(network, airframe, x_c)?;
         let envelope = whitening.map(|w| DataEnvelope::new(w, &residual.network)).transpose();
         let envelope = envelope.map_err(content)?.map(Arc::new);
@@ -273,7 +273,7 @@ impl Residual {
 
 /// Origin in the metadata of a file.
 fn origin(bytes: &[u8]) -> Result<Origin, String> {
-    let origin: Origin = weights::said(bytes)?;
+    let origin: Origin = weights::origin(bytes)?;
     match origin.schema.as_str() {
         Origin::SCHEMA => Ok(origin),
         other => Err(format!("its schema is {other:?}, this program reads {}", Origin::SCHEMA)),

@@ -192,7 +192,7 @@ impl Measures {
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
         }
-        // how far these formulas were from measured derivatives; the widths beside them stand where nothing is known
+        // measured errors of these formulas; without them the stated standard deviations are kept
         for (name, _, width, _) in effects.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
             *width = widths::of(Tool::Textbook, name).unwrap_or(*width);
         }

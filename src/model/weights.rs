@@ -23,14 +23,14 @@ pub struct Square<'a> {
     pub entries: &'a [f32],
 }
 
-/// Content of a file: the layers of `network`, an optional matrix, and the origin `said`.
+/// Content of a file: the layers of `network`, an optional matrix, and its `origin`.
 ///
 /// # Errors
 /// The error of the format's writer.
 pub fn to_bytes(
     network: &Dense,
     matrix: Option<Square>,
-    said: &impl Serialize,
+    origin: &impl Serialize,
 ) -> Result<Vec<u8>, SafeTensorError> {
     let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let mut tensors = Vec::new();
@@ -49,19 +49,19 @@ pub fn to_bytes(
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
     // one entry: the format writes several in no fixed order, and equal networks are equal files
-    let said = serde_json::to_string(said)?;
-    safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), said)])))
+    let origin = serde_json::to_string(origin)?;
+    safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), origin)])))
 }
 
 /// Origin of a file, from its metadata.
 ///
 /// # Errors
 /// The reason why it cannot be read, in words.
-pub fn said<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+pub fn origin<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let said = said.ok_or(format!("its metadata has no entry {METADATA}"))?;
-    serde_json::from_str(said).map_err(|e| format!("its metadata: {e}"))
+    let origin = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let origin = origin.ok_or(format!("its metadata has no entry {METADATA}"))?;
+    serde_json::from_str(origin).map_err(|e| format!("its metadata: {e}"))
 }
 
 /// Network of a file: tensors `layers.0.weight`, `layers.0.bias` and so on.

@@ -170,7 +170,7 @@ impl Dense {
     /// If the network has not `IN` inputs and `OUT` outputs, or a layer wider than [`ON_STACK`].
     #[inline(always)]
     pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
-        // room that is not used costs time as well
+        // initialising unused buffer space costs time
         if self.sizes.iter().all(|units| *units <= ON_STACK / 2) {
             self.on_stack::<R, IN, OUT, { ON_STACK / 2 }>(input)
         } else {

@@ -118,7 +118,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        // at zero the slope of what stands under the root decides, and 0 · ∞ would be no number
+        // at zero the radicand's derivative decides, and 0 · ∞ would be NaN
         let slope = T::where_less(T::zero(), root, T::from_f64(0.5) / root, T::zero());
         self.chain(root, slope)
     }

@@ -33,7 +33,7 @@ pub trait Real:
     fn sin_cos(self) -> (Self, Self);
     /// The angle of the point (x, y) = (`x`, `self`), in −π..π.
     fn atan2(self, x: Self) -> Self;
-    /// Square root; NaN for a negative number.
+    /// Square root of the number.
     fn sqrt(self) -> Self;
     /// The exponential function e^x.
     fn exp(self) -> Self;

@@ -9,7 +9,7 @@ use greylag_num::{Real, each};
 /// `jxz` follows \[BM12\]: the product of inertia enters the inertia matrix as −Jxz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidBody<R = f64> {
-    /// Mass, kg, without units of force.
+    /// Mass of the aircraft, kg.
     pub mass: R,
     /// Moment of inertia about body x, kg m².
     pub jx: R,

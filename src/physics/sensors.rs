@@ -116,7 +116,7 @@ impl TryFrom<BTreeMap<String, Written>> for Sensors {
 
     fn try_from(written: BTreeMap<String, Written>) -> Result<Self, String> {
         let mut sensors = Sensors::default();
-        // words first: a constant of its own goes before what a word says of all
+        // words first: the prior of a single constant takes precedence over a word for all
         for (name, value) in &written {
             if let Written::Word(word) = value {
                 sensors.take_word(name, word)?;

@@ -35,7 +35,7 @@ pub struct FirstLook {
 pub type Progress<'a> = dyn Fn(Stage<'_>) -> ControlFlow<()> + Sync + 'a;
 
 /// Discards progress and never cancels.
-pub fn unheard(_: Stage<'_>) -> ControlFlow<()> {
+pub fn ignore_progress(_: Stage<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
@@ -48,12 +48,12 @@ pub struct Cancelled;
 ///
 /// # Errors
 /// [`Cancelled`] if the listener answered `Break`.
-pub fn say(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
-    said(progress(Stage::new(doing, fraction)))
+pub fn report(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
+    not_cancelled(progress(Stage::new(doing, fraction)))
 }
 
 /// Converts a listener's answer: `Break` to [`Cancelled`].
-pub fn said(answer: ControlFlow<()>) -> Result<(), Cancelled> {
+pub fn not_cancelled(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     match answer {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(Cancelled),

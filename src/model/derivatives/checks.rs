@@ -18,12 +18,12 @@ const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=8.0;
 pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>) -> Vec<String> {
     let of = |name: &str| values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x);
     let slope = of(".CLalpha").unwrap_or(0.0);
-    let mut said = Vec::new();
+    let mut warnings = Vec::new();
     let mut out: Vec<&str> = Vec::new();
     for (control, moment, all) in CONTROLS {
         if of(moment).is_some_and(|x| x.abs() < CONTROL) {
             let name = &moment[1..];
-            said.push(format!("{name} is 0 in the file: {}", tool.of_controls(control)));
+            warnings.push(format!("{name} is 0 in the file: {}", tool.of_controls(control)));
             out.extend(all);
         }
     }
@@ -49,12 +49,12 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
     .into_iter()
     .flatten()
     {
-        said.push(found.0);
+        warnings.push(found.0);
         out.extend(found.1);
     }
-    odd(&of, slope, &mut said);
+    odd(&of, slope, &mut warnings);
     values.retain(|(full, _)| !out.iter().any(|name| full.ends_with(name)));
-    said
+    warnings
 }
 
 /// Controls with their primary moment, and all their derivatives.
@@ -65,20 +65,20 @@ const CONTROLS: [(&str, &str, &[&str]); 3] = [
 ];
 
 /// Appends warnings about values that are kept but implausible.
-fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, said: &mut Vec<String>) {
+fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, warnings: &mut Vec<String>) {
     if !SLOPES.contains(&slope) {
-        said.push(format!(
+        warnings.push(format!(
             "CLalpha = {slope:.3} by a radian is of no whole aircraft: see that alpha is in degrees there and the reference \
              area is the wing's"
         ));
     }
     if let Some(x) = of(".Cmalpha").filter(|x| *x >= 0.0) {
-        said.push(format!(
+        warnings.push(format!(
             "Cmalpha = {x:.3} makes the aircraft unstable: see that moments are about the centre of gravity"
         ));
     }
     if let Some(x) = of(".Cnbeta").filter(|x| *x <= 0.0) {
-        said.push(format!(
+        warnings.push(format!(
             "Cnbeta = {x:.4} turns the nose away from the wind: see that the fin is in the geometry and sideslip is positive \
              with wind from the right"
         ));

@@ -40,8 +40,7 @@ pub(super) use heights;
 
 /// Reports to `terms` each hat over `alpha` (rad) times `amount`; beyond its ends a curve is constant.
 ///
-/// Unlike other effects it is not inlined where a call is cheap, because the inlined code would slow the compilation
-/// of every fit.
+/// Unlike other effects it is not inlined where a call is cheap, because inlining would enlarge the code of every fit.
 #[inline(always)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
     #[inline(never)]

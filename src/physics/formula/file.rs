@@ -142,7 +142,7 @@ struct Places<'a> {
 
 impl Places<'_> {
     /// Message for the `fault` of the string whose value begins at byte `start` of the file.
-    fn said(&self, start: usize, fault: &Fault) -> String {
+    fn message(&self, start: usize, fault: &Fault) -> String {
         // a string's value begins behind its quotes
         let quotes = self.text[start..].chars().take_while(|c| matches!(c, '"' | '\'')).count();
         let at = (start + if quotes >= 3 { 3 } else { 1 } + fault.at).min(self.text.len());
@@ -165,7 +165,7 @@ fn line(file: &ChannelFile, names: &[&str], place: &Places) -> Result<Placed, St
     };
     let read = |text: &Spanned<String>, names: &[&str]| {
         let start = text.span().start;
-        parser::parse(text.get_ref(), names).map_err(|fault| place.said(start, &fault))
+        parser::parse(text.get_ref(), names).map_err(|fault| place.message(start, &fault))
     };
     let factor = match &file.factor {
         Some(text) => read(text, &[])?,
@@ -209,15 +209,15 @@ fn built(
     }
     let bounds: Vec<[f64; 2]> = file.parameters.values().map(|p| p.bounds).collect();
     for Placed { line, shape_at } in &lines {
-        let said = |fault: Fault| place.said(*shape_at, &fault);
-        memory::check(&line.shape, &bounds).map_err(said)?;
+        let message = |fault: Fault| place.message(*shape_at, &fault);
+        memory::check(&line.shape, &bounds).map_err(message)?;
         memory::check(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
-        let parts = split::parts(&line.shape, linear).map_err(said)?;
+        let parts = split::parts(&line.shape, linear).map_err(message)?;
         let factor =
             units::dimension(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
         for (k, part) in &parts {
             balance(line.channel, factor, part, names[*k], dimensions[*k], &dimensions)
-                .map_err(said)?;
+                .map_err(message)?;
         }
         let shared = parts.len() > 1 && line.factor.node != Node::Number(1.0);
         if shared {

@@ -32,16 +32,16 @@ factor = "qbar*S*b"
 shape = "k*max(abs(beta) - w, 0)^2 + k*table(alpha; -0.1:0, 0.2:1)"
 "#;
 
-/// Reads `count` files drawn from `seed`, each with a random formula or with random damage; `hear` receives the text
+/// Reads `count` files drawn from `seed`, each with a random formula or with random damage; `observe` receives the text
 /// of each and the reader's result. Returns the number of valid effect files.
-pub fn run(count: usize, seed: u64, hear: &mut dyn FnMut(&str, &Result<(), String>)) -> usize {
+pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), String>)) -> usize {
     let mut random = stream(seed, &[DRAW]);
     let mut good = 0;
     for _ in 0..count {
         let text = if random.random::<bool>() { grown(&mut random) } else { damaged(&mut random) };
-        let said = file::parse(&text).map(drop);
-        good += usize::from(said.is_ok());
-        hear(&text, &said);
+        let result = file::parse(&text).map(drop);
+        good += usize::from(result.is_ok());
+        observe(&text, &result);
     }
     good
 }

@@ -37,7 +37,7 @@ enum Operation {
     Sqrt,
     Smoothstep,
     Deadband,
-    /// Pushes the lag or delay of that index, if the past is known; otherwise the value it settles to, the top.
+    /// Replaces the top by the lag or delay of that index if the past is known; else keeps it, the value it settles to.
     Remembered(u16),
     Square,
     Power(i16),
@@ -49,7 +49,7 @@ enum Operation {
     Times(Variable),
     /// Multiplies the top by a run of variables of the list.
     TimesAll(u16, u16),
-    /// Stores the top, or loads the stored value.
+    /// Stores the top as the shared factor and removes it.
     Keep,
     TimesKept,
     /// Reports the top and removes it.
@@ -425,7 +425,7 @@ fn direct(function: Function, leaf: &Node) -> Option<Operation> {
 
 #[inline(always)]
 fn put<R: Real>(below: &mut [R; DEPTH], depth: &mut usize, x: R) {
-    // the first one puts nothing of worth there, which keeps the top a plain number
+    // the first push stores a meaningless value there, so that the top need not be optional
     if let Some(place) = below.get_mut(*depth) {
         *place = x;
     }

@@ -89,7 +89,7 @@ pub fn diagnosed(
         baseline: None,
     });
     let said = diagnosis.sentences.first().filter(|_| asserted.is_empty());
-    let answer = said.map_or(answer.clone(), |said| answer.saying(said.clone()));
+    let answer = said.map_or(answer.clone(), |said| answer.with_effect(said.clone()));
     let mut tuned = tuned.model;
     tuned.name = "tuned".into();
     Ok(Diagnosed { tuned, answer })

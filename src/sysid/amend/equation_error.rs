@@ -15,9 +15,9 @@ const ITERATIONS: usize = 5;
 /// Iterations of each starting point before they are compared.
 const TRIAL: usize = 2;
 /// Convergence tolerance on the weighted sum of squares: a tenth of a standard deviation.
-const SETTLED: f64 = 0.01;
+const COST_TOLERANCE: f64 = 0.01;
 /// Windows overlap by half, so each counts as half a sample.
-const INDEPENDENT: f64 = 0.5;
+const INDEPENDENT_FRACTION: f64 = 0.5;
 
 /// Estimates the free coefficients from forces and moments in weak form; the best result over the catalogue's
 /// starting points for shape constants of added effects.
@@ -99,7 +99,9 @@ fn search(
             break;
         }
         let next = step(&present, free, flights, &theta, &r, &weights);
-        let Some(Step { change, .. }) = next.filter(|step| step.gain > SETTLED) else { break };
+        let Some(Step { change, .. }) = next.filter(|step| step.gain > COST_TOLERANCE) else {
+            break;
+        };
         for (k, f) in free.iter().enumerate() {
             let change = change[k].clamp(-f.stride, f.stride);
             theta[k] = (theta[k] + change).clamp(f.bounds.0, f.bounds.1);
@@ -154,7 +156,7 @@ fn step(
         low.iter().zip(high).map(|(a, b)| (a - b) / between).collect()
     };
     let j: Vec<Vec<f64>> = free.iter().enumerate().map(column).collect();
-    let weight = |row: usize| INDEPENDENT * weights[r.channel[row]];
+    let weight = |row: usize| INDEPENDENT_FRACTION * weights[r.channel[row]];
     let used: Vec<usize> = (0..r.values.len())
         .filter(|row| r.values[*row].is_finite() && j.iter().all(|c| c[*row].is_finite()))
         .collect();

@@ -15,7 +15,7 @@ pub const JUDGED_AT_S: f64 = 5.0;
 pub(super) const IMPROVED: f64 = 0.01;
 /// An effect that lowers the held-out error below this share joins although the search has not converged with it:
 /// convergence may need further effects.
-pub const SETTLED_OR_NOT: f64 = 0.5;
+pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
 /// An effect's coefficient must differ from zero by this many standard deviations.
 const CLEAR: f64 = 1.96;
 /// The same for effects of more than three coefficients, of which one exceeds `CLEAR` by chance.
@@ -79,7 +79,7 @@ impl Judge<'_> {
         let after = self.scores(&fit.model);
         effect.refused = objections(&added.id, &fit.parameters);
         let errors = judged(&after).zip(judged(before));
-        if !errors.is_some_and(|(a, b)| a < SETTLED_OR_NOT * b) {
+        if !errors.is_some_and(|(a, b)| a < ACCEPTED_UNCONVERGED * b) {
             effect.refused.extend(fit.unsettled.clone());
         }
         if let Some((a, b)) = errors
@@ -89,7 +89,7 @@ impl Judge<'_> {
                 "free runs of {} s on flights that the fit did not see come no closer \
                  ({b:.5} without it, {a:.5} with it){}",
                 judged_at(before).unwrap_or(JUDGED_AT_S),
-                said_by_the_model(&added.id, &fit.parameters)
+                confounded_with_model(&added.id, &fit.parameters)
             ));
         }
         effect.joined = effect.refused.is_empty() || refused == Refused::Kept;
@@ -139,7 +139,7 @@ pub fn doubled(id: &str, parameters: &[Parameter]) -> bool {
 }
 
 /// The model's own coefficients that are confounded with the effect `id`, in words; empty if there are none.
-fn said_by_the_model(id: &str, parameters: &[Parameter]) -> String {
+fn confounded_with_model(id: &str, parameters: &[Parameter]) -> String {
     if !doubled(id, parameters) {
         return String::new();
     }

@@ -13,7 +13,7 @@ use super::parameters;
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::PerFlight;
-use crate::progress::{Progress, say, unheard};
+use crate::progress::{Progress, ignore_progress, report};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
@@ -92,7 +92,7 @@ pub fn leave_one_out(
     let mut all = Vec::new();
     for (k, structure) in structures.iter().enumerate() {
         let doing = format!("{}: leaving out one flight after the other", structure.name);
-        say(progress, &doing, k as f64 / structures.len() as f64)?;
+        report(progress, &doing, k as f64 / structures.len() as f64)?;
         let one = |left: usize| error_of(model, &ready, left, &structure.fitted, at);
         let errors: Vec<f64> =
             (0..ready.len()).into_par_iter().map(one).collect::<Result<_, _>>()?;
@@ -152,7 +152,7 @@ fn error_of(
             (with(model, effects)?, options)
         }
     };
-    match output_error::fit(&start, &others, &options, &unheard) {
+    match output_error::fit(&start, &others, &options, &ignore_progress) {
         Ok(fit) => Ok(error(&fit.model)),
         Err(_) => Ok(f64::NAN),
     }

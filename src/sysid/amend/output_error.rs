@@ -21,14 +21,14 @@ use super::result::{FittedFlight, Parameter};
 use super::shooting::{self, Shot};
 use crate::diagnose::search::clocks::{self, Clocks};
 use crate::per_flight::{PerFlight, trims};
-use crate::progress::{Cancelled, Progress, say};
+use crate::progress::{Cancelled, Progress, report};
 use greylag_model::GreyBox;
 use greylag_num::statistics::quantile;
 
 /// Least usable duration of the flights, s.
 pub const LEAST_S: f64 = 10.0;
 /// Convergence tolerance: largest change of a coefficient in its standard deviations.
-const SETTLED: f64 = 0.03;
+const STEP_TOLERANCE: f64 = 0.03;
 /// Derivatives are renewed until the renewal changes no coefficient by more than this many standard deviations.
 const RENEWED: f64 = 0.1;
 /// The same tolerance for all shot lengths but the last.
@@ -120,7 +120,7 @@ pub fn fit(
         return Err(AmendError::NothingFree { model: name() });
     }
     let doing = format!("{}: equation error over {} flight(s)", model.name, flights.len());
-    say(progress, &doing, 0.0)?;
+    report(progress, &doing, 0.0)?;
     let clocks = match free.iter().any(|f| f.input && f.added) {
         true => clocks(model, &free, flights, options.per_flight),
         false => None,
@@ -140,7 +140,7 @@ pub fn fit(
         let doing = format!("{}: output error over {length_s} s", model.name);
         let share = 0.9 / options.lengths_s.len() as f64;
         let from = 0.1 + share * k as f64;
-        let step = |share_done: f64| say(progress, &doing, from + share * share_done);
+        let step = |share_done: f64| report(progress, &doing, from + share * share_done);
         step(0.0)?;
         if k == 0 {
             search.start_from_the_closer(&given, *length_s);
@@ -210,7 +210,7 @@ impl<'a> Search<'a> {
         let expected: Vec<_> = flights.iter().map(|f| f.doubt).collect();
         let own = flights.iter().map(|f| Own::of(f.doubt.map(|[mean, _]| mean))).collect();
         let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
-        // samples of a coarse model's residual hang together for about a fifth of a second
+        // residuals of a coarse model are correlated over about a fifth of a second
         let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
         Search {
             base,
@@ -310,7 +310,7 @@ impl<'a> Search<'a> {
                 if self.change.0 < 3.0 || renewal + inner < 2 {
                     self.reweigh();
                 }
-                if !moved || self.change.0 < SETTLED {
+                if !moved || self.change.0 < STEP_TOLERANCE {
                     break;
                 }
             }

@@ -20,7 +20,7 @@ pub enum CompareError {
     /// The flight has no clock.
     #[error(transparent)]
     Clock(#[from] ClockError),
-    /// The horizon is not positive and finite.
+    /// The horizon is outside the range that can be flown.
     #[error("horizon {0} s cannot be flown: give horizons from 0.01 to 600 s")]
     Horizon(f64),
     /// The progress listener cancelled.

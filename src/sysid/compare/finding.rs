@@ -56,7 +56,7 @@ pub fn worst(
             Finding { regime, trend: Trend::None }
         })
     };
-    let Some(decisive) = telling(bins).filter(|b| !is_constant(residuals, b)) else {
+    let Some(decisive) = most_informative(bins).filter(|b| !is_constant(residuals, b)) else {
         return everywhere();
     };
     let Some((from, to)) = range(&decisive.bins) else { return everywhere() };
@@ -72,7 +72,7 @@ pub fn worst(
 
 /// The variable that a residual mainly follows, whether or not some range of it is supported.
 pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
-    telling(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
+    most_informative(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
 }
 
 fn excludes_zero([low, high]: [f64; 2]) -> bool {
@@ -80,7 +80,7 @@ fn excludes_zero([low, high]: [f64; 2]) -> bool {
 }
 
 /// The variable that explains most; time, altitude and flight only by `CIRCUMSTANCE_MARGIN`.
-fn telling(bins: &[RegimeBins]) -> Option<&RegimeBins> {
+fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
         let circumstance = matches!(b.variable, Time | Altitude | Flight);

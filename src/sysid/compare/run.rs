@@ -19,7 +19,7 @@ use super::result::{
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::progress::{Progress, say};
+use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::channels::ChannelId;
 use crate::weak_form::kernel::KERNEL_S;
@@ -74,7 +74,7 @@ pub fn compare(
         .enumerate()
         .map(|(k, model)| {
             let doing = format!("comparing {} with {} flight(s)", model.name, prepared.len());
-            say(progress, &doing, k as f64 * share)?;
+            report(progress, &doing, k as f64 * share)?;
             let mut result = one_model(model, &prepared, &used, options);
             result.sentences.extend(verdict::beaten(&result.free_run, &forecasts));
             let rudder = rudder::unmodelled(flights, model).map(rudder::warning);

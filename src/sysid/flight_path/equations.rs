@@ -109,7 +109,7 @@ impl Problem<'_> {
 
     /// Residuals of the kinematic steps in the assumed standard deviations of gyros and accelerometers: robust scale
     /// for each axis of rotation and velocity. Below one, the assumed noise suffices.
-    pub fn strain(&self, found: &Found) -> [f64; MOTION] {
+    pub fn step_residuals(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
         let mut left: [Vec<f64>; MOTION] = Default::default();

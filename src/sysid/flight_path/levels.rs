@@ -22,7 +22,7 @@ const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
 /// Scaled residual of the kinematic steps above which gyros or accelerometers have larger errors than their noise;
 /// that of a launch is 8.
-const STRAINED: f64 = 2.0;
+const EXCESSIVE: f64 = 2.0;
 /// Standard deviation of the acceleration where no accelerometer measures it, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
 /// Gust level of calm air, m/s.
@@ -53,7 +53,7 @@ pub struct Levels {
     pub white: [f64; CHANNELS],
     /// Ratio of the scatter of the channels' block means to that of white noise.
     pub colour: [f64; CHANNELS],
-    /// Whether the user or the airframe states a level, which is then not estimated.
+    /// Whether a level is stated and therefore not estimated.
     pub stated: [bool; CHANNELS],
     /// White noise of the airspeed whose means scatter like its slow error, m/s. Zero where a vane measures α or no
     /// velocity over ground was logged: otherwise the mean vertical wind, and with it α, follows from the change of
@@ -94,7 +94,7 @@ impl Levels {
         let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
         let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
-        // what is not known of forces is no noise that could be averaged
+        // an unknown force is no noise that averages out
         let gain = if log.has.force { between(force) } else { 0.0 };
         let turn = between(gyro);
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
@@ -134,12 +134,12 @@ impl Levels {
 
     /// Raises the levels of gyros and accelerometers whose kinematic residuals exceed chance, one level for the three
     /// axes of each. Returns the largest relative change.
-    pub fn loosen(&mut self, strain: &[f64; 6]) -> f64 {
+    pub fn loosen(&mut self, step_residuals: &[f64; 6]) -> f64 {
         let worst = |of: &[f64]| {
             let worst = of.iter().copied().fold(1.0, f64::max);
-            if worst > STRAINED { worst } else { 1.0 }
+            if worst > EXCESSIVE { worst } else { 1.0 }
         };
-        let (turn, pull) = (worst(&strain[..3]), worst(&strain[3..]));
+        let (turn, pull) = (worst(&step_residuals[..3]), worst(&step_residuals[3..]));
         self.gyro.iter_mut().for_each(|level| *level *= turn);
         self.force.iter_mut().for_each(|level| *level *= pull);
         turn.max(pull).ln()

@@ -67,7 +67,7 @@ pub struct Options {
     pub step_s: f64,
     /// Longest time between rows that does not count as a gap, s.
     pub gap_s: f64,
-    /// Shortest segment worth reconstructing, s.
+    /// Shortest segment that is reconstructed, s.
     pub shortest_s: f64,
     /// Airspeed below which the aircraft counts as not flying, m/s.
     pub airspeed_min_mps: f64,

@@ -181,7 +181,7 @@ fn segment(
                 let gain = if log.has.force { 1.0 + values[FORCE_GAIN + i] } else { 1.0 };
                 force[k][i] / gain - values[FORCE + i]
             }),
-            // Without an altitude the air is that of sea level, as the notes say.
+            // Without an altitude the air density is that at sea level, as the notes state.
             altitude: Some(track.altitude[k]).filter(|h| h.is_finite()).unwrap_or(0.0),
             density: track.density[k],
         }

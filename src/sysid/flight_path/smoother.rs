@@ -27,7 +27,7 @@ const GUSTY: usize = 4;
 const FIRST: usize = 2;
 const LAST: usize = 25;
 /// Convergence tolerance: largest change of a constant in its standard deviation, and relative change of a level.
-const SETTLED: f64 = 0.05;
+const STEP_TOLERANCE: f64 = 0.05;
 const LEVEL_SETTLED: f64 = 0.02;
 /// Smallest share of a step that is tried.
 const LEAST_PART: f64 = 1.0 / 64.0;
@@ -70,8 +70,8 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
             continue;
         }
         let change = found.levels.renew(&solved.readings, log.step);
-        let change = change.max(found.levels.loosen(&problem.strain(found)));
-        if iteration > from.max(FIRST) && moved < SETTLED && change < LEVEL_SETTLED {
+        let change = change.max(found.levels.loosen(&problem.step_residuals(found)));
+        if iteration > from.max(FIRST) && moved < STEP_TOLERANCE && change < LEVEL_SETTLED {
             break;
         }
     }

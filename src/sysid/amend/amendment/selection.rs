@@ -6,12 +6,12 @@ use super::{Added, Options, joined};
 use crate::amend::conventions::{Convention, Tried, closer};
 use crate::amend::error::AmendError;
 use crate::amend::flight::Flight;
-use crate::amend::judge::{self, Judge, Kept, SETTLED_OR_NOT, settled};
+use crate::amend::judge::{self, ACCEPTED_UNCONVERGED, Judge, Kept, settled};
 use crate::amend::output_error::{self, Fit, FitOptions};
 use crate::amend::parameters;
 use crate::amend::result::AddedEffect;
 use crate::compare::HorizonScore;
-use crate::progress::{self, Progress, say};
+use crate::progress::{self, Progress, report};
 use greylag_model::GreyBox;
 
 /// Largest number of passes over the requested effects.
@@ -71,7 +71,7 @@ impl Ask<'_> {
         let Options { effects, refused, .. } = self.options;
         let mut best = (so_far.fit, so_far.after);
         let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
-        // each with the number of effects beside which it was asked for, 0 for those that have joined
+        // each with the number of effects in the model when it was tried, 0 for those that have joined
         let verdict = |added: &Added| {
             let tried = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
             tried.map(|tried| (tried.clone(), 0))
@@ -121,7 +121,7 @@ impl Ask<'_> {
             return Ok(None);
         }
         let Some(mut kept) = fitted(&all)? else { return Ok(None) };
-        // what the model itself can say is not represented twice, which would widen all intervals
+        // an effect that the model's own coefficients can represent would widen all intervals
         let mut fewer = all.clone();
         fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
         if fewer.len() < all.len()
@@ -165,12 +165,13 @@ impl Ask<'_> {
                 let Some(other) = convention.other(&base) else { continue };
                 let (from, to) = (convention.of(&base), convention.of(&other));
                 let doing = format!("{}: {to} instead of {from}", model.name);
-                say(self.progress, &doing, self.done()[0])?;
+                report(self.progress, &doing, self.done()[0])?;
                 let tried = self.under(&other, &best)?;
                 let closer = tried.as_ref().map_or(f64::NAN, |t| closer(&best.fit, &t.fit));
                 let error = [best.error(), tried.as_ref().map_or(f64::NAN, Selection::error)];
                 let taken = tried.filter(|t| {
-                    let settled = t.fit.unsettled.is_none() || error[1] < SETTLED_OR_NOT * error[0];
+                    let settled =
+                        t.fit.unsettled.is_none() || error[1] < ACCEPTED_UNCONVERGED * error[0];
                     settled && convention.is_borne_out(closer, error)
                 });
                 let kept = taken.is_some();

@@ -82,7 +82,7 @@ impl Search<'_> {
         let (size, constants) = (self.of_flight(), self.asked.constants());
         let count = self.flights.len();
         let place = |flight: usize, which: usize| self.free.len() + flight * size + which;
-        // less the mean of the flights, which is as well in the model's coefficient
+        // less the mean of the flights, which is confounded with the model's coefficient
         let beside_mean = |flight: usize, which: usize| {
             let value =
                 |k: usize| self.place.own[k].unknowns(&self.asked).nth(which).unwrap_or(0.0);

@@ -97,7 +97,7 @@ impl Answer {
     }
 
     /// The answer with `effect` as its sentence on effects, for example that none was asserted.
-    pub fn saying(self, effect: String) -> Answer {
+    pub fn with_effect(self, effect: String) -> Answer {
         Answer { effect, ..self }
     }
 

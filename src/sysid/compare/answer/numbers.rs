@@ -15,7 +15,7 @@ pub enum Way {
     Tuned,
     /// Effects were added, and all coefficients refitted.
     Effects,
-    /// It is an independent model.
+    /// It is a different model.
     Other,
 }
 
@@ -28,7 +28,7 @@ pub struct Step {
     pub model: String,
     /// Free-run error at the horizon: NRMSE, the root mean square over the eight states, each over its scale x_c.
     pub error: f64,
-    /// Change against the step before, or for an independent model against the first one, %. `None` for the first.
+    /// Change against the step before, or for a different model against the first one, %. `None` for the first.
     pub change_percent: Option<f64>,
 }
 

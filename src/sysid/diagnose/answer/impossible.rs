@@ -28,13 +28,13 @@ pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
         let airspeed = mean(&speeds);
         let wind = wind(flight, airspeed);
         let all = flight.nuisances.iter().filter_map(move |n| Some((n, why(n)?)));
-        let all = all.map(|(n, why)| said(&flight.name, n, why)).chain(wind);
+        let all = all.map(|(n, why)| sentence(&flight.name, n, why)).chain(wind);
         all.collect::<Vec<_>>()
     };
     flights.iter().flat_map(of_flight).chain(tuned.iter().filter_map(coefficient)).collect()
 }
 
-fn said(flight: &str, n: &Nuisance, why: &str) -> String {
+fn sentence(flight: &str, n: &Nuisance, why: &str) -> String {
     format!("{flight}: {} is found at {}: {why}.", n.name, with_interval(n.value, n.sd, n.unit))
 }
 

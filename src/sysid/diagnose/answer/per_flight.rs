@@ -78,7 +78,7 @@ struct Fitted {
 
 impl Fitted {
     /// Whether its distance from zero is implausible.
-    fn strains(&self) -> bool {
+    fn is_implausible(&self) -> bool {
         self.value.abs() > BELIEVED * self.constant.width
     }
 }
@@ -86,7 +86,7 @@ impl Fitted {
 /// Flights for which nothing is asserted: where one constant compensates for another cause, the constants correlated
 /// with it are not reliable either.
 fn astray(fitted: &[Fitted]) -> HashSet<String> {
-    fitted.iter().filter(|f| f.strains()).map(|f| f.flight.clone()).collect()
+    fitted.iter().filter(|f| f.is_implausible()).map(|f| f.flight.clone()).collect()
 }
 
 fn fitted(round: &Round) -> Vec<Fitted> {
@@ -100,7 +100,7 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
         let share = 1.0 / flights as f64;
-        // the mean of all flights is as well in the model's coefficient, so that what tells them apart is known better
+        // the mean of all flights is confounded with the model's coefficient, so differences are known better
         let weights: Vec<f64> =
             (0..flights).map(|k| f64::from(u8::from(k == flight)) - share).collect();
         let pairs = places.iter().zip(&weights);
@@ -179,7 +179,7 @@ fn by_flight<'a>(all: impl Iterator<Item = (&'a str, String)>) -> Vec<(&'a str, 
 
 /// Notes on constants far outside their prior, in words.
 pub fn notes(round: &Round) -> Vec<String> {
-    let far = fitted(round).into_iter().filter(Fitted::strains);
+    let far = fitted(round).into_iter().filter(Fitted::is_implausible);
     far.map(|f| {
         format!(
             "{} of {} lies {:+.1} prior standard deviations from zero: the prior is too narrow, or something that acts \

@@ -92,7 +92,7 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
         let [value, sd, sums] =
             fitted(found, s.id, c.name).unwrap_or([s.score.values[k], 0.0, 0.0]);
-        // the blocks' scatter stands in the deviation of the round that selected it
+        // the standard deviation of the round that selected it includes the blocks' scatter
         parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums))
     });
     let parameters = parameters.collect();
@@ -153,7 +153,7 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
     let parameters = (0..about.coefficients.len())
         .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
         .collect();
-    // what is no more than chance says nothing flight by flight either
+    // estimates by flight mean nothing for evidence within chance
     let by_flight = match score.evidence > found.threshold {
         true => flights(round, &checks::by_flight(round, trial, score)),
         false => Vec::new(),

@@ -29,10 +29,9 @@ pub enum Verdict {
 /// constants of each flight were estimated, `decoys` and the candidates' curves with
 /// [`Detail::Full`](crate::diagnose::Detail::Full).
 ///
-/// Units are SI and stand beside the values; channels D, L, Y are forces (N), l, m, n moments (N m). A number that
-/// does not exist is NaN, which JSON writes as `null`. Times and lengths of the flights are not repeated here:
-/// flights are named by their file. For equal inputs, options and version the result is equal, since `settings.seed`
-/// determines all random draws.
+/// Units are SI and stand beside the values; channels D, L, Y are forces (N), l, m, n moments (N m). A number that does
+/// not exist is NaN, which JSON writes as `null`. Flights are named by their file. For equal inputs, options and version
+/// the result is equal, since `settings.seed` determines all random draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// Schema of the document, `greylag.diagnosis/1`.

@@ -15,7 +15,7 @@ use crate::diagnose::search::round::{Beside, Problem, Round};
 use crate::diagnose::search::settling::{SETTLING, settled};
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::per_flight::{PerFlight, askew};
-use crate::progress::{Progress, part, say};
+use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 
 /// Prior standard deviation of each misalignment angle, °: a board mounted by eye.
@@ -36,7 +36,7 @@ pub fn against_axes(
     mut found: Found,
 ) -> Result<Found, DiagnoseError> {
     let Some(tilted) = worth(&problem, &found) else { return Ok(found) };
-    say(progress, "explaining the flights by axes that stand askew", 0.9)?;
+    report(progress, "explaining the flights by axes that stand askew", 0.9)?;
     let other = search(&tilted, model, options, &part(progress, [0.9, 0.95]))?;
     let cost = |problem: &Problem, of: &Found| cost(problem, &found, of);
     let (Some(effects), Some(axes)) = (cost(&problem, &found), cost(&tilted, &other)) else {

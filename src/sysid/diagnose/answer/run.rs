@@ -9,7 +9,7 @@ use crate::diagnose::answer::per_flight;
 use crate::diagnose::answer::ranking;
 use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
 use crate::diagnose::answer::rival::against_axes;
-use crate::diagnose::answer::sentences::{self, Said};
+use crate::diagnose::answer::sentences::{self, Content};
 use crate::diagnose::answer::shares;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::options::{Detail, Options};
@@ -20,7 +20,7 @@ use crate::diagnose::search::excitation;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::progress::{Progress, say};
+use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, RUDDER};
@@ -55,7 +55,7 @@ pub fn diagnose(
     notes.extend(excitation::check(&problem.flights)?);
     let found = search(&problem, model, options, progress)?;
     let mut found = against_axes(problem, model, options, progress, found)?;
-    say(progress, "what is left", 0.95)?;
+    report(progress, "what is left", 0.95)?;
     let rudder = rudder::unmodelled(flights, model);
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
@@ -72,7 +72,7 @@ pub fn diagnose(
         Detail::Full => decoys::decoys(&found, options.seed),
         Detail::Lean => Vec::new(),
     };
-    let said = sentences::sentences(&Said {
+    let findings = sentences::sentences(&Content {
         found: &found,
         verdict,
         doubtful: &doubtful,
@@ -86,7 +86,7 @@ pub fn diagnose(
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
         verdict,
-        sentences: rudder.map(rudder::warning).into_iter().chain(said).collect(),
+        sentences: rudder.map(rudder::warning).into_iter().chain(findings).collect(),
         doubtful,
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,

@@ -22,7 +22,7 @@ const CLOSEST: f64 = 0.5;
 const AXES: &str = "amend with --axes-askew 3, or mount the board anew";
 
 /// Input of the sentences.
-pub struct Said<'a> {
+pub struct Content<'a> {
     /// Result of the search.
     pub found: &'a Found,
     /// Overall verdict on the model.
@@ -41,18 +41,18 @@ pub struct Said<'a> {
 
 /// The sentences, the most important first: impossible figures, instruments where they explain the flights, the
 /// aircraft.
-pub fn sentences(said: &Said) -> Vec<String> {
-    let Said { verdict, doubtful, effects, channels, measurement, .. } = *said;
+pub fn sentences(content: &Content) -> Vec<String> {
+    let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
     let askew = per_flight::askew_sentences(measurement);
     if !askew.is_empty() {
         all.extend(askew.into_iter().map(|s| format!("{s} To keep it out of the model, {AXES}.")));
     }
     all.extend(effects.iter().filter(|c| c.asserted).map(asserted));
-    all.extend(answer(said));
+    all.extend(answer(content));
     all.extend(effects.iter().filter(|c| c.status == Status::Small).map(small));
     if verdict != Verdict::Unknown {
-        all.extend(beyond(said));
+        all.extend(beyond(content));
     }
     let refused = |c: &&Candidate| c.status == Status::Refused && c.evidence > c.threshold;
     all.extend(effects.iter().filter(refused).filter(|c| !c.refused.is_empty()).map(|c| {
@@ -73,13 +73,13 @@ pub fn sentences(said: &Said) -> Vec<String> {
     }
     all.extend(abstained(channels));
     all.extend(sensors(measurement));
-    all.extend(per_flight::trim_sentences(said.trims));
+    all.extend(per_flight::trim_sentences(content.trims));
     all
 }
 
 /// The sentence of the verdict; none if effects are asserted, since their own sentences follow.
-fn answer(said: &Said) -> Option<String> {
-    let Said { found, verdict, doubtful, effects, .. } = *said;
+fn answer(content: &Content) -> Option<String> {
+    let Content { found, verdict, doubtful, effects, .. } = *content;
     match verdict {
         Verdict::Effect => None,
         Verdict::Adequate => Some(format!(
@@ -121,8 +121,8 @@ fn unexplained(found: &Found, effects: &[Candidate]) -> String {
 }
 
 /// Sentences on the residual beyond the effects found.
-fn beyond(said: &Said) -> Vec<String> {
-    let Said { found, verdict, channels, .. } = *said;
+fn beyond(content: &Content) -> Vec<String> {
+    let Content { found, verdict, channels, .. } = *content;
     let left = channels.iter().filter(|c| !c.abstained).filter_map(|c| {
         let term = c.left_with.as_ref()?;
         Some(format!("More than noise is left in {}: it goes with {term} above all.", c.channel))

@@ -8,11 +8,11 @@ use crate::diagnose::DiagnoseError;
 use crate::diagnose::proposal::draft::{self, Term};
 use crate::diagnose::search::remainder::remainder;
 use crate::diagnose::search::round::Round;
-use crate::progress::{Progress, part, say};
+use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// A formula is in doubt if a flexible model can still remove this share of what the formula removed.
+/// A formula is doubtful if a flexible model can still remove this share of what the formula removed.
 const MATERIAL: f64 = 0.02;
 /// A simpler form may remove less than the best one by this share: even an exact formula of a strong effect leaves a
 /// residual of that order, from errors of the reconstructed path.
@@ -77,7 +77,7 @@ pub(super) fn beyond(
             all.push((*channel, found));
         }
     }
-    say(progress, "judging the best free forms beside the library's", 0.8)?;
+    report(progress, "judging the best free forms beside the library's", 0.8)?;
     let mut forms: Vec<Form> =
         library.terms.iter().map(|t| t.form).chain(library.class.clone()).collect();
     for finalist in all.iter().flat_map(|(_, s)| &s.finalists) {

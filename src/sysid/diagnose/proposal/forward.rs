@@ -23,17 +23,15 @@ const MOST: usize = 3;
 const WORTH: f64 = 0.05;
 /// Tuning passes after a term has joined.
 const SETTLING: usize = 2;
-/// A channel is searched from this share of its variance beyond noise; below it the diagnosis calls the model
-/// adequate.
+/// Unexplained share of the variance beyond noise from which a channel is searched; the diagnosis's adequate level.
 const FAILING: f64 = 5e-4;
 /// The same relative to the worst channel: a smaller deficit is searched for after the worst one has been corrected.
 const BESIDE: f64 = 0.05;
-/// Standard deviations by which joint tuning may change a coefficient; a larger change shows that terms are
-/// confounded.
+/// Standard deviations by which joint tuning may change a coefficient; a larger change shows confounded terms.
 const MOVED: f64 = 5.0;
 /// Largest number of channels that are searched.
 const CHANNELS: usize = 3;
-/// Channels of forces and moments in the order of the regression.
+/// Force and moment channels in the order of the regression.
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
@@ -99,8 +97,7 @@ pub(super) struct Ask<'a> {
     pub forms: &'a [(Form, Entry)],
     /// Channels whose error counts, in the order of the regression.
     pub channels: [bool; 6],
-    /// Least evidence of the first term, whatever chance reaches among `forms`; used if these were preselected from
-    /// more.
+    /// Least evidence of the first term, whatever chance reaches among `forms`, in case these are preselected.
     pub least: f64,
     /// Share of what the best form removes by which a simpler one may remove less.
     pub behind: f64,
@@ -108,7 +105,7 @@ pub(super) struct Ask<'a> {
 
 /// Explanatory text of a search's result.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Said {
+pub(super) struct Outcome {
     pub front: Vec<Rung>,
     pub alike: Vec<Alternative>,
     pub grades: Option<Grades>,
@@ -118,7 +115,7 @@ pub(super) struct Said {
 
 /// State and result of a forward search.
 pub(super) struct Climbed {
-    pub said: Said,
+    pub outcome: Outcome,
     /// The first term as found; `None` if there is none.
     pub first: Option<Term>,
     /// All terms with their tuned coefficients.
@@ -140,7 +137,7 @@ pub(super) struct Climbed {
 impl Climbed {
     /// Share of the squared error beyond noise that the terms remove.
     pub(super) fn removed(&self) -> f64 {
-        self.said.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
+        self.outcome.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
     }
 
     /// Number of nodes of the formula.
@@ -164,7 +161,7 @@ impl Ask<'_> {
         let given = model.clone();
         let excess = self.excess(&model)?.max(1.0);
         let mut c = Climbed {
-            said: Said::default(),
+            outcome: Outcome::default(),
             first: None,
             terms: Vec::new(),
             class: Vec::new(),
@@ -182,7 +179,7 @@ impl Ask<'_> {
                 ranked(self.problem, round, self.options);
             let on = self.winner(&round, &scores).is_some_and(|place| {
                 if c.terms.is_empty() {
-                    c.said.nulls = nulls;
+                    c.outcome.nulls = nulls;
                 }
                 let stage = Stage { round: &round, scores: &scores, place, threshold };
                 self.joins(&mut c, &given, &stage) == Some(true)
@@ -192,10 +189,10 @@ impl Ask<'_> {
                 break;
             }
         }
-        if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.said.front.get_mut(k)) {
+        if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.outcome.front.get_mut(k)) {
             rung.chosen = true;
         }
-        if let Some(grades) = c.said.grades.as_mut().filter(|_| c.significant_left_out) {
+        if let Some(grades) = c.outcome.grades.as_mut().filter(|_| c.significant_left_out) {
             *grades = Grades { variables: false, trend: false, form: false, ..*grades };
         }
         c.first = c.terms.first().copied();
@@ -211,10 +208,10 @@ impl Ask<'_> {
         let form = self.form(round.trials[*trial].id)?.fitted(&score.values);
         let first = c.terms.is_empty();
         let threshold = if first { threshold.max(self.least) } else { threshold };
-        let before = c.said.front.last().map_or(0.0, |r| r.removed);
+        let before = c.outcome.front.last().map_or(0.0, |r| r.removed);
         let worth = score.fall > WORTH * c.first_fall;
         c.terms.push(Term { form, value: score.values[0], sd: score.deviations[0] });
-        c.said.front.push(Rung {
+        c.outcome.front.push(Rung {
             formula: draft::formula(&c.terms),
             complexity: c.complexity(),
             // a term also frees the coefficients that compensated for its absence, which are counted in its fall
@@ -223,7 +220,7 @@ impl Ask<'_> {
             threshold,
             chosen: false,
         });
-        // until it stands beside the others
+        // set back when the term joins
         let much = score.fall > WORTH * c.excess;
         c.significant_left_out = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
@@ -244,7 +241,7 @@ impl Ask<'_> {
             c.terms.pop();
             return Some(false);
         }
-        if let Some(rung) = c.said.front.last_mut() {
+        if let Some(rung) = c.outcome.front.last_mut() {
             rung.removed = removed;
         }
         c.model = tuned;
@@ -257,17 +254,17 @@ impl Ask<'_> {
         let &Stage { round, scores, place, .. } = stage;
         let (trial, score) = &scores[place];
         let alike = self.alike(round, scores, place);
-        c.said.refused.extend(contradicted(round, *trial, score));
+        c.outcome.refused.extend(contradicted(round, *trial, score));
         let steady = self.selected(round, scores, place) >= SELECTED;
         c.class = alike.iter().map(|a| a.0).collect();
         let mut grades = grades::grades(form, &c.class);
         grades.form &= steady && !self.surpassed(stage);
-        c.said.grades = Some(grades);
+        c.outcome.grades = Some(grades);
         let alternative = |(form, evidence): &(Form, f64)| Alternative {
             formula: draft::formula(&[Term { form: *form, value: 0.0, sd: 0.0 }]),
             evidence: *evidence,
         };
-        c.said.alike = alike.iter().map(alternative).collect();
+        c.outcome.alike = alike.iter().map(alternative).collect();
     }
 
     /// Squared error beyond noise of `model`.
@@ -303,7 +300,7 @@ impl Ask<'_> {
     fn winner(&self, round: &Round, scores: &[(usize, Score)]) -> Option<usize> {
         let fits = |k: &usize| {
             let (trial, score) = &scores[*k];
-            !round.at_bound(*trial, score) && !checks::relieves(round, score)
+            !round.at_bound(*trial, score) && !checks::absorbs_prior_error(round, score)
         };
         let best = (0..scores.len()).find(fits)?;
         let size =
@@ -311,7 +308,7 @@ impl Ask<'_> {
         let own = &scores[best].1;
         let pool: Vec<usize> = match self.behind > 0.0 {
             true => (0..scores.len())
-                .filter(|k| checks::likeness(round, own, &scores[*k].1).abs() > checks::ALIKE)
+                .filter(|k| checks::correlation(round, own, &scores[*k].1).abs() > checks::ALIKE)
                 .collect(),
             false => checks::class(round, scores, best),
         };
@@ -335,7 +332,7 @@ impl Ask<'_> {
             .filter_map(|k| {
                 let (trial, score) = &scores[k];
                 let form = self.form(round.trials[*trial].id)?.fitted(&score.values);
-                let same = checks::likeness(round, &scores[place].1, score).abs() > 1.0 - SAME;
+                let same = checks::correlation(round, &scores[place].1, score).abs() > 1.0 - SAME;
                 let larger = self.behind > 0.0 && form.shape.complexity() > own;
                 (!same && !larger).then_some((form, score.evidence))
             })
@@ -356,7 +353,7 @@ impl Ask<'_> {
                 let slack = LIKELY + NODE * (size(k) - size(place)).max(0.0);
                 let other = &scores[k].1;
                 other.fall > own.fall + slack
-                    && checks::likeness(round, own, other).abs() > checks::ALIKE
+                    && checks::correlation(round, own, other).abs() > checks::ALIKE
             })
     }
 

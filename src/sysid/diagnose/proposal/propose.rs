@@ -15,7 +15,7 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::diagnose::{DiagnoseError, Options, Verdict};
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::progress::{Progress, part, say};
+use crate::progress::{Progress, part, report};
 use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::Channel;
@@ -52,8 +52,8 @@ pub fn propose(
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
-    let said = rudder.map(rudder::warning).into_iter().collect();
-    let mut proposal = empty(model, verdict(&found), options, said, notes);
+    let warnings = rudder.map(rudder::warning).into_iter().collect();
+    let mut proposal = empty(model, verdict(&found), options, warnings, notes);
     if let Some(why) = settled(&found, proposal.verdict) {
         proposal.sentences.push(why);
         return Ok(proposal);
@@ -62,7 +62,7 @@ pub fn propose(
     let channels = searched(&found, rudder.is_some());
     let forms = forms(&problem, &channels);
     proposal.tried = forms.len();
-    say(progress, &format!("trying {} shapes", forms.len()), SEARCHED)?;
+    report(progress, &format!("trying {} shapes", forms.len()), SEARCHED)?;
     let ask = Ask {
         problem: &problem,
         options,
@@ -73,9 +73,10 @@ pub fn propose(
     };
     let library = ask.climb(tuned.clone()).ok_or_else(unusable)?;
     let climbed = beyond_library(&ask, library, &tuned, &mut proposal, progress)?;
-    let Climbed { said, first, terms, .. } = climbed;
-    (proposal.front, proposal.alike, proposal.grades) = (said.front, said.alike, said.grades);
-    (proposal.refused, proposal.nulls) = (said.refused, said.nulls);
+    let Climbed { outcome, first, terms, .. } = climbed;
+    (proposal.front, proposal.alike, proposal.grades) =
+        (outcome.front, outcome.alike, outcome.grades);
+    (proposal.refused, proposal.nulls) = (outcome.refused, outcome.nulls);
     let Some(first) = first else {
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
@@ -83,7 +84,7 @@ pub fn propose(
     // further terms show that the first one's form is not the whole
     let whole = terms.len() == 1 && !outdone(&proposal);
     proposal.grades.iter_mut().for_each(|grades| grades.form &= whole);
-    say(progress, "testing the formula on flights that the search has not seen", TESTED)?;
+    report(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();
     let tested = tested(&test, &tuned, &terms, options, names).ok_or_else(unusable)?;
     let from = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -167,7 +168,7 @@ fn beyond_library(
     let channels = doubted.as_ref().map_or(&[][..], |(_, channels)| channels);
     let forms = lags::forms(&library, channels);
     if !forms.is_empty() {
-        say(progress, "trying controls through a lag", LAGS)?;
+        report(progress, "trying controls through a lag", LAGS)?;
         proposal.tried += forms.len();
         let lagged = lags::climb(ask, &library, forms, tuned);
         if let Some(lagged) = lagged.filter(|lagged| better(lagged, &library)) {
@@ -176,7 +177,7 @@ fn beyond_library(
         }
     }
     let Some(doubt) = doubted.filter(|_| ask.options.free_forms) else { return Ok(library) };
-    say(progress, "trying free forms", FREE[0])?;
+    report(progress, "trying free forms", FREE[0])?;
     let Some((mut record, free)) = beyond(ask, &library, tuned, doubt, &part(progress, FREE))?
     else {
         return Ok(library);

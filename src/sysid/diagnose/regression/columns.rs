@@ -82,7 +82,7 @@ impl Ready {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 9, c, bend * slope[c]));
             }
-            // J ω̇ + ω × J ω = M(t − T), as explicit Euler steps of 2 T have it: T Σ ∂(ω × J ω − M)/∂x ẋ
+            // J ω̇ + ω × J ω = M(t − T), for explicit Euler steps of 2 T: T Σ ∂(ω × J ω − M)/∂x ẋ
             if acting.sampling == Sampling::Instants {
                 let rates = differences(&acting, place.segment, place.index, inputs);
                 for (slope, rate) in here.slope.iter().zip(rates) {

@@ -31,9 +31,9 @@ const DOUBT: f64 = 4.0;
 const LEAST_SIGNAL: f64 = 0.5;
 /// Reduction, in prior standard deviations, of the prior's misfit beyond which a candidate may merely replace an
 /// adjustment of existing coefficients.
-const STRAIN: f64 = 5.0;
+const PRIOR_MISFIT: f64 = 5.0;
 /// Least share of such a candidate's reduction that must be prior misfit for it to count as such.
-const RELIEF: f64 = 0.9;
+const PRIOR_SHARE: f64 = 0.9;
 /// Number of candidates that compete in a bootstrap.
 const COMPETING: usize = 8;
 
@@ -124,16 +124,16 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
 /// Whether the candidate mostly replaces an adjustment of existing coefficients: its reduction is the prior misfit of
 /// coefficients that the data moved far from their prior, and hardly any error of the flights, which those
 /// coefficients remove as well.
-pub fn relieves(round: &Round, score: &Score) -> bool {
+pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     let prior = &round.projected.prior;
     let last = round.projected.width();
     let linear: f64 = score.weights.iter().map(|(c, w)| w * prior[(*c, last)]).sum();
-    let relief = 2.0 * linear - quadratic(&score.weights, &score.weights, prior);
-    relief > STRAIN.powi(2) && relief > RELIEF * score.fall
+    let reduction = 2.0 * linear - quadratic(&score.weights, &score.weights, prior);
+    reduction > PRIOR_MISFIT.powi(2) && reduction > PRIOR_SHARE * score.fall
 }
 
 /// Correlation of the contributions of two scores to the residual.
-pub fn likeness(round: &Round, a: &Score, b: &Score) -> f64 {
+pub fn correlation(round: &Round, a: &Score, b: &Score) -> f64 {
     let total = &round.projected.total;
     let of = |u: &Score, v: &Score| quadratic(&u.weights, &v.weights, total);
     of(a, b) / (of(a, a) * of(b, b)).sqrt()
@@ -148,7 +148,7 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
             let (trial, other) = &scores[*k];
             other.evidence > own.evidence - CLOSE
                 && !round.at_bound(*trial, other)
-                && likeness(round, own, other).abs() > ALIKE
+                && correlation(round, own, other).abs() > ALIKE
         })
         .collect()
 }

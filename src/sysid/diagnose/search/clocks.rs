@@ -19,7 +19,7 @@ const PASSES: usize = 4;
 /// Seed of the random draws of shared noise.
 const SEED: u64 = 1;
 
-/// What the reconstruction leaves in doubt of a flight.
+/// Uncertainty of a flight after its reconstruction.
 #[derive(Clone, Copy, Debug)]
 pub struct Doubt {
     sensors: [f64; SENSORS],

@@ -74,7 +74,7 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// Largest share over the channels that second derivatives of the deflections remove beside `fall`, the reduction
+    /// Share over all channels that second derivatives of the deflections remove beside `fall`, the reduction
     /// by an effect; zero if it is not more than with right models.
     pub fn bends_beside(&self, fall: f64) -> f64 {
         let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();

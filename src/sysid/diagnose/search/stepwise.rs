@@ -21,7 +21,7 @@ use crate::diagnose::search::settling::{Ranked, SETTLING, ranked};
 use crate::diagnose::search::shape::shape;
 use crate::diagnose::search::unexplained::unexplained;
 use crate::diagnose::search::{checks, excitation};
-use crate::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
+use crate::progress::{Cancelled, FirstLook, Progress, Stage, not_cancelled, report};
 use examine::examine;
 use greylag_model::{GreyBox, RUDDER};
 use run_off::run_off;
@@ -35,7 +35,7 @@ const MOST: usize = 6;
 /// held.
 const MOST_SETTLING: usize = 12;
 /// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
-const SETTLED: f64 = 0.2;
+const STEP_TOLERANCE: f64 = 0.2;
 /// Largest number of candidates refused beside the joined effects before the search ends.
 const MOST_ASIDE: usize = 4;
 
@@ -53,19 +53,19 @@ pub fn search(
         let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
         Round::new(problem, model.clone(), entries).ok_or_else(unusable)
     };
-    say(progress, "tuning the model's own coefficients", 0.0)?;
+    report(progress, "tuning the model's own coefficients", 0.0)?;
     let tuned = round(model.clone(), &[])?.tuned();
     let mut entries = catalogue::candidates(model, &options.with, &options.without);
     if !excitation::moves_rudder(&problem.flights) {
         entries.retain(|e| e.about.id != RUDDER);
     }
-    say(progress, &format!("ranking {} candidate effects", entries.len()), 0.05)?;
+    report(progress, &format!("ranking {} candidate effects", entries.len()), 0.05)?;
     let shape = shape(&round(tuned.clone(), &[])?, options.nulls);
     let Ranked { round: first, scores, nulls, threshold } =
         ranked(problem, round(tuned, &entries)?, options);
     let ranking = first_look(&first, &scores, threshold);
     let doing = "checking the best candidate";
-    said(progress(Stage { doing, fraction: RANKED, ranking: &ranking }))?;
+    not_cancelled(progress(Stage { doing, fraction: RANKED, ranking: &ranking }))?;
     let first_remainder = remainder(&first, options.nulls, options.level);
     let mut found = Found {
         unexplained: unexplained(&first, &first.tuned_residual()),
@@ -107,7 +107,7 @@ fn select(
         found.beaten.clear();
         found.level.clear();
         run_off(problem, found);
-        say(progress, "checking the best candidate", found.fraction())?;
+        report(progress, "checking the best candidate", found.fraction())?;
         let Some(winner) = examine(found, options) else { break };
         let passed = winner.refused.is_empty() || winner.trace.is_some();
         let outcome = match (&winner.trace, passed) {
@@ -115,7 +115,7 @@ fn select(
             (None, true) => "joins",
             (None, false) => "is refused",
         };
-        say(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
+        report(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
         // several things may be missing: a refused candidate does not prevent the next one
         if !passed && found.last.is_some() && aside.len() < MOST_ASIDE {
             found.scores.remove(0);
@@ -152,11 +152,11 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
         of.map(|c| c.value).collect()
     };
     for effect in joined {
-        // what it had is possible again
+        // its values were valid before, so joining cannot fail
         let _ = model.join(effect, &own(effect));
     }
     for c in current.coefficients().iter().filter(|c| {
-        // what it replaced is there again
+        // coefficients that the removed effect had replaced keep the given model's values
         current.replaced(&c.name) != Some(id)
     }) {
         model.set_coefficient(&c.name, c.value);
@@ -189,7 +189,11 @@ impl Found {
         self.beyond = Some(checks::Beyond::of(&settled));
         self.shape = shape(&settled, options.nulls);
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
-        say(progress, &format!("ranking {} candidate effects again", open.len()), self.fraction())?;
+        report(
+            progress,
+            &format!("ranking {} candidate effects again", open.len()),
+            self.fraction(),
+        )?;
         let Some(round) = Round::new(problem, model, &open) else { return Ok(false) };
         let Ranked { round, scores, threshold, .. } = ranked(problem, round, options);
         (self.scores, self.threshold) = (scores, threshold);
@@ -210,9 +214,9 @@ impl Found {
     ) -> Result<Option<Round>, Cancelled> {
         let newest = self.selected.last().map(|s| s.id);
         for pass in 0..MOST_SETTLING {
-            say(progress, doing, self.fraction())?;
+            report(progress, doing, self.fraction())?;
             let Some(round) = Round::new(problem, model.clone(), &[]) else { return Ok(None) };
-            if pass >= SETTLING && round.stride() < SETTLED {
+            if pass >= SETTLING && round.stride() < STEP_TOLERANCE {
                 return Ok(Some(round));
             }
             model = round.tuned();

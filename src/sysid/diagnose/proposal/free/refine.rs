@@ -16,7 +16,7 @@ const MOVED: f64 = 0.01;
 /// Largest change of a constant in one step, as a share of its value.
 const REACH: f64 = 0.5;
 /// Convergence tolerance: least relative increase of the reduction in a step.
-const SETTLED: f64 = 1e-4;
+const RELATIVE_TOLERANCE: f64 = 1e-4;
 
 /// A channel with the form's factor.
 pub struct Place<'a> {
@@ -58,7 +58,7 @@ impl Place<'_> {
                     break;
                 }
             }
-            if fall - before <= SETTLED * before {
+            if fall - before <= RELATIVE_TOLERANCE * before {
                 break;
             }
         }

@@ -55,7 +55,7 @@ pub struct Kept {
     /// Products with residual, noise and itself, by block.
     blocks: Vec<[f64; 3]>,
     /// Change of each nuisance parameter for a unit of the column, in prior widths.
-    strain: Vec<f64>,
+    prior_shift: Vec<f64>,
 }
 
 /// Score of a form.
@@ -145,7 +145,7 @@ impl<'a> Screen<'a> {
         let left = columns - &self.known * &taken;
         let one = |k: usize| {
             let (x, own) = (columns.column(k), left.column(k));
-            let strain: Vec<f64> =
+            let prior_shift: Vec<f64> =
                 taken.column(k).iter().zip(self.roots.iter()).map(|(t, w)| t * w).collect();
             let mut blocks = vec![[0.0; 3]; self.block_count];
             for &(from, to, b) in &self.blocks {
@@ -157,9 +157,9 @@ impl<'a> Screen<'a> {
             Kept {
                 square: x.dot(&own),
                 linear: x.dot(&self.residual),
-                prior: strain.iter().map(|t| t * t).sum(),
+                prior: prior_shift.iter().map(|t| t * t).sum(),
                 blocks,
-                strain,
+                prior_shift,
             }
         };
         (0..columns.ncols()).map(one).collect()
@@ -209,7 +209,7 @@ impl<'a> Screen<'a> {
     pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
         let product = |b: usize| null.signs[b] * kept.blocks[b][1];
         let noise: f64 = (0..self.block_count).map(product).sum();
-        let prior: f64 = kept.strain.iter().zip(null.prior.iter()).map(|(t, g)| t * g).sum();
+        let prior: f64 = kept.prior_shift.iter().zip(null.prior.iter()).map(|(t, g)| t * g).sum();
         self.reached(kept, noise - prior, product, constants)
     }
 

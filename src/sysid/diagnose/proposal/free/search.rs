@@ -12,7 +12,7 @@ use crate::diagnose::proposal::draft::{self, Term};
 use crate::diagnose::proposal::library::{BESIDE_AIR, Form, OF_AIR, Shape};
 use crate::diagnose::search::nulls::threshold;
 use crate::diagnose::search::round::Round;
-use crate::progress::{Cancelled, Progress, say};
+use crate::progress::{Cancelled, Progress, report};
 use greylag_num::statistics::quantile;
 use greylag_physics::Channel;
 use greylag_physics::formula::{Variable, file};
@@ -20,7 +20,7 @@ use greylag_physics::formula::{Variable, file};
 /// Number of forms evaluated at once.
 const BATCH: usize = 64;
 /// Batches between two progress reports.
-const HEARD: usize = 32;
+const REPORT_EVERY: usize = 32;
 /// Number of forms of each size whose constants are fitted.
 const FITTED: usize = 8;
 /// Number of forms of a channel that enter the round.
@@ -88,17 +88,17 @@ pub fn searched(
     let mut done = 0;
     for side in &mut sides {
         side.keep(&screen, &samples, |count| {
-            say(progress, "trying free forms", 0.7 * (done + count) as f64 / tried as f64)
+            report(progress, "trying free forms", 0.7 * (done + count) as f64 / tried as f64)
         })?;
         done += side.kept.len();
     }
-    say(progress, "fitting the constants of the best free forms", 0.7)?;
+    report(progress, "fitting the constants of the best free forms", 0.7)?;
     let counts: Vec<usize> = (0..=MOST_NODES)
         .map(|n| sides.iter().flat_map(|s| &s.grammar.candidates).filter(|c| c.size == n).count())
         .collect();
     let search = Search { channel, screen: &screen, samples: &samples, counts };
     let fitted = search.fitted(&sides);
-    say(progress, "the same search in flights that lack nothing", 0.85)?;
+    report(progress, "the same search in flights that lack nothing", 0.85)?;
     let nulls = search.nulls(&sides, options);
     Ok(Some(Searched {
         tried,
@@ -126,12 +126,12 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Side {
-    /// Evaluates all forms; `heard` receives the number done.
+    /// Evaluates all forms; `on_progress` receives the number done.
     fn keep(
         &mut self,
         screen: &Screen,
         samples: &Samples,
-        heard: impl Fn(usize) -> Result<(), Cancelled>,
+        on_progress: impl Fn(usize) -> Result<(), Cancelled>,
     ) -> Result<(), Cancelled> {
         let atoms: Vec<Vec<f64>> = self
             .grammar
@@ -158,8 +158,8 @@ impl Side {
             screen.keep(&DMatrix::from_vec(rows, candidates.len(), columns))
         };
         let mut kept = Vec::with_capacity(self.grammar.candidates.len());
-        for many in self.grammar.candidates.chunks(BATCH * HEARD) {
-            heard(kept.len())?;
+        for many in self.grammar.candidates.chunks(BATCH * REPORT_EVERY) {
+            on_progress(kept.len())?;
             let done: Vec<Vec<Kept>> = many.par_chunks(BATCH).map(batch).collect();
             kept.extend(done.into_iter().flatten());
         }

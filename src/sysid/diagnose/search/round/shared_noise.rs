@@ -65,7 +65,7 @@ pub(super) fn shared(
         let (known, _, mut after) = known(of.problem, of.model, &flights, columns);
         let made = Columns { trials: Vec::new(), columns: candidates };
         let end = place(&mut after, known.len(), &made, &flights);
-        // the residual stands where it stands before
+        // the residual keeps the index that it has in `before`
         for list in &mut after {
             list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
         }

@@ -37,14 +37,14 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     let members: Vec<usize> =
         std::iter::once(*place).chain(class.iter().map(|k| found.scores[*k].0)).collect();
     let heldout = checks::heldout_reduction(round, trial, score);
-    let relieves = checks::relieves(round, score);
-    let slight = (heldout < HELD_OUT || heldout.is_nan()) && !relieves;
+    let absorbs_prior_error = checks::absorbs_prior_error(round, score);
+    let slight = (heldout < HELD_OUT || heldout.is_nan()) && !absorbs_prior_error;
     if slight {
         refused.push(under("it takes", heldout, "of the error on held-out segments", HELD_OUT));
     }
     // what explains something else would be selected besides, not in its place
     let rival = |(t, other): &&(usize, Score)| {
-        !found.beaten.contains(t) && checks::likeness(round, score, other).abs() > RIVAL
+        !found.beaten.contains(t) && checks::correlation(round, score, other).abs() > RIVAL
     };
     let open: Vec<usize> = found.scores.iter().filter(rival).map(|(t, _)| *t).collect();
     let selected = checks::selected(round, &open, &members, options.bootstraps);
@@ -52,14 +52,14 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
         refused.push(under("it is the best in", selected, "of the block bootstraps", SELECTED));
     }
     // a candidate that absorbs prior misfit does not correct the error of a formula
-    refused.extend(hidden(found, score).filter(|_| !relieves));
+    refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
     let first = trial.points[score.point].free[0].0;
     if checks::contradict(score.values[first], &by_flight) {
         refused.push("the flights contradict one another about its amount".into());
     }
     let contribution = round.contribution(score);
-    let trace = match refused.is_empty() && !relieves {
+    let trace = match refused.is_empty() && !absorbs_prior_error {
         true => immaterial(found, round, score),
         false => None,
     };
@@ -77,7 +77,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
         refused,
         slight,
         trace,
-        relieves,
+        absorbs_prior_error,
         curved: trial.points[score.point].contribution.is_some(),
         contribution,
     })

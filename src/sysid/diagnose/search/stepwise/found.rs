@@ -41,7 +41,7 @@ pub struct Selected {
     pub trace: Option<String>,
     /// Whether it mostly replaces an adjustment of existing coefficients, so that the remaining residual is no
     /// argument against it.
-    pub relieves: bool,
+    pub absorbs_prior_error: bool,
     /// Whether it is nonlinear in its constants.
     pub curved: bool,
     /// Fitted contribution to the residual, by flight.

@@ -17,10 +17,11 @@ impl Found {
     /// plus what a flexible model could remove, or of the error beyond noise.
     pub(super) fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
-        let real = |s: &&Selected| s.refused.is_empty() && !s.relieves;
+        let real = |s: &&Selected| s.refused.is_empty() && !s.absorbs_prior_error;
         let taken: Vec<(&'static str, [f64; 6])> =
             self.selected.iter().filter(real).map(|s| (s.id, s.taken)).collect();
-        let assertable = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
+        let assertable =
+            self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.absorbs_prior_error);
         for effect in assertable {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
             let significant =

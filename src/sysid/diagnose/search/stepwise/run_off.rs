@@ -8,7 +8,7 @@ use crate::diagnose::search::settling::{SETTLING, settled};
 /// A candidate is a contender if its order (see `Score::order`) exceeds this share of the best one's.
 const CONTENDING: f64 = 0.2;
 /// Least correlation of its contribution with the best one's.
-const CONTENDING_LIKENESS: f64 = 0.6;
+const CONTENDING_CORRELATION: f64 = 0.6;
 /// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
@@ -26,7 +26,7 @@ pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
             let (trial, score) = &found.scores[*k];
             score.order > CONTENDING * best.order
                 && !round.at_bound(*trial, score)
-                && checks::likeness(round, best, score).abs() > CONTENDING_LIKENESS
+                && checks::correlation(round, best, score).abs() > CONTENDING_CORRELATION
         })
         .take(CONTENDERS)
         .collect();
