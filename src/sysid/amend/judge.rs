@@ -98,7 +98,7 @@ impl Judge<'_> {
     }
 }
 
-/// The result of a fit; `None` if the fit failed for the model rather than for the flights or a cancellation.
+/// The result of a fit; `None` if it did not converge or its equations have no solution. Other errors are returned.
 pub fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
     match of {
         Ok(of) => Ok(Some(of)),
@@ -107,7 +107,7 @@ pub fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
     }
 }
 
-/// Whether a fit failed for the model rather than for the flights or a cancellation.
+/// Whether a fit did not converge, or its equations have no solution.
 fn failed(why: &AmendError) -> bool {
     matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
 }

@@ -28,7 +28,7 @@ const FIRST: usize = 2;
 const LAST: usize = 25;
 /// Convergence tolerance: largest change of a constant in its standard deviation, and relative change of a level.
 const STEP_TOLERANCE: f64 = 0.05;
-const LEVEL_SETTLED: f64 = 0.02;
+const LEVEL_TOLERANCE: f64 = 0.02;
 /// Smallest share of a step that is tried.
 const LEAST_PART: f64 = 1.0 / 64.0;
 
@@ -71,7 +71,7 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
         }
         let change = found.levels.renew(&solved.readings, log.step);
         let change = change.max(found.levels.loosen(&problem.step_residuals(found)));
-        if iteration > from.max(FIRST) && moved < STEP_TOLERANCE && change < LEVEL_SETTLED {
+        if iteration > from.max(FIRST) && moved < STEP_TOLERANCE && change < LEVEL_TOLERANCE {
             break;
         }
     }

@@ -209,9 +209,9 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let point = &trial.points[score.point];
     let columns: Vec<usize> = point.free.iter().map(|f| f.1).chain(point.contribution).collect();
     let (na, last) = (round.known.len(), round.known.len() + columns.len());
-    let feigned = &round.shared[flight];
-    let mut shared: Vec<f64> = feigned[..na].to_vec();
-    shared.extend(columns.iter().map(|c| feigned.get(na + c).copied().unwrap_or(0.0)));
+    let spurious = &round.shared[flight];
+    let mut shared: Vec<f64> = spurious[..na].to_vec();
+    shared.extend(columns.iter().map(|c| spurious.get(na + c).copied().unwrap_or(0.0)));
     let placed = alone(&round.placed, flight, na, &columns);
     let mut with_residual = placed.clone();
     let residual = round.placed[flight].iter().find(|(p, _)| *p == round.last)?;
