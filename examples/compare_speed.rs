@@ -35,7 +35,7 @@ fn main() {
         &model("jsbsim"),
         &flights,
         &diagnose::Options::default(),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     );
     let answer = answer.expect("a diagnosis");
     println!(
@@ -49,7 +49,7 @@ fn main() {
         &[prior, model("jsbsim")],
         &flights,
         &Options::default(),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     );
     let found = found.expect("a comparison");
     println!("two models compared in {:.2} s", start.elapsed().as_secs_f64());

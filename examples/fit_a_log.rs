@@ -9,7 +9,7 @@ use greylag::model::GreyBox;
 use greylag::physics::formula::register;
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, reconstruct};
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 use greylag::sysid::{amend, compare, diagnose};
 
 /// The flight in a log of any format, with what its sensors' constants are.
@@ -27,7 +27,7 @@ fn flight(path: &str, model: &GreyBox) -> anyhow::Result<Reconstruction> {
 fn error(model: &GreyBox, flight: &Reconstruction) -> anyhow::Result<f64> {
     let options = compare::Options { horizons_s: vec![5.0], seed: 1 };
     let models = std::slice::from_ref(model);
-    let found = compare::compare(models, std::slice::from_ref(flight), &options, &unheard)?;
+    let found = compare::compare(models, std::slice::from_ref(flight), &options, &ignore_progress)?;
     let score = found.models[0].free_run.first().context("the flight is shorter than 5 s")?;
     Ok(score.rmse_scaled)
 }
@@ -46,7 +46,7 @@ fn main() -> anyhow::Result<()> {
         with.extend(register::load(Path::new(file))?.iter().map(|e| e.about.id.to_owned()));
     }
     let options = diagnose::Options { with, ..Default::default() };
-    let found = diagnose::diagnose(&model, std::slice::from_ref(&fit), &options, &unheard)?;
+    let found = diagnose::diagnose(&model, std::slice::from_ref(&fit), &options, &ignore_progress)?;
     found.sentences.iter().for_each(|sentence| println!("{sentence}"));
 
     let asserted = found.effects.iter().filter(|e| e.asserted);
@@ -57,7 +57,7 @@ fn main() -> anyhow::Result<()> {
         std::slice::from_ref(&fit),
         std::slice::from_ref(&judge),
         &options,
-        &unheard,
+        &ignore_progress,
     )?;
     let [before, after] = [&model, &fitted.model].map(|m| error(m, &judge));
     println!("error of 5 s on the flight held out: {:.4} to {:.4}", before?, after?);

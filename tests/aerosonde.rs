@@ -127,8 +127,9 @@ static FLIGHTS: LazyLock<[Reconstruction; 2]> =
     LazyLock::new(|| [1, 2].map(|seed| rebuilt(&flown(seed, 60.0))));
 
 fn asked(model: &GreyBox) -> Diagnosis {
-    let (options, unheard) = (Options::default(), &greylag::sysid::progress::unheard);
-    let found = diagnose(model, &*FLIGHTS, &options, unheard).unwrap();
+    let (options, ignore_progress) =
+        (Options::default(), &greylag::sysid::progress::ignore_progress);
+    let found = diagnose(model, &*FLIGHTS, &options, ignore_progress).unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
     found
 }

@@ -29,7 +29,7 @@ fn validate_a_hidden_lag_is_measured_and_the_error_falls() {
         &all[..2],
         &all[2..],
         &added("actuator_lag"),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap();
     let story = &found.amendment;
@@ -68,7 +68,8 @@ fn validate_a_model_of_guesses_is_fitted_from_scratch() {
     let all = flights("", 71);
     let fitted = |prior| {
         let options = Options { prior, ..Options::default() };
-        amend(&guess, &all[..2], &all[2..], &options, &greylag::sysid::progress::unheard).unwrap()
+        amend(&guess, &all[..2], &all[2..], &options, &greylag::sysid::progress::ignore_progress)
+            .unwrap()
     };
     let (file, scratch) = (fitted(Prior::File), fitted(Prior::Bounds));
     let horizons = [5.0];
@@ -76,7 +77,7 @@ fn validate_a_model_of_guesses_is_fitted_from_scratch() {
         std::slice::from_ref(&exact),
         &all[2..],
         &greylag::sysid::compare::Options { horizons_s: horizons.to_vec(), seed: 1 },
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     );
     let best = at_5s(&compared.unwrap().models[0].free_run);
     let [file_error, error] = [&file, &scratch].map(|f| at_5s(&f.amendment.before));
@@ -100,7 +101,8 @@ fn validate_an_integrator_that_no_coefficient_makes_up_for_is_replaced() {
     let all = flights("", 41);
     let options = Options { conventions: true, ..Options::default() };
     let found =
-        amend(&model, &all[..2], &all[2..], &options, &greylag::sysid::progress::unheard).unwrap();
+        amend(&model, &all[..2], &all[2..], &options, &greylag::sysid::progress::ignore_progress)
+            .unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
     let tried: Vec<_> = story.conventions.iter().map(|t| (t.from, t.to, t.kept)).collect();
@@ -134,7 +136,7 @@ fn validate_a_curve_takes_up_what_no_formula_says() {
         &all[..2],
         &all[2..],
         &added("lift_curve"),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap();
     let story = &found.amendment;
@@ -163,8 +165,9 @@ fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
         "inertia_xz lift_stall drag_elevator_abs drag_alpha2 drag_beta2 lift_curve".split(' ');
     let effects = effects.map(|id| Added { id: id.into(), start: None }).collect();
     let options = Options { effects, ..Options::default() };
-    let found = amend(&printed, &all[..3], &all[3..], &options, &greylag::sysid::progress::unheard)
-        .unwrap();
+    let found =
+        amend(&printed, &all[..3], &all[3..], &options, &greylag::sysid::progress::ignore_progress)
+            .unwrap();
     let story = &found.amendment;
     story.sentences.iter().chain(&story.notes).for_each(|s| println!("{s}"));
     assert!(story.effects.iter().all(|e| e.joined), "{:?}", story.effects);
@@ -173,7 +176,7 @@ fn validate_the_prior_as_printed_ends_close_to_the_simulators_model() {
         &all[..3],
         &all[3..],
         &Options::default(),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap();
     let least = at_5s(&tuned.amendment.after);
@@ -201,7 +204,8 @@ fn what_the_model_says_itself_is_not_told_twice() {
     let effects = vec![with("drag_alpha2", 0.5), with("thrust_scale", 20.0)];
     let options = Options { effects, ..Options::default() };
     let found =
-        amend(&model, &all[..2], &all[2..], &options, &greylag::sysid::progress::unheard).unwrap();
+        amend(&model, &all[..2], &all[2..], &options, &greylag::sysid::progress::ignore_progress)
+            .unwrap();
     let story = &found.amendment;
     story.sentences.iter().for_each(|s| println!("{s}"));
     let joined = |id: &str| story.effects.iter().find(|e| e.id == id).unwrap().joined;
@@ -220,7 +224,7 @@ fn an_effect_that_is_not_there_is_refused() {
         &all[..2],
         &all[2..],
         &added("motor_torque"),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap();
     assert!(!found.amendment.effects[0].refused.is_empty());
@@ -233,14 +237,15 @@ fn bad_input_is_said_before_anything_is_fitted() {
     let model = sensors::model();
     let none: &[Reconstruction] = &[];
     let why = |options: &Options| {
-        amend(&model, none, none, options, &greylag::sysid::progress::unheard)
+        amend(&model, none, none, options, &greylag::sysid::progress::ignore_progress)
             .unwrap_err()
             .to_string()
     };
     assert!(why(&added("flubber")).contains("effects list"));
     assert!(why(&added("drag_beta2")).contains("already"));
-    let short = amend(&model, none, none, &Options::default(), &greylag::sysid::progress::unheard)
-        .unwrap_err();
+    let short =
+        amend(&model, none, none, &Options::default(), &greylag::sysid::progress::ignore_progress)
+            .unwrap_err();
     assert!(matches!(short, AmendError::TooLittle { .. }), "{short}");
 }
 

@@ -26,7 +26,7 @@ fn fit(model: &GreyBox, id: &str, values: &[f64], flights: &[Flight]) -> Option<
         model.join(id, values).unwrap();
         options.added.push(id.into());
     }
-    output_error::fit(&model, flights, &options, &greylag::sysid::progress::unheard)
+    output_error::fit(&model, flights, &options, &greylag::sysid::progress::ignore_progress)
         .map_err(|e| println!("{e}"))
         .ok()
 }

@@ -13,7 +13,7 @@ use greylag::sysid::amend::leave_one_out::{Fitted, Structure, leave_one_out};
 use greylag::sysid::amend::{Added, AmendError, Options, amend};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::per_flight::PerFlight;
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 
 fn at_5s(scores: &[greylag::sysid::compare::HorizonScore]) -> f64 {
     scores.iter().find(|s| s.horizon_s == 5.0).unwrap().rmse_scaled
@@ -31,7 +31,8 @@ fn clean(seed: u64) -> Reconstruction {
 fn validate_a_true_model_stays_true_through_stalls() {
     let all: Vec<Reconstruction> = (81..85).map(clean).collect();
     let found =
-        amend(&sensors::model(), &all[..3], &all[3..], &Options::default(), &unheard).unwrap();
+        amend(&sensors::model(), &all[..3], &all[3..], &Options::default(), &ignore_progress)
+            .unwrap();
     let (given, after) = (at_5s(&found.amendment.given), at_5s(&found.amendment.after));
     println!("given {given:.5}, fitted {after:.5}");
     // a fifth more is required of every set, a twentieth aimed at
@@ -129,12 +130,12 @@ fn leaving_out_one_flight_after_the_other_names_the_lag() {
     };
     let given = Structure { name: "given".into(), fitted: Fitted::Nothing };
     let structures = [given, of(&[]), of(&["actuator_lag"]), of(&["actuator_lag", "motor_torque"])];
-    let scored = leave_one_out(&model, &all, &structures, &[1.0, 5.0], &unheard).unwrap();
+    let scored = leave_one_out(&model, &all, &structures, &[1.0, 5.0], &ignore_progress).unwrap();
     scored.iter().for_each(|s| println!("{s:?}"));
     let chosen: Vec<&str> =
         scored.iter().filter(|s| s.chosen).map(|s| s.structure.as_str()).collect();
     assert_eq!(chosen, ["actuator_lag"]);
     assert!(scored[2].mean < 0.5 * scored[1].mean, "{} {}", scored[2].mean, scored[1].mean);
-    let few = leave_one_out(&model, &all[..2], &structures, &[1.0], &unheard);
+    let few = leave_one_out(&model, &all[..2], &structures, &[1.0], &ignore_progress);
     assert!(matches!(few, Err(AmendError::TooFewFlights { flights: 2, .. })));
 }

@@ -8,7 +8,7 @@ use greylag::physics::catalogue;
 use greylag::physics::formula::{Status, register};
 use greylag::sim::missing::Missing;
 use greylag::sysid::diagnose::{Options, Verdict, diagnose};
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 
 mod lacking_support;
 
@@ -58,7 +58,7 @@ fn a_slipstream_over_the_elevator_is_found_without_a_rudder() {
     let effect = register::find("tail_slipstream").unwrap();
     let (model, search, _) =
         lacking_support::flown(Missing::written(effect, &[-0.8, 0.0]).unwrap(), 4401);
-    let found = diagnose(&model, &search, &Options::default(), &unheard).unwrap();
+    let found = diagnose(&model, &search, &Options::default(), &ignore_progress).unwrap();
     println!("{:?}", found.sentences);
     assert_eq!(found.verdict, Verdict::Effect);
     let asserted: Vec<_> = found.effects.iter().filter(|e| e.asserted).collect();

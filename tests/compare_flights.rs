@@ -34,7 +34,8 @@ fn flights(first: u64, noise: Noise) -> Vec<Reconstruction> {
 }
 
 fn against(models: &[GreyBox], flights: &[Reconstruction]) -> Comparison {
-    compare(models, flights, &Options::default(), &greylag::sysid::progress::unheard).unwrap()
+    compare(models, flights, &Options::default(), &greylag::sysid::progress::ignore_progress)
+        .unwrap()
 }
 
 fn one(name: &str, flights: &[Reconstruction]) -> ModelResult {
@@ -307,7 +308,7 @@ fn a_model_that_falls_out_of_the_sky_is_said_to() {
 fn what_cannot_be_compared_is_refused_with_the_reason() {
     let (prior, options) = ([model("prior")], Options::default());
     let try_with = |models: &[GreyBox], flights: &[Reconstruction], options: &Options| {
-        compare(models, flights, options, &greylag::sysid::progress::unheard)
+        compare(models, flights, options, &greylag::sysid::progress::ignore_progress)
             .map(|_| ())
             .unwrap_err()
     };

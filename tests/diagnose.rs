@@ -79,7 +79,8 @@ fn rebuilt(log: &Flight) -> Reconstruction {
 
 fn asked(seed: u64, flights: &[Reconstruction], options: &Options) -> Diagnosis {
     let found =
-        diagnose(&wrong(seed), flights, options, &greylag::sysid::progress::unheard).unwrap();
+        diagnose(&wrong(seed), flights, options, &greylag::sysid::progress::ignore_progress)
+            .unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
     diagnosis_support::agree(&found);
     found
@@ -161,9 +162,13 @@ fn searched_for(id: &str, amplitude: f64, seed: u64, options: &Options) -> Diagn
     let path = start.path().join("model.toml");
     std::fs::write(&path, starting_model(&reference, "start", seed, &missing).unwrap()).unwrap();
     let model = GreyBox::load(&path).unwrap();
-    let found =
-        diagnose(&model, &trained(seed, missing), options, &greylag::sysid::progress::unheard)
-            .unwrap();
+    let found = diagnose(
+        &model,
+        &trained(seed, missing),
+        options,
+        &greylag::sysid::progress::ignore_progress,
+    )
+    .unwrap();
     println!("{:#?}", found.sentences);
     found
 }
@@ -238,7 +243,7 @@ fn what_cannot_be_diagnosed_is_said() {
             &model,
             flights,
             &Options { without, ..Options::default() },
-            &greylag::sysid::progress::unheard,
+            &greylag::sysid::progress::ignore_progress,
         )
         .unwrap_err()
     };
@@ -275,7 +280,7 @@ fn the_prior_as_printed_has_its_thrust_and_its_inertia_wrong() {
         &printed,
         &trained(5, Vec::new()),
         &Options::default(),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap();
     println!("{:#?}", found.sentences);
@@ -305,7 +310,7 @@ fn an_inertia_of_the_wrong_sign_is_found_where_the_models_accelerations_mislead(
         &printed(),
         &trained(63, Vec::new()),
         &Options::default(),
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap();
     println!("{:#?}", found.sentences);

@@ -14,7 +14,7 @@ use greylag::physics::{Channel, Controls, State};
 use greylag::sim::missing::Missing;
 use greylag::sysid::amend::{Added, Options, amend};
 use greylag::sysid::diagnose;
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 use lacking_support::flown;
 use validate_support::{controls, histories, inputs as sent, model, plant};
 
@@ -143,7 +143,7 @@ fn fit_and_diagnosis_find_the_time_constant() {
     let (model, fit, test) = flown(Missing::written(effect, &[1.16, 0.5]).unwrap(), SEED);
     let effects = vec![Added { id: "yaw_by_spool".into(), start: None }];
     let options = Options { effects, ..Options::default() };
-    let amended = amend(&model, &fit, &test, &options, &unheard).unwrap();
+    let amended = amend(&model, &fit, &test, &options, &ignore_progress).unwrap();
     let value = |name: &str| {
         let all = amended.model.coefficients();
         all.iter().find(|c| c.name == format!("yaw_by_spool.{name}")).unwrap().value
@@ -153,7 +153,7 @@ fn fit_and_diagnosis_find_the_time_constant() {
 
     // the diagnosis names it; 10 ms are the doubt of the actuators' clock
     let options = diagnose::Options { with: vec!["yaw_by_spool".into()], ..Default::default() };
-    let found = diagnose::diagnose(&model, &fit, &options, &unheard).unwrap();
+    let found = diagnose::diagnose(&model, &fit, &options, &ignore_progress).unwrap();
     let first = &found.effects[0];
     assert!(first.asserted && first.id == "yaw_by_spool", "{:?}", found.sentences);
     let tau = first.parameters.iter().find(|p| p.name == "tau").unwrap().value;

@@ -15,7 +15,7 @@ use greylag::sim::instruments::Instruments;
 use greylag::sysid::diagnose::{Detail, Diagnosis, Options, diagnose};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 use greylag_sitl::hidden::Hidden;
 use greylag_sitl::plant::PlantOptions;
 use rand_distr::{Distribution, StandardNormal};
@@ -66,7 +66,7 @@ fn asked(seed: u64, hidden: &[(&str, f64)], installed: &Installation) -> Diagnos
     for n in flights.iter().flat_map(|f| &f.nuisances) {
         println!("{} {:.4} ± {:.4}", n.name, n.value, n.sd);
     }
-    let found = diagnose(&wrong(seed), &flights, &options, &unheard).unwrap();
+    let found = diagnose(&wrong(seed), &flights, &options, &ignore_progress).unwrap();
     println!("{:?} {:#?} {:#?}", found.verdict, found.sentences, found.notes);
     diagnosis_support::agree(&found);
     found

@@ -43,7 +43,7 @@ fn compared(flight: &Reconstruction) -> Comparison {
         &[model("prior-as-printed")],
         std::slice::from_ref(flight),
         &options,
-        &greylag::sysid::progress::unheard,
+        &greylag::sysid::progress::ignore_progress,
     )
     .unwrap()
 }

@@ -11,7 +11,7 @@ use greylag::sysid::amend;
 use greylag::sysid::diagnose::{Detail, Diagnosis, Options, Verdict, diagnose};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::per_flight::PerFlight;
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 use greylag_sitl::hidden::Hidden;
 use nalgebra::{Rotation3, Vector3};
 
@@ -63,7 +63,7 @@ fn asked(flights: &[Reconstruction], per_flight: PerFlight) -> Diagnosis {
         per_flight,
         ..Options::default()
     };
-    let found = diagnose(&off(&sensors::model(), 3), flights, &options, &unheard).unwrap();
+    let found = diagnose(&off(&sensors::model(), 3), flights, &options, &ignore_progress).unwrap();
     println!("{:?} {:#?}", found.verdict, found.sentences);
     found
 }
@@ -132,7 +132,9 @@ fn free_runs_find_trims_and_axes_and_leave_the_model_what_flights_have_in_common
     let fitted = |per_flight: PerFlight| {
         let options = amend::Options { per_flight, ..amend::Options::default() };
         let wrong = off(&sensors::model(), 3);
-        amend::amend(&wrong, &flights[..2], &flights[2..], &options, &unheard).unwrap().amendment
+        amend::amend(&wrong, &flights[..2], &flights[2..], &options, &ignore_progress)
+            .unwrap()
+            .amendment
     };
     let (without, with) = (
         fitted(PerFlight::default()),

@@ -8,7 +8,7 @@ use std::path::Path;
 use greylag::physics::formula::{Status, file, register};
 use greylag::sim::missing::Missing;
 use greylag::sysid::diagnose::{DiagnoseError, Options, Proposal, Verdict, propose, trend};
-use greylag::sysid::progress::{Stage, unheard};
+use greylag::sysid::progress::{Stage, ignore_progress};
 use lacking_support::flown;
 
 /// Seed of the flights; none of those that thresholds were set with.
@@ -21,7 +21,7 @@ fn a_thrust_line_to_the_left_is_named_and_tested() {
     let effect = register::load(&params.join("effects/yaw_by_throttle.toml")).unwrap()[0];
     let (model, search, test) = flown(Missing::written(effect, &[1.16]).unwrap(), SEED);
     let options = Options { without: vec!["thrust_line_sideways".into()], ..Options::default() };
-    let found = propose(&model, &search, &test, &options, &unheard).unwrap();
+    let found = propose(&model, &search, &test, &options, &ignore_progress).unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained);
     let chosen = found.front.iter().find(|r| r.chosen).unwrap();
     assert_eq!(chosen.formula, "yaw = k*throttle", "{:?}", found.sentences);
@@ -66,7 +66,7 @@ fn a_control_through_a_lag_is_found_with_its_time_constant() {
     let effect = register::read(LATE).unwrap();
     let (model, search, test) = flown(Missing::written(effect, &effect.values).unwrap(), SEED);
     let options = Options { free_forms: false, ..Options::default() };
-    let found = propose(&model, &search, &test, &options, &unheard).unwrap();
+    let found = propose(&model, &search, &test, &options, &ignore_progress).unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained);
     let own = file::parse(&found.effect.unwrap()).unwrap();
     assert_eq!((own.memories().len(), own.about.shape), (1, 1), "{:?}", found.sentences);
@@ -100,7 +100,7 @@ fn a_form_that_the_library_lacks_is_found_among_free_ones() {
     let (model, search, test) = flown(Missing::written(effect, &effect.values).unwrap(), SEED);
     let with = |free_forms: bool| {
         let options = Options { free_forms, ..Options::default() };
-        propose(&model, &search, &test, &options, &unheard).unwrap()
+        propose(&model, &search, &test, &options, &ignore_progress).unwrap()
     };
     let found = with(true);
     assert_eq!(found.verdict, Verdict::Unexplained);

@@ -35,7 +35,7 @@ pub fn ask(
         nulls: nulls.unwrap_or(usual.nulls),
         ..usual
     };
-    let said = diagnose(model, flights, &options, &greylag::sysid::progress::unheard)?;
+    let said = diagnose(model, flights, &options, &greylag::sysid::progress::ignore_progress)?;
     let asserted = said.effects.iter().filter(|c| c.asserted);
     let values = asserted.map(|c| (c.id.clone(), c.parameters.iter().map(|p| p.value).collect()));
     let values = values.collect();

@@ -186,7 +186,12 @@ fn fit(model: &GreyBox, ids: &[String], starts: &Starts, flights: &[amend::Fligh
         with.join(id, &start(model, id, starts)?)?;
     }
     let options = FitOptions { added: ids.to_vec(), ..FitOptions::default() };
-    Ok(amend::output_error::fit(&with, flights, &options, &greylag::sysid::progress::unheard)?)
+    Ok(amend::output_error::fit(
+        &with,
+        flights,
+        &options,
+        &greylag::sysid::progress::ignore_progress,
+    )?)
 }
 
 /// Values of an effect's coefficients from which a search may start: those known, else clear ones.

@@ -22,7 +22,7 @@ use greylag::sim::trial::Trial;
 use greylag::sysid::diagnose::{Options, Proposal, propose, signals};
 use greylag::sysid::flight_path::reconstruction::Reconstruction;
 use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
-use greylag::sysid::progress::unheard;
+use greylag::sysid::progress::ignore_progress;
 
 /// A model with the flights of an aircraft that has more to it.
 struct Case {
@@ -61,7 +61,7 @@ impl Case {
     fn proposal(&self, free_forms: bool) -> Result<(Proposal, f64), Box<dyn Error>> {
         let options = Options { seed: self.seed, free_forms, ..Options::default() };
         let start = Instant::now();
-        let found = propose(&self.model, &self.search, &self.test, &options, &unheard)?;
+        let found = propose(&self.model, &self.search, &self.test, &options, &ignore_progress)?;
         Ok((found, start.elapsed().as_secs_f64()))
     }
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::commands::status::INTERRUPTED;
-use crate::sysid::progress::{Cancelled, Stage, said};
+use crate::sysid::progress::{Cancelled, Stage, not_cancelled};
 
 /// Steps of a whole bar.
 const STEPS: u64 = 1000;
@@ -82,7 +82,7 @@ impl Bar {
     /// # Errors
     /// Ctrl-C was pressed.
     pub fn go_on(&self) -> Result<(), Cancelled> {
-        said(pressed())
+        not_cancelled(pressed())
     }
 
     /// Prints a line of the result above the bar.

@@ -90,7 +90,7 @@ impl Reporter<'_> {
             models,
             &[path],
             &compare::Options::default(),
-            &crate::sysid::progress::unheard,
+            &crate::sysid::progress::ignore_progress,
         )
         .map_err(|e| report(&e))
         .ok()

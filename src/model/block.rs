@@ -1,4 +1,4 @@
-//! Sixteen aircraft a step on, in the widest registers that the processor has.
+//! One step of sixteen aircraft at once, in the widest vector registers of the processor.
 
 use crate::{GreyBox, Memory};
 #[cfg(target_arch = "x86_64")]
@@ -6,12 +6,12 @@ use greylag_num::{Avx2, Avx512};
 use greylag_num::{Base, Lanes, Packed, ROW};
 use greylag_physics::{Controls, State};
 
-/// Sixteen numbers, one an aircraft.
+/// Sixteen numbers, one for each aircraft.
 pub type Block = Lanes<ROW>;
 
 impl GreyBox {
-    /// [`step`](GreyBox::step) of sixteen aircraft. No multiply-add is fused, so that all processors give
-    /// the same numbers to the bit.
+    /// Advances sixteen aircraft by one [`step`](GreyBox::step). No multiply-add is fused, so that all processors
+    /// give bit-identical results.
     pub fn step_block(
         &self,
         state: &State<Block>,

@@ -1,9 +1,9 @@
-//! The envelope of the data that a residual was trained on: how far from it a point lies.
+//! Envelope of a residual's training data, with the distance of a point from it.
 //!
 //! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples lie within 1. The
-//! leverage is that of a linear regression on 1, the network's inputs and the units of its last hidden layer,
-//! x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the data and where units act
-//! that hardly acted on it; the variance of a Bayesian last layer is proportional to it.
+//! leverage is that of a linear regression on 1, the network's inputs and the units of its last hidden layer, x̂ᵀ
+//! (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the data and where units are active that were
+//! hardly active on it; the variance of a Bayesian last layer is proportional to it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,25 +11,25 @@ use crate::residual::INPUTS;
 use greylag_num::Dense;
 use greylag_num::dense::ON_STACK;
 
-/// Features at most: 1, the inputs, the widest hidden layer.
+/// Largest number of features: 1, the inputs, the widest hidden layer.
 const MOST: usize = 1 + INPUTS + ON_STACK;
 
-/// Ridge on the features' second moments, as a part of their mean: a unit that never acted has no moment.
+/// Ridge on the features' second moments, as a share of their mean, because a unit that was never active has none.
 const RIDGE: f64 = 1e-4;
 
-/// The part of the training samples that lies within a distance of 1.
+/// Share of the training samples within a distance of 1.
 const WITHIN: f64 = 0.999;
 
-/// The envelope of training data in the space of a network's features.
+/// Envelope of training data in the space of a network's features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataEnvelope {
-    /// W, row-major and square: the distance of features x̂ is ‖W x̂‖.
+    /// Whitening matrix W, row-major and square: the distance of features x̂ is ‖W x̂‖.
     whitening: Vec<f32>,
 }
 
 impl DataEnvelope {
-    /// The envelope of `inputs`, the scaled inputs of `network` at the training samples; `None` if there are none, or
-    /// one is no number.
+    /// The envelope of `inputs`, the scaled inputs of `network` at the training samples; `None` if there are none or
+    /// one is not finite.
     pub fn of(network: &Dense, inputs: &[[f64; INPUTS]]) -> Option<DataEnvelope> {
         let all: Vec<DVector<f64>> = inputs
             .iter()
@@ -56,7 +56,7 @@ impl DataEnvelope {
     /// The envelope with the matrix W, row-major, for `network`.
     ///
     /// # Errors
-    /// If its size is not that of the network's features, or an entry is no finite number.
+    /// If its size is not that of the network's features, or an entry is not finite.
     pub fn new(whitening: Vec<f32>, network: &Dense) -> Result<DataEnvelope, String> {
         let features = features(network, &[0.0; INPUTS]).1;
         if whitening.len() != features * features {
@@ -69,7 +69,7 @@ impl DataEnvelope {
         Ok(DataEnvelope { whitening })
     }
 
-    /// W, row-major.
+    /// Whitening matrix W, row-major.
     pub fn whitening(&self) -> &[f32] {
         &self.whitening
     }
@@ -79,7 +79,7 @@ impl DataEnvelope {
         self.whitening.len().isqrt()
     }
 
-    /// The distance of the scaled `inputs` of `network`: 0.999 of the training samples lie within 1.
+    /// Distance of the scaled `inputs` of `network`: 99.9 % of the training samples lie within 1.
     pub fn distance(&self, network: &Dense, inputs: &[f64; INPUTS]) -> f64 {
         let (features, count) = features(network, inputs);
         let rows = self.whitening.chunks_exact(count);
@@ -90,7 +90,7 @@ impl DataEnvelope {
     }
 }
 
-/// 1, the inputs, the units of the last hidden layer, and how many that are.
+/// Features (1, the inputs, the units of the last hidden layer) and their number.
 fn features(network: &Dense, inputs: &[f64; INPUTS]) -> ([f64; MOST], usize) {
     let mut features = [0.0; MOST];
     features[0] = 1.0;

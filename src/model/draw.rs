@@ -1,4 +1,4 @@
-//! Models drawn from what is not known of one: Monte Carlo over its coefficients.
+//! Monte Carlo draws of models from the uncertainty of the coefficients.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -6,11 +6,11 @@ use crate::{GreyBox, Named};
 use greylag_num::stream;
 use greylag_physics::effects::Kind;
 
-/// Purpose of the random stream.
+/// Number of the random stream.
 const DRAWS: u64 = 40;
 
 impl GreyBox {
-    /// The physical bounds of the coefficient of that full name, for an aircraft of this size.
+    /// Physical bounds of the coefficient `name`, for an aircraft of this size.
     pub fn bounds_of(&self, name: &str) -> Option<(f64, f64)> {
         let (effect, coefficient) = name.split_once('.')?;
         let about = Kind::from_id(effect)?.describe();
@@ -18,8 +18,9 @@ impl GreyBox {
         Some(self.size().bounds(found))
     }
 
-    /// Draw `k` of `seed`: every coefficient is normal about its value, with its [width](Named::width) as
-    /// standard deviation, held within its physical bounds. Mass, inertia, actuators and the residual stay.
+    /// Draw `k` of `seed`: every coefficient is normally distributed about its value, with its [width](Named::width)
+    /// as standard deviation, limited to its physical bounds. Mass, inertia, actuators and the residual are
+    /// unchanged.
     pub fn drawn(&self, seed: u64, k: u64) -> GreyBox {
         let mut rng = stream::stream(seed, &[DRAWS, k]);
         let draw = |c: &Named| {

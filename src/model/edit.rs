@@ -1,61 +1,60 @@
-//! Edits of a model file's text: new values, new effects, everything else as its author wrote it.
+//! Edits of a model file's text: new values and effects, with everything else unchanged.
 
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-/// Why a model file's text cannot be edited.
+/// Error of editing a model file's text.
 #[derive(Debug, thiserror::Error)]
 pub enum EditError {
-    /// It is no TOML.
+    /// The text is not valid TOML.
     #[error("cannot edit the model file: {0}; `greylag compare` tells what is wrong with it")]
     Syntax(#[from] toml_edit::TomlError),
-    /// A place is missing or is something else.
+    /// An entry is missing or has another type.
     #[error("cannot edit the model file: {0} is not where a model file has it")]
     Place(String),
-    /// An effect is there already.
+    /// The model already has the effect.
     #[error("cannot add {0} to the model file: it has that effect already")]
     Present(String),
 }
 
-/// A number to write.
+/// A number to write into a model file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Number {
-    /// `effect.coefficient`.
+    /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
-    /// Its value.
+    /// Value in the coefficient's unit.
     pub value: f64,
-    /// Its standard deviation, in the unit of the value.
+    /// Standard deviation, in the unit of the value.
     pub sd: Option<f64>,
-    /// Its bounds, in the unit of the value, where they are its own.
+    /// Bounds in the unit of the value, if the model states its own.
     pub bounds: Option<[f64; 2]>,
 }
 
-/// What changes in a model file.
+/// Changes to a model file.
 #[derive(Clone, Debug, Default)]
 pub struct Edit {
-    /// The new name of the model.
+    /// New name of the model.
     pub name: String,
-    /// The airframe file, relative to the new model file.
+    /// Path of the airframe file, relative to the new model file.
     pub airframe: String,
-    /// Coefficients that are there already.
+    /// New values of existing coefficients.
     pub changed: Vec<Number>,
-    /// Coefficients of effects that are new, those of one effect in a row, with the source of the
-    /// effect's formula.
+    /// Coefficients of new effects, those of one effect in sequence, with the source of the effect's formula.
     pub added: Vec<(Number, String)>,
-    /// Coefficients that become zero, each with the effect that stands in its place.
+    /// Coefficients set to zero, each with the effect that replaces its term.
     pub dropped: Vec<(String, &'static str)>,
-    /// Texts that stand in place of what the file has: keys, the last of them below the others.
+    /// Replaced texts: path of keys, outermost first, and the new text.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
-    /// Files of effects that are no part of the catalogue, relative to the new model file.
+    /// Effect files outside the catalogue, relative to the new model file.
     pub effect_files: Vec<String>,
-    /// What they were fitted to, for their sources.
+    /// Flights that the values were fitted to, for their sources.
     pub fitted_to: String,
 }
 
 impl Edit {
-    /// `text`, a model file, with the edit made; comments and everything else as they were.
+    /// Applies the edit to `text`, a model file; comments and everything else are unchanged.
     ///
     /// # Errors
-    /// The text is no model file, or has an effect already that would be added.
+    /// The text is not a model file, or already has an effect to be added.
     pub fn apply(&self, text: &str) -> Result<String, EditError> {
         let mut document: DocumentMut = text.parse()?;
         for (key, new) in [("name", &self.name), ("airframe", &self.airframe)] {
@@ -128,7 +127,7 @@ impl Edit {
     }
 }
 
-/// The entry of the coefficient `name`.
+/// Entry of the coefficient `name`.
 fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item, EditError> {
     let (id, short) = split(name)?;
     let effect = effects.get_mut(id).and_then(Item::as_table_like_mut);
@@ -136,7 +135,7 @@ fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item,
     item.ok_or_else(|| EditError::Place(format!("effects.{name}")))
 }
 
-/// Makes the coefficient `name` zero for the sake of the effect `by`.
+/// Sets the coefficient `name` to zero because the effect `by` replaces its term.
 fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result<(), EditError> {
     let place = || EditError::Place(format!("effects.{name}"));
     let item = entry(effects, name)?;
@@ -150,7 +149,7 @@ fn drop_coefficient(effects: &mut dyn TableLike, name: &str, by: &str) -> Result
     Ok(())
 }
 
-/// The source of a coefficient, said to be amended once however often it was.
+/// The source of a coefficient without the remark of an earlier amendment.
 fn original(source: &str) -> String {
     let amended = "greylag amend: ";
     let bare = source.strip_prefix(amended).and_then(|s| s.split("; fitted to ").next());
@@ -161,7 +160,7 @@ fn split(name: &str) -> Result<(&str, &str), EditError> {
     name.split_once('.').ok_or_else(|| EditError::Place(name.into()))
 }
 
-/// Puts `new` in the place of `old`, spaces and comments around it left alone.
+/// Replaces the value `old` by `new`, with the surrounding spaces and comments unchanged.
 fn replace(old: &mut Value, mut new: Value) {
     *new.decor_mut() = old.decor().clone();
     *old = new;
@@ -240,7 +239,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
         let source = dropped["source"].as_str();
         assert_eq!(source, Some("greylag amend: zero, lift_table stands in its place"));
         assert_eq!(read["effects"]["lift_stall"]["k"]["value"].as_float(), Some(1.0));
-        // amended again, the source tells of the last fit only
+        // amended again, the source names the last fit only
         let again = Edit { fitted_to: "b.csv".into(), added: Vec::new(), ..edit() };
         let read: toml::Table = toml::from_str(&again.apply(&text).unwrap()).unwrap();
         let source = read["effects"]["lift_linear"]["CLalpha"]["source"].as_str();

@@ -1,4 +1,4 @@
-//! Model files: TOML that names the effects and gives every number with its source.
+//! Model files: TOML that names the effects and states every number with its source.
 
 use std::path::Path;
 
@@ -85,7 +85,7 @@ struct TableFile {
 struct GridFile {
     throttle: Vec<f64>,
     airspeed_mps: Vec<f64>,
-    /// A row for each throttle.
+    /// One row for each throttle.
     value: Vec<Vec<f64>>,
     #[serde(rename = "source")]
     _source: String,
@@ -95,7 +95,7 @@ impl GreyBox {
     /// Reads a model file (`schema = 1`) and the airframe file it names, relative to itself.
     ///
     /// # Errors
-    /// If a file cannot be read, is no such TOML, names an unknown effect or coefficient, lacks
+    /// If a file cannot be read, has a syntax error or another schema, names an unknown effect or coefficient, lacks
     /// one, or holds a number that is not physical.
     pub fn load(path: &Path) -> Result<GreyBox, FileError> {
         let what = "model file";
@@ -108,7 +108,7 @@ impl GreyBox {
         GreyBox::parse(&text, path)
     }
 
-    /// Reads the text of a model file that lies, or would lie, at `path`.
+    /// Parses the text of a model file stored, or to be stored, at `path`.
     ///
     /// # Errors
     /// As for [`GreyBox::load`].
@@ -137,7 +137,7 @@ impl GreyBox {
     }
 }
 
-/// Moments of inertia of aircraft, kg m²: from those of a few grams to those of airliners.
+/// Range of moments of inertia of aircraft, kg m², from a few grams of mass to airliners.
 const INERTIA: [f64; 2] = [1e-7, 1e9];
 
 fn inertia(field: &str, number: &Sourced) -> Result<f64, String> {
@@ -199,7 +199,7 @@ impl File {
     }
 }
 
-/// Refuses more effects with memory than a model has room for.
+/// Rejects more effects with memory than a model can hold.
 fn can_be_remembered(inputs: usize, terms: &[Term]) -> Result<(), String> {
     if inputs > inputs::MOST {
         return Err(format!(
@@ -254,8 +254,7 @@ impl AirFile {
     }
 }
 
-/// One effect's coefficients and points out of its TOML table; what that leaves out of an effect of a file is as
-/// its own file has it.
+/// Coefficients and tables of one effect from its TOML table; missing ones of an effect file keep that file's values.
 fn effect(
     about: &Description,
     written: Option<&Written>,
@@ -303,7 +302,7 @@ fn effect(
     Ok((named, points))
 }
 
-/// The coefficient of the effect `id` that `about` describes, within its bounds.
+/// Coefficient of the effect `id` described by `about`, checked against its bounds.
 fn checked(id: &str, about: &Coefficient, number: &Sourced, size: &Size) -> Result<Named, String> {
     let name = about.name;
     let own = number.bounds.map(|[low, high]| (low, high));

@@ -1,11 +1,10 @@
-//! What the effects of a model make: forces and moments, accelerations, the state's rate.
+//! Forces and moments, accelerations and state rates of a model.
 //!
-//! Effects that need only the point are summed first, in code that holds nothing else: a planner
-//! spends most of its time there. Only a model with other effects goes on to work out what those
-//! need, [`Base`].
+//! Effects that need only the point are summed first, in separate code, where a planner spends most of its time. Only
+//! a model with other effects also computes their input, [`Base`].
 //!
-//! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several
-//! instruction sets stays in its own; everyone else calls the plain ones, which are compiled once.
+//! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several instruction sets
+//! stays within its own; other callers use the plain ones, which are compiled once.
 
 use super::GreyBox;
 use super::grey_box::{Named, Term};
@@ -15,11 +14,11 @@ use greylag_physics::point::Base;
 use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, Point, State, Wrench};
 
-/// Passes over the effects that depend on the state's rate. Each brings the rate at least a factor of
-/// two closer within the bounds of `unsteady_lift`, a factor of ten at customary values.
+/// Fixed-point passes over the effects that depend on the state's rate. Each pass reduces the error by at least a
+/// factor of two within the bounds of `unsteady_lift`, by a factor of ten at usual values.
 const RATE_PASSES: usize = 4;
 
-/// Where a model is asked: state, controls, airflow.
+/// Point of evaluation: state, controls, airflow.
 #[derive(Clone, Copy)]
 struct Place<'a, R> {
     state: &'a State<R>,
@@ -27,9 +26,9 @@ struct Place<'a, R> {
     air: &'a AirData<R>,
 }
 
-/// The coefficients by which terms are multiplied.
+/// Coefficients that weight the terms.
 pub trait Weights<R>: Copy {
-    /// `amount` times the coefficient that has this place in the model's list.
+    /// Product of `amount` and the coefficient at index `place` of the model's list.
     fn weigh(self, place: usize, amount: R) -> R;
 }
 
@@ -40,23 +39,23 @@ impl<R: Real> Weights<R> for &[Named] {
     }
 }
 
-/// The sum of terms times their coefficients.
+/// Sum of terms weighted by their coefficients.
 struct Sum<W, R> {
     weights: W,
-    /// Place of the reporting effect's first coefficient.
+    /// Index of the reporting effect's first coefficient.
     first: usize,
     wrench: Wrench<R>,
 }
 
-/// Terms handed on with the place of their coefficient in the whole model.
+/// Terms passed on with the index of their coefficient in the whole model.
 struct Each<'a, F> {
     first: usize,
     term: &'a mut F,
 }
 
-/// Terms of an effect whose coefficients start at a given place in the model's list.
+/// Receiver of the terms of effects that start at a given index of the model's coefficients.
 pub trait Starting<R>: Terms<R> {
-    /// The terms that follow are of an effect whose first coefficient has this place.
+    /// Announces the terms of an effect whose first coefficient has this index.
     fn start_at(&mut self, first: usize);
 }
 
@@ -88,7 +87,7 @@ impl<R: Real, F: FnMut(usize, Channel, R)> Starting<R> for Each<'_, F> {
     }
 }
 
-/// State, controls and airflow with the surfaces centred, then also without body rates.
+/// Evaluation points with the surfaces centred, and also without body rates.
 #[inline(always)]
 pub fn parted<R: Real>(
     state: &State<R>,
@@ -103,7 +102,7 @@ pub fn parted<R: Real>(
 }
 
 impl GreyBox {
-    /// Forces and moments of all effects.
+    /// Total force and moment of all effects.
     pub fn wrench<R: Real>(
         &self,
         state: &State<R>,
@@ -128,7 +127,7 @@ impl GreyBox {
         self.with_dependent(&place, wrench).1
     }
 
-    /// What one unit of each coefficient contributes: calls `term` with its place in
+    /// Contribution of one unit of each coefficient: calls `term` with its index in
     /// [`coefficients`](GreyBox::coefficients), a channel and the amount in N or N m.
     pub fn contributions<R: Real>(
         &self,
@@ -146,12 +145,12 @@ impl GreyBox {
         }
     }
 
-    /// What the effects get as input that need more than the point.
+    /// Input of the effects that need more than the point.
     fn base<R: Real>(&self, place: &Place<R>) -> Base<R> {
         self.with_dependent(place, self.independent_sum(place)).0
     }
 
-    /// Reports the effects that need only the point.
+    /// Reports the terms of effects that need only the point.
     #[inline(always)]
     fn independent_terms<R: Real>(&self, place: &Place<R>, terms: &mut impl Starting<R>) {
         let base = Base::zero();
@@ -163,7 +162,7 @@ impl GreyBox {
         }
     }
 
-    /// Reports the effects that need more, which `base` gives.
+    /// Reports the terms of the other effects, given their input `base`.
     #[inline(always)]
     fn dependent_terms<R: Real>(
         &self,
@@ -185,7 +184,7 @@ impl GreyBox {
         Point { state, controls, air, geometry: &self.airframe.geometry, axes: self.axes, base }
     }
 
-    /// The sum of the effects that need only the point.
+    /// Sum of the effects that need only the point.
     #[inline(always)]
     fn independent_sum<R: Real>(&self, place: &Place<R>) -> Wrench<R> {
         let mut sum = self.sum_from(Wrench::zero());
@@ -198,8 +197,8 @@ impl GreyBox {
         Sum { weights: &self.coefficients, first: 0, wrench }
     }
 
-    /// What the other effects get as input, where `independent` is the sum of those that need only the
-    /// point, with the sum of all.
+    /// Input of the other effects, where `independent` is the sum of those that need only the point, and the sum of
+    /// all.
     #[inline(always)]
     fn with_dependent<R: Real>(
         &self,
@@ -241,8 +240,7 @@ impl GreyBox {
         }
     }
 
-    /// The sum of the effects that need only the point with the surfaces centred, then also without
-    /// body rates.
+    /// Sums of the effects that need only the point with the surfaces centred, and also without body rates.
     #[inline(always)]
     fn parts<R: Real>(&self, place: &Place<R>) -> [Wrench<R>; 2] {
         let mut sums = [Wrench::zero(); 2];
@@ -254,7 +252,7 @@ impl GreyBox {
         sums
     }
 
-    /// Hands what the effects contribute that need only the point to `terms`, as part of its caller.
+    /// Reports the terms of effects that need only the point to `terms`; inlined into the caller.
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn report_independent<R: Real>(
@@ -267,8 +265,8 @@ impl GreyBox {
         self.independent_terms(&Place { state, controls, air }, terms);
     }
 
-    /// [`accelerations`](GreyBox::accelerations) of the effects that need only the point, as part of
-    /// its caller: all of them where [`needs`](GreyBox::needs) says [`Needs::Point`].
+    /// [`accelerations`](GreyBox::accelerations) due to the effects that need only the point, inlined into the
+    /// caller; these are all effects if [`needs`](GreyBox::needs) is [`Needs::Point`].
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn independent_accelerations<R: Real>(
@@ -281,8 +279,8 @@ impl GreyBox {
         self.accelerations_under(&wrench, state, air)
     }
 
-    /// Sums of the effects that need only the point: as they are, with the surfaces centred, and also without body
-    /// rates; the last two are zero where no effect needs them.
+    /// Sums of the effects that need only the point: unmodified, with the surfaces centred, and also without body
+    /// rates; the last two are zero if no effect needs them.
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn independent_sums<R: Real>(
@@ -299,8 +297,8 @@ impl GreyBox {
         sums
     }
 
-    /// Forces and moments of all effects, made from [`independent_sums`](GreyBox::independent_sums), the other
-    /// effects having the coefficients `weights`.
+    /// Total force and moment from [`independent_sums`](GreyBox::independent_sums), with `weights` as the
+    /// coefficients of the other effects.
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn whole_wrench<R: Real>(
@@ -316,8 +314,7 @@ impl GreyBox {
         self.completed(&place, independent, parts, weights).1
     }
 
-    /// Places in the list of coefficients of those of the effects that need more than the point; shape constants are
-    /// not among them.
+    /// Indices of the coefficients of the effects that need more than the point, without shape constants.
     #[cfg(feature = "learn")]
     pub fn dependent_coefficients(&self) -> impl Iterator<Item = usize> + '_ {
         self.terms[self.independent..].iter().flat_map(|term| {
@@ -337,7 +334,7 @@ impl GreyBox {
         self.accelerations_inlined(state, controls, air)
     }
 
-    /// [`accelerations`](GreyBox::accelerations) as part of its caller.
+    /// [`accelerations`](GreyBox::accelerations), inlined into the caller.
     #[inline(always)]
     pub fn accelerations_inlined<R: Real>(
         &self,
@@ -369,7 +366,7 @@ impl GreyBox {
         (acceleration, rigid_body::angular_acceleration(&body, state, moment))
     }
 
-    /// The state's rate of change ṡ, per second, at `altitude` (m).
+    /// State derivative ṡ, units of [`State`] per second, at `altitude` (m).
     pub fn rate<R: Real>(
         &self,
         state: &State<R>,
@@ -379,7 +376,7 @@ impl GreyBox {
         self.rate_inlined(state, controls, altitude)
     }
 
-    /// [`rate`](GreyBox::rate) as part of its caller.
+    /// [`rate`](GreyBox::rate), inlined into the caller.
     #[inline(always)]
     pub(super) fn rate_inlined<R: Real>(
         &self,

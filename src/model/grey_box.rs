@@ -1,4 +1,4 @@
-//! The dynamics model: which effects act, with which coefficients, on which rigid body.
+//! The grey-box dynamics model: physical effects with their coefficients on a rigid body, and a learned residual.
 
 use crate::{Integrator, Residual};
 use greylag_num::{Grid, Real, Table};
@@ -11,35 +11,34 @@ use greylag_physics::rigid_body::{ForceAxes, RigidBody};
 use greylag_physics::size::Size;
 use greylag_physics::{AirData, Airframe, Controls, State};
 
-/// A coefficient of a model: full name, value, standard deviation.
+/// A coefficient of a model with its prior uncertainty and bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
-    /// `effect.coefficient`, as in the model file.
+    /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
-    /// Its value.
+    /// Value, in the unit of the catalogue.
     pub value: f64,
-    /// Its standard deviation as a prior, where the file states one.
+    /// Prior standard deviation, if the file states one; see [`Named::width`].
     pub sd: Option<f64>,
-    /// The least and the most that it can be, where the file or a user says so; else what the catalogue has for an
-    /// aircraft of this size.
+    /// Bounds stated by the file or the user; if `None`, those of the catalogue for an aircraft of this size apply.
     pub bounds: Option<[f64; 2]>,
 }
 
-/// The effect that holds a rudder's forces and moments.
+/// Id of the effect with a rudder's forces and moments.
 pub const RUDDER: &str = "rudder_linear";
 
 /// Prior width of a coefficient whose file states none, as a share of its value.
 const WIDTH: f64 = 0.15;
 
 impl Named {
-    /// Its standard deviation as a prior: the stated one, else 15 % of its value
-    /// (`docs/explanation/diagnosis.md`, the algebra). A coefficient of zero without a stated width is held.
+    /// Prior standard deviation: the stated one, else 15 % of its value (`docs/explanation/diagnosis.md`, the
+    /// algebra). A coefficient of zero without a stated width is held.
     pub fn width(&self) -> f64 {
         self.sd.unwrap_or(WIDTH * self.value.abs())
     }
 }
 
-/// What an effect has beside its coefficients.
+/// Table and grid of an effect.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Points {
     pub(super) table: Option<Table>,
@@ -47,67 +46,89 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// With the rest of what belongs to the effect.
+    /// Combines them with the other data that belong to the effect.
     #[inline(always)]
     pub(super) fn own<'a>(&'a self, shape: &'a [f64], first_lag: usize) -> Own<'a> {
         Own { table: self.table.as_ref(), grid: self.grid.as_ref(), shape, first_lag }
     }
 }
 
-/// An effect as a model uses it.
+/// An effect of a model.
 #[derive(Clone, Debug)]
 pub(super) struct Term {
     pub(super) kind: Kind,
-    /// Place of its first coefficient in the model's list.
+    /// Index of its first coefficient in the model's list.
     pub(super) first: usize,
     pub(super) points: Points,
-    /// The values of its shape constants, kept beside it for speed.
+    /// Values of its shape constants, copied from the coefficients for speed.
     pub(super) shape: Vec<f64>,
-    /// Place of its first lag among those of the model.
+    /// Index of its first lag among those of the model.
     pub(super) first_lag: usize,
 }
 
 impl Term {
-    /// An effect whose coefficients start at `first`.
+    /// A term whose coefficients start at index `first`.
     pub(super) fn new(kind: Kind, first: usize, points: Points) -> Term {
         Term { kind, first, points, shape: vec![0.0; kind.describe().shape], first_lag: 0 }
     }
 }
 
-/// ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a sum of effects on a rigid body, with
-/// what was learned beside it.
+/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: physical effects on a rigid body, and
+/// a learned residual F_a.
+///
+/// The model has the parameters and equations but no flight state: all evaluations take `&self`, so one model can
+/// serve several threads. Units are SI and radians, body axes FRD. Its methods are of four kinds:
+///
+/// - Construction: [`load`](GreyBox::load) reads a model file with its airframe, [`parse`](GreyBox::parse) a text;
+///   [`join`](GreyBox::join) adds an effect.
+/// - Change of parameters: [`set_coefficient`](GreyBox::set_coefficient),
+///   [`set_coefficients`](GreyBox::set_coefficients), [`set_body`](GreyBox::set_body),
+///   [`set_bounds`](GreyBox::set_bounds), [`with_widths`](GreyBox::with_widths). Values are not checked against their
+///   bounds. Set mass and inertia with `set_body`, since the public `body` is computed from them and from the effects
+///   on them at each change.
+/// - Evaluation at an instant: [`wrench`](GreyBox::wrench), [`contributions`](GreyBox::contributions),
+///   [`accelerations`](GreyBox::accelerations), [`rate`](GreyBox::rate), from the state and the deflections that act.
+/// - Advance by one [`STEP`](crate::STEP), 0.01 s: first [`act`](GreyBox::act) converts the actuators' positions to
+///   the deflections that act, then [`step`](GreyBox::step) integrates with these held.
+///
+/// Time enters through the caller's memories alone: `act` and `step` each must be called exactly once in every
+/// [`STEP`](crate::STEP) of a run, with the [`InputMemory`] and the [`Memory`](crate::Memory) of that run. Start a
+/// run with [`at_rest`](GreyBox::at_rest) and the default integrator memory. A model without input effects and lags
+/// ([`acts_at_once`](GreyBox::acts_at_once)) needs no `act`. [`Twin`](crate::Twin) performs these calls in order for
+/// a simulated aircraft.
 #[derive(Clone, Debug)]
 pub struct GreyBox {
-    /// The model's name, from its file.
+    /// Name of the model, from its file.
     pub name: String,
-    /// What its file says that it is.
+    /// Description of the model, from its file.
     pub description: String,
     /// SHA-256 of the files that it was read from, hexadecimal: model, residual, effect files.
     pub sha256: String,
-    /// The aircraft it describes.
+    /// Geometry, actuators and limits of the aircraft.
     pub airframe: Airframe,
-    /// Mass and inertia as the model believes them, its effects on them included.
+    /// Mass and inertia including the effects on them; recomputed at each change of coefficients, see
+    /// [`set_body`](GreyBox::set_body).
     pub body: RigidBody,
     /// Mass and inertia without those effects.
     pub(super) bare_body: RigidBody,
-    /// Air and gravity as the model believes them.
+    /// Density law and gravity of the model.
     pub atmosphere: Atmosphere,
-    /// Axes in which its aerodynamic forces act.
+    /// Axes of the model's aerodynamic forces.
     pub axes: ForceAxes,
-    /// How it steps through time.
+    /// Time integration scheme.
     pub integrator: Integrator,
-    /// What was learned beside the effects, F_a.
+    /// Learned residual F_a beside the effects, if there is one.
     pub residual: Option<Residual>,
-    /// Effects that need only the point come first, then by what they need.
+    /// Effects, those that need only the point first, then sorted by their needs.
     pub(super) terms: Vec<Term>,
-    /// How many of the terms need only the point.
+    /// Number of the terms that need only the point.
     pub(super) independent: usize,
-    /// Input effects with the place of their constant, in the order of [`inputs::Kind::ALL`].
+    /// Input effects with the index of their constant, in the order of [`inputs::Kind::ALL`].
     pub(super) inputs: Vec<(inputs::Kind, usize)>,
     pub(super) coefficients: Vec<Named>,
-    /// How many lags and delays its formulas have, at most [`LAGS`].
+    /// Number of lags and delays in formulas, at most [`LAGS`].
     pub(super) lags: usize,
-    /// Whether the link that it is flown through carries no command for a rudder.
+    /// Whether the link carries no rudder command.
     pub(super) rudder_is_left: bool,
 }
 
@@ -117,8 +138,8 @@ impl GreyBox {
         &self.coefficients
     }
 
-    /// Changes one coefficient by its full name; `false` if the model has none of that name. The value
-    /// is not checked: a fit may pass through what is not physical.
+    /// Sets one coefficient by its full name; `false` if the model has none of that name. The value is not checked
+    /// against bounds, because a fit may pass through unphysical values.
     pub fn set_coefficient(&mut self, name: &str, value: f64) -> bool {
         let Some(found) = self.coefficients.iter_mut().find(|c| c.name == name) else {
             return false;
@@ -128,17 +149,17 @@ impl GreyBox {
         true
     }
 
-    /// Changes all coefficients, in the order of [`coefficients`](GreyBox::coefficients), unchecked.
+    /// Sets all coefficients, in the order of [`coefficients`](GreyBox::coefficients), unchecked.
     ///
     /// # Panics
-    /// If there are more or fewer `values` than coefficients.
+    /// If the number of `values` differs from that of the coefficients.
     pub fn set_coefficients(&mut self, values: &[f64]) {
         assert_eq!(values.len(), self.coefficients.len(), "a value for each coefficient");
         self.coefficients.iter_mut().zip(values).for_each(|(c, v)| c.value = *v);
         self.renew();
     }
 
-    /// Changes mass and inertia; effects on them act on the new ones.
+    /// Sets mass and inertia; effects on them apply to the new values.
     pub fn set_body(&mut self, body: RigidBody) {
         self.bare_body = body;
         self.renew();
@@ -149,7 +170,7 @@ impl GreyBox {
         &self.bare_body
     }
 
-    /// The most that one of the effects needs.
+    /// The largest need among the effects.
     pub fn needs(&self) -> Needs {
         self.terms.last().map_or(Needs::Point, |term| term.kind.needs())
     }
@@ -159,7 +180,7 @@ impl GreyBox {
         self.effects().any(|about| about.id == id)
     }
 
-    /// Whether the aircraft has a rudder that yaws it, as far as the model knows, and that is commanded.
+    /// Whether the model has a rudder that yaws the aircraft and is commanded.
     pub fn has_rudder(&self) -> bool {
         let yaws = |c: &Named| c.name == "rudder_linear.Cndr" && c.value != 0.0;
         self.airframe.actuators.rudder.is_some()
@@ -167,7 +188,7 @@ impl GreyBox {
             && self.coefficients.iter().any(yaws)
     }
 
-    /// The same model with other prior standard deviations: `sd` gives that of a coefficient, or `None` to leave it.
+    /// The same model with other prior standard deviations: `sd` returns that of a coefficient, or `None` to keep it.
     pub fn with_widths(mut self, sd: impl Fn(&Named) -> Option<f64>) -> GreyBox {
         for c in &mut self.coefficients {
             c.sd = sd(c).or(c.sd);
@@ -175,51 +196,51 @@ impl GreyBox {
         self
     }
 
-    /// The model with bounds of its own for the coefficient `name` (`effect.coefficient`); whether it has that.
+    /// Sets bounds for the coefficient `name` (`effect.coefficient`); `false` if the model has none of that name.
     pub fn set_bounds(&mut self, name: &str, bounds: [f64; 2]) -> bool {
         let found = self.coefficients.iter_mut().find(|c| c.name == name);
         found.map(|c| c.bounds = Some(bounds)).is_some()
     }
 
-    /// The least and the most that the coefficient number `place` can be, of which the catalogue knows `about`.
+    /// Bounds of the coefficient at index `place`, described by `about` in the catalogue.
     pub fn bounds(&self, place: usize, about: &Coefficient) -> (f64, f64) {
         let own = self.coefficients[place].bounds;
         own.map_or_else(|| self.size().bounds(about), |[low, high]| (low, high))
     }
 
-    /// The same aircraft flown through a link that carries no command for a rudder: it stays where it is.
+    /// The same aircraft on a link without a rudder command; its rudder is not moved.
     pub fn leaving_rudder(mut self) -> GreyBox {
         self.rudder_is_left = true;
         self
     }
 
-    /// The effects that the model names.
+    /// Descriptions of the model's effects.
     pub fn effects(&self) -> impl Iterator<Item = Description> {
         let inputs = self.inputs.iter().map(|(kind, _)| kind.describe());
         self.terms.iter().map(|term| term.kind.describe()).chain(inputs)
     }
 
-    /// Its effects that come from files.
+    /// Effects that come from effect files.
     pub fn written(&self) -> impl Iterator<Item = &'static Written> {
         self.terms.iter().filter_map(|term| term.kind.written())
     }
 
-    /// An effect that a search proposed and nobody has accepted, if it has one.
+    /// Id of an effect that a search proposed and no person has accepted, if there is one.
     pub fn proposed(&self) -> Option<&'static str> {
         self.written().find(|e| e.status == Status::Proposed).map(|e| e.about.id)
     }
 
-    /// Its grid of thrust over throttle and airspeed, if it has one.
+    /// Grid of thrust over throttle and airspeed, if there is one.
     pub fn thrust_grid(&self) -> Option<&Grid> {
         self.terms.iter().find_map(|t| t.points.grid.as_ref())
     }
 
-    /// The tables of its effects, with the effects' ids.
+    /// Tables of the effects, with the effects' ids.
     pub fn tables(&self) -> impl Iterator<Item = (&'static str, &Table)> {
         self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.points.table.as_ref()?)))
     }
 
-    /// Whether the model is linear in each of its coefficients, in their order.
+    /// Whether the model is linear in each coefficient, in their order.
     pub fn linear(&self) -> Vec<bool> {
         let mut linear = vec![false; self.coefficients.len()];
         for Term { kind, first, .. } in &self.terms {
@@ -229,8 +250,8 @@ impl GreyBox {
         linear
     }
 
-    /// Puts the effects in the order of evaluation, whatever the order in which they came, then renews
-    /// what the coefficients decide.
+    /// Sorts the effects into their order of evaluation, then recomputes all quantities that depend on the
+    /// coefficients.
     pub(super) fn settle(&mut self) {
         self.terms.sort_by_key(|term| (term.kind.needs(), term.kind.describe().id));
         self.independent = self.terms.partition_point(|term| term.kind.needs() == Needs::Point);
@@ -254,7 +275,7 @@ impl GreyBox {
         }
     }
 
-    /// What acts on the air when the actuators are measured at `controls`; called once every
+    /// Deflections that act on the air when the actuators are measured at `controls`; must be called once every
     /// [`STEP`](crate::STEP).
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, memory: &mut InputMemory<R>) -> Controls<R> {
@@ -272,7 +293,7 @@ impl GreyBox {
         acting
     }
 
-    /// What the model remembers of controls that have been at `controls` for long.
+    /// Initial memory of a run whose controls have settled at `controls`.
     #[inline(always)]
     pub fn at_rest<R: Real>(&self, controls: &Controls<R>) -> InputMemory<R> {
         let mut lagged = [R::zero(); LAGS];
@@ -280,7 +301,8 @@ impl GreyBox {
         InputMemory::at_rest(controls, lagged)
     }
 
-    /// Calls `of` for each lag and delay of its formulas: its place, itself, the shape constants of its effect.
+    /// Calls `of` for each lag and delay of the formulas: with its index, itself, and the shape constants of its
+    /// effect.
     #[inline(always)]
     fn each_lag(&self, mut of: impl FnMut(usize, &Memory, &[f64])) {
         for Term { kind, shape, first_lag, .. } in &self.terms {
@@ -291,17 +313,17 @@ impl GreyBox {
         }
     }
 
-    /// Whether the controls act as they are measured, and their past does not matter.
+    /// Whether the controls act as measured, independent of their past.
     pub fn acts_at_once(&self) -> bool {
         self.inputs.is_empty() && self.lags == 0
     }
 
-    /// Lags and delays of its formulas.
+    /// Number of lags and delays in formulas.
     pub fn lags(&self) -> usize {
         self.lags
     }
 
-    /// What the physical bounds of its coefficients go by.
+    /// Size of the aircraft, with which the physical bounds of the coefficients scale.
     pub fn size(&self) -> Size {
         Size::new(&self.bare_body, &self.airframe.geometry).lifted_at(
             self.airframe.envelope.airspeed_min_mps,
@@ -310,14 +332,14 @@ impl GreyBox {
         )
     }
 
-    /// The reference scale x_c, eq. (21): \[1, 1, V0, 2V0/b, 2V0/c, 2V0/b, 1, 1\], V0 in m/s.
+    /// Reference scale x_c of the state, eq. (21): \[1, 1, V0, 2V0/b, 2V0/c, 2V0/b, 1, 1\], V0 in m/s.
     pub fn scale(&self) -> [f64; 8] {
         let v0 = self.airframe.reference.airspeed;
         let (span, chord) = (self.airframe.geometry.span, self.airframe.geometry.chord);
         [1.0, 1.0, v0, 2.0 * v0 / span, 2.0 * v0 / chord, 2.0 * v0 / span, 1.0, 1.0]
     }
 
-    /// The airflow at `state`, `altitude` in m.
+    /// Airflow at `state` and `altitude` (m).
     #[inline(always)]
     pub fn air<R: Real>(&self, state: &State<R>, altitude: f64) -> AirData<R> {
         let density = R::from_f64(self.atmosphere.density_at(altitude));

@@ -1,4 +1,4 @@
-//! Steps through time: RK4, and the scheme that JSBSim flies with.
+//! Time integration: RK4, and JSBSim's scheme.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use greylag_physics::{AirData, Command, Controls, State};
 /// The time step of control and simulation, s.
 pub const STEP: f64 = 0.01;
 
-/// How a model advances by [`STEP`] with its controls held.
+/// Scheme by which a model advances by [`STEP`] with its controls held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
@@ -23,19 +23,19 @@ pub enum Integrator {
     Jsbsim,
 }
 
-/// What [`Integrator::Jsbsim`] remembers: the last acceleration in the horizon frame, m/s².
+/// Memory of [`Integrator::Jsbsim`]: the last acceleration in the horizon frame, m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<R = f64>(Option<Vector<R>>);
 
 impl<R> Default for Memory<R> {
-    /// The memory at the start of an episode.
+    /// The memory at the start of a run.
     fn default() -> Self {
         Memory(None)
     }
 }
 
 impl<R: Real> Memory<R> {
-    /// What `then` remembers where `chosen` is above zero, else this; an empty memory gives way.
+    /// Selects `then` where `chosen` is above zero, else this memory; an empty memory is replaced by the other one.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let (Some(mut all), Some(then)) = (self.0, then.0) else {
@@ -49,7 +49,7 @@ impl<R: Real> Memory<R> {
 }
 
 impl<R: Copy> Memory<R> {
-    /// The memory with every number read as another kind.
+    /// Converts every number of the memory to another scalar.
     #[inline(always)]
     pub fn map<S: Copy>(&self, f: impl FnMut(R) -> S) -> Memory<S> {
         match self.0 {
@@ -71,8 +71,8 @@ impl GreyBox {
         self.step_inlined(state, controls, altitude, memory)
     }
 
-    /// [`step`](GreyBox::step) as part of its caller, for kernels compiled for several instruction
-    /// sets; elsewhere it only swells the program.
+    /// [`step`](GreyBox::step), inlined into the caller, for kernels compiled for several instruction sets; elsewhere
+    /// it only increases the program's size.
     #[inline(always)]
     pub fn step_inlined<R: Real>(
         &self,
@@ -90,7 +90,7 @@ impl GreyBox {
     #[inline(always)]
     fn step_rk4<R: Real>(&self, s: &State<R>, controls: &Controls<R>, altitude: f64) -> State<R> {
         let (mut at, mut next) = (*s, *s);
-        // how far each slope is followed to the next one, and for how long it counts in the end, s
+        // step to the next stage and weight in the final sum of each slope, s
         let stages = [
             (STEP / 2.0, STEP / 6.0),
             (STEP / 2.0, STEP / 3.0),
@@ -116,7 +116,7 @@ impl GreyBox {
         let air = self.air(s, altitude);
         let (mut acceleration, mut spin) = self.accelerations_inlined(s, controls, &air);
         if let Some(residual) = &self.residual {
-            // this scheme knows accelerations only: what was learned of φ̇ and θ̇ has no place in it
+            // this scheme uses accelerations only: the residual's φ̇ and θ̇ cannot enter it
             let learned = residual.rate(s, controls);
             let push = rigid_body::acceleration_of(s, &air, &learned);
             for (sum, part) in acceleration.iter_mut().zip(push) {
@@ -132,9 +132,8 @@ impl GreyBox {
     }
 }
 
-/// The state one [`STEP`] later by [`Integrator::Jsbsim`] from accelerations in body axes (m/s²,
-/// rad/s²) and the last acceleration in the horizon frame, if there is one; and what is to be
-/// remembered in its place.
+/// Advances by one [`STEP`] with [`Integrator::Jsbsim`] from accelerations in body axes (m/s², rad/s²) and the last
+/// acceleration in the horizon frame, if there is one; returns the state and the acceleration to remember.
 #[inline(always)]
 pub fn advance_jsbsim<R: Real>(
     s: &State<R>,
@@ -172,13 +171,13 @@ pub fn advance_jsbsim<R: Real>(
     (next, to_heading(acceleration, turning))
 }
 
-/// One component of velocity a step later, by Adams–Bashforth 2.
+/// One component of the velocity a step later, by Adams–Bashforth 2.
 #[inline(always)]
 fn adams_bashforth<R: Real>(velocity: R, acceleration: R, last: R) -> R {
     velocity + acceleration.scale(1.5 * STEP) - last.scale(0.5 * STEP)
 }
 
-/// A horizontal-frame vector seen from a heading turned by the angle of this sine and cosine.
+/// Components of a horizon-frame vector for a heading changed by the angle of this sine and cosine.
 #[inline(always)]
 fn to_heading<R: Real>([n, e, d]: Vector<R>, (sin, cos): (R, R)) -> Vector<R> {
     [n * cos + e * sin, e * cos - n * sin, d]
@@ -205,17 +204,17 @@ fn euler_step_attitude<R: Real>(s: &State<R>) -> (R, R, R) {
     (roll, pitch, turn)
 }
 
-/// A whole simulated aircraft: state, actuator filters, altitude and the integrator's memory.
+/// A complete simulated aircraft: state, actuator filters, altitude and the integrator's memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twin {
-    /// The physical state.
+    /// State of flight, as in [`State`].
     pub state: State,
-    /// The actuator filters.
+    /// Actuator filters with their memories.
     pub actuators: Actuators,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
     memory: Memory,
-    /// `None` before the first step, up to which all was at rest.
+    /// Memory of input effects and lags; `None` before the first step, until which all controls were at rest.
     inputs: Option<InputMemory>,
 }
 
@@ -225,14 +224,14 @@ impl Twin {
         Twin::at_rest(state, &Controls::default(), altitude)
     }
 
-    /// An aircraft at `state` and `altitude` (m), actuators and what acts through them long at `controls`.
+    /// An aircraft at `state` and `altitude` (m), with actuators and input effects settled at `controls`.
     pub fn at_rest(state: State, controls: &Controls, altitude: f64) -> Twin {
         let actuators = Actuators::at_rest(controls);
         Twin { state, actuators, altitude, memory: Memory::default(), inputs: None }
     }
 
-    /// Advances by [`STEP`] in the order of the simulator: the state moves under the actuators as
-    /// they are, then the actuators take the command.
+    /// Advances by [`STEP`] in the simulator's order: the state is integrated with the present actuators, then the
+    /// actuators receive the command.
     pub fn step(&mut self, model: &GreyBox, command: &Command) {
         let air = model.air(&self.state, self.altitude);
         let velocity = rigid_body::air_velocity(&self.state, &air);
@@ -245,8 +244,8 @@ impl Twin {
         self.actuators.step(command, &model.airframe.actuators);
     }
 
-    /// Specific force at the centre of gravity, body axes, m/s²: what an accelerometer there reads. About −9.81 on z
-    /// in level flight.
+    /// Specific force at the centre of gravity, body axes, m/s²: the reading of an accelerometer there. About −9.81
+    /// on z in level flight.
     pub fn specific_force(&self, model: &GreyBox) -> Vector<f64> {
         let air = model.air(&self.state, self.altitude);
         let measured = self.actuators.controls();

@@ -1,4 +1,4 @@
-//! How an effect joins a model, or why it cannot.
+//! Adding an effect to a model.
 
 use super::grey_box::{Points, Term};
 use super::{GreyBox, Named};
@@ -6,83 +6,83 @@ use greylag_physics::actuators::LAGS;
 use greylag_physics::effects::{Coefficient, Description, Kind};
 use greylag_physics::inputs;
 
-/// Why an effect cannot join a model.
+/// Error of adding an effect to a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum JoinError {
-    /// There is no such effect.
+    /// The effect does not exist.
     #[error(
         "effect {id:?} is unknown to this program; `greylag effects list` names those it knows"
     )]
     Unknown {
-        /// The id asked for.
+        /// The requested id.
         id: String,
     },
-    /// The model has it already.
+    /// The model already has the effect.
     #[error("model {model} has the effect {id} already; refit its coefficients instead")]
     Present {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// The effect.
+        /// Id of the effect.
         id: &'static str,
     },
-    /// It needs a table, which only a model file can give.
+    /// The effect needs a table, which only a model file can provide.
     #[error("effect {id} needs a table {table}; write it into the model file")]
     Table {
-        /// The effect.
+        /// Id of the effect.
         id: &'static str,
-        /// The table.
+        /// Name of the missing table.
         table: &'static str,
     },
-    /// A value is not possible, or there are too few or too many.
+    /// A value is not possible, or their number is wrong.
     #[error("effect {id} takes {expected}; the values {values:?} do not fit")]
     Values {
-        /// The effect.
+        /// Id of the effect.
         id: &'static str,
-        /// What it takes.
+        /// The expected values, in words.
         expected: String,
-        /// What was given.
+        /// Values that were given.
         values: Vec<f64>,
     },
-    /// More input effects than a model can have.
+    /// The model would have too many input effects.
     #[error(
         "model {model} has {most} effects between actuators and surfaces already, which is the most"
     )]
     Inputs {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// The most.
+        /// Largest number possible.
         most: usize,
     },
-    /// More lags and delays in formulas than a model can have.
+    /// The model would have too many lags and delays in formulas.
     #[error(
         "model {model} would have more than {most} lags and delays in its formulas, which is the most"
     )]
     Lags {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// The most.
+        /// Largest number possible.
         most: usize,
     },
-    /// No body has the mass or the inertia that it would leave.
+    /// The resulting mass or inertia would be unphysical.
     #[error(
         "effect {id} with {values:?} would leave model {model} without a positive mass, or with jx·jz not above jxz²; join it with less"
     )]
     Body {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// The effect.
+        /// Id of the effect.
         id: &'static str,
-        /// What was given.
+        /// Values that were given.
         values: Vec<f64>,
     },
 }
 
 impl GreyBox {
-    /// Adds the effect `id` with `values` of its coefficients, in its own order. What it stands in the place of
-    /// becomes zero, and stays so in a fit.
+    /// Adds the effect `id` with `values` of its coefficients, in its own order. Coefficients whose term it replaces
+    /// become zero, and stay zero in a fit.
     ///
     /// # Errors
-    /// The effect is unknown, there already or needs a table, or the values are not possible.
+    /// The effect is unknown, already present or needs a table, or the values are not possible.
     pub fn join(&mut self, id: &str, values: &[f64]) -> Result<(), JoinError> {
         let (about, kind) = match (Kind::from_id(id), inputs::Kind::from_id(id)) {
             (Some(kind), _) => (kind.describe(), Ok(kind)),
@@ -119,15 +119,15 @@ impl GreyBox {
         Ok(())
     }
 
-    /// The effect in whose favour the coefficient `name` is zero, if there is one.
+    /// Id of the effect that replaces the term of the coefficient `name`, if there is one.
     pub fn replaced(&self, name: &str) -> Option<&'static str> {
         let gone = self.coefficients.iter().any(|c| c.name == name && c.value == 0.0);
         self.effects().find(|about| gone && about.replaces.contains(&name)).map(|about| about.id)
     }
 
-    /// [`join`](GreyBox::join) with the largest share of `values`, in hundredths, with which the body
-    /// [may become](greylag_physics::rigid_body::RigidBody::may_become) what they make of it: all of them, but for an
-    /// estimate of mass or inertia that overshoots.
+    /// [`join`](GreyBox::join) with the largest share of `values`, in hundredths, for which the change of the body
+    /// [is acceptable](greylag_physics::rigid_body::RigidBody::may_become): all of them, unless an estimate of mass
+    /// or inertia overshoots.
     ///
     /// # Errors
     /// As [`join`](GreyBox::join).
@@ -181,7 +181,7 @@ impl GreyBox {
         Err(JoinError::Values { id, expected: expected.join(", "), values: values.into() })
     }
 
-    /// Refuses an effect that would leave a mass or an inertia that no body has.
+    /// Rejects an effect whose resulting mass or inertia would be unphysical.
     fn stays_physical(&self, kind: Kind, values: &[f64]) -> Result<(), JoinError> {
         let mut body = self.body;
         kind.change(values, &mut body);

@@ -1,4 +1,4 @@
-//! A model as an aircraft of JSBSim.
+//! Export of a model as a JSBSim aircraft.
 
 mod aerodynamics;
 mod conditions;
@@ -16,19 +16,19 @@ use greylag_physics::servos::Surface;
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Metres per foot.
+/// Length of a foot, m.
 const FT: f64 = 0.3048;
-/// Kilograms per pound.
+/// Mass of a pound, kg.
 const LB: f64 = 0.453_592_37;
-/// kg m² per slug ft².
+/// Moment of inertia of a slug ft², kg m².
 const SLUG_FT2: f64 = 1.355_817_948_331_4;
 
-/// The files of an aircraft, by their path below the folder of the aircraft's name.
+/// Files of an aircraft, by their paths below the folder with the aircraft's name.
 #[derive(Clone, Debug)]
 pub struct Exported {
-    /// Path and text.
+    /// Path and text of each file.
     pub files: Vec<(String, String)>,
-    /// Effects of the model that the files do not have.
+    /// Effects of the model that the export leaves out.
     pub left_out: Vec<String>,
 }
 
@@ -39,16 +39,16 @@ const ELEVATOR: &str = "fcs/elevator-pos-rad";
 const RUDDER: &str = "fcs/rudder-pos-rad";
 const THROTTLE: &str = "fcs/throttle-pos-norm";
 
-/// The files of `model` as the aircraft `name`, which is always in the condition of the model's airframe.
+/// Files of `model` as the aircraft `name`, always in the condition of the model's airframe.
 pub fn export(model: &GreyBox, name: &str) -> Exported {
     written(&Conditions::one(model), name)
 }
 
-/// The files of one aircraft that `models` describe in several conditions, flap settings say, as the aircraft `name`.
+/// Files of the aircraft `name` that `models` describe in several conditions, for example flap settings.
 ///
 /// The models differ in their aerodynamic coefficients and in one property of their airframes' `[conditions]`. The
 /// aircraft reads that property: between two settings its aerodynamic forces and moments are interpolated, beyond the
-/// last they stay.
+/// last they are constant.
 ///
 /// # Errors
 /// [`ConditionsError`], if the models differ in something else, or in no condition.
@@ -56,7 +56,7 @@ pub fn export_in_conditions(models: &[GreyBox], name: &str) -> Result<Exported, 
     Ok(written(&Conditions::of(models)?, name))
 }
 
-/// What the files do not have of `model`.
+/// Effects of `model` that the export leaves out.
 fn left_out(model: &GreyBox) -> Vec<String> {
     let effect = |full: &str| full.split('.').next().unwrap_or_default().to_owned();
     let known = |name: &str| aerodynamics::knows(name) || engine::knows(name);
@@ -141,7 +141,7 @@ fn document(conditions: &Conditions, name: &str, [motor, thruster]: [&str; 2]) -
     out
 }
 
-/// The coefficient of that full name; zero without it.
+/// Value of the coefficient `name`; zero if the model has none.
 fn coefficient(model: &GreyBox, name: &str) -> f64 {
     model.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
 }
@@ -182,7 +182,7 @@ fn controls(conditions: &Conditions, name: &str) -> String {
     out
 }
 
-/// Aileron, elevator and rudder by JSBSim's usual commands.
+/// Filters of aileron, elevator and rudder on JSBSim's usual commands.
 fn usual_surfaces(figures: &ActuatorFigures) -> String {
     let surfaces = [
         ("aileron", Some(&figures.aileron), AILERON),
@@ -196,7 +196,7 @@ fn usual_surfaces(figures: &ActuatorFigures) -> String {
     surfaces.into_iter().filter_map(one).collect()
 }
 
-/// Frequency (rad/s) and damping of a surface's filter: the bilinear transform backwards.
+/// Frequency (rad/s) and damping of a surface's filter, by the inverse bilinear transform.
 fn analogue(surface: &Surface, step: f64) -> [f64; 2] {
     let [b, _, a2] = surface.filter;
     // b = w²/d, a2 = (4 − 4ζw + w²)/d, d = 4 + 4ζw + w²: 1 + a2 = (8 + 2w²)/d

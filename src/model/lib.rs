@@ -1,4 +1,4 @@
-//! The grey box: a prior made of physical effects, its integrators, trim and linearisation.
+//! The grey-box model: physical effects, integrators, trim and linearisation.
 
 pub mod block;
 pub mod data_envelope;

@@ -6,25 +6,24 @@ use super::{GreyBox, Memory, Trim};
 use greylag_num::Dual;
 use greylag_physics::{Controls, State};
 
-/// One step of 0.01 s, linear about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt, δr).
+/// Linear model of one step of 0.01 s about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linear {
-    /// ∂s₊/∂s, states in the order of eq. (4).
+    /// Jacobian ∂s₊/∂s, states in the order of eq. (4).
     pub a: SMatrix<f64, 8, 8>,
-    /// ∂s₊/∂(δa, δe, δt, δr).
+    /// Jacobian ∂s₊/∂(δa, δe, δt, δr).
     pub b: SMatrix<f64, 8, 4>,
 }
 
 /// Linearises one step of `model` about `trim` at `altitude` (m).
 ///
-/// The integrator's memory is taken as settled: its last acceleration equals the present one. The
-/// controls are those that act: what the model's effects on deflections (lag, delay, dead zone) make
-/// of the actuators' positions before is left out, as it has memory of its own.
+/// The integrator's memory is taken as steady: its last acceleration equals the present one. The controls are those
+/// that act; the model's input effects (lag, delay, dead zone) are left out, since they have their own memory.
 pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
     linearise_step(model, &trim.state, &trim.controls, altitude)
 }
 
-/// The same about any state, steady or not.
+/// Linearises one step about any state, steady or not.
 pub fn linearise_step(
     model: &GreyBox,
     state: &State,

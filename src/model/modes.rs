@@ -1,4 +1,4 @@
-//! Modes of steady level flight: what the aircraft does by itself, with names and time constants.
+//! Natural modes of steady level flight, with names and time constants.
 
 use nalgebra::{Complex, Matrix4, SMatrix};
 use serde::Serialize;
@@ -7,51 +7,51 @@ use super::{GreyBox, Trim, TrimError};
 use greylag_num::Dual;
 use greylag_physics::{Controls, State};
 
-/// Places of θ, V, q, α and of φ, p, r, β in the state of eq. (4).
+/// Indices of θ, V, q, α and of φ, p, r, β in the state of eq. (4).
 const LONGITUDINAL: [usize; 4] = [1, 2, 4, 6];
 const LATERAL: [usize; 4] = [0, 3, 5, 7];
 
-/// The linear model in continuous time about a condition: δṡ = a δs + b δz, z = (δa, δe, δt, δr).
+/// Continuous-time linear model about a condition: δṡ = a δs + b δz, z = (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rates {
-    /// ∂ṡ/∂s, states in the order of eq. (4), 1/s.
+    /// Jacobian ∂ṡ/∂s, states in the order of eq. (4), 1/s.
     pub a: SMatrix<f64, 8, 8>,
-    /// ∂ṡ/∂(δa, δe, δt, δr).
+    /// Jacobian ∂ṡ/∂(δa, δe, δt, δr).
     pub b: SMatrix<f64, 8, 4>,
 }
 
-/// A mode of motion: an oscillation, or one that grows or decays without.
+/// A natural mode, oscillatory or aperiodic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mode {
-    /// Its name.
+    /// Usual name of the mode.
     pub name: &'static str,
-    /// Its eigenvalue, 1/s; the one with the positive imaginary part of a pair.
+    /// Eigenvalue, 1/s; for a pair the one with the positive imaginary part.
     #[serde(serialize_with = "parts")]
     pub eigenvalue: Complex<f64>,
 }
 
-/// Real and imaginary part.
+/// Serialises real and imaginary part.
 fn parts<S: serde::Serializer>(x: &Complex<f64>, to: S) -> Result<S::Ok, S::Error> {
     [x.re, x.im].serialize(to)
 }
 
 impl Mode {
-    /// Whether it oscillates.
+    /// Whether the mode is oscillatory.
     pub fn oscillates(&self) -> bool {
         self.eigenvalue.im > 0.0
     }
 
-    /// Natural frequency, rad/s.
+    /// Natural frequency of the mode, rad/s.
     pub fn frequency(&self) -> f64 {
         self.eigenvalue.norm()
     }
 
-    /// Damping ratio; below zero it grows.
+    /// Damping ratio; negative for a divergent oscillation.
     pub fn damping(&self) -> f64 {
         -self.eigenvalue.re / self.eigenvalue.norm()
     }
 
-    /// Time constant of its decay, s; below zero that of its growth.
+    /// Time constant of decay, s; negative for divergence.
     pub fn time_constant(&self) -> f64 {
         -1.0 / self.eigenvalue.re
     }
@@ -72,14 +72,14 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
     }
 }
 
-/// The modes of straight flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.
+/// Modes of straight flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.
 ///
 /// # Errors
 /// If the model cannot fly straight there.
 pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
     let trim = Trim::straight(model, airspeed, altitude)?;
     let a = rates(model, &trim, altitude).a;
-    // the search for eigenvalues does not end on what is no number
+    // the eigenvalue iteration does not end on NaN
     if !a.iter().all(|x| x.is_finite()) {
         return Err(TrimError {
             model: model.name.clone(),
@@ -95,7 +95,7 @@ pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>,
     Ok(all)
 }
 
-/// Eigenvalues from fast to slow, of pairs the one with the positive imaginary part.
+/// Eigenvalues from fast to slow, for pairs the one with the positive imaginary part.
 fn eigenvalues(a: &Matrix4<f64>) -> Vec<Complex<f64>> {
     let mut all: Vec<Complex<f64>> = a.complex_eigenvalues().iter().copied().collect();
     // rounding may leave a real one a trace of an imaginary part

@@ -1,13 +1,13 @@
-//! Newton's method on a few equations, with exact derivatives from dual numbers.
+//! Newton's method for a few equations, with exact derivatives from dual numbers.
 
 use nalgebra::{DMatrix, DVector};
 
 use greylag_num::Dual;
 
-/// The root of `f` near `start`, or `None` if it does not settle in 60 damped steps.
+/// Root of `f` near `start`; `None` if it does not converge in 60 damped steps.
 ///
-/// `largest` bounds each step of each unknown, so that a poor start cannot leave the region in
-/// which the equations mean something. Settled: every residual below 1e-10.
+/// `largest` limits the step of each unknown, so that a poor start does not leave the region in which the equations
+/// are valid. Convergence: every residual below 1e-10.
 pub(super) fn solve<const N: usize>(
     start: [f64; N],
     largest: [f64; N],

@@ -1,4 +1,4 @@
-//! Whether measures are those of an aircraft: what a unit that slipped looks like.
+//! Plausibility of an aircraft's measures, to detect wrong units.
 //!
 //! H. Tennekes, "The Simple Science of Flight", 2nd ed., 2009: from insects to airliners the wing loading (N/m²) is near
 //! 47 times the cube root of the weight (N), within a factor of a few.
@@ -7,22 +7,22 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Factor of Tennekes' line, N^(2/3)/m².
 const LINE: f64 = 47.0;
-/// Wing loading in parts of the line: a human-powered aircraft has 0.07, a supersonic fighter 2.4.
+/// Wing loading relative to the line: a human-powered aircraft has 0.07, a supersonic fighter 2.4.
 const LOADING: [f64; 2] = [0.04, 6.0];
-/// Aspect ratio of aircraft with a straight wing.
+/// Plausible aspect ratios of straight wings.
 const ASPECT: [f64; 2] = [2.0, 40.0];
-/// Reynolds number of the mean chord: below, no textbook's wing; above, no subsonic aircraft.
+/// Plausible Reynolds numbers of the mean chord for textbook formulas of subsonic wings.
 const REYNOLDS: [f64; 2] = [1.5e4, 2e8];
 /// Kinematic viscosity of air at sea level, m²/s.
 const VISCOSITY: f64 = 1.46e-5;
-/// Static thrust in parts of the weight.
+/// Plausible static thrust over weight.
 const THRUST: [f64; 2] = [0.03, 4.0];
-/// Pitch speed in parts of the airspeed of level flight at a lift coefficient of 0.6.
+/// Plausible pitch speed over the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: [f64; 2] = [1.0, 12.0];
-/// Static thrust times pitch speed a kilogram, W/kg.
+/// Plausible static thrust times pitch speed per kilogram, W/kg.
 const POWER: [f64; 2] = [5.0, 5000.0];
 
-/// Units that slip, with the factor back to kg, m or m².
+/// Frequently confused units, with the factor to kg, m or m².
 const SLIPS: [(&str, usize, f64); 8] = [
     ("g", 0, 1e-3),
     ("t", 0, 1e3),
@@ -33,22 +33,22 @@ const SLIPS: [(&str, usize, f64); 8] = [
     ("mm²", 2, 1e-6),
     ("ft²", 2, 0.0929),
 ];
-/// What they are the units of, as options, with what is meant.
+/// Options with the units that they expect.
 const OPTIONS: [(&str, &str); 3] = [("--mass-kg", "kg"), ("--span-m", "m"), ("--area-m2", "m²")];
 
 /// Mass (kg), span (m) and wing area (m²) of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// Mass, kg.
+    /// Total mass, kg.
     pub mass: f64,
-    /// Span, m.
+    /// Wing span, m.
     pub span: f64,
-    /// Wing area, m².
+    /// Area of the wing, m².
     pub area: f64,
 }
 
 impl Size {
-    /// Weight, N.
+    /// Weight at standard gravity, N.
     fn weight(self) -> f64 {
         self.mass * STANDARD_GRAVITY
     }
@@ -58,7 +58,7 @@ impl Size {
         (2.0 * self.weight() / (SEA_LEVEL_DENSITY * self.area * 0.6)).sqrt()
     }
 
-    /// Why no aircraft is so, with the number that was probably meant; `None` if some are.
+    /// Why the measures are implausible, with the value that was probably meant; `None` if they are plausible.
     pub fn doubt(self) -> Option<String> {
         let what = self.odd()?;
         let value = |place: usize, size: Size| [size.mass, size.span, size.area][place];
@@ -80,7 +80,7 @@ impl Size {
         Some(format!("{what}: {}", meant.unwrap_or_else(check)))
     }
 
-    /// What about these measures no aircraft has.
+    /// Implausible property of these measures, in words.
     fn odd(self) -> Option<String> {
         let aspect = self.span * self.span / self.area;
         let loading = self.weight() / self.area / (LINE * self.weight().cbrt());
@@ -105,7 +105,8 @@ impl Size {
         })
     }
 
-    /// What of a propulsion of this static thrust (N) and pitch speed (m/s) no such aircraft has.
+    /// Why a propulsion of this static thrust (N) and pitch speed (m/s) is implausible for the aircraft; `None` if it
+    /// is plausible.
     pub fn doubt_of_thrust(self, thrust: f64, pitch_speed: f64) -> Option<String> {
         let share = thrust / self.weight();
         let speed = pitch_speed / self.level_mps();
@@ -138,7 +139,7 @@ fn outside(x: f64, [least, most]: [f64; 2]) -> bool {
     !(least..=most).contains(&x)
 }
 
-/// Three significant figures without zeros at the end.
+/// Text with three significant figures, without trailing zeros.
 fn short(x: f64) -> String {
     let places = (2 - x.abs().log10().floor() as i32).clamp(0, 9) as usize;
     let text = format!("{x:.places$}");

@@ -1,4 +1,4 @@
-//! The residual F_a(s, z; θ_a): a small network that adds what the prior lacks, eq. (19) of \[GSFM26\].
+//! Learned residual F_a(s, z; θ_a): a small network that adds what the physical effects lack, eq. (19) of \[GSFM26\].
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,17 +16,17 @@ use greylag_physics::{Airframe, Controls, State};
 
 /// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
 ///
-/// Roll and pitch are left out on purpose: attitude acts on the aircraft through gravity alone,
-/// which the prior has exactly, so that what is learned in one attitude holds in every other.
+/// Roll and pitch are left out on purpose: attitude acts on the aircraft through gravity alone, which the physical
+/// part models exactly, so a residual learned in one attitude is valid in every other.
 pub const INPUTS: usize = 9;
 
 /// Outputs of the network: the rates of the state, in units of x_c a second.
 pub const OUTPUTS: usize = 8;
 
-/// The tensor of a file that says where the training data lies.
+/// Name of a file's tensor with the envelope of the training data.
 const ENVELOPE: &str = "data_envelope";
 
-/// A learned addition to the rates of a model's state.
+/// Learned contribution to the state's rates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     network: Arc<Dense>,
@@ -34,84 +34,84 @@ pub struct Residual {
     envelope: Option<Arc<DataEnvelope>>,
 }
 
-/// Fixed scales of the network's inputs and outputs, from the airframe and not from data: inputs of
-/// order one over the envelope, outputs in x_c of eq. (21).
+/// Fixed scales of the network's inputs and outputs, from the airframe rather than from data: inputs are of order one
+/// over the envelope, outputs in x_c of eq. (21).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
-    /// What is taken off each input.
+    /// Offset subtracted from each input.
     pub offset: [f64; INPUTS],
-    /// What each input is multiplied with thereafter.
+    /// Factor applied to each input after the offset.
     pub factor: [f64; INPUTS],
-    /// What each output is multiplied with: x_c.
+    /// Factor applied to each output: x_c.
     pub output: [f64; OUTPUTS],
 }
 
-/// What a residual's file says of where it comes from.
+/// Origin of a residual, as stated in its file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Layout of the file: [`Origin::SCHEMA`].
+    /// Schema of the file: [`Origin::SCHEMA`].
     pub schema: String,
-    /// Fingerprint of the airframe that it belongs to, see [`fingerprint`].
+    /// Hash of the airframe that it belongs to, see [`fingerprint`].
     pub airframe: String,
     /// SHA-256 of the training data, hexadecimal.
     pub data: String,
     /// Seed of the training.
     pub seed: u64,
-    /// The program that trained it, with its version.
+    /// Name and version of the program that trained it.
     pub program: String,
 }
 
-/// Why a residual cannot be used.
+/// Error of loading a residual.
 #[derive(Debug, thiserror::Error)]
 pub enum ResidualError {
     /// The file cannot be read.
     #[error("cannot read residual {path}: {why}; a model folder holds model.toml and residual.safetensors", path = path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's words.
+        /// The system's error.
         why: std::io::Error,
     },
-    /// The file is no residual.
+    /// The file does not contain a residual.
     #[error("residual {path}: {why}; train it again with `greylag train dynamics`", path = path.display())]
     Content {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the error.
         why: String,
     },
-    /// It was learned on another aircraft.
+    /// The residual was trained for another airframe.
     #[error("residual {path} was learned for another airframe than {airframe}; use the airframe file it came with, or train it again", path = path.display())]
     Airframe {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The airframe's name.
+        /// Name of the given airframe.
         airframe: String,
     },
-    /// The network has other inputs or outputs.
+    /// The network has another number of inputs or outputs.
     #[error("a residual takes a network of {INPUTS} inputs and {OUTPUTS} outputs, not {0:?}")]
     Shape(Vec<usize>),
     /// A layer is too wide.
     #[error("a residual's layers have up to {ON_STACK} units, not {0:?}; choose fewer")]
     Wide(Vec<usize>),
-    /// The numbers are no network.
+    /// The parameters do not form a network.
     #[error(transparent)]
     Network(#[from] DenseError),
 }
 
 impl Origin {
-    /// The layout that this program reads and writes.
+    /// Schema that this program reads and writes.
     pub const SCHEMA: &'static str = "greylag.residual/1";
 }
 
-/// SHA-256 of what a residual depends on in an airframe: name, geometry and actuators.
+/// SHA-256 of the properties of an airframe that a residual depends on: name, geometry and actuators.
 pub fn fingerprint(airframe: &Airframe) -> String {
     hash(fingerprinted(airframe).as_bytes())
 }
 
-/// The text of schema 1 that is hashed: field by field, so that a further field of an airframe does not
-/// refuse the policies and residuals that were learned before it.
+/// Text of schema 1 that is hashed, field by field, so that an additional field of an airframe does not invalidate
+/// earlier policies and residuals.
 fn fingerprinted(airframe: &Airframe) -> String {
     let Geometry { area, span, chord } = airframe.geometry;
     let ActuatorFigures { aileron, elevator, throttle, step, .. } = airframe.actuators;
@@ -121,7 +121,7 @@ fn fingerprinted(airframe: &Airframe) -> String {
          {surface:?}, throttle: {throttle:?}, deflection_max: {deflection_max:?}, step: {step:?} }}",
         airframe.name
     );
-    if !says_all(&airframe.actuators) {
+    if !fits_schema_1(&airframe.actuators) {
         let rudder = airframe.actuators.rudder;
         text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
     }
@@ -132,21 +132,21 @@ fn fingerprinted(airframe: &Airframe) -> String {
     text
 }
 
-/// Whether schema 1 says all of `figures`: surfaces alike, to both sides, at any rate, no rudder.
-fn says_all(figures: &ActuatorFigures) -> bool {
+/// Whether schema 1 can represent `figures`: surfaces alike, symmetric travel, no rate limit, no rudder.
+fn fits_schema_1(figures: &ActuatorFigures) -> bool {
     let ActuatorFigures { aileron, elevator, rudder, .. } = figures;
     let plain = aileron.travel.is_symmetric() && aileron.rate_max.is_none();
     plain && elevator == aileron && rudder.is_none()
 }
 
-/// SHA-256 in hexadecimal.
+/// SHA-256 in hexadecimal digits.
 pub fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
 impl Scales {
-    /// The scales of an aircraft: airspeed about V0 by a quarter of it, rates by the part of x_c that
-    /// brisk flight has, angles by 0.2 rad (about the stall), deflections by their stop.
+    /// Scales of an aircraft: airspeed about V0 by a quarter of it, rates by the share of x_c reached in brisk
+    /// flight, angles by 0.2 rad (about the stall), deflections by their stops.
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
@@ -160,7 +160,7 @@ impl Scales {
         Scales { offset, factor, output: x_c }
     }
 
-    /// The network's inputs at a point.
+    /// Inputs of the network for a state and controls.
     #[inline(always)]
     pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
         let State { airspeed, p, q, r, alpha, beta, .. } = *state;
@@ -173,7 +173,7 @@ impl Scales {
         x
     }
 
-    /// Rates from the network's outputs.
+    /// State rates from the network's outputs.
     #[inline(always)]
     pub fn rate<R: Real>(&self, mut outputs: [R; OUTPUTS]) -> State<R> {
         for (x, scale) in outputs.iter_mut().zip(&self.output) {
@@ -204,7 +204,7 @@ impl Residual {
         Ok(Residual { network: Arc::new(network), scales, envelope: None })
     }
 
-    /// The residual, knowing that it was trained on these samples.
+    /// The residual with the envelope of these training samples.
     pub fn trained_on<'a>(
         mut self,
         samples: impl Iterator<Item = (&'a State, &'a Controls)>,
@@ -214,27 +214,27 @@ impl Residual {
         self
     }
 
-    /// How far a point lies from the training data: 0.999 of that lies within 1. Zero where the file does not say.
+    /// Distance of a point from the training data: 99.9 % of them lie within 1. Zero if the file has no envelope.
     pub fn distance(&self, state: &State, controls: &Controls) -> f64 {
         let inputs = self.scales.inputs(state, controls);
         self.envelope.as_ref().map_or(0.0, |e| e.distance(&self.network, &inputs))
     }
 
-    /// The network.
+    /// The network behind the residual.
     pub fn network(&self) -> &Dense {
         &self.network
     }
 
-    /// What is added to the rates of the state, units of [`State`] a second.
+    /// Contribution to the state's rates, units of [`State`] per second.
     #[inline(always)]
     pub fn rate<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> State<R> {
         self.scales.rate(self.network.evaluate(self.scales.inputs(state, controls)))
     }
 
-    /// The file's content.
+    /// Content of the residual's file.
     ///
     /// # Errors
-    /// What the writer of the format says.
+    /// The error of the format's writer.
     pub fn to_bytes(&self, origin: &Origin) -> Result<Vec<u8>, SafeTensorError> {
         let envelope = self.envelope.as_ref().map(|e| Square {
             name: ENVELOPE,
@@ -263,7 +263,7 @@ impl Residual {
             return Err(ResidualError::Airframe { path: path.into(), airframe });
         }
         let whitening = weights::matrix(&bytes, ENVELOPE).map_err(content)?;
-        // a network of another shape is refused before it is asked for its features
+        // a network of another shape is rejected before its features are computed
         let residual = Residual::new(network, airframe, x_c)?;
         let envelope = whitening.map(|w| DataEnvelope::new(w, &residual.network)).transpose();
         let envelope = envelope.map_err(content)?.map(Arc::new);
@@ -271,9 +271,9 @@ impl Residual {
     }
 }
 
-/// The metadata of a file.
+/// Origin in the metadata of a file.
 fn origin(bytes: &[u8]) -> Result<Origin, String> {
-    let origin: Origin = weights::said(bytes)?;
+    let origin: Origin = weights::origin(bytes)?;
     match origin.schema.as_str() {
         Origin::SCHEMA => Ok(origin),
         other => Err(format!("its schema is {other:?}, this program reads {}", Origin::SCHEMA)),

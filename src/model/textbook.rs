@@ -1,4 +1,4 @@
-//! A model from a few measures of an aircraft, by formulas of textbooks, with honest widths.
+//! Model of an aircraft from a few of its measures, by textbook formulas, with realistic standard deviations.
 //!
 //! B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985
 //! (radii of gyration); \[BM12\]. The ratios for roll are those of the published X8 and Aerosonde; the
@@ -12,48 +12,48 @@ use crate::derivatives::widths::{self, Tool};
 use derivatives::{induced, rudder};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// What balances and steers an aircraft.
+/// Arrangement of an aircraft's control surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tail {
-    /// A tailplane and a fin.
+    /// Conventional tail: a tailplane and a fin.
     Conventional,
-    /// Elevons.
+    /// Flying wing with elevons.
     FlyingWing,
 }
 
-/// Measures of an aircraft.
+/// Measures of an aircraft, from which a model is estimated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measures {
-    /// Its name.
+    /// Name of the aircraft.
     pub name: String,
-    /// Mass, kg.
+    /// Total mass, kg.
     pub mass: f64,
-    /// Span, m.
+    /// Wing span, m.
     pub span: f64,
-    /// Wing area, m².
+    /// Area of the wing, m².
     pub area: f64,
-    /// What balances it.
+    /// Arrangement of the control surfaces.
     pub tail: Tail,
-    /// Travel of the rudder to both sides, rad; `None` without one.
+    /// Rudder travel to either side, rad; `None` without a rudder.
     pub rudder: Option<f64>,
-    /// Travel of aileron and elevator to both sides, rad.
+    /// Travel of aileron and elevator to either side, rad.
     pub travel: f64,
-    /// Thrust at rest at full throttle, N.
+    /// Static thrust at full throttle, N.
     pub static_thrust: f64,
-    /// Airspeed at which full throttle gives no thrust, m/s.
+    /// Airspeed at which full throttle gives no thrust (pitch speed), m/s.
     pub pitch_speed: f64,
 }
 
-/// An estimated number: its name, value, standard deviation as a share of the value, source.
+/// An estimated number: name, value, relative standard deviation, source.
 pub type Estimate = (&'static str, f64, f64, &'static str);
 
-/// An effect of the model file with its estimates.
+/// An effect of a model file with its estimates.
 pub(crate) type Section = (&'static str, Vec<Estimate>);
 
-/// Lift coefficient at which a small wing stalls.
+/// Largest lift coefficient of a small wing.
 const LIFT_MAX: f64 = 1.2;
 
-/// Derived figures that several coefficients share.
+/// Derived quantities that several coefficients share.
 struct Figures {
     aspect: f64,
     chord: f64,
@@ -65,7 +65,7 @@ struct Figures {
     lift: f64,
 }
 
-/// The table `[incidence]` of an airframe file from the incidences (rad) of cruise and stall.
+/// Table `[incidence]` of an airframe file from the angles of attack (rad) of cruise and stall.
 pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     let up_to = |share: f64| (cruise + share * (stall - cruise)).max(0.01);
     format!(
@@ -78,7 +78,7 @@ pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     )
 }
 
-/// Lift slope (1/rad) of a straight wing of this aspect ratio, by Helmbold.
+/// Lift slope (1/rad) of a straight wing of aspect ratio `aspect`, by Helmbold.
 fn helmbold(aspect: f64) -> f64 {
     std::f64::consts::TAU * aspect / (2.0 + (4.0 + aspect * aspect).sqrt())
 }
@@ -94,13 +94,13 @@ impl Measures {
         Figures { aspect, chord, stall, cruise, wing, lift: loading / (cruise * cruise) }
     }
 
-    /// The airframe file.
+    /// Text of the airframe file.
     pub fn airframe(&self) -> String {
         let f = self.figures();
         self.airframe_with_chord(f.chord, [self.slope(&f), self.zero_lift()])
     }
 
-    /// The same with the mean chord (m), the slope of the lift (1/rad) and the lift at α = 0 of another source.
+    /// The airframe file with mean chord (m), lift slope (1/rad) and lift coefficient at α = 0 from another source.
     pub(crate) fn airframe_with_chord(&self, chord: f64, [slope, zero_lift]: [f64; 2]) -> String {
         let f = self.figures();
         let mut out = format!(
@@ -143,12 +143,12 @@ impl Measures {
         out
     }
 
-    /// The model file, beside the airframe file `airframe.toml`.
+    /// Text of the model file, to be stored beside the airframe file `airframe.toml`.
     pub fn model(&self) -> String {
         self.model_of(&self.sections(), "Textbook estimates from mass, span, area and tail.")
     }
 
-    /// The model file of the effects `sections`, with mass and inertia of these measures.
+    /// Text of a model file with the effects `sections`, and mass and inertia of these measures.
     pub(crate) fn model_of(&self, sections: &[Section], description: &str) -> String {
         let mut out = format!(
             "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
@@ -170,13 +170,13 @@ impl Measures {
         out
     }
 
-    /// Induced drag with the incidence and its square, of a wing with this slope of the lift and this lift at none.
+    /// Induced drag coefficients of α and α², for a wing with this lift slope and this lift coefficient at α = 0.
     pub(crate) fn induced_by(&self, slope: f64, zero_lift: f64) -> [f64; 2] {
         let k = 1.0 / induced(&self.figures());
         [2.0 * k * zero_lift * slope, k * slope * slope]
     }
 
-    /// The effects with their estimates.
+    /// Effects of the model with their estimates.
     pub(crate) fn sections(&self) -> Vec<Section> {
         let f = self.figures();
         let mut effects = vec![
@@ -192,14 +192,14 @@ impl Measures {
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
         }
-        // how far these formulas were from measured derivatives; the widths beside them stand where nothing is known
+        // measured errors of these formulas; without them the stated standard deviations are kept
         for (name, _, width, _) in effects.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
             *width = widths::of(Tool::Textbook, name).unwrap_or(*width);
         }
         effects
     }
 
-    /// Radii of gyration as shares of half span, half length and half their mean.
+    /// Radii of gyration relative to half span, half length and half their mean.
     fn inertia(&self) -> [Estimate; 4] {
         let length =
             if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };
@@ -214,7 +214,7 @@ impl Measures {
     }
 }
 
-/// Lines of a model file; a width of nothing is left out.
+/// Appends estimates as lines of a model file; a standard deviation of zero is omitted.
 pub fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
         let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
@@ -265,7 +265,7 @@ mod tests {
         ];
         for (name, value) in published {
             let ours = model.coefficients().iter().find(|c| c.name == name).unwrap();
-            // within two standard deviations: what an honest width says
+            // within two standard deviations: as a realistic standard deviation requires
             assert!((ours.value - value).abs() < 2.0 * ours.width(), "{ours:?} for {value}");
         }
     }

@@ -1,13 +1,14 @@
-//! Trim: the deflections that hold a flight condition.
+//! Trim: deflections that hold a steady flight condition.
 
 use super::GreyBox;
 use super::newton;
 use greylag_num::{Dual, Real};
 use greylag_physics::{Controls, State};
 
-/// Path angle by which a descent at full throttle must be shallower than at idle to be one with an engine, rad.
+/// The descent at full throttle counts as powered flight only if its path is shallower than that at idle by this
+/// angle, rad.
 const SHALLOWER: f64 = 1e-6;
-/// Bisections of the throttle: to the last digit.
+/// Bisections of the throttle, enough for full precision.
 const HALVINGS: usize = 52;
 
 /// A steady flight condition with the controls that hold it.
@@ -15,34 +16,33 @@ const HALVINGS: usize = 52;
 pub struct Trim {
     /// The state, whose rates vanish (see [`Trim::attitude`] for airspeed).
     pub state: State,
-    /// The controls.
+    /// Controls that hold the condition.
     pub controls: Controls,
-    /// What is left of V̇ where the throttle is at its stop, m/s²; else zero.
+    /// Remaining V̇ if the throttle is at its stop, m/s²; otherwise zero.
     pub acceleration: f64,
 }
 
-/// Why a condition has no trim.
+/// Error of a condition without trim.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "model {model} has no trim at roll {roll_deg:.1}°, pitch {pitch_deg:.1}°, {airspeed_mps:.1} m/s: \
      the aircraft cannot hold it there; ask for less bank or pitch, or for more airspeed"
 )]
 pub struct TrimError {
-    /// The model's name.
+    /// Name of the model.
     pub model: String,
-    /// Roll asked for.
+    /// Requested roll angle, °.
     pub roll_deg: f64,
-    /// Pitch asked for.
+    /// Requested pitch angle, °.
     pub pitch_deg: f64,
-    /// Airspeed asked for.
+    /// Requested airspeed, m/s.
     pub airspeed_mps: f64,
 }
 
 impl Trim {
     /// Straight and level at `airspeed` (m/s) and `altitude` (m): γ = 0, so θ = α.
     ///
-    /// The controls that hold it may lie beyond their stops: whether the aircraft has that much
-    /// thrust is for the caller to see.
+    /// The controls may lie beyond their stops; the caller must check whether the aircraft has that much thrust.
     ///
     /// # Errors
     /// If no controls hold level flight at that airspeed.
@@ -65,11 +65,11 @@ impl Trim {
             .ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
-    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level, or where no throttle holds level
-    /// flight the descent at full throttle if that is shallower, else at idle, as a glider's.
+    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level; if no throttle holds level
+    /// flight, the descent at full throttle if that is shallower, else the glide at idle.
     ///
     /// # Errors
-    /// If no elevator holds either.
+    /// If no elevator deflection holds either.
     pub fn straight(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
         match Trim::level(model, airspeed, altitude) {
             Ok(level) if (0.0..=1.0).contains(&level.controls.throttle) => Ok(level),
@@ -78,15 +78,15 @@ impl Trim {
         }
     }
 
-    /// Angle of the flight path above the horizon with level wings and no sideslip, rad.
+    /// Flight path angle with level wings and no sideslip, positive upwards, rad.
     pub fn path(&self) -> f64 {
         self.state.pitch - self.state.alpha
     }
 
     /// A steady turn that holds roll and pitch (rad) at `airspeed` (m/s) and `altitude` (m).
     ///
-    /// Where the throttle that would hold the airspeed lies beyond its stops it is left at the
-    /// stop, and the airspeed drifts with [`acceleration`](Trim::acceleration).
+    /// If the throttle that holds the airspeed lies beyond its stops, it is set to the stop, and the airspeed drifts
+    /// with [`acceleration`](Trim::acceleration).
     ///
     /// # Errors
     /// If no deflection holds that attitude.
@@ -107,7 +107,7 @@ impl Trim {
         match within_stops(|start| solve(Thrust::From(start)), 0.3) {
             Some(free) if (0.0..=1.0).contains(&free.controls.throttle) => Ok(free),
             Some(free) => held(free.controls.throttle.clamp(0.0, 1.0)).ok_or_else(fail),
-            // a thrust that is no line in throttle may miss the one that is wanted at any throttle
+            // a thrust that is nonlinear in throttle may not reach the required one at any throttle
             None => held(0.0)
                 .filter(|idle| idle.acceleration >= 0.0)
                 .or_else(|| held(1.0).filter(|full| full.acceleration <= 0.0))
@@ -117,9 +117,9 @@ impl Trim {
     }
 }
 
-/// What a search for a trim finds from the throttle `start`; from full throttle where that lies beyond the
-/// stops and this within: thrust that falls before it rises with throttle, as a windmilling propeller's does,
-/// has two trims.
+/// The trim found from the initial throttle `start`; from full throttle if the first one is beyond the stops and the
+/// second one within. Thrust that falls before it rises with throttle, such as a windmilling propeller's, has two
+/// trims.
 fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> {
     let holds = |trim: &Trim| (0.0..=1.0).contains(&trim.controls.throttle);
     let first = from(start);
@@ -129,8 +129,8 @@ fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> 
     from(1.0).filter(holds).or(first)
 }
 
-/// The trim at the throttle where what is `left` rises through zero, by bisection: Newton's steps may go to and fro about
-/// a kink of a table of thrust. `None` if it does not lie between idle and full throttle.
+/// The trim at the throttle where `left` rises through zero, by bisection: Newton's method may oscillate about a kink
+/// of a thrust table. `None` if there is none between idle and full throttle.
 fn halved(held: impl Fn(f64) -> Option<Trim>, left: impl Fn(&Trim) -> f64) -> Option<Trim> {
     let [idle, full] = [held(0.0)?, held(1.0)?];
     if !(left(&idle) < 0.0 && left(&full) > 0.0) {
@@ -144,7 +144,7 @@ fn halved(held: impl Fn(f64) -> Option<Trim>, left: impl Fn(&Trim) -> f64) -> Op
     held(high)
 }
 
-/// The descent at `airspeed`, m/s, at full throttle where that is shallower than at idle.
+/// The descent at `airspeed` (m/s) and full throttle if it is shallower than that at idle.
 fn descent(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
     let [idle, full] = [0.0, 1.0].map(|throttle| straight_at(model, airspeed, altitude, throttle));
     let powered = |full: &Trim| {
@@ -153,7 +153,7 @@ fn descent(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
     full.filter(powered).or(idle)
 }
 
-/// The straight flight at `airspeed` (m/s) and that throttle. Unknowns: α, δe, θ.
+/// Straight flight at `airspeed` (m/s) and the given throttle. Unknowns: α, δe, θ.
 fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> Option<Trim> {
     let condition = |[alpha, elevator, pitch]: [Dual<3>; 3]| {
         let held = Dual::from_f64(throttle);
@@ -171,12 +171,12 @@ fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> 
     Some(Trim { state, controls, acceleration: 0.0 })
 }
 
-/// The throttle of an attitude's trim.
+/// Treatment of the throttle in an attitude's trim.
 #[derive(Clone, Copy)]
 enum Thrust {
-    /// It holds the airspeed; the search starts here.
+    /// The throttle is an unknown that holds the airspeed, with this initial value.
     From(f64),
-    /// It is held here.
+    /// The throttle is held at this value.
     Held(f64),
 }
 
@@ -198,9 +198,8 @@ fn level_condition<R: Real>(
     (state, Controls { aileron: zero, elevator, throttle, rudder: zero, lagged: None })
 }
 
-/// Unknowns: α, the sideways unknown, p, q, r, δa, δe, δt. The sideways unknown is δr at β = 0 where the
-/// model has a rudder that yaws (a coordinated turn), else β at δr = 0. Where the throttle is held,
-/// δt = throttle replaces V̇ = 0.
+/// Solves for α, the lateral unknown, p, q, r, δa, δe, δt. The lateral unknown is δr at β = 0 where the model has a
+/// rudder that yaws (a coordinated turn), else β at δr = 0. If the throttle is held, δt = throttle replaces V̇ = 0.
 fn solve_attitude(
     model: &GreyBox,
     roll: f64,
@@ -237,12 +236,12 @@ fn solve_attitude(
     Some(Trim { state, controls, acceleration: 0.0 })
 }
 
-/// What balances a turn sideways.
+/// Lateral unknown of a turn.
 #[derive(Clone, Copy)]
 enum Sideways {
-    /// Sideslip.
+    /// Sideslip at zero rudder.
     Sideslip,
-    /// The rudder, without sideslip.
+    /// Rudder at zero sideslip.
     Rudder,
 }
 

@@ -1,4 +1,4 @@
-//! Weights of a dense network as a safetensors file, with one entry of metadata.
+//! Weights of a dense network as a safetensors file, with one metadata entry.
 
 use std::collections::HashMap;
 
@@ -9,28 +9,28 @@ use serde::de::DeserializeOwned;
 
 use greylag_num::Dense;
 
-/// The entry of a file's metadata that holds what it says of itself, as JSON.
+/// Metadata entry with the file's origin, as JSON.
 const METADATA: &str = "greylag";
 
-/// A square matrix beside a network's layers, row-major.
+/// A square matrix stored beside a network's layers, row-major.
 #[derive(Clone, Copy, Debug)]
 pub struct Square<'a> {
-    /// The tensor's name.
+    /// Name of the tensor.
     pub name: &'static str,
-    /// Rows and columns.
+    /// Number of rows, equal to that of columns.
     pub size: usize,
-    /// The entries.
+    /// Matrix entries, row by row.
     pub entries: &'a [f32],
 }
 
-/// A file's content: the layers of `network`, a matrix where there is one, and `said` of it.
+/// Content of a file: the layers of `network`, an optional matrix, and its `origin`.
 ///
 /// # Errors
-/// What the writer of the format says.
+/// The error of the format's writer.
 pub fn to_bytes(
     network: &Dense,
     matrix: Option<Square>,
-    said: &impl Serialize,
+    origin: &impl Serialize,
 ) -> Result<Vec<u8>, SafeTensorError> {
     let little = |list: &[f32]| list.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let mut tensors = Vec::new();
@@ -49,25 +49,25 @@ pub fn to_bytes(
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
     // one entry: the format writes several in no fixed order, and equal networks are equal files
-    let said = serde_json::to_string(said)?;
-    safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), said)])))
+    let origin = serde_json::to_string(origin)?;
+    safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), origin)])))
 }
 
-/// What a file says of itself.
+/// Origin of a file, from its metadata.
 ///
 /// # Errors
-/// What is wrong with it, in words.
-pub fn said<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+/// The reason why it cannot be read, in words.
+pub fn origin<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
-    let said = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let said = said.ok_or(format!("its metadata has no entry {METADATA}"))?;
-    serde_json::from_str(said).map_err(|e| format!("its metadata: {e}"))
+    let origin = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let origin = origin.ok_or(format!("its metadata has no entry {METADATA}"))?;
+    serde_json::from_str(origin).map_err(|e| format!("its metadata: {e}"))
 }
 
-/// The network of a file: `layers.0.weight`, `layers.0.bias` and so on.
+/// Network of a file: tensors `layers.0.weight`, `layers.0.bias` and so on.
 ///
 /// # Errors
-/// What is wrong with it, in words.
+/// The reason why it cannot be read, in words.
 pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
@@ -98,10 +98,10 @@ pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     Dense::new(&sizes, parameters).map_err(|e| e.to_string())
 }
 
-/// The entries of the matrix `name` of a file, row-major, if it has one.
+/// Entries of the matrix `name` of a file, row-major, if there is one.
 ///
 /// # Errors
-/// What is wrong with it, in words.
+/// The reason why it cannot be read, in words.
 pub fn matrix(bytes: &[u8], name: &str) -> Result<Option<Vec<f32>>, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let Ok(tensor) = tensors.tensor(name) else { return Ok(None) };

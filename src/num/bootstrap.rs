@@ -1,11 +1,11 @@
-//! Intervals of statistics from resampling.
+//! Bootstrap intervals of statistics.
 
 use rand::RngExt;
 
 use super::statistics::quantile;
 use super::stream;
 
-/// Resamples of an interval.
+/// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
 
 /// The 95 % percentile interval of `statistic` over `samples`, resampled with replacement from `seed`
@@ -14,7 +14,7 @@ pub fn interval(samples: &[f64], seed: u64, statistic: impl Fn(&[f64]) -> f64) -
     stratified_interval(std::slice::from_ref(&samples), seed, statistic)
 }
 
-/// As [`interval`], of the samples of all `strata` in order, each of which is resampled by itself: it keeps its size
+/// As [`interval`], of the samples of all `strata` in order, each of which is resampled separately and keeps its size
 /// (rliable, Agarwal et al. 2021).
 pub fn stratified_interval<S: AsRef<[f64]>>(
     strata: &[S],
@@ -46,7 +46,7 @@ mod tests {
     use crate::statistics::mean;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// The interval of a mean covers it about as often as it says.
+    /// The coverage of the interval of a mean is close to nominal.
     #[test]
     fn intervals_cover_the_mean() {
         let mut random = stream::stream(5, &[]);

@@ -5,12 +5,12 @@ use rand::RngExt;
 
 use super::Real;
 
-/// The widest layer that a network may have. [`Units`] has room for it on the heap, taken once:
-/// [`Dense::evaluate_in`] and [`Dense::evaluate_one`] take any network and allocate nothing.
+/// Widest layer that a network may have. [`Units`] holds it on the heap, allocated once: [`Dense::evaluate_in`] and
+/// [`Dense::evaluate_one`] accept any network and allocate nothing.
 pub const WIDEST: usize = 512;
 
-/// The widest layer that [`Dense::evaluate`] and [`Dense::last_hidden`] have room for on the stack: they need no
-/// [`Units`] and allocate nothing, but panic for a wider network. A residual with a wider layer is refused.
+/// Widest layer that [`Dense::evaluate`] and [`Dense::last_hidden`] hold on the stack: they need no [`Units`] and
+/// allocate nothing, but panic for a wider network. A residual with a wider layer is refused.
 pub const ON_STACK: usize = 128;
 
 /// A dense network: affine layers with max(0, ·) between them, none after the last.
@@ -26,13 +26,13 @@ pub struct Dense {
 /// One affine layer, y = x W + b.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a> {
-    /// W, `[in, out]`: the weights of one input lie together.
+    /// Weights W, `[in, out]`: those of one input are contiguous.
     pub weights: &'a [f32],
-    /// b.
+    /// Bias vector b.
     pub bias: &'a [f32],
 }
 
-/// Room for the units of two layers of up to [`WIDEST`], on the heap: with it, evaluating a network allocates nothing.
+/// Buffers on the heap for the units of two layers of up to [`WIDEST`], so that evaluation allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Units<R> {
     from: Vec<R>,
@@ -40,13 +40,13 @@ pub struct Units<R> {
 }
 
 impl<R: Copy> Units<R> {
-    /// Room for any network, filled with `zero`.
+    /// Buffers for any network, filled with `zero`.
     pub fn new(zero: R) -> Units<R> {
         Units { from: vec![zero; WIDEST], to: vec![zero; WIDEST] }
     }
 }
 
-/// The layers of a network. A type of its own, so that walking them is inlined into kernels.
+/// Iterator over a network's layers; a named type so that it is inlined into kernels.
 #[derive(Clone, Debug)]
 pub struct Layers<'a> {
     sizes: &'a [usize],
@@ -66,30 +66,30 @@ impl<'a> Iterator for Layers<'a> {
     }
 }
 
-/// Why numbers do not make a network.
+/// Error of a network's definition.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DenseError {
-    /// Its layers cannot be evaluated.
+    /// The layer sizes are not supported.
     #[error(
         "a network of layers {0:?} cannot be used: it takes two or more, each of 1 to {WIDEST}"
     )]
     Sizes(Vec<usize>),
-    /// The list of parameters has another length.
+    /// The number of parameters is wrong.
     #[error("a network of layers {sizes:?} has {expected} parameters, not {found}")]
     Count {
-        /// The layers.
+        /// Sizes of the layers.
         sizes: Vec<usize>,
-        /// Parameters it takes.
+        /// Number of parameters needed.
         expected: usize,
-        /// Parameters given.
+        /// Number of parameters given.
         found: usize,
     },
-    /// A parameter is no number.
+    /// A parameter is not finite.
     #[error("parameter {0} of a network is not a finite number")]
     NotFinite(usize),
 }
 
-/// Parameters of a network of layers `sizes`.
+/// Number of parameters of a network of layers `sizes`.
 fn count(sizes: &[usize]) -> usize {
     sizes.windows(2).map(|s| (s[0] + 1) * s[1]).sum()
 }
@@ -98,7 +98,7 @@ impl Dense {
     /// A network of layers `sizes` (inputs first) with these parameters.
     ///
     /// # Errors
-    /// If they do not fit, or one is not finite.
+    /// If their number is wrong, or one is not finite.
     pub fn new(sizes: &[usize], parameters: Vec<f32>) -> Result<Self, DenseError> {
         let fits = |n: &usize| (1..=WIDEST).contains(n);
         if sizes.len() < 2 || !sizes.iter().all(fits) {
@@ -114,8 +114,8 @@ impl Dense {
         }
     }
 
-    /// A network that answers zero to everything: hidden layers uniform in ±1/√in, as burn and
-    /// PyTorch start them, the last layer zero.
+    /// A network whose output is zero for any input: hidden layers uniform in ±1/√in, as burn and PyTorch initialise
+    /// them, the last layer zero.
     ///
     /// # Errors
     /// If `sizes` cannot be evaluated.
@@ -129,17 +129,17 @@ impl Dense {
         Dense::new(sizes, parameters)
     }
 
-    /// Units of each layer, inputs first.
+    /// Number of units of each layer, inputs first.
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }
 
-    /// All parameters.
+    /// All parameters, layer after layer.
     pub fn parameters(&self) -> &[f32] {
         &self.parameters
     }
 
-    /// All parameters, to be changed. Whoever writes keeps them finite.
+    /// All parameters, mutable. The caller must keep them finite.
     pub fn parameters_mut(&mut self) -> &mut [f32] {
         &mut self.parameters
     }
@@ -150,7 +150,7 @@ impl Dense {
         Layers { sizes: &self.sizes, rest: &self.parameters }
     }
 
-    /// A network as PyTorch and burn start it: all parameters of a layer uniform in ±1/√in.
+    /// A network initialised as in PyTorch and burn: all parameters of a layer uniform in ±1/√in.
     ///
     /// # Errors
     /// If `sizes` cannot be evaluated.
@@ -164,13 +164,13 @@ impl Dense {
         Dense::new(sizes, parameters)
     }
 
-    /// The network's answer.
+    /// Output of the network.
     ///
     /// # Panics
     /// If the network has not `IN` inputs and `OUT` outputs, or a layer wider than [`ON_STACK`].
     #[inline(always)]
     pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
-        // room that is not used costs time as well
+        // initialising unused buffer space costs time
         if self.sizes.iter().all(|units| *units <= ON_STACK / 2) {
             self.on_stack::<R, IN, OUT, { ON_STACK / 2 }>(input)
         } else {
@@ -202,7 +202,7 @@ impl Dense {
         answer
     }
 
-    /// The units of the last hidden layer, into `units`; how many they are: none of a single affine layer.
+    /// Writes the units of the last hidden layer to `units` and returns their number, zero for a single affine layer.
     ///
     /// # Panics
     /// If `input` has another length than the network's first layer, or a layer is wider than [`ON_STACK`].
@@ -219,7 +219,7 @@ impl Dense {
         if hidden == 0 { 0 } else { self.sizes[hidden] }
     }
 
-    /// The network's answer, whatever its width, in `units`.
+    /// Output of a network of any width, using `units` as buffers.
     ///
     /// # Panics
     /// If `input` has another length than the network's first layer.
@@ -241,8 +241,8 @@ impl Dense {
         &from[..self.sizes[last + 1]]
     }
 
-    /// The network's answer to one input in single precision, side by side over the outputs of a layer:
-    /// for a network that is asked once a tick. Units at zero cost nothing.
+    /// Output for one input in single precision, vectorised over the outputs of a layer, for a network evaluated once
+    /// a tick. Units at zero are skipped.
     ///
     /// # Panics
     /// As [`evaluate_in`](Dense::evaluate_in).
@@ -270,7 +270,7 @@ impl Dense {
 }
 
 impl Layer<'_> {
-    /// y = x W + b.
+    /// Computes y = x W + b.
     #[inline(always)]
     pub fn apply<R: Real>(&self, input: &[R], output: &mut [R]) {
         match R::ABREAST {
@@ -281,7 +281,7 @@ impl Layer<'_> {
         }
     }
 
-    /// `B` outputs side by side, the rest by twos and ones.
+    /// Computes `B` outputs at a time, the rest by twos and ones.
     #[inline(always)]
     fn blocks<R: Real, const B: usize>(&self, input: &[R], output: &mut [R]) {
         let mut first = 0;
@@ -299,7 +299,7 @@ impl Layer<'_> {
         }
     }
 
-    /// `B` outputs from `first` on.
+    /// Computes `B` outputs from `first` on.
     #[inline(always)]
     fn columns<R: Real, const B: usize>(&self, first: usize, input: &[R], output: &mut [R]) {
         let outputs = output.len();
@@ -324,7 +324,7 @@ impl Layer<'_> {
     }
 }
 
-/// max(0, ·) of every unit.
+/// Applies max(0, ·) to every unit.
 #[inline(always)]
 pub fn rectify<R: Real>(units: &mut [R]) {
     for unit in units {

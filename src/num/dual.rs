@@ -10,14 +10,14 @@ use super::{Real, each};
 /// this is not the crate `num-dual`, whose scalar must be a float with comparisons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<const N: usize, T = f64> {
-    /// The value.
+    /// Value of the function.
     pub value: T,
     /// Its derivatives with respect to the `N` inputs.
     pub gradient: [T; N],
 }
 
 impl<const N: usize, T: Real> Dual<N, T> {
-    /// The input number `index`, with derivative one with respect to itself.
+    /// Input number `index`, whose derivative with respect to itself is one.
     pub fn variable(value: T, index: usize) -> Self {
         let mut gradient = [T::zero(); N];
         gradient[index] = T::from_f64(1.0);
@@ -118,7 +118,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        // at zero the slope of what stands under the root decides, and 0 · ∞ would be no number
+        // at zero the radicand's derivative decides, and 0 · ∞ would be NaN
         let slope = T::where_less(T::zero(), root, T::from_f64(0.5) / root, T::zero());
         self.chain(root, slope)
     }
@@ -141,7 +141,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
 mod tests {
     use super::*;
 
-    /// A function that uses every operation, smooth at the point where it is tried.
+    /// A function that uses every operation and is smooth at the test point.
     fn everything<R: Real>(x: R, y: R) -> R {
         let (s, c) = (x * y).sin_cos();
         let a = s.atan2(c + R::from_f64(2.0)) + (x / y).exp() - (x * x + y * y).sqrt();

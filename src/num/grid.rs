@@ -3,9 +3,10 @@
 use super::Real;
 use super::table::TableError;
 
-/// Most points along the second variable: the ramps of all are in registers or on the stack.
+/// Largest number of points along the second variable, limited because their ramps are held in registers or on the
+/// stack.
 const MOST_COLUMNS: usize = 16;
-/// Most points along the first variable.
+/// Largest number of points along the first variable.
 const MOST_ROWS: usize = 100;
 
 /// A bilinear function of two variables.
@@ -19,15 +20,15 @@ pub struct Grid {
     slopes: Vec<Vec<f64>>,
 }
 
-/// Why points do not make a grid.
+/// Error of a grid's definition.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum GridError {
-    /// One of the variables.
+    /// The points of one variable are invalid.
     #[error("{variable}: {why}")]
     Axis {
-        /// Which one.
+        /// Name of the variable.
         variable: &'static str,
-        /// What is wrong.
+        /// The error of its points.
         why: TableError,
     },
     /// The values do not fill the grid.
@@ -54,13 +55,13 @@ fn increasing(points: &[f64], most: usize) -> Result<(), TableError> {
     }
 }
 
-/// Value at the first point, then the slope of each step.
+/// Value at the first point, then the slope of each interval.
 fn along(y: &[f64], values: impl Fn(usize) -> f64) -> Vec<f64> {
     let slope = |j: usize| (values(j) - values(j - 1)) / (y[j] - y[j - 1]);
     std::iter::once(values(0)).chain((1..y.len()).map(slope)).collect()
 }
 
-/// How far `x` is beyond `from`, no further than to `to`.
+/// Clipped ramp: `x` − `from`, limited to 0..(`to` − `from`).
 #[inline(always)]
 fn ramp<R: Real>(x: R, from: f64, to: f64) -> R {
     let (part, length) = ((x - R::from_f64(from)).max(R::zero()), R::from_f64(to - from));
@@ -71,7 +72,7 @@ impl Grid {
     /// The function with the value `values[i][j]` at (`x[i]`, `y[j]`), both increasing.
     ///
     /// # Errors
-    /// If the points are no such grid, or more than 100 by 16.
+    /// If the points do not form a grid, or are more than 100 by 16.
     pub fn new(x: &[f64], y: &[f64], values: &[Vec<f64>]) -> Result<Grid, GridError> {
         let of = |variable| move |why| GridError::Axis { variable, why };
         increasing(x, MOST_ROWS).map_err(of("the first variable"))?;
@@ -93,12 +94,12 @@ impl Grid {
         })
     }
 
-    /// The points along the first and the second variable.
+    /// Points along the first and the second variable.
     pub fn axes(&self) -> [&[f64]; 2] {
         [&self.x, &self.y]
     }
 
-    /// The function's value at (`x`, `y`), NaN if one of them is. Sums of clipped ramps as in
+    /// Value at (`x`, `y`), NaN if one of them is. Computed as sums of clipped ramps as in
     /// [`Table::at`](super::Table::at): no search, hence no branch per lane.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R, y: R) -> R {
@@ -116,7 +117,7 @@ impl Grid {
     }
 }
 
-/// The value at the first point with the ramps times their slopes.
+/// Value at the first point plus the ramps times their slopes.
 #[inline(always)]
 fn line<R: Real>(slopes: &[f64], ramps: &[R; MOST_COLUMNS]) -> R {
     let mut sum = R::from_f64(slopes[0]);

@@ -1,4 +1,4 @@
-//! Lanes: single-precision numbers that move together through the same equations.
+//! Lanes: single-precision numbers that are evaluated together.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -11,30 +11,30 @@ use std::arch::x86_64::{__m128, __m256, __m512};
 
 /// `N` lanes in a register `V`, one for each candidate of a batch.
 ///
-/// In single numbers (`V = [f32; N]`) the compiler makes vectors of them, which it takes long for and
-/// does badly for AVX-512; in the registers of an instruction set it only has to keep them.
+/// With an array (`V = [f32; N]`) the compiler must vectorise by itself, which is slow and poor for AVX-512; with
+/// registers of an instruction set it need not.
 ///
-/// With `FUSED`, [`Real::mul_add`] rounds once: twice the speed where the processor has the
-/// instruction and the kernel is compiled for it, very slow elsewhere, and other last bits. But for that
-/// all kinds of lanes give the same numbers to the bit.
+/// With `FUSED`, [`Real::mul_add`] rounds once: twice the speed where the processor has the instruction and the
+/// kernel is compiled for it, very slow elsewhere, and other last bits. Otherwise all kinds of lanes give
+/// bit-identical results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes<const N: usize, const FUSED: bool = false, V = [f32; N]>(pub V);
 
-/// Sixteen lanes in a register of AVX-512.
+/// Sixteen lanes in an AVX-512 register.
 #[cfg(target_arch = "x86_64")]
 pub type Avx512<const FUSED: bool> = Lanes<16, FUSED, __m512>;
-/// Sixteen lanes in registers of AVX2.
+/// Sixteen lanes in AVX2 registers.
 #[cfg(target_arch = "x86_64")]
 pub type Avx2<const FUSED: bool> = Lanes<16, FUSED, Pair<__m256>>;
-/// Sixteen lanes in what the target always has.
+/// Sixteen lanes in registers that every processor of the target has.
 #[cfg(target_arch = "x86_64")]
 pub type Base<const FUSED: bool> = Lanes<16, FUSED, Pair<Pair<__m128>>>;
-/// Sixteen lanes in what the target always has.
+/// Sixteen lanes in registers that every processor of the target has.
 #[cfg(not(target_arch = "x86_64"))]
 pub type Base<const FUSED: bool> = Lanes<16, FUSED>;
 
-/// Whether a multiply-add is fused in what the target always has.
+/// Whether a multiply-add is fused on every processor of the target.
 pub const BASE_FUSED: bool = cfg!(target_arch = "aarch64");
 
 impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
@@ -132,25 +132,25 @@ impl<const N: usize, const FUSED: bool, V: Register> Real for Lanes<N, FUSED, V>
 }
 
 impl<const N: usize, const FUSED: bool, V: Register> Lanes<N, FUSED, V> {
-    /// The sum over the lanes, N being a power of two: the upper half is added to the lower one until one
-    /// number is left, so that every kind of register gives the same to the bit.
+    /// Sum over the lanes, N being a power of two, by repeatedly adding the upper half to the lower one, so that
+    /// every kind of register gives a bit-identical result.
     #[inline(always)]
     pub fn sum(self) -> f32 {
         self.0.sum()
     }
 }
 
-/// Lanes that can be reached in rows of [`ROW`].
+/// Lanes that can be accessed in rows of [`ROW`].
 pub trait Packed: Real {
-    /// How many rows they are.
+    /// Number of rows.
     const ROWS: usize;
-    /// Lanes of the rows `row(0)`, `row(1)`, …
+    /// Packs the rows `row(0)`, `row(1)`, …
     fn pack(row: impl FnMut(usize) -> [f32; ROW]) -> Self;
-    /// One of the rows.
+    /// Extracts one of the rows.
     fn unpack(self, row: usize) -> [f32; ROW];
 }
 
-/// Lanes of a row.
+/// Number of lanes in a row.
 pub const ROW: usize = 16;
 
 impl<const N: usize, const FUSED: bool, V: Register> Packed for Lanes<N, FUSED, V> {
@@ -194,7 +194,7 @@ fn sin_cos<V: Register>(x: V) -> (V, V) {
     V::quarters(shifted, sine, cosine)
 }
 
-/// The angle of the point (x, y) to 3 ulp, without branches (Cephes `atanf`).
+/// Angle of the point (x, y) to 3 ulp, without branches (Cephes `atanf`).
 #[inline(always)]
 fn atan2<V: Register>(y: V, x: V) -> V {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -217,7 +217,7 @@ fn atan2<V: Register>(y: V, x: V) -> V {
     V::where_less(y, c(0.0), angle.neg(), angle)
 }
 
-/// The exponential to 2 ulp, saturating at the ends of the range (Cephes `expf`).
+/// Exponential to 2 ulp, saturating at the ends of the range (Cephes `expf`).
 #[inline(always)]
 fn exp<V: Register>(x: V) -> V {
     let c = V::splat;
@@ -257,7 +257,7 @@ mod tests {
         assert_eq!(atan2([0.0_f32], [0.0]), [0.0]);
     }
 
-    /// Every function of lanes at many places, lane by lane.
+    /// Values of every function of lanes at many arguments, lane by lane.
     #[inline(always)]
     fn tried<const N: usize, const FUSED: bool, V: Register>() -> Vec<[f32; ROW]> {
         let mut all = Vec::new();

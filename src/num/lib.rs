@@ -1,4 +1,4 @@
-//! Numbers: the scalar an equation is written over, the types that stand for it, and seeded streams.
+//! Numerics: the generic scalar of the equations, its implementations, and seeded random streams.
 
 pub mod bootstrap;
 pub mod dense;

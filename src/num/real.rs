@@ -1,10 +1,10 @@
-//! `Real`: the few operations that an equation of motion may use.
+//! `Real`: the operations that an equation of motion may use.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A scalar that the physics is written over once and read as `f64`, as [`Lanes`](super::Lanes)
-/// of `f32`, or as [`Dual`](super::Dual) numbers.
+/// The scalar that the physics is generic over: `f64`, [`Lanes`](super::Lanes) of `f32`, or [`Dual`](super::Dual)
+/// numbers.
 ///
 /// There is no `<`: lanes cannot branch, so equations use [`where_less`](Real::where_less),
 /// [`min`](Real::min), [`max`](Real::max), [`abs`](Real::abs) and [`Table`](super::Table).
@@ -22,30 +22,30 @@ pub trait Real:
     + AddAssign
     + SubAssign
 {
-    /// How many outputs of a layer are summed side by side, in registers.
+    /// Number of outputs of a layer that are summed at once, in registers.
     const ABREAST: usize = 6;
-    /// Whether a function that is not in line with its caller would lose the caller's instructions.
+    /// Whether a call that is not inlined would leave the caller's vector instruction set.
     const IN_REGISTERS: bool = false;
 
     /// The constant `x`, with no derivative, in every lane.
     fn from_f64(x: f64) -> Self;
-    /// Sine and cosine.
+    /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
     /// The angle of the point (x, y) = (`x`, `self`), in −π..π.
     fn atan2(self, x: Self) -> Self;
-    /// The square root.
+    /// Square root of the number.
     fn sqrt(self) -> Self;
-    /// The exponential.
+    /// The exponential function e^x.
     fn exp(self) -> Self;
     /// `then` where `a < b`, else `otherwise`; both are computed.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
 
-    /// The magnitude.
+    /// Magnitude (absolute value) of the number.
     #[inline(always)]
     fn abs(self) -> Self {
         Self::where_less(self, Self::zero(), -self, self)
     }
-    /// The smaller of two numbers; NaN if `self` is, so that limits do not hide a lost number.
+    /// The smaller of two numbers; NaN if `self` is, so that limits do not hide a NaN.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self::where_less(other, self, other, self)
@@ -55,12 +55,12 @@ pub trait Real:
     fn max(self, other: Self) -> Self {
         Self::where_less(self, other, other, self)
     }
-    /// `self · factor + addend`, rounded once or twice as the type says.
+    /// Multiply-add `self · factor + addend`, with one or two roundings depending on the type.
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         self * factor + addend
     }
-    /// Zero.
+    /// The constant zero.
     #[inline(always)]
     fn zero() -> Self {
         Self::from_f64(0.0)
@@ -91,8 +91,8 @@ pub trait Real:
     }
 }
 
-/// `f` of every number. In line with its caller, which an array's own `map` may not be: what is not in line
-/// leaves the vector instructions of who calls it.
+/// Applies `f` to every element. Guaranteed to be inlined, unlike an array's own `map`: a call would leave the vector
+/// instructions of the caller.
 #[inline(always)]
 pub fn each<const N: usize, T: Copy, S: Copy>(all: [T; N], mut f: impl FnMut(T) -> S) -> [S; N] {
     let mut out = [f(all[0]); N];

@@ -1,4 +1,4 @@
-//! Registers: what lanes are kept in, and the operations that a processor has for them.
+//! Registers that hold lanes, with the processor's operations on them.
 
 use std::fmt::Debug;
 
@@ -6,55 +6,55 @@ use std::fmt::Debug;
 /// integer's last bits in those of the sum.
 pub(super) const ROUND: f32 = 12_582_912.0;
 
-/// Some numbers in single precision that one instruction works on. Each operation is one rounding of
-/// IEEE 754, so that all kinds of register give the same numbers to the bit.
+/// Single-precision numbers that one instruction processes. Each operation rounds once as in IEEE 754, so that all
+/// kinds of register give bit-identical results.
 ///
-/// Those of an instruction set may only be touched by functions compiled for it.
+/// Those of an instruction set may only be used in functions compiled for it.
 pub trait Register: Copy + Debug + Send + Sync + 'static {
-    /// How many numbers it holds.
+    /// Number of lanes.
     const LANES: usize;
-    /// How many may hold sums side by side, so that the latency of a multiply-add is hidden and what it
-    /// takes has room.
+    /// Number of registers for simultaneous sums, enough to hide the latency of a multiply-add and few enough to
+    /// leave registers for its operands.
     const SUMS: usize;
     /// The same number in every lane.
     fn splat(x: f32) -> Self;
-    /// The first numbers of a list.
+    /// Loads the first numbers of a list.
     fn read(from: &[f32]) -> Self;
-    /// Puts the numbers at the start of a list.
+    /// Stores the numbers at the start of a list.
     fn write(self, to: &mut [f32]);
-    /// The sum.
+    /// Sum of the lanes, pairwise.
     fn add(self, other: Self) -> Self;
-    /// The difference.
+    /// Difference of the lanes, pairwise.
     fn sub(self, other: Self) -> Self;
-    /// The product.
+    /// Product of the lanes, pairwise.
     fn mul(self, other: Self) -> Self;
-    /// The quotient.
+    /// Quotient of the lanes, pairwise.
     fn div(self, other: Self) -> Self;
-    /// `self` with the other sign.
+    /// Negates `self` in every lane.
     fn neg(self) -> Self;
-    /// `self` without its sign.
+    /// Absolute value of `self` in every lane.
     fn abs(self) -> Self;
-    /// The square root.
+    /// Square root of every lane.
     fn sqrt(self) -> Self;
     /// `self · factor + addend`, rounded once.
     fn fused(self, factor: Self, addend: Self) -> Self;
-    /// `self < other ? self : other`.
+    /// The smaller number of each lane: `self < other ? self : other`.
     fn lesser(self, other: Self) -> Self;
-    /// `self > other ? self : other`.
+    /// The larger number of each lane: `self > other ? self : other`.
     fn greater(self, other: Self) -> Self;
-    /// `a < b ? then : otherwise`.
+    /// Selection in each lane: `a < b ? then : otherwise`.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
-    /// Sine and cosine of an angle with n quarters of a turn more, n being the integer that was rounded
-    /// into `shifted` by adding 1.5 · 2²³.
+    /// Sine and cosine of an angle increased by n quarter turns, n being the integer that was rounded into `shifted`
+    /// by adding 1.5 · 2²³.
     fn quarters(shifted: Self, sine: Self, cosine: Self) -> (Self, Self);
-    /// 2ⁿ of an integer in −126..=127.
+    /// Power 2ⁿ of an integer in −126..=127.
     fn power(n: Self) -> Self;
-    /// The sum of the lanes: the upper half is added to the lower one until one number is left.
+    /// Sum over the lanes, by repeatedly adding the upper half to the lower one.
     fn sum(self) -> f32;
 }
 
-/// `N` results of an expression in `i`. A loop rather than `std::array::from_fn`: a function that is not in
-/// line leaves the vector instructions of whoever calls it.
+/// `N` results of an expression in `i`. A loop rather than `std::array::from_fn`: a function that is not inlined
+/// leaves the vector instructions of its caller.
 macro_rules! entries {
     ($i:ident => $value:expr) => {{
         let mut all = [0.0; N];
@@ -67,7 +67,7 @@ macro_rules! entries {
     }};
 }
 
-/// Single numbers, for the compiler to make vectors of.
+/// An array of numbers, to be vectorised by the compiler.
 impl<const N: usize> Register for [f32; N] {
     const LANES: usize = N;
     // of a block of 16 lanes 24 of NEON's 32 registers
@@ -164,7 +164,7 @@ impl<const N: usize> Register for [f32; N] {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair<V>(V, V);
 
-/// Operations half by half.
+/// Operations on each half.
 macro_rules! halves {
     ($($method:ident($($other:ident),*)),*) => {$(
         #[inline(always)]

@@ -38,7 +38,7 @@ pub fn correlation_length(parts: &[Vec<f64>]) -> f64 {
     let own = mean_product(0);
     let longest = parts.iter().map(Vec::len).max().unwrap_or(0);
     let correlations = (1..longest).map(|lag| mean_product(lag) / own);
-    // a comparison with what is no number is false
+    // a comparison with NaN is false
     correlations.take_while(|c| *c > 0.05).fold(1.0, |sum, c| sum + 2.0 * c)
 }
 

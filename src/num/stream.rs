@@ -1,4 +1,4 @@
-//! Seeded streams of random numbers: the same on every machine, independent by name.
+//! Seeded random streams, identical on every machine and independent by path.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 /// flight in every version of every machine.
 pub type Stream = ChaCha8Rng;
 
-/// The stream of `seed` for one purpose, for example `stream(seed, &[episode, tick])`: streams
-/// with different paths are independent, whatever order they are drawn in.
+/// Random stream of `seed` for one purpose, for example `stream(seed, &[episode, tick])`: streams with different
+/// paths are independent, whatever order they are drawn in.
 pub fn stream(seed: u64, path: &[u64]) -> Stream {
     // FNV-1a over the path picks one of ChaCha's 2^64 streams of the key
     let number =

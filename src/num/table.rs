@@ -1,4 +1,4 @@
-//! A function given by points: linear between them, constant beyond.
+//! A function of one variable given by points: linear between them, constant outside.
 
 use super::Real;
 
@@ -6,22 +6,22 @@ use super::Real;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     floor: f64,
-    /// (x at the segment's start, its length, slope).
+    /// Segments: x at the start, length, slope.
     segments: Vec<(f64, f64, f64)>,
 }
 
-/// Why points do not make a table.
+/// Error of a table's definition.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum TableError {
-    /// Too few points.
+    /// There are too few points.
     #[error("a table needs at least two points, this one has {0}")]
     TooShort(usize),
-    /// Too many points.
+    /// There are too many points.
     #[error("a table may have {most} points, this one has {points}; thin it out")]
     TooLong {
-        /// How many it has.
+        /// Number of points given.
         points: usize,
-        /// How many it may have.
+        /// Largest number possible.
         most: usize,
     },
     /// The two lists differ in length.
@@ -35,7 +35,7 @@ pub enum TableError {
     NotFinite(usize),
 }
 
-/// Points that one evaluation of the model can bear.
+/// Largest number of points, a limit on the cost of evaluating a model.
 const MAX_POINTS: usize = 1000;
 
 impl Table {
@@ -65,7 +65,7 @@ impl Table {
         Ok(Table { floor: y[0], segments })
     }
 
-    /// The points through which it goes.
+    /// Points of the table.
     pub fn points(&self) -> Vec<(f64, f64)> {
         let mut y = self.floor;
         let mut points = Vec::with_capacity(self.segments.len() + 1);
@@ -79,8 +79,8 @@ impl Table {
         points
     }
 
-    /// The function's value at `x`, NaN if `x` is. A sum of clipped ramps: no search, hence no
-    /// branch per lane. On an abscissa the derivative is the right segment's.
+    /// Value at `x`, NaN if `x` is. Computed as a sum of clipped ramps without a search, hence without a branch per
+    /// lane. At an abscissa the derivative is that of the right segment.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R) -> R {
         // zero, or NaN

@@ -13,7 +13,7 @@ pub struct Command<R = f64> {
     pub aileron: R,
     /// Elevator, −1..1; positive pitches down.
     pub elevator: R,
-    /// Throttle, 0..1.
+    /// Throttle command, 0..1.
     pub throttle: R,
     /// Rudder, −1..1; positive yaws left. Zero on an aircraft without one.
     pub rudder: R,
@@ -39,7 +39,7 @@ impl Command {
     }
 }
 
-/// Lags and delays that the formulas of one model may have, `lag(…)` and `delay(…)` of effect files.
+/// Largest number of lags and delays, `lag(…)` and `delay(…)` of effect files, in the formulas of one model.
 pub const LAGS: usize = 2;
 
 /// What acts on the airframe at an instant: deflections and throttle position.
@@ -53,13 +53,13 @@ pub struct Controls<R = f64> {
     pub throttle: R,
     /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without one.
     pub rudder: R,
-    /// Values of the lags and delays of the model's formulas at this instant; `None` where the controls' past is not
-    /// known: they have then settled.
+    /// Values of the lags and delays of the model's formulas at this instant; `None` if the past of the controls is
+    /// unknown, in which case they are taken as settled.
     pub lagged: Option<[R; LAGS]>,
 }
 
 impl<R: Copy> Controls<R> {
-    /// The controls with every number read as another kind.
+    /// Converts every number of the controls to another scalar.
     #[inline(always)]
     #[expect(
         clippy::manual_map,
@@ -80,7 +80,7 @@ impl<R: Copy> Controls<R> {
 }
 
 impl Controls {
-    /// The controls after the share `part` of the way to `next`, on a straight line.
+    /// Linear interpolation to `next`, at the share `part` of the way.
     pub fn towards(&self, next: &Controls, part: f64) -> Controls {
         let mix = |a: f64, b: f64| a + part * (b - a);
         Controls {
@@ -101,22 +101,22 @@ impl Controls {
 pub struct ActuatorState<R = f64> {
     /// Aileron position, rad; positive rolls right.
     pub aileron: R,
-    /// Aileron rate, rad/s.
+    /// Rate of the aileron, rad/s.
     pub aileron_rate: R,
     /// Elevator position, rad; positive trailing edge down.
     pub elevator: R,
-    /// Elevator rate, rad/s.
+    /// Rate of the elevator, rad/s.
     pub elevator_rate: R,
-    /// Throttle position, 0..1.
+    /// Position of the throttle, 0..1.
     pub throttle: R,
     /// Rudder position, rad; positive trailing edge left. Zero on an aircraft without one.
     pub rudder: R,
-    /// Rudder rate, rad/s.
+    /// Rate of the rudder, rad/s.
     pub rudder_rate: R,
 }
 
 impl<R: Copy> ActuatorState<R> {
-    /// The positions, which are what acts.
+    /// The positions, as controls.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -129,7 +129,7 @@ impl<R: Copy> ActuatorState<R> {
     }
 }
 
-/// A second-order surface filter with its own memory, clipped after the filter.
+/// A second-order surface filter with its memory, limited after the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceFilter<R = f64> {
     /// The two last commanded deflections, rad, newest first.
@@ -140,7 +140,7 @@ pub struct SurfaceFilter<R = f64> {
     clipped: [R; 2],
 }
 
-/// The filters of all actuators; an aircraft without a rudder has none for it.
+/// The filters of all actuators; an aircraft without a rudder has no filter for it.
 ///
 /// The observed numbers ([`ActuatorState`]) are not quite a Markov state; this is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +157,7 @@ impl<R: Real> SurfaceFilter<R> {
         SurfaceFilter { input: [position; 2], output: [position; 2], clipped: [position; 2] }
     }
 
-    /// The filter that explains a `position` (rad) and `rate` (rad/s) after the two last commands.
+    /// The filter memory consistent with a `position` (rad) and `rate` (rad/s) after the two last commands.
     #[inline(always)]
     fn observed(
         [position, rate]: [R; 2],
@@ -210,7 +210,7 @@ impl<R: Real> SurfaceFilter<R> {
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls`, commanded to stay there; a rudder without figures stays there.
+    /// Actuators at rest at `controls` and commanded to stay there; a rudder without figures stays there.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),
@@ -221,12 +221,12 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// The same without a rudder that `figures` do not have.
+    /// The actuators without the rudder's filter if `figures` have no rudder.
     pub fn fitted(self, figures: &ActuatorFigures) -> Self {
         Actuators { rudder: figures.rudder.and(self.rudder), ..self }
     }
 
-    /// The filters that explain an observed `state` after the commands `previous` (newest first).
+    /// The filter memories consistent with an observed `state` after the commands `previous` (newest first).
     ///
     /// Exact unless a surface is at its stop, where the filter's own output is not observed: the
     /// first step after leaving it may then be off by up to 8 % of the travel. Likewise where a
@@ -265,7 +265,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// The filters of `then` where `chosen` is above zero, else these.
+    /// Selects the filters of `then` where `chosen` is above zero, else these.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
@@ -294,7 +294,7 @@ impl<R: Real> Actuators<R> {
         self.throttle_input = command.throttle;
     }
 
-    /// What acts on the airframe now.
+    /// Present deflections and throttle position.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -309,7 +309,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// What is observed now: positions, with rates as differences over the last step.
+    /// Present observation: positions, with rates as differences over the last step.
     #[inline(always)]
     pub fn observed(&self, figures: &ActuatorFigures) -> ActuatorState<R> {
         let (rudder, rudder_rate) = match &self.rudder {

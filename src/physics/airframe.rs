@@ -1,4 +1,4 @@
-//! The airframe: geometry, actuators and the envelope it may be flown in, from a TOML file.
+//! The airframe: geometry, actuators and flight envelope, from a TOML file.
 
 mod controls;
 mod effectors;
@@ -20,11 +20,11 @@ pub use crate::servos::ActuatorFigures;
 /// Wing area in m², span and mean chord in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
-    /// Wing area S.
+    /// Reference wing area S, m².
     pub area: f64,
-    /// Span b.
+    /// Wing span b, m.
     pub span: f64,
-    /// Mean aerodynamic chord c.
+    /// Mean aerodynamic chord c, m.
     pub chord: f64,
 }
 
@@ -38,35 +38,36 @@ pub struct Envelope {
     pub pitch_max_deg: f64,
     /// Smallest pitch angle, degrees.
     pub pitch_min_deg: f64,
-    /// Largest load factor.
+    /// Largest normal load factor.
     pub load_factor_max: f64,
-    /// Least load factor, where the file states one: see [`load_factor_least`](Envelope::load_factor_least).
+    /// Smallest load factor, if the file states one: see [`load_factor_least`](Envelope::load_factor_least).
     #[serde(default)]
     pub load_factor_min: Option<f64>,
-    /// Largest sideslip, degrees, where the file states one: see [`sideslip_most_deg`](Envelope::sideslip_most_deg).
+    /// Largest sideslip, degrees, if the file states one: see [`sideslip_most_deg`](Envelope::sideslip_most_deg).
     #[serde(default)]
     pub sideslip_max_deg: Option<f64>,
-    /// Smallest airspeed, m/s.
+    /// Smallest true airspeed, m/s.
     pub airspeed_min_mps: f64,
-    /// Largest airspeed, m/s.
+    /// Largest true airspeed, m/s.
     pub airspeed_max_mps: f64,
-    /// Airspeed held when nothing else is asked for, m/s.
+    /// Default airspeed, m/s.
     pub airspeed_cruise_mps: f64,
-    /// Fastest change of a surface command, in units of the command (−1..1) a second.
+    /// Largest rate of a surface command, in units of the command (−1..1) per second.
     pub surface_slew_per_s: f64,
 }
 
-/// Least load factor over the largest, where a file states none: FAR 23.337 (b) (1), normal and utility category.
+/// Smallest load factor relative to the largest, if a file states none: FAR 23.337 (b) (1), normal and utility
+/// category.
 const LEAST_LOAD: f64 = -0.4;
-/// Largest sideslip where a file states none, degrees: beyond it linear lateral derivatives say little.
+/// Largest sideslip if a file states none, degrees: linear lateral derivatives are not valid beyond it.
 const SIDESLIP_DEG: f64 = 25.0;
-/// Stall angle over the angle from which the nose is pushed down, where a file states none.
+/// Ratio of the stall angle to the angle from which the nose is pushed down, if a file states none.
 const STALL: f64 = 4.0 / 3.0;
-/// Part of the stall angle that flight keeps to.
+/// Share of the stall angle that limits the angle of attack in flight.
 const BEFORE_STALL: f64 = 0.95;
 
 impl Envelope {
-    /// The least load factor: the file's, else −0.4 of the largest (FAR 23.337).
+    /// Smallest load factor: the file's, else −0.4 of the largest (FAR 23.337).
     pub fn load_factor_least(&self) -> f64 {
         self.load_factor_min.unwrap_or(LEAST_LOAD * self.load_factor_max)
     }
@@ -76,41 +77,41 @@ impl Envelope {
         self.sideslip_max_deg.unwrap_or(SIDESLIP_DEG)
     }
 
-    /// Airspeed from which a log's rows count as flight, m/s: half the least one, so that a stall is flight and
-    /// taxiing is not.
+    /// Airspeed from which a log's rows count as flight, m/s: half the smallest one, so that a stall counts as flight
+    /// and taxiing does not.
     pub fn flying_from_mps(&self) -> f64 {
         0.5 * self.airspeed_min_mps
     }
 }
 
-/// The condition about which an aircraft's quantities are scaled.
+/// Reference condition for scaling an aircraft's quantities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// Airspeed V0 of x_c, eq. (21) of \[GSFM26\], m/s.
+    /// Reference airspeed V0 of x_c, eq. (21) of \[GSFM26\], m/s.
     pub airspeed: f64,
     /// Altitude of designs and checks, m above mean sea level.
     pub altitude: f64,
 }
 
 impl Reference {
-    /// That of files of schema 1: the start of an episode in section V-A of \[GSFM26\].
+    /// Reference condition of files of schema 1: the start of an episode in section V-A of \[GSFM26\].
     pub const OF_SCHEMA_1: Reference = Reference { airspeed: 16.67, altitude: 600.0 };
 }
 
-/// Incidence (angle of attack) that a controller keeps to.
+/// Limits of the angle of attack for controllers.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Incidence {
     /// Largest angle of attack of steady flight, rad.
     #[serde(rename = "comfortable_rad")]
     pub comfortable: f64,
-    /// Largest angle of attack that a commanded attitude may need, rad; what is above it is for transients.
+    /// Largest angle of attack that a commanded attitude may require, rad; larger ones occur in transients only.
     #[serde(rename = "tolerable_rad")]
     pub tolerable: f64,
     /// Angle of attack beyond which the nose is pushed down, rad.
     #[serde(rename = "push_from_rad")]
     pub push_from: f64,
-    /// Angle of attack at which the wing stalls, rad, where the file states one: see [`before_stall`](Incidence::before_stall).
+    /// Angle of attack at stall, rad, if the file states one: see [`before_stall`](Incidence::before_stall).
     #[serde(default, rename = "stall_rad")]
     pub stall: Option<f64>,
     /// Elevator deflection, nose down, added per rad of angle of attack beyond `push_from`, rad/rad.
@@ -118,7 +119,7 @@ pub struct Incidence {
 }
 
 impl Incidence {
-    /// For a wing that stalls at about 12°.
+    /// Limits for a wing that stalls at about 12°.
     pub const DEFAULT: Incidence = Incidence {
         comfortable: 0.05,
         tolerable: 0.09,
@@ -127,7 +128,8 @@ impl Incidence {
         stall: None,
     };
 
-    /// The largest angle of attack of a transient, rad: 95 % of the stall's, which is 4/3 of `push_from` where the file states none.
+    /// Largest angle of attack of a transient, rad: 95 % of the stall angle, which is 4/3 of `push_from` if the file
+    /// states none.
     pub fn before_stall(&self) -> f64 {
         BEFORE_STALL * self.stall.unwrap_or(STALL * self.push_from)
     }
@@ -153,68 +155,68 @@ impl Incidence {
     }
 }
 
-/// An aircraft without its aerodynamics.
+/// Properties of an aircraft other than its aerodynamics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Airframe {
-    /// The aircraft's name.
+    /// Name of the aircraft.
     pub name: String,
     /// Wing area, span and chord.
     pub geometry: Geometry,
-    /// Actuator filters at 0.01 s.
+    /// Actuator filters at a time step of 0.01 s.
     pub actuators: ActuatorFigures,
-    /// What is known of a rudder.
+    /// Statement of the file on a rudder.
     pub yaw: Yaw,
-    /// The surfaces and motors that the controls move, where the file names them.
+    /// Surfaces and motors that the controls move, if the file names them.
     pub mixer: Option<Mixer>,
-    /// JSBSim's properties that are held while the aircraft flies: flaps, say.
+    /// JSBSim properties that are held in flight, for example flaps.
     pub conditions: BTreeMap<String, f64>,
-    /// The condition about which quantities are scaled.
+    /// Reference condition for scaling.
     pub reference: Reference,
-    /// Incidence that controllers keep to.
+    /// Limits of the angle of attack for controllers.
     pub incidence: Incidence,
-    /// Limits to fly within.
+    /// Limits of the flight envelope.
     pub envelope: Envelope,
-    /// What is known of its sensors beforehand.
+    /// Stated errors and noise of its sensors.
     pub sensors: Sensors,
 }
 
-/// A number in a parameter file, with where it comes from.
+/// A number of a parameter file with its source.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a number with its source: { value = …, source = \"…\" }")]
 pub struct Sourced {
-    /// The number, in the unit that the field's name ends with.
+    /// Value in the unit that ends the field's name.
     pub value: f64,
-    /// Where it comes from.
+    /// Source of the value, in words.
     pub source: String,
-    /// Its standard deviation as a prior, in the same unit, where one is known.
+    /// Prior standard deviation, in the same unit, if it is known.
     pub sd: Option<f64>,
-    /// The least and the most that it can be, in the same unit, where the file says so.
+    /// Bounds in the same unit, if the file states them.
     pub bounds: Option<[f64; 2]>,
 }
 
-/// Why an airframe or model file could not be used.
+/// Error of reading an airframe or model file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The file could not be read.
+    /// The file cannot be read.
     #[error("cannot read {what} {path}: {why}. Name an existing file, for example params/x8/{example}", path = path.display())]
     Read {
-        /// What kind of file.
+        /// Kind of file, in words.
         what: &'static str,
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's words.
+        /// The system's error.
         why: std::io::Error,
-        /// A file that exists.
+        /// Path of an existing example file.
         example: &'static str,
     },
-    /// The file is not what it should be.
+    /// The content is invalid.
     #[error("{what} {path}: {why}", path = path.display())]
     Content {
-        /// What kind of file.
+        /// Kind of file, in words.
         what: &'static str,
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// Description of the error, with its remedy.
         why: String,
     },
 }
@@ -256,7 +258,7 @@ struct GeometryFile {
 }
 
 impl File {
-    /// Filters of the controls, with what the file says of a rudder.
+    /// Actuator filters, and the file's statement on a rudder.
     fn controls(&self) -> Result<(ActuatorFigures, Yaw), String> {
         match (self.schema, &self.actuators, &self.controls) {
             (1, Some(alike), None) => alike.figures(),
@@ -304,7 +306,7 @@ impl File {
 }
 
 impl Airframe {
-    /// Straight flight with level wings at the reference airspeed: where imagined flights begin.
+    /// Straight flight with level wings at the reference airspeed, the initial state of imagined flights.
     pub fn start(&self) -> State {
         State { airspeed: self.reference.airspeed, ..State::NEUTRAL }
     }
@@ -312,7 +314,8 @@ impl Airframe {
     /// Reads an airframe file (`schema = 2`, or 1 of earlier programs).
     ///
     /// # Errors
-    /// If the file cannot be read, is no such TOML, or holds a number that no aircraft has.
+    /// If the file cannot be read, has a syntax error or another schema, or holds a number outside the range of
+    /// aircraft.
     pub fn load(path: &Path) -> Result<Airframe, FileError> {
         let what = "airframe file";
         let text = crate::text_file::read(path).map_err(|why| FileError::Read {
@@ -324,7 +327,7 @@ impl Airframe {
         Self::parse(&text).map_err(|why| FileError::Content { what, path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
+    /// [`load`](Self::load) from the file's text; the error describes the fault.
     pub fn parse(text: &str) -> Result<Airframe, String> {
         let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(file.schema, 2)?;
@@ -399,13 +402,13 @@ impl Envelope {
     }
 }
 
-/// A name that tables and file names can bear.
+/// Checks that a name is usable in tables and file names.
 pub fn named(name: String) -> Result<String, String> {
     let fits = !name.trim().is_empty() && name.len() <= 64 && !name.chars().any(char::is_control);
     if fits { Ok(name) } else { Err("name must be one line of 1 to 64 bytes; give it one".into()) }
 }
 
-/// Refuses a file of another layout than this program's: 1 to `newest`.
+/// Rejects a file whose schema is not one of 1 to `newest`.
 pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     if (1..=newest).contains(&schema) {
         return Ok(());
@@ -416,12 +419,12 @@ pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     ))
 }
 
-/// A number that must lie above zero and at most at `most`, the largest that an aircraft has.
+/// Checks that a number is positive and at most `most`, the largest of any aircraft.
 pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
     within(field, number, [most * 1e-9, most])
 }
 
-/// A number that must lie between the smallest and the largest that an aircraft has, both above zero.
+/// Checks that a number lies within the range of aircraft, both limits positive.
 pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));
@@ -435,7 +438,7 @@ pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<
     ))
 }
 
-/// A TOML error on one line: where, then what.
+/// A TOML error on one line: location, then description.
 pub fn toml_error(text: &str, error: &toml::de::Error) -> String {
     let line =
         error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);

@@ -1,27 +1,26 @@
-//! The air the aircraft flies in, together with the gravity it flies under.
+//! Air density and gravity.
 
-/// Density of the standard atmosphere at sea level (ISO 2533), which equivalent airspeed refers to,
-/// kg/m³.
+/// Sea-level density of the standard atmosphere (ISO 2533), the reference of equivalent airspeed, kg/m³.
 pub const SEA_LEVEL_DENSITY: f64 = 1.225;
-/// Standard gravity (ISO 80000-3): the g of units of acceleration, m/s².
+/// Standard gravity (ISO 80000-3), the unit g of accelerations, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Effective gravity in middle latitudes, m/s²: for who has no model of the aircraft to ask. It is
-/// JSBSim's at 46.8° and 600 m, and within 0.03 of any place's.
+/// Effective gravity at middle latitudes, m/s², for use without a model of the aircraft. It is JSBSim's at 46.8° and
+/// 600 m, and within 0.03 of that anywhere.
 pub const MIDDLE_GRAVITY: f64 = 9.806;
 
-/// Where the air density comes from.
+/// Density law of the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Density {
-    /// The same everywhere, kg/m³.
+    /// Constant density, kg/m³.
     Constant(f64),
     /// The troposphere of the standard atmosphere (ISO 2533), by altitude.
     Standard,
 }
 
-/// Air and gravity as a model assumes them.
+/// Density law and gravity of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Atmosphere {
-    /// The density law.
+    /// Density law as a function of altitude.
     pub density: Density,
     /// Effective gravity (gravitation less the Earth's rotation), m/s².
     pub gravity: f64,
@@ -40,7 +39,7 @@ impl Atmosphere {
 
 /// Density of the standard atmosphere below 11 km, kg/m³, at geometric `altitude` (m).
 ///
-/// Sea-level pressure as JSBSim has it, 2116.228 lbf/ft², 5 parts in a million above ISO 2533.
+/// Sea-level pressure is JSBSim's, 2116.228 lbf/ft², 5 parts in a million above ISO 2533.
 pub fn standard_density(altitude: f64) -> f64 {
     const RADIUS: f64 = 6_356_766.0;
     const LAPSE: f64 = 0.0065;

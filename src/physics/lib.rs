@@ -1,4 +1,4 @@
-//! The nouns of flight: state, controls, air, wrench, airframe, actuators and the rigid body.
+//! Basic quantities of flight: state, controls, air, wrench, airframe, actuators and the rigid body.
 //!
 //! Units are SI and radians; body axes are forward-right-down (FRD), earth axes north-east-down.
 

@@ -1,48 +1,50 @@
-//! The mixer: which named surfaces and motors the four virtual controls move, and what these say of the controls.
+//! The mixer: maps the four virtual controls to named surfaces and motors, and their positions back to the controls.
 //!
-//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have others:
-//! two elevons, a V-tail, several motors. Effector i is given u_i = Σ_j g_ij c_j, c the commands of the controls; a
-//! surface goes to its deflection at u_i, −1..1. Backwards, c = g⁺ u: least squares, u_i the deflection over half the
-//! travel. Forces that are linear in the surfaces' deflections are then linear in those of the controls.
+//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have others: two
+//! elevons, a V-tail, several motors. Effector i is given u_i = Σ_j g_ij c_j, c the commands of the controls; a
+//! surface goes to its deflection at u_i, −1..1. The inverse is c = g⁺ u, by least squares, where u_i is the
+//! deflection over half the travel. Forces that are linear in the surfaces' deflections are then linear in those of
+//! the controls.
 
 use crate::Command;
 use crate::servos::{Travel, Travels};
 
 /// Names of the controls, in the order of an effector's gains.
 pub const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
-/// A column of gains shorter than this beside its own length, once the columns before it are taken out, is none.
+/// A column of gains is dependent if, after the preceding columns are projected out, its length is below this share
+/// of its own.
 const DEPENDENT: f64 = 1e-6;
-/// Share by which a control's travel may differ from that which the surfaces give.
+/// Relative tolerance between a control's stated travel and the one that its surfaces give.
 const TRAVEL: f64 = 1e-3;
 
-/// What an effector does.
+/// Kind of an effector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Does {
-    /// A surface: its deflections at −1 and 1, rad.
+    /// A surface with its deflections at the commands −1 and 1, rad.
     Deflects(Travel),
-    /// A motor, tractor or pusher; its command is 0..1.
+    /// A motor, tractor or pusher, with a command of 0..1.
     Pulls,
 }
 
 /// A named surface or motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effector {
-    /// Its name, which is also that of its columns in a log: `NAME_rad`, `NAME_cmd`.
+    /// Name, also of its columns in a log: `NAME_rad`, `NAME_cmd`.
     pub name: String,
-    /// What it does.
+    /// Kind of the effector.
     pub does: Does,
-    /// Its command for a command of one on each of [`CONTROLS`].
+    /// Gains: its command for a command of one on each of [`CONTROLS`].
     pub gains: [f64; 4],
     /// Servo output of the flight controller that moves it, from 1.
     pub channel: Option<u8>,
-    /// JSBSim's property of its command, −1..1 or 0..1.
+    /// JSBSim property of its command, −1..1 or 0..1.
     pub command: Option<String>,
-    /// JSBSim's property of its deflection, rad, or of the motor's throttle.
+    /// JSBSim property of its deflection, rad, or of the motor's throttle.
     pub position: Option<String>,
 }
 
 impl Effector {
-    /// The command, limited to what the effector takes.
+    /// The command limited to the effector's range.
     fn limited(&self, command: f64) -> f64 {
         match self.does {
             Does::Deflects(_) => command.clamp(-1.0, 1.0),
@@ -50,7 +52,7 @@ impl Effector {
         }
     }
 
-    /// Its position at a command: rad, or 0..1 of a motor.
+    /// Position at a command: rad, or 0..1 for a motor.
     pub fn position(&self, command: f64) -> f64 {
         match self.does {
             Does::Deflects(travel) => travel.deflection(command),
@@ -58,7 +60,7 @@ impl Effector {
         }
     }
 
-    /// Position at a command of one: half the travel, rad; one of a motor.
+    /// Position at a command of one: half the travel, rad; one for a motor.
     fn unit(&self) -> f64 {
         match self.does {
             Does::Deflects(travel) => 0.5 * (travel.most - travel.least),
@@ -67,15 +69,15 @@ impl Effector {
     }
 }
 
-/// Why surfaces and motors cannot be flown by the controls.
+/// Error of a mixer's definition.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MixerError {
-    /// A control moves nothing.
+    /// No effector moves a control.
     #[error(
         "nothing moves the {control}: give a surface or motor {control} = …, its command for a full {control}"
     )]
     Unmoved {
-        /// The control.
+        /// Name of the control.
         control: &'static str,
     },
     /// An effector moves a control that the aircraft does not have.
@@ -83,58 +85,58 @@ pub enum MixerError {
         "{effector} has {control} = …, but there is no [controls.{control}]: add that section or leave the gain out"
     )]
     NoSuchControl {
-        /// The effector.
+        /// Name of the effector.
         effector: String,
-        /// The control.
+        /// Name of the control.
         control: &'static str,
     },
-    /// Two controls cannot be told apart.
+    /// Two controls are linearly dependent.
     #[error(
         "the mixer is singular: {effectors} move with the {control} as with {others}, so that no setting gives one without \
          the other; give one of them a gain of the other sign, or add what moves the {control} alone"
     )]
     Singular {
-        /// The control that is lost.
+        /// Name of the dependent control.
         control: &'static str,
-        /// Those before it.
+        /// Names of the controls before it.
         others: String,
-        /// What moves it.
+        /// Names of its effectors.
         effectors: String,
     },
-    /// A control's travel is not that of its surfaces.
+    /// A control's travel differs from that of its surfaces.
     #[error(
         "controls.{control} goes from {given_least:.4} to {given_most:.4} rad, its surfaces give {least:.4} to {most:.4}: \
          write these"
     )]
     Travel {
-        /// The control.
+        /// Name of the control.
         control: &'static str,
-        /// By the file, rad.
+        /// Lower limit in the file, rad.
         given_least: f64,
-        /// By the file, rad.
+        /// Upper limit in the file, rad.
         given_most: f64,
-        /// By the surfaces, rad.
+        /// Lower limit from the surfaces, rad.
         least: f64,
-        /// By the surfaces, rad.
+        /// Upper limit from the surfaces, rad.
         most: f64,
     },
 }
 
-/// Which surfaces and motors the controls move.
+/// Mapping between controls, surfaces and motors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixer {
     effectors: Vec<Effector>,
-    /// g⁺: command of each control for a command of each effector.
+    /// Pseudo-inverse g⁺: command of each control for a command of each effector.
     back: Vec<[f64; 4]>,
-    /// Deflection of each control at a command of one, mean of the surfaces that it moves, rad; 1 of the throttle.
+    /// Deflection of each control at a command of one, rad: mean over its surfaces; 1 for the throttle.
     unit: [f64; 4],
 }
 
 impl Mixer {
-    /// The mixer of `effectors` on an aircraft with or without a `rudder`.
+    /// Builds the mixer of `effectors` on an aircraft with or without a `rudder`.
     ///
     /// # Errors
-    /// If a control moves nothing or does not exist, or two cannot be told apart.
+    /// If a control moves nothing or does not exist, or two are linearly dependent.
     pub fn new(effectors: Vec<Effector>, rudder: bool) -> Result<Mixer, MixerError> {
         let has = [true, true, rudder, true];
         for (j, control) in CONTROLS.into_iter().enumerate() {
@@ -157,14 +159,14 @@ impl Mixer {
         &self.effectors
     }
 
-    /// What each effector is given for `command`, limited to its range.
+    /// Commands of the effectors for `command`, limited to their ranges.
     pub fn mix(&self, command: &Command) -> Vec<f64> {
         let asked = [command.aileron, command.elevator, command.rudder, command.throttle];
         let sum = |e: &Effector| e.gains.iter().zip(asked).map(|(g, c)| g * c).sum::<f64>();
         self.effectors.iter().map(|e| e.limited(sum(e))).collect()
     }
 
-    /// How far the controls go, at [`Self::shares`] of the effectors' positions.
+    /// Deflections of the controls, by [`Self::shares`] of the effectors' positions.
     pub fn deflections(&self, positions: &[f64]) -> [f64; 4] {
         let mut out = [0.0; 4];
         for (shares, position) in self.shares().zip(positions) {
@@ -173,7 +175,7 @@ impl Mixer {
         out
     }
 
-    /// Share of each effector's position (rad; 0..1 of a motor) in the deflection of each control (rad; 0..1 of the
+    /// Share of each effector's position (rad; 0..1 for a motor) in the deflection of each control (rad; 0..1 for the
     /// throttle).
     pub fn shares(&self) -> impl Iterator<Item = [f64; 4]> {
         let both = self.back.iter().zip(&self.effectors);
@@ -185,7 +187,7 @@ impl Mixer {
         &self.back
     }
 
-    /// Where the controls' deflections end: at full commands of each alone.
+    /// Travels of the controls, at full command of each alone.
     pub fn travels(&self) -> Travels {
         let travel = |j: usize| {
             let at = |value: f64| {
@@ -201,10 +203,10 @@ impl Mixer {
         Travels { aileron: travel(0), elevator: travel(1), rudder: moved.then(|| travel(2)) }
     }
 
-    /// Refuses `travels` of an airframe file that are not those of the surfaces.
+    /// Rejects `travels` of an airframe file that differ from those of the surfaces.
     ///
     /// # Errors
-    /// The first that differs by more than 0.1 %.
+    /// The first one that differs by more than 0.1 %.
     pub fn checked(self, travels: &Travels) -> Result<Mixer, MixerError> {
         let own = self.travels();
         let pairs = [
@@ -234,8 +236,8 @@ impl Mixer {
     }
 }
 
-/// Deflection of control `j` at a command of one: the mean over the surfaces that it moves, over the motors where
-/// it moves motors alone.
+/// Deflection of control `j` at a command of one: the mean over the surfaces that it moves, or over the motors if it
+/// moves motors only.
 fn unit(effectors: &[Effector], j: usize) -> f64 {
     if j == 3 {
         return 1.0;
@@ -251,7 +253,7 @@ fn unit(effectors: &[Effector], j: usize) -> f64 {
     sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
 }
 
-/// g⁺ by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ; a row an effector. A control without gains has zeros.
+/// g⁺ by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ; one row for each effector. A control without gains has zeros.
 fn pseudo_inverse(effectors: &[Effector]) -> Result<Vec<[f64; 4]>, MixerError> {
     let column = |j: usize| -> Vec<f64> { effectors.iter().map(|e| e.gains[j]).collect() };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();

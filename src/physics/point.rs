@@ -1,14 +1,14 @@
-//! The point of the flight envelope at which forces are asked for.
+//! The point of evaluation of forces and moments.
 
 use crate::airframe::Geometry;
 use crate::rigid_body::{ForceAxes, Vector};
 use crate::{Controls, State, Wrench};
 use greylag_num::Real;
 
-/// What the airflow is, worked out once for all effects.
+/// Airflow quantities, computed once for all effects.
 #[derive(Clone, Copy, Debug)]
 pub struct AirData<R = f64> {
-    /// Q = ½ρV²S, the dynamic pressure times the wing area, N.
+    /// Dynamic pressure times wing area, ½ρV²S, N.
     pub q_s: R,
     /// Air density ρ, kg/m³.
     pub density: R,
@@ -20,11 +20,11 @@ pub struct AirData<R = f64> {
     pub sin_beta: R,
     /// Cosine of the sideslip angle.
     pub cos_beta: R,
-    /// p̂ = bp/2V.
+    /// Nondimensional roll rate p̂ = bp/2V.
     pub p_hat: R,
-    /// q̂ = cq/2V.
+    /// Nondimensional pitch rate q̂ = cq/2V.
     pub q_hat: R,
-    /// r̂ = br/2V.
+    /// Nondimensional yaw rate r̂ = br/2V.
     pub r_hat: R,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
@@ -53,40 +53,40 @@ impl<R: Real> AirData<R> {
     }
 }
 
-/// Everything a static effect may depend on.
+/// Input of a static effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<'a, R = f64> {
-    /// The physical state.
+    /// State of the aircraft.
     pub state: &'a State<R>,
-    /// The controls that act.
+    /// Acting controls.
     pub controls: &'a Controls<R>,
-    /// The airflow.
+    /// Airflow at the state.
     pub air: &'a AirData<R>,
     /// Wing area, span and chord.
     pub geometry: &'a Geometry,
     /// Axes in which drag, side force and lift act.
     pub axes: ForceAxes,
-    /// What the effects that need only the point make; zero for those effects themselves.
+    /// Sum of the effects that need only the point; zero while those are evaluated.
     pub base: &'a Base<R>,
 }
 
-/// What the effects that need only the point make together.
+/// Sums over the effects that need only the point.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<R = f64> {
-    /// Their forces and moments.
+    /// Forces and moments of these effects.
     pub wrench: Wrench<R>,
-    /// Their force in body axes, N.
+    /// Force of these effects in body axes, N.
     pub force: Vector<R>,
     /// The part of `wrench` due to aileron, elevator and rudder.
     pub deflected: Wrench<R>,
-    /// What `wrench` would be without deflections and body rates.
+    /// The part of `wrench` without deflections and body rates.
     pub still: Wrench<R>,
-    /// The rate of the state of the model with all its effects, in each state's unit per second.
+    /// Rate of the model's state with all its effects, in each state's unit per second.
     pub rate: State<R>,
 }
 
 impl<R: Real> Base<R> {
-    /// Nothing known.
+    /// All quantities zero.
     #[inline(always)]
     pub fn zero() -> Self {
         let wrench = Wrench::zero();

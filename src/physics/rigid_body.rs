@@ -1,4 +1,4 @@
-//! The rigid body: from forces to the rates of the state, eqs. (7)–(12) and (35) of \[GSFM26\].
+//! Rigid-body dynamics: from forces to the rates of the state, eqs. (7)–(12) and (35) of \[GSFM26\].
 
 use crate::wrench::Channel;
 use crate::{AirData, State, Wrench};
@@ -9,28 +9,28 @@ use greylag_num::{Real, each};
 /// `jxz` follows \[BM12\]: the product of inertia enters the inertia matrix as −Jxz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidBody<R = f64> {
-    /// Mass.
+    /// Mass of the aircraft, kg.
     pub mass: R,
-    /// Roll inertia.
+    /// Moment of inertia about body x, kg m².
     pub jx: R,
-    /// Pitch inertia.
+    /// Moment of inertia about body y, kg m².
     pub jy: R,
-    /// Yaw inertia.
+    /// Moment of inertia about body z, kg m².
     pub jz: R,
-    /// Product of inertia.
+    /// Product of inertia in the x–z plane, kg m².
     pub jxz: R,
 }
 
 impl RigidBody {
-    /// Whether a body can have these figures: a positive mass, and a positive inertia about every axis.
+    /// Whether the values are physical: a positive mass, and a positive definite inertia.
     pub fn is_physical(&self) -> bool {
         let RigidBody { mass, jx, jy, jz, jxz } = *self;
         mass > 0.0 && jx > 0.0 && jy > 0.0 && jz > 0.0 && jx * jz > jxz * jxz
     }
 
-    /// Whether an iteration may go from this body to `next`: to one that is a body and has kept a third of its mass
-    /// and of what separates its inertia from that of a rod. A longer step from a wrong inertia ends where the
-    /// accelerations are all but infinite.
+    /// Whether an iteration may step from this body to `next`: `next` must be physical and keep a third of the mass
+    /// and of the inertia's distance from that of a rod. A longer step from a wrong inertia leads to nearly infinite
+    /// accelerations.
     pub fn may_become(&self, next: &RigidBody) -> bool {
         let room = |b: &RigidBody| 1.0 - b.jxz * b.jxz / (b.jx * b.jz);
         next.is_physical() && 3.0 * next.mass >= self.mass && 3.0 * room(next) >= room(self)
@@ -38,7 +38,7 @@ impl RigidBody {
 }
 
 impl<R: Copy> RigidBody<R> {
-    /// Applies `f` to every figure.
+    /// Applies `f` to every value.
     #[inline(always)]
     pub fn map<S>(&self, f: impl Fn(R) -> S) -> RigidBody<S> {
         RigidBody {
@@ -51,13 +51,13 @@ impl<R: Copy> RigidBody<R> {
     }
 }
 
-/// In which axes the aerodynamic forces of a model act.
+/// Axes of a model's aerodynamic forces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ForceAxes {
-    /// Lift and drag turned by α only, side force along body y: eqs. (39), (43) of \[GSFM26\].
+    /// Lift and drag rotated by α only, side force along body y: eqs. (39), (43) of \[GSFM26\].
     Stability,
-    /// All three turned by α and β, as JSBSim's DRAG, SIDE and LIFT axes are.
+    /// All three forces rotated by α and β, like JSBSim's DRAG, SIDE and LIFT axes.
     Wind,
 }
 
@@ -81,8 +81,7 @@ pub fn body_force<R: Real>(wrench: &Wrench<R>, air: &AirData<R>, axes: ForceAxes
     ]
 }
 
-/// The drag, side force and lift (N) that together are `force` (N, body axes): the inverse of
-/// [`body_force`] without thrust.
+/// Drag, side force and lift (N) whose sum is `force` (N, body axes): the inverse of [`body_force`] without thrust.
 #[inline(always)]
 pub fn aerodynamic_force<R: Real>(
     force: Vector<R>,
@@ -168,8 +167,8 @@ pub fn state_rate<R: Real>(
     State { roll, pitch, airspeed, p: spin[0], q: spin[1], r: spin[2], alpha, beta }
 }
 
-/// The acceleration in body axes (m/s²) that changes airspeed, α and β at the rates of `rate`: what
-/// [`state_rate`] makes of acceleration, turned round.
+/// Acceleration in body axes (m/s²) that gives airspeed, α and β the rates of `rate`: the inverse of [`state_rate`]
+/// in the acceleration.
 #[inline(always)]
 pub fn acceleration_of<R: Real>(state: &State<R>, air: &AirData<R>, rate: &State<R>) -> Vector<R> {
     let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
@@ -183,8 +182,8 @@ pub fn acceleration_of<R: Real>(state: &State<R>, air: &AirData<R>, rate: &State
     ]
 }
 
-/// The transpose of [`state_rate`] in acceleration and spin: what a `slope` of anything with respect
-/// to the rates is with respect to acceleration (body axes) and angular acceleration.
+/// Transpose of [`state_rate`] in acceleration and spin: converts a gradient `slope` with respect to the rates to one
+/// with respect to acceleration (body axes) and angular acceleration.
 #[inline(always)]
 pub fn state_rate_transposed<R: Real>(
     state: &State<R>,
@@ -203,8 +202,8 @@ pub fn state_rate_transposed<R: Real>(
     (acceleration, [slope.p, slope.q, slope.r])
 }
 
-/// The transpose of [`body_force`] and [`angular_acceleration`] in the wrench: what slopes with
-/// respect to acceleration (body axes) and angular acceleration are with respect to each channel.
+/// Transpose of [`body_force`] and [`angular_acceleration`] in the wrench: converts gradients with respect to
+/// acceleration (body axes) and angular acceleration to one with respect to each channel.
 #[inline(always)]
 pub fn accelerations_transposed<R: Real>(
     body: &RigidBody<R>,
@@ -232,7 +231,7 @@ pub fn accelerations_transposed<R: Real>(
     wrench
 }
 
-/// Rotates a vector from body axes to the local horizon turned with the heading (ψ = 0).
+/// Rotates a vector from body axes to the local horizon frame with the aircraft's heading (ψ = 0).
 #[inline(always)]
 pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();
@@ -246,7 +245,7 @@ pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     ]
 }
 
-/// The inverse of [`body_to_horizon`].
+/// Inverse of [`body_to_horizon`].
 #[inline(always)]
 pub fn horizon_to_body<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();

@@ -1,4 +1,4 @@
-//! What is known of an aircraft's sensors and of the wind before a flight is looked at.
+//! Prior knowledge of an aircraft's sensors and of the wind, from the section `[sensors]`.
 //!
 //! ```toml
 //! [sensors]
@@ -49,23 +49,23 @@ pub const CONSTANTS: [(&str, &str); 30] = [
     ("accelerometer_gain_z", ""),
 ];
 
-/// Keys of the noise of sensors, standard deviations.
+/// Keys of the sensors' noise, standard deviations.
 const NOISE: [&str; 4] = ["attitude_sd_rad", "airspeed_sd_mps", "vanes_sd_rad", "velocity_sd_mps"];
 
 /// Longest lever arm, m.
 const FARTHEST: f64 = 100.0;
 
-/// A constant as it is known beforehand.
+/// Prior of a constant.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Known {
-    /// Its mean, in the unit of [`CONSTANTS`]; an airspeed scale is measured by true.
+    /// Mean, in the unit of [`CONSTANTS`]; an airspeed scale is measured over true.
     pub value: f64,
-    /// Its standard deviation; 0 holds it.
+    /// Standard deviation; 0 holds the constant.
     pub sd: f64,
 }
 
-/// What is known of sensors and wind: the contents of a section `[sensors]`.
+/// Prior knowledge of sensors and wind: the content of a section `[sensors]`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(try_from = "BTreeMap<String, Written>")]
 pub struct Sensors {
@@ -78,9 +78,9 @@ pub struct Sensors {
 /// A sensor whose noise may be stated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Noisy {
-    /// Roll, pitch, yaw, rad.
+    /// Attitude: roll, pitch, yaw, rad.
     Attitude,
-    /// Airspeed, m/s.
+    /// True airspeed, m/s.
     Airspeed,
     /// Angle of attack and sideslip, rad.
     Vanes,
@@ -97,7 +97,7 @@ enum Written {
     Known(Known),
 }
 
-/// The key of a constant in a file: its name with its unit.
+/// Key of a constant in a file: its name with its unit.
 fn key((name, unit): (&str, &str)) -> String {
     let suffix = match unit {
         "rad" => "_rad",
@@ -116,7 +116,7 @@ impl TryFrom<BTreeMap<String, Written>> for Sensors {
 
     fn try_from(written: BTreeMap<String, Written>) -> Result<Self, String> {
         let mut sensors = Sensors::default();
-        // words first: a constant of its own goes before what a word says of all
+        // words first: the prior of a single constant takes precedence over a word for all
         for (name, value) in &written {
             if let Written::Word(word) = value {
                 sensors.take_word(name, word)?;
@@ -204,7 +204,7 @@ impl Sensors {
         Ok(())
     }
 
-    /// The same with what `other` says in its place, where it says something.
+    /// These priors, with those that `other` states in place of them.
     pub fn overridden_by(&self, other: &Sensors) -> Sensors {
         let mut all = self.clone();
         all.constants.extend(other.constants.iter().map(|(name, known)| (*name, *known)));
@@ -216,34 +216,34 @@ impl Sensors {
         all
     }
 
-    /// What is known of a constant of [`CONSTANTS`].
+    /// Prior of a constant of [`CONSTANTS`], if it is stated.
     pub fn known(&self, name: &str) -> Option<Known> {
         self.constants.get(name).copied()
     }
 
-    /// Holds a constant of [`CONSTANTS`] at `value`, unless something is known of it.
+    /// Holds a constant of [`CONSTANTS`] at `value`, unless a prior is stated.
     pub fn hold(&mut self, name: &'static str, value: f64) {
         self.constants.entry(name).or_insert(Known { value, sd: 0.0 });
     }
 
-    /// The wind north, east, down (m/s), where its horizontal part is stated.
+    /// Wind north, east, down (m/s), if its horizontal part is stated.
     pub fn wind(&self) -> Option<[f64; 3]> {
         let [north, east, down] =
             ["wind_north", "wind_east", "wind_down"].map(|name| self.known(name).map(|k| k.value));
         Some([north?, east?, down.unwrap_or(0.0)])
     }
 
-    /// The stated noise of a sensor, a standard deviation.
+    /// Stated noise of a sensor, a standard deviation.
     pub fn noise(&self, of: Noisy) -> Option<f64> {
         self.noise[of as usize]
     }
 
-    /// Where the vanes are, m from the centre of gravity, body axes.
+    /// Position of the vanes, m from the centre of gravity, body axes.
     pub fn vanes_at(&self) -> Option<[f64; 3]> {
         self.vanes_at
     }
 
-    /// Where the accelerometer is, likewise.
+    /// Position of the accelerometer, m from the centre of gravity, body axes.
     pub fn accelerometer_at(&self) -> Option<[f64; 3]> {
         self.accelerometer_at
     }

@@ -1,35 +1,35 @@
-//! Servos: how far, how fast and with which lag each control follows its command.
+//! Servos: travel, rate limit and filter of each control.
 
 use crate::{Command, Controls};
 use greylag_num::Real;
 
-/// How far a surface goes, rad: its deflections at the commands −1 and 1.
+/// Travel of a surface, rad: its deflections at the commands −1 and 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travel {
-    /// Deflection at the command −1, below zero.
+    /// Deflection at the command −1, negative.
     pub least: f64,
-    /// Deflection at the command 1, above zero.
+    /// Deflection at the command 1, positive.
     pub most: f64,
 }
 
 impl Travel {
-    /// The same to both sides, rad.
+    /// A symmetric travel, rad.
     pub const fn symmetric(most: f64) -> Travel {
         Travel { least: -most, most }
     }
 
-    /// Whether it is the same to both sides.
+    /// Whether the travel is symmetric.
     #[inline(always)]
     pub fn is_symmetric(&self) -> bool {
         self.least == -self.most
     }
 
-    /// The larger of both sides, rad.
+    /// Larger deflection of both sides, rad.
     pub fn largest(&self) -> f64 {
         self.most.max(-self.least)
     }
 
-    /// The smaller of both sides, rad: what can be reached either way.
+    /// Smaller deflection of both sides, rad, which is reachable either way.
     pub fn smallest(&self) -> f64 {
         self.most.min(-self.least)
     }
@@ -39,17 +39,17 @@ impl Travel {
         self.least < deflection && deflection < self.most
     }
 
-    /// The deflection (rad) that a command of one asks for on the side of `deflection`.
+    /// Deflection (rad) per unit of command on the side of `deflection`.
     pub fn slope(&self, deflection: f64) -> f64 {
         if deflection < 0.0 { -self.least } else { self.most }
     }
 
-    /// `deflection` (rad) in parts of the travel to its side.
+    /// Ratio of `deflection` (rad) to the travel on its side.
     pub fn part(&self, deflection: f64) -> f64 {
         deflection / self.slope(deflection)
     }
 
-    /// The deflection (rad) that `command` asks for.
+    /// Deflection (rad) for `command`.
     #[inline(always)]
     pub fn deflection<R: Real>(&self, command: R) -> R {
         if self.is_symmetric() {
@@ -59,7 +59,7 @@ impl Travel {
         R::where_less(command, R::zero(), down, up)
     }
 
-    /// The command that asks for `deflection` (rad).
+    /// Command for `deflection` (rad).
     #[inline(always)]
     pub fn command<R: Real>(&self, deflection: R) -> R {
         if self.is_symmetric() {
@@ -70,33 +70,33 @@ impl Travel {
     }
 }
 
-/// How far the surfaces of an aircraft go.
+/// Travels of an aircraft's surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travels {
-    /// The ailerons.
+    /// Travel of the ailerons.
     pub aileron: Travel,
-    /// The elevator.
+    /// Travel of the elevator.
     pub elevator: Travel,
-    /// The rudder, where there is one.
+    /// Travel of the rudder, if there is one.
     pub rudder: Option<Travel>,
 }
 
 impl Travels {
-    /// Ailerons and elevator by `most` (rad) to both sides, no rudder.
+    /// Symmetric travel of ailerons and elevator by `most` (rad), no rudder.
     pub const fn alike(most: f64) -> Travels {
         let travel = Travel::symmetric(most);
         Travels { aileron: travel, elevator: travel, rudder: None }
     }
 }
 
-/// One surface: its travel, its filter at one time step, its largest rate.
+/// A surface: its filter at one time step, its travel, its rate limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// b0, a1, a2 of y = b0 (u + 2u₋₁ + u₋₂) − a1 y₋₁ − a2 y₋₂.
+    /// Coefficients b0, a1, a2 of y = b0 (u + 2u₋₁ + u₋₂) − a1 y₋₁ − a2 y₋₂.
     pub filter: [f64; 3],
     /// Deflections at full command, which are also the stops.
     pub travel: Travel,
-    /// Largest rate, rad/s; `None` if nothing limits it but the filter.
+    /// Rate limit, rad/s; `None` if only the filter limits the rate.
     pub rate_max: Option<f64>,
 }
 
@@ -113,15 +113,15 @@ impl Surface {
 /// The actuators' discrete filters at one time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuatorFigures {
-    /// The ailerons.
+    /// Figures of the ailerons.
     pub aileron: Surface,
-    /// The elevator.
+    /// Figures of the elevator.
     pub elevator: Surface,
-    /// The rudder, where there is one.
+    /// Figures of the rudder, if there is one.
     pub rudder: Option<Surface>,
-    /// b, a of y = b (u + u₋₁) + a y₋₁.
+    /// Coefficients b, a of the throttle's lag y = b (u + u₋₁) + a y₋₁.
     pub throttle: [f64; 2],
-    /// Time step, s.
+    /// Time step of the filters, s.
     pub step: f64,
 }
 
@@ -141,7 +141,7 @@ impl ActuatorFigures {
         [k / (2.0 + k), (2.0 - k) / (2.0 + k)]
     }
 
-    /// How far the surfaces go.
+    /// Travels of the surfaces.
     pub fn travels(&self) -> Travels {
         Travels {
             aileron: self.aileron.travel,
@@ -150,7 +150,7 @@ impl ActuatorFigures {
         }
     }
 
-    /// The command that asks for these deflections and this throttle, limited to its ranges.
+    /// Command for these deflections and this throttle, limited to its ranges.
     pub fn command(&self, controls: &Controls) -> Command {
         Command {
             aileron: self.aileron.travel.part(controls.aileron),
@@ -161,7 +161,7 @@ impl ActuatorFigures {
         .clamped()
     }
 
-    /// What `command` comes to rest at.
+    /// Steady-state controls for `command`.
     pub fn controls(&self, command: &Command) -> Controls {
         Controls {
             aileron: self.aileron.travel.deflection(command.aileron),

@@ -1,13 +1,13 @@
-//! How the physical bounds of coefficients grow with an aircraft.
+//! Growth of the coefficients' physical bounds with the size of an aircraft.
 
 use super::airframe::Geometry;
 use super::effects::Coefficient;
 use super::rigid_body::RigidBody;
 
-/// Mass (kg) and span (m) up to which bounds hold as the catalogue has them.
+/// Mass (kg) and span (m) up to which the catalogue's bounds apply unchanged.
 const WRITTEN_FOR: [f64; 2] = [25.0, 5.0];
 
-/// The coefficient that carries the weight of an aircraft in slow flight.
+/// Coefficient that carries the weight of an aircraft in slow flight.
 const LIFT: &str = "CL0";
 /// Load factor of a gentle pull-up in slow flight.
 const PULL: f64 = 1.5;
@@ -16,7 +16,7 @@ const SEA_LEVEL: f64 = 1.225;
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY: f64 = 9.80665;
 
-/// How many times heavier and wider an aircraft is than one of 25 kg and 5 m; at least 1.
+/// Size relative to an aircraft of 25 kg and 5 m: ratios of mass and span, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     mass: f64,
@@ -25,23 +25,23 @@ pub struct Size {
 }
 
 impl Size {
-    /// That of an aircraft of `body` and `geometry`.
+    /// Size of an aircraft of `body` and `geometry`.
     pub fn new(body: &RigidBody, geometry: &Geometry) -> Size {
         let [mass, span] = WRITTEN_FOR;
         let length = (geometry.span / span).max(1.0);
         Size { mass: (body.mass / mass).max(1.0), length, lift: 1.0 }
     }
 
-    /// With the lift that an aircraft of `body` and `geometry` needs at the least `airspeed` (m/s) it flies at: a wing
-    /// must be able to carry the weight there, and `PULL` times that when it pulls up.
+    /// The size with the lift coefficient that an aircraft of `body` and `geometry` needs at its smallest `airspeed`
+    /// (m/s): the weight there, times `PULL` in a pull-up.
     pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
         let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
         let level = body.mass * GRAVITY / (pressure * geometry.area);
         Size { lift: (PULL * level).max(1.0), ..self }
     }
 
-    /// The physically possible values of `coefficient`: those of the catalogue, which are without unit or per angle,
-    /// or grow with forces, lengths, moments, angular momenta and inertias. Those of an effect file stay as written.
+    /// Physical bounds of `coefficient`: those of the catalogue, which are dimensionless or per angle, or grow with
+    /// forces, lengths, moments, angular momenta and inertias. Those of an effect file are unchanged.
     pub fn bounds(&self, coefficient: &Coefficient) -> (f64, f64) {
         if !coefficient.grows {
             return coefficient.bounds;
@@ -62,7 +62,7 @@ impl Size {
         }
     }
 
-    /// Whether bounds in `unit` grow with an aircraft.
+    /// Whether bounds in `unit` grow with the aircraft.
     pub fn scales(unit: &str) -> bool {
         Size { mass: 1.0, length: 1.0, lift: 1.0 }.factor(unit).is_some()
     }

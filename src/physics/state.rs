@@ -1,4 +1,4 @@
-//! The eight variables of flight that the model predicts.
+//! The eight flight states that the model predicts.
 
 use greylag_num::{Real, each};
 
@@ -75,7 +75,7 @@ impl<R: Copy> State<R> {
 }
 
 impl<R: Real> State<R> {
-    /// `self + step · rate`, component by component.
+    /// Euler step: `self + step · rate`, by component.
     #[inline(always)]
     pub fn advance(&self, rate: &State<R>, step: f64) -> Self {
         State {
@@ -90,7 +90,7 @@ impl<R: Real> State<R> {
         }
     }
 
-    /// `then` where `chosen` is above zero, else `self`, component by component.
+    /// Selects `then` where `chosen` is above zero, else `self`, by component.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &State<R>) -> Self {
         let (mut all, then) = (self.to_array(), then.to_array());

@@ -1,17 +1,17 @@
-//! Text files that a person wrote: read whole, unless they are too long to be that.
+//! Reading of text files written by persons, with a limit on their length.
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Bytes of the longest file that is read: a hundred times the longest that is shipped. What a parser makes of text takes up to
-/// eighty times its length in memory.
+/// Longest file that is read, bytes: a hundred times the longest one shipped. A parser uses up to eighty times the
+/// text's length in memory.
 pub const LONGEST: u64 = 1 << 20;
 
-/// The text of the file at `path`.
+/// Reads the text of the file at `path`.
 ///
 /// # Errors
-/// If it cannot be read, is no UTF-8, or is longer than [`LONGEST`].
+/// If it cannot be read, is not UTF-8, or is longer than [`LONGEST`].
 pub fn read(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;

@@ -1,4 +1,4 @@
-//! Time as the vehicle counts it.
+//! Time on the vehicle's clock.
 
 use std::time::Duration;
 

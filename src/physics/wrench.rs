@@ -1,4 +1,4 @@
-//! What acts on the airframe, channel by channel.
+//! Forces and moments on the airframe, by channel.
 
 use greylag_num::Real;
 
@@ -55,7 +55,7 @@ impl<R: Real> Wrench<R> {
     pub fn get(&self, channel: Channel) -> R {
         self.0[channel as usize]
     }
-    /// `self` less `other`.
+    /// The difference `self` − `other`, by channel.
     #[inline(always)]
     pub fn minus(&self, other: &Self) -> Self {
         let mut difference = *self;

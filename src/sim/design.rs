@@ -18,7 +18,7 @@ use greylag_physics::inputs::InputMemory;
 use greylag_physics::rigid_body;
 use greylag_physics::{Controls, State};
 use greylag_sysid::flight_path::reconstruction::{Instant, Reconstruction, Segment};
-use greylag_sysid::progress::{Cancelled, Progress, say};
+use greylag_sysid::progress::{Cancelled, Progress, report};
 use greylag_sysid::separation::{Separation, separation};
 use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 
@@ -109,7 +109,7 @@ pub fn prospects(
     }
     let truths = [truth(model, &suspects[0])?, truth(model, &suspects[1])?];
     let ways = [alternatives(model, &suspects[0])?, alternatives(model, &suspects[1])?];
-    say(progress, "imagining each manoeuvre", 0.0)?;
+    report(progress, "imagining each manoeuvre", 0.0)?;
     let flown = AtomicUsize::new(0);
     let prospect = |manoeuvre: &Manoeuvre| -> Result<Prospect, DesignError> {
         let cruise = model.airframe.envelope.airspeed_cruise_mps;
@@ -120,7 +120,7 @@ pub fn prospects(
         };
         let separations = [separation_of(0)?, separation_of(1)?];
         let done = flown.fetch_add(1, Ordering::Relaxed) + 1;
-        say(progress, "imagining each manoeuvre", done as f64 / MENU.len() as f64)?;
+        report(progress, "imagining each manoeuvre", done as f64 / MENU.len() as f64)?;
         Ok(Prospect { name: manoeuvre.name, duration_s: schedule.duration(), separations })
     };
     let mut all = MENU.par_iter().map(prospect).collect::<Result<Vec<_>, _>>()?;

@@ -1,4 +1,5 @@
-//! From flight logs to what is wrong with a model: reconstruct, compare, localise, rank, amend.
+//! System identification from flight logs: reconstruct the flight path, compare models with it, rank the effects that
+//! a model lacks, amend it.
 
 #[cfg(feature = "study")]
 pub mod amend;

@@ -1,63 +1,66 @@
-//! How far a long task has come, and whether it shall go on.
+//! Progress of a long task, and its cancellation.
 
 use std::ops::ControlFlow;
 
-/// What a long task is doing.
+/// A stage of a long task.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
-    /// What is being done, in words.
+    /// Current activity, in words.
     pub doing: &'a str,
-    /// Share of the whole task that is done, 0 to 1; it never falls.
+    /// Share of the whole task that is done, 0 to 1; never decreases.
     pub fraction: f64,
-    /// The candidates of a diagnosis as ranked so far, the best first; empty before that and elsewhere.
+    /// Candidates of a diagnosis in the present ranking, the best first; empty before the ranking and in other tasks.
     pub ranking: &'a [FirstLook],
 }
 
 impl<'a> Stage<'a> {
-    /// A stage that ranks nothing.
+    /// A stage without a ranking.
     pub fn new(doing: &'a str, fraction: f64) -> Stage<'a> {
         Stage { doing, fraction, ranking: &[] }
     }
 }
 
-/// A candidate effect as the first ranking has it, before anything has settled.
+/// A candidate effect in the first ranking, before tuning.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FirstLook {
-    /// Its id.
+    /// Identifier of the effect.
     pub id: &'static str,
-    /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, no unit.
+    /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
     pub evidence: f64,
     /// Evidence that the best candidate reaches by chance where nothing is missing.
     pub threshold: f64,
 }
 
-/// Hears the stages of a long task; `Break` ends it at the next one.
+/// Listener to the stages of a long task; `Break` cancels the task at the next stage.
 pub type Progress<'a> = dyn Fn(Stage<'_>) -> ControlFlow<()> + Sync + 'a;
 
-/// Hears nothing, and lets the task go on.
-pub fn unheard(_: Stage<'_>) -> ControlFlow<()> {
+/// Discards progress and never cancels.
+pub fn ignore_progress(_: Stage<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// A long task that was ended by whoever listened to it.
+/// Error of a task that its progress listener cancelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// Says a stage; an error if the task shall end.
-pub fn say(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
-    said(progress(Stage::new(doing, fraction)))
+/// Reports a stage.
+///
+/// # Errors
+/// [`Cancelled`] if the listener answered `Break`.
+pub fn report(progress: &Progress, doing: &str, fraction: f64) -> Result<(), Cancelled> {
+    not_cancelled(progress(Stage::new(doing, fraction)))
 }
 
-/// An error for a `Break`.
-pub fn said(answer: ControlFlow<()>) -> Result<(), Cancelled> {
+/// Converts a listener's answer: `Break` to [`Cancelled`].
+pub fn not_cancelled(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     match answer {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(Cancelled),
     }
 }
 
-/// Hears the stages of a part of a task as stages of the whole, from one share of it to another.
+/// Maps the stages of a part of a task to stages of the whole, from one share of it to another.
 pub fn part<'a>(
     progress: &'a Progress<'a>,
     [from, to]: [f64; 2],

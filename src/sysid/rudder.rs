@@ -1,4 +1,4 @@
-//! A rudder that moves in the flights and that the model does not have.
+//! A rudder that moves in the flights but is not part of the model.
 
 use crate::compare::ChannelId;
 use crate::flight_path::reconstruction::Reconstruction;
@@ -6,14 +6,14 @@ use greylag_logs::rudder::RudderMotion;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::airframe::Yaw;
 
-/// The channels into which a rudder's forces and moments go: it turns the aircraft to the side, and
-/// its deflection with the sideslip that follows costs drag.
+/// Channels of a rudder's forces and moments: it yaws the aircraft, and its deflection with the resulting sideslip
+/// causes drag.
 pub const CHANNELS: [ChannelId; 4] =
     [ChannelId::Drag, ChannelId::Side, ChannelId::Roll, ChannelId::Yaw];
 
-/// The largest movement of a rudder in `flights` that `model` has no effect for.
+/// Largest motion of a rudder in `flights` for which `model` has no effect.
 ///
-/// A command that moves no rudder, as firmware sends one to aircraft without it, is none.
+/// A command that moves no rudder, such as firmware sends to aircraft without one, does not count.
 pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderMotion> {
     if model.has(RUDDER) {
         return None;
@@ -28,7 +28,7 @@ pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderM
     all.max_by(|a, b| a.size().total_cmp(&b.size()))
 }
 
-/// What is to be said first of residuals that hold a rudder's forces and moments.
+/// Warning that the residuals contain a rudder's forces and moments.
 pub fn warning(motion: RudderMotion) -> String {
     format!(
         "{motion} and the model has no rudder effect: yaw, roll, side-force and drag residuals include \
@@ -37,7 +37,7 @@ pub fn warning(motion: RudderMotion) -> String {
     )
 }
 
-/// Why an effect is not asserted while such a rudder moves.
+/// Reason not to assert an effect while such a rudder moves.
 pub fn reason(motion: RudderMotion) -> String {
     let motion = motion.to_string();
     format!("t{}, and the model has no rudder effect for its channels", &motion[1..])

@@ -1,4 +1,4 @@
-//! How far flights set two candidate effects apart, once everything else has been refitted.
+//! Separation of two candidate effects by flights, after everything else has been refitted.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,28 +6,27 @@ use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::{channels, columns};
 use greylag_model::GreyBox;
 
-/// Channels used: D, L, Y, l, m, n.
+/// Number of channels used: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;
-/// Smallest ridge of a free column as a share of its square, so that equal columns do no harm.
+/// Smallest ridge parameter of a free column as a share of its square, so that equal columns are no problem.
 const RIDGE: f64 = 1e-9;
-/// Width of a sensor's constant error in a channel, in standard deviations of a window's noise.
+/// Prior width of a sensor's constant error in a channel, in standard deviations of a window's noise.
 const BIAS_WIDTH: f64 = 100.0;
 
-/// What is left of a candidate, in units of evidence (a squared distance over noise).
+/// Remaining squared distance of a candidate over noise, in units of evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
-    /// What remains of the true effect after the prior is refitted: whether it can be seen at all.
+    /// Distance of the true effect after the coefficients are refitted: whether it is detectable at all.
     pub visible: f64,
-    /// What remains when the other effect is fitted in its place.
+    /// Distance after the other effect is fitted in its place.
     pub apart: f64,
 }
 
-/// How far `flight`, on which the aircraft was `truth`, sets that apart from `others`, when `base`
-/// lacks both: `others` are the ways in which the other effect may be fitted, each a set of models
-/// whose differences from `base` may be scaled freely.
+/// Distance by which `flight`, flown by the aircraft `truth`, separates it from `others`, when `base` lacks both
+/// effects: `others` are the ways in which the other effect may be fitted, each a set of models whose differences
+/// from `base` may be scaled freely.
 ///
-/// The coefficients of `base` are refitted within their prior widths, and so are constant errors in
-/// every channel.
+/// The coefficients of `base` are refitted within their prior widths, and so are constant errors in every channel.
 pub fn separation(
     base: &GreyBox,
     truth: &GreyBox,
@@ -57,7 +56,7 @@ fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     scale
 }
 
-/// Measured less predicted in units of noise, channel after channel; 0 where not known.
+/// Measured less predicted in standard deviations of noise, channel after channel; 0 where not known.
 fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVector<f64> {
     let windows = flight.windows.len();
     let mut all = DVector::zeros(CHANNELS * windows);
@@ -74,7 +73,7 @@ fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVec
     all
 }
 
-/// The columns of what is refitted anyway, each times its prior width.
+/// Columns of all parameters that are refitted, each times its prior width.
 fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<DVector<f64>> {
     let windows = flight.windows.len();
     let found = columns(base, flight);
@@ -94,8 +93,8 @@ fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<D
     all
 }
 
-/// The squared length of `gap` after the best of `prior` (with a pseudo-observation of one each) and
-/// any amount of each of `free` have been taken off.
+/// Squared length of `gap` after projection onto `prior` (each with a unit pseudo-observation) and `free` has been
+/// subtracted.
 fn remaining(prior: &[DVector<f64>], free: Vec<DVector<f64>>, gap: &DVector<f64>) -> f64 {
     let free = free.into_iter().filter(|column| column.norm_squared() > 0.0);
     let columns: Vec<DVector<f64>> = prior.iter().cloned().chain(free).collect();

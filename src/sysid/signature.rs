@@ -1,50 +1,50 @@
-//! An effect's signature: what it changes along the airflow and the controls, then in a manoeuvre.
+//! Signature of an effect: the change of forces and moments along airflow and controls, and of a manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;
 use greylag_physics::rigid_body;
 use greylag_physics::{Command, Controls, State};
 
-/// Altitude at which signatures are taken, m: the start of an episode.
+/// Altitude of the signatures, m: the start of an episode.
 const ALTITUDE: f64 = 600.0;
 
-/// Sweeps shown, those that the effect changes most.
+/// Number of sweeps shown, those with the largest change.
 const SWEEPS: usize = 4;
 
-/// States shown in the manoeuvre, likewise.
+/// Number of states shown in the manoeuvre, those with the largest change.
 const STATES: usize = 4;
 
-/// Points of a sweep.
+/// Number of points of a sweep.
 const POINTS: usize = 121;
 
-/// A change smaller than this share of the channel's own range is no signature.
+/// A change below this share of the channel's own range is negligible.
 const NOTHING: f64 = 1e-4;
 
-/// Why an effect has no signature.
+/// Error of computing a signature.
 #[derive(Debug, thiserror::Error)]
 pub enum SignatureError {
-    /// It cannot join the model.
+    /// The effect cannot join the model.
     #[error(transparent)]
     Join(#[from] JoinError),
-    /// The model does not fly level.
+    /// The model has no level trim.
     #[error(transparent)]
     Trim(#[from] TrimError),
-    /// It is an error of the measurement.
+    /// The effect is a measurement error.
     #[error(
         "{id} is an error of the measurement: it changes no force, and the reconstruction of a flight decides it"
     )]
     Measurement {
-        /// The effect.
+        /// Identifier of the effect.
         id: &'static str,
     },
 }
 
-/// What an effect changes.
+/// Changes caused by an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signature {
-    /// Along one variable at a time, the plainest first.
+    /// Changes along one variable at a time, the clearest first.
     pub sweeps: Vec<Pair>,
-    /// Over time in [`MANOEUVRE`], the plainest first.
+    /// Changes over time in [`MANOEUVRE`], the clearest first.
     pub manoeuvre: Vec<Pair>,
 }
 
@@ -55,11 +55,11 @@ pub struct Pair {
     pub x_label: &'static str,
     /// The vertical quantity with its unit.
     pub y_label: &'static str,
-    /// Horizontal values.
+    /// Values of the horizontal quantity.
     pub x: Vec<f64>,
-    /// Without the effect.
+    /// Vertical values without the effect.
     pub without: Vec<f64>,
-    /// With it.
+    /// Vertical values with the effect.
     pub with: Vec<f64>,
 }
 
@@ -67,7 +67,7 @@ pub struct Pair {
 pub const MANOEUVRE: &str = "From level flight: 3-2-1-1 on the elevator from 0.5 s, a doublet of the aileron from \
      4 s, full throttle from 6 s to 8 s.";
 
-/// Quantities that an effect may change, with the unit.
+/// Quantities that an effect may change, with their units.
 const CHANNELS: [&str; 6] = [
     "drag less thrust by mass, m/s²",
     "lift by mass, m/s²",
@@ -88,7 +88,7 @@ const STATE_LABELS: [&str; 8] = [
     "sideslip, °",
 ];
 
-/// A condition of flight.
+/// A flight condition.
 #[derive(Clone, Copy)]
 struct Condition {
     state: State,
@@ -96,7 +96,7 @@ struct Condition {
     altitude: f64,
 }
 
-/// A variable to sweep: its label, its ends in the label's unit, how to set it.
+/// A variable to sweep: its label, its range in the label's unit, its setter.
 type Variable = (&'static str, [f64; 2], fn(&mut Condition, f64));
 
 const VARIABLES: [Variable; 12] = [
@@ -137,7 +137,7 @@ pub fn signature(
     Ok(Signature { sweeps: sweeps(&models, &trim), manoeuvre: manoeuvre(&models, &trim) })
 }
 
-/// Sets the coefficients of an effect that the model has.
+/// Sets the coefficients of an effect of the model.
 fn set(model: &mut GreyBox, about: &Description, values: &[f64]) {
     for (c, value) in about.coefficients.iter().zip(values) {
         model.set_coefficient(&format!("{}.{}", about.id, c.name), *value);
@@ -171,7 +171,7 @@ fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
     plainest(all, SWEEPS)
 }
 
-/// [`CHANNELS`] at a condition.
+/// Values of [`CHANNELS`] at a condition.
 fn accelerations(model: &GreyBox, at: &Condition) -> [f64; 6] {
     let air = model.air(&at.state, at.altitude);
     let (acceleration, [l, m, n]) = model.accelerations(&at.state, &at.controls, &air);
@@ -203,7 +203,7 @@ fn manoeuvre(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
     plainest(pairs.collect(), STATES)
 }
 
-/// The command of [`MANOEUVRE`] at `time` (s).
+/// Command of [`MANOEUVRE`] at `time` (s).
 fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
     let level = model.airframe.actuators.command(&trim.controls);
     let pulse = |from: f64, to: f64| if (from..to).contains(&time) { 1.0 } else { 0.0 };
@@ -218,7 +218,7 @@ fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
     .clamped()
 }
 
-/// The `most` pairs with the largest change, as a share of the vertical quantity's range over all.
+/// The `most` pairs with the largest change, relative to the vertical quantity's range over all.
 fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
     let extent = |values: &[f64]| {
         let fold = |f: fn(f64, f64) -> f64, start| values.iter().copied().fold(start, f);
@@ -233,7 +233,7 @@ fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
         let difference: Vec<f64> =
             pair.with.iter().zip(&pair.without).map(|(with, without)| with - without).collect();
         let largest = difference.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-        // a change that varies along the axis says more than one that does not
+        // a change that varies along the axis is more informative than a constant one
         (extent(&difference) + 0.1 * largest) / range(pair.y_label)
     };
     let mut ranked: Vec<(f64, &Pair)> =

@@ -21,7 +21,7 @@ use greylag_model::GreyBox;
 use greylag_sysid::amend::document::{Original, sha256};
 use greylag_sysid::amend::{Estimate, Fit};
 use greylag_sysid::compare::{self, Comparison, compare};
-use greylag_sysid::progress::unheard;
+use greylag_sysid::progress::ignore_progress;
 
 /// Options with which a workbench is opened.
 pub struct Given {
@@ -261,7 +261,7 @@ impl Bench {
             (key, inner.models(), inner.reconstructions(&inner.seen()))
         };
         let options = compare::Options::default();
-        let made = Arc::new(compare(&models, &flights, &options, &unheard)?);
+        let made = Arc::new(compare(&models, &flights, &options, &ignore_progress)?);
         self.lock().comparison = Some((key, made.clone()));
         Ok(made)
     }

@@ -15,7 +15,7 @@ use greylag_report::write_over;
 use greylag_sysid::amend::document::{self, Hashed, MODEL, Original, STORY, differs};
 use greylag_sysid::amend::{self, Added, Amended, Options, Refused, amend, estimate, tune};
 use greylag_sysid::compare::{HorizonScore, free_run};
-use greylag_sysid::progress::{Progress, part, say};
+use greylag_sysid::progress::{Progress, part, report};
 use greylag_sysid::weak_form::prepared::Prepared;
 
 /// The file of a fit's errors over the flights that it saw.
@@ -115,7 +115,7 @@ impl Bench {
         let Divided { fit, held_out, notes } = &task.flights;
         let effects: Vec<Added> =
             task.effects.iter().map(|e| Added { id: e.id.clone(), start: None }).collect();
-        say(progress, "equation error", 0.0)?;
+        report(progress, "equation error", 0.0)?;
         let at_once = estimate(&task.model, fit, held_out, &effects)?;
         self.lock().estimate = Some((task.key.clone(), at_once));
         self.changed();

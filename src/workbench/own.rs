@@ -20,7 +20,7 @@ use greylag_report::write_over;
 use greylag_sysid::amend::document::sha256;
 use greylag_sysid::compare::{self, ChannelId, compare};
 use greylag_sysid::diagnose::{Curve, over_the_best};
-use greylag_sysid::progress::unheard;
+use greylag_sysid::progress::ignore_progress;
 use greylag_sysid::weak_form::prepared::Prepared;
 
 /// The folder of the effect files, below the session's.
@@ -136,7 +136,8 @@ impl Bench {
         };
         let Some(without) = zeroed(&with, id) else { return Ok(None) };
         let models = [without, with];
-        let comparison = compare(&models, &flights, &compare::Options::default(), &unheard)?;
+        let comparison =
+            compare(&models, &flights, &compare::Options::default(), &ignore_progress)?;
         let slowest = models[0].airframe.envelope.flying_from_mps();
         let prepared = flights.iter().map(|f| Prepared::new(f, slowest));
         let prepared = prepared.collect::<Result<Vec<_>, _>>()?;

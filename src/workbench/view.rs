@@ -21,7 +21,7 @@ use greylag_logs::finding::Finding;
 use greylag_logs::info::Purpose;
 use greylag_logs::phases::Phase;
 use greylag_sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
-use greylag_sysid::progress::unheard;
+use greylag_sysid::progress::ignore_progress;
 
 /// Longest free run, s.
 const LONGEST_S: f64 = 60.0;
@@ -211,7 +211,8 @@ impl Bench {
             Some(name) => (self.comparison()?, name),
             None => {
                 let flights = std::slice::from_ref(&flight.flight);
-                let made = compare(&models, flights, &compare::Options::default(), &unheard)?;
+                let made =
+                    compare(&models, flights, &compare::Options::default(), &ignore_progress)?;
                 (Arc::new(made), flight.flight.name.clone())
             }
         };

@@ -344,7 +344,7 @@ fn networks(inputs: u64, mut rng: ChaCha8Rng) -> u64 {
                 *byte = rng.random();
             }
         }
-        let said = weights::said::<Vec<u64>>(&bytes);
+        let said = weights::origin::<Vec<u64>>(&bytes);
         taken += u64::from(weights::network(&bytes).is_ok() && said.is_ok());
     }
     taken

@@ -149,7 +149,7 @@ impl Agent {
 fn read(path: &Path) -> Result<(Dense, Origin), AgentError> {
     let bytes = std::fs::read(path).map_err(|why| AgentError::Read { path: path.into(), why })?;
     let content = |why: String| AgentError::Content { path: path.into(), why };
-    let origin: Origin = weights::said(&bytes).map_err(content)?;
+    let origin: Origin = weights::origin(&bytes).map_err(content)?;
     if origin.schema != Origin::SCHEMA {
         let why =
             format!("its schema is {:?}, this program reads {}", origin.schema, Origin::SCHEMA);

@@ -1,16 +1,16 @@
-//! AVL's text (`ST`, `SB`): a row of `NAME = number`, totals at a reference incidence, derivatives by α and β (1/rad), by
-//! pb/2V, qc/2V, rb/2V, and by controls whose names stand above their columns. `ST` is in stability axes, turned here
-//! into body axes; `SB` is by u, v, w over V in body axes.
+//! Reader of AVL's stability derivatives (`ST`, `SB`): rows of `NAME = number`, totals at a reference incidence,
+//! derivatives by α and β (1/rad), by pb/2V, qc/2V, rb/2V, and by controls whose names stand above their columns.
+//! `ST` is in stability axes, converted here to body axes; `SB` is by u, v, w over V in body axes.
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
 
-/// Where the text comes from, in messages.
+/// Description of the text's origin for messages.
 const FROM: &str = "AVL's command ST (or SB), given in the menu OPER after a run, writes it";
 /// Side force, lift, rolling, pitching and yawing moment.
 const NAMES: [&str; 5] = ["CY", "CL", "Cl", "Cm", "Cn"];
 
-/// Reads AVL's `text`; control derivatives become those by a radian, given the `radians` in their unit.
+/// Reads AVL's `text`; control derivatives are converted to 1/rad, given the `radians` in their unit.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let numbers = Numbers::read(text)?;
     let alpha = numbers.need("Alpha", FROM)?.to_radians();
@@ -36,7 +36,7 @@ pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesE
     })
 }
 
-/// The derivatives with that suffix, moments about body axes.
+/// The derivatives with that suffix, moments in body axes.
 fn column(
     numbers: &Numbers,
     suffix: &str,
@@ -56,7 +56,7 @@ fn column(
     Ok(to_body(all, alpha))
 }
 
-/// Controls by name, with the suffix of their derivatives: a line has `aileron d01 elevator d02`.
+/// Names of the controls with the suffixes of their derivatives; a line holds `aileron d01 elevator d02`.
 fn control_names(text: &str) -> Vec<(String, String)> {
     let mut all: Vec<(String, String)> = Vec::new();
     for line in text.lines().filter(|line| !line.contains('=')) {

@@ -1,29 +1,29 @@
-//! Derivatives that no aircraft has: what a tool did not compute is zero in its table, and is not taken from it.
+//! Plausibility checks of derivatives: a quantity that a tool did not compute is zero in its output and is rejected.
 
 use super::{Tool, Value};
 use crate::textbook::{Measures, Tail};
 
-/// Least rolling damping beside a lift slope: elliptic wings have 1/8 of it, very short ones 1/12.
+/// Least rolling damping relative to the lift slope: elliptic wings have 1/8 of it, very short ones 1/12.
 const ROLL_DAMPING: f64 = 0.02;
-/// Least damping in pitch of an aircraft with a tail; textbook ones have −5 and more.
+/// Least pitch damping of an aircraft with a tail; textbook values are −5 and beyond.
 const PITCH_DAMPING: f64 = 1.0;
-/// Least damping in yaw of an aircraft with a tail; a fin alone has −0.02 and more.
+/// Least yaw damping of an aircraft with a tail; a fin alone gives −0.02 and beyond.
 const YAW_DAMPING: f64 = 8e-3;
-/// Least moment of a control by a radian.
+/// Least moment derivative of a control, 1/rad.
 const CONTROL: f64 = 5e-3;
-/// Lift slopes of whole aircraft, 1/rad.
+/// Plausible lift slopes of whole aircraft, 1/rad.
 const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=8.0;
 
-/// Takes the values out that `tool` cannot have computed, and says which, and what is odd besides.
+/// Removes the values that `tool` cannot have computed; returns warnings about these and about implausible ones.
 pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>) -> Vec<String> {
     let of = |name: &str| values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x);
     let slope = of(".CLalpha").unwrap_or(0.0);
-    let mut said = Vec::new();
+    let mut warnings = Vec::new();
     let mut out: Vec<&str> = Vec::new();
     for (control, moment, all) in CONTROLS {
         if of(moment).is_some_and(|x| x.abs() < CONTROL) {
             let name = &moment[1..];
-            said.push(format!("{name} is 0 in the file: {}", tool.of_controls(control)));
+            warnings.push(format!("{name} is 0 in the file: {}", tool.of_controls(control)));
             out.extend(all);
         }
     }
@@ -49,36 +49,36 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
     .into_iter()
     .flatten()
     {
-        said.push(found.0);
+        warnings.push(found.0);
         out.extend(found.1);
     }
-    odd(&of, slope, &mut said);
+    odd(&of, slope, &mut warnings);
     values.retain(|(full, _)| !out.iter().any(|name| full.ends_with(name)));
-    said
+    warnings
 }
 
-/// Controls with the moment that they are there for, and all that they make.
+/// Controls with their primary moment, and all their derivatives.
 const CONTROLS: [(&str, &str, &[&str]); 3] = [
     ("aileron", ".Clda", &[".CYda", ".Clda", ".Cnda"]),
     ("elevator", ".Cmde", &[".CLde", ".Cmde"]),
     ("rudder", ".Cndr", &[".CYdr", ".Cldr", ".Cndr"]),
 ];
 
-/// What is taken, and is odd.
-fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, said: &mut Vec<String>) {
+/// Appends warnings about values that are kept but implausible.
+fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, warnings: &mut Vec<String>) {
     if !SLOPES.contains(&slope) {
-        said.push(format!(
+        warnings.push(format!(
             "CLalpha = {slope:.3} by a radian is of no whole aircraft: see that alpha is in degrees there and the reference \
              area is the wing's"
         ));
     }
     if let Some(x) = of(".Cmalpha").filter(|x| *x >= 0.0) {
-        said.push(format!(
+        warnings.push(format!(
             "Cmalpha = {x:.3} makes the aircraft unstable: see that moments are about the centre of gravity"
         ));
     }
     if let Some(x) = of(".Cnbeta").filter(|x| *x <= 0.0) {
-        said.push(format!(
+        warnings.push(format!(
             "Cnbeta = {x:.4} turns the nose away from the wind: see that the fin is in the geometry and sideslip is positive \
              with wind from the right"
         ));

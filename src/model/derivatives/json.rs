@@ -1,8 +1,8 @@
-//! What OptVL and AeroSandbox return in Python, written as JSON: their own names, under a few keys of ours
+//! Reader of results of OptVL and AeroSandbox in Python, written as JSON: the tools' names under a few keys of ours
 //! (docs/how-to/add-an-aircraft.md has the ten lines that write it).
 //!
-//! OptVL: `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), controls by a degree. AeroSandbox: `CLa`,
-//! moments about body axes; control derivatives are differences that the script takes, by a degree.
+//! OptVL: `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), controls per degree. AeroSandbox:
+//! `CLa`, moments about body axes; control derivatives are differences computed by the script, per degree.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, positive, to_body};
 
-/// The numbers of a document, however deep, but those of `controls`.
+/// Numbers of a document at any depth, except those of `controls`.
 struct Flat<'a> {
     numbers: BTreeMap<&'a str, f64>,
     controls: Option<&'a Map<String, Value>>,
@@ -18,7 +18,7 @@ struct Flat<'a> {
     point: Option<[f64; 2]>,
 }
 
-/// Reads a JSON document; control derivatives become those by a radian, given the `radians` in their unit.
+/// Reads a JSON document; control derivatives are converted to 1/rad, given the `radians` in their unit.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let flat = document(text)?;
     let flat = Flat::of(&flat)?;
@@ -29,7 +29,7 @@ pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesE
     }
 }
 
-/// Reference area, chord and span.
+/// Reference area, chord and span, in the file's unit.
 pub(super) fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
     Flat::of(&document(text)?)?.reference()
 }
@@ -87,7 +87,7 @@ impl<'a> Flat<'a> {
         positive([self.need("Sref", FROM)?, self.need("Cref", FROM)?, self.need("Bref", FROM)?])
     }
 
-    /// Incidence of the run, rad.
+    /// Angle of attack of the run, rad.
     fn alpha(&self) -> Result<f64, DerivativesError> {
         const FROM: &str = "write the incidence of the run as \"alpha_deg\": …";
         Ok(self.need("alpha_deg", FROM)?.to_radians())

@@ -1,7 +1,8 @@
-//! Stability derivatives that aerodynamic tools compute, as airframe and model.
+//! Stability derivatives computed by aerodynamic tools, converted to an airframe and a model.
 //!
-//! Each tool has its axes, units and names; they end here in body axes, by a radian, by pb/2V, qc/2V, rb/2V. Each
-//! derivative has the width of its tool ([`widths`]), and what a tool cannot compute is named and not taken (`checks`).
+//! Each tool has its axes, units and names; they are converted to body axes, 1/rad, and nondimensional rates pb/2V,
+//! qc/2V, rb/2V. Each derivative has the standard deviation of its tool ([`widths`]), and a derivative that a tool
+//! cannot compute is reported and not used (`checks`).
 
 mod avl;
 mod checks;
@@ -15,70 +16,70 @@ pub use widths::Tool;
 
 use super::textbook::{Estimate, Measures, Section};
 
-/// What is known of an aircraft beside the derivatives.
+/// Data of an aircraft beside its derivatives.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Name, mass, tail, travel and thrust; span and area are those of the file.
+    /// Name, mass, tail, travel and thrust; span and area come from the file.
     pub measures: Measures,
-    /// Metres in the unit of length of the file.
+    /// Length in metres of the file's unit of length.
     pub metres: f64,
-    /// Radians in the unit of the control derivatives: AVL has degrees times the control's gain.
+    /// Angle in radians of the control derivatives' unit; AVL has degrees times the control's gain.
     pub radians: f64,
 }
 
-/// What was made of a file.
+/// Result of reading a file.
 #[derive(Clone, Debug)]
 pub struct Read {
-    /// The tool that wrote it.
+    /// Tool that wrote the file.
     pub tool: Tool,
-    /// The airframe file.
+    /// Text of the airframe file.
     pub airframe: String,
-    /// The model file, beside `airframe.toml`.
+    /// Text of the model file, to be stored beside `airframe.toml`.
     pub model: String,
-    /// What is not of the file, and what was turned round, one sentence each.
+    /// Assumptions beyond the file, and changes of sign, one sentence each.
     pub notes: Vec<String>,
-    /// What is not believed, by name, one sentence each.
+    /// Implausible values by name, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Why a file is of no use.
+/// Error of reading derivatives.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DerivativesError {
-    /// A number is missing.
+    /// A required number is missing.
     #[error("the file has no {name}: {tool}")]
     Missing {
-        /// The number.
+        /// Name of the number.
         name: String,
-        /// Where it comes from.
+        /// Description of its origin.
         tool: &'static str,
     },
-    /// A number is none.
+    /// A value is not a number.
     #[error("{name} = {text} in line {line} is not a number; run the case again")]
     Number {
-        /// The number's name.
+        /// Name of the number.
         name: String,
-        /// What stands there.
+        /// The text in its place.
         text: String,
-        /// Where, from 1.
+        /// Line of the text, from 1.
         line: usize,
     },
-    /// The JSON cannot be read.
+    /// The JSON is invalid.
     #[error(
         "the JSON cannot be read: {what}; write it as docs/how-to/add-an-aircraft.md does, without NaN"
     )]
     Json {
-        /// What is wrong.
+        /// Description of the error.
         what: String,
     },
-    /// The tool is none that is known.
+    /// The tool is unknown.
     #[error(
         "the tool '{said}' is not known: name AeroSandbox's method, as \"tool\": \"AeroBuildup\", \"VortexLatticeMethod\" or \"LiftingLine\""
     )]
     Tool {
-        /// What the file says.
+        /// Name in the file.
         said: String,
     },
-    /// The tool is not named, and the names do not tell it.
+    /// The tool is not named and cannot be inferred from the names.
     #[error(
         "the JSON does not say which method computed it, and its errors depend on it: add \"tool\": \"AeroBuildup\", \"VortexLatticeMethod\" or \"LiftingLine\""
     )]
@@ -88,32 +89,32 @@ pub enum DerivativesError {
     Reference,
 }
 
-/// Derivatives of side force, lift, rolling, pitching, yawing moment by one variable, body axes.
+/// Derivatives of side force, lift, rolling, pitching, yawing moment with respect to one variable, body axes.
 type Column = [f64; 5];
 
-/// A control with its derivatives by a radian, in the tool's sense of turning.
+/// A control with its derivatives, 1/rad, in the tool's sign convention.
 #[derive(Clone, Debug)]
 struct Control {
     name: String,
     column: Column,
 }
 
-/// The derivatives of a file: body axes, by a radian.
+/// Derivatives of a file: body axes, 1/rad.
 struct Derivatives {
     tool: Tool,
     /// Reference area, chord, span in the file's unit.
     reference: [f64; 3],
-    /// Point about which moments are taken, x and z in the file's axes.
+    /// Moment reference point, x and z in the file's axes.
     point: Option<[f64; 2]>,
-    /// Incidence of the run, rad.
+    /// Angle of attack of the run, rad.
     alpha: f64,
-    /// Lift and pitching moment of the run.
+    /// Lift and pitching moment coefficients of the run.
     totals: [f64; 2],
     by_alpha: Column,
     by_beta: Column,
     by_rates: [Column; 3],
     controls: Vec<Control>,
-    /// What the reader assumed.
+    /// Assumptions of the reader.
     notes: Vec<String>,
 }
 
@@ -131,13 +132,14 @@ fn is_json(text: &str) -> bool {
     text.trim_start().starts_with('{')
 }
 
-/// Moments about stability axes turned into those about body axes.
+/// Converts moments about stability axes to body axes.
 fn to_body([side, lift, roll, pitch, yaw]: Column, alpha: f64) -> Column {
     let (sin, cos) = alpha.sin_cos();
     [side, lift, roll * cos - yaw * sin, pitch, roll * sin + yaw * cos]
 }
 
-/// Derivatives by body rates of those by rates about stability axes: p' = p cos α + r sin α, r' = r cos α − p sin α.
+/// Converts derivatives with respect to rates about stability axes to those about body axes: p' = p cos α + r sin α,
+/// r' = r cos α − p sin α.
 fn about_body([p, q, r]: [Column; 3], alpha: f64) -> [Column; 3] {
     let (sin, cos) = alpha.sin_cos();
     let both = |a: f64, b: f64| std::array::from_fn(|i| a * p[i] + b * r[i]);
@@ -162,10 +164,10 @@ pub fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
     }
 }
 
-/// Reads the `text` of AVL, XFLR5, or what OptVL and AeroSandbox return as JSON, with what is known `beside` it.
+/// Reads the `text` of AVL, XFLR5, or OptVL's and AeroSandbox's results as JSON, with the data `beside` it.
 ///
 /// # Errors
-/// If a number that is needed is missing or is none.
+/// If a required number is missing or not a number.
 pub fn read(text: &str, beside: &Beside) -> Result<Read, DerivativesError> {
     let mut found = Derivatives::read(text, beside.radians)?;
     let [area, chord, span] = found.reference;
@@ -204,7 +206,7 @@ pub fn read(text: &str, beside: &Beside) -> Result<Read, DerivativesError> {
     })
 }
 
-/// About which point the moments are.
+/// The moment reference point, in words.
 fn about(d: &Derivatives) -> String {
     match d.point {
         Some([x, z]) => format!(
@@ -246,7 +248,8 @@ fn lateral(d: &Derivatives) -> Vec<Value> {
     ]
 }
 
-/// Derivatives by aileron, elevator and rudder, each with our sign; what the file lacks stays the textbook's.
+/// Derivatives by aileron, elevator and rudder in our sign convention; what the file lacks keeps the textbook's
+/// value.
 fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Vec<Value> {
     let mut out = Vec::new();
     let mut used = Vec::new();
@@ -292,7 +295,7 @@ fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Ve
     out
 }
 
-/// What a positive deflection does here.
+/// Effect of a positive deflection here.
 const SENSE: [&str; 3] = [
     "a positive aileron rolls right here",
     "a positive elevator pitches down here",
@@ -304,12 +307,12 @@ fn value(sections: &[Section], effect: &str, name: &str) -> f64 {
     own.and_then(|(_, all)| all.iter().find(|e| e.0 == name)).map_or(0.0, |e| e.1)
 }
 
-/// Slope of the lift (1/rad) and lift at α = 0.
+/// Lift slope (1/rad) and lift coefficient at α = 0.
 fn slope_and_zero(sections: &[Section]) -> [f64; 2] {
     [value(sections, "lift_linear", "CLalpha"), value(sections, "lift_linear", "CL0")]
 }
 
-/// The induced drag goes by the file's lift.
+/// Adapts the induced drag to the file's lift.
 fn trimmed(sections: &mut [Section], measures: &Measures) {
     let [slope, zero] = slope_and_zero(sections);
     let [linear, square] = measures.induced_by(slope, zero);

@@ -1,10 +1,10 @@
-//! Texts of `NAME = number`, as Fortran and Qt programs write them.
+//! Parser of texts of `NAME = number`, as Fortran and Qt programs write them.
 
 use std::collections::BTreeMap;
 
 use super::DerivativesError;
 
-/// The numbers of a text by their names; the first of a name counts.
+/// Numbers of a text by name; the first one of a name counts.
 pub(super) struct Numbers(BTreeMap<String, f64>);
 
 impl Numbers {
@@ -43,7 +43,7 @@ impl Numbers {
         self.0.get(name).copied()
     }
 
-    /// The number, which `tool` writes.
+    /// The number `name`, required from `tool`.
     pub fn need(&self, name: &str, tool: &'static str) -> Result<f64, DerivativesError> {
         let missing = || DerivativesError::Missing { name: name.into(), tool };
         self.get(name).ok_or_else(missing)

@@ -1,8 +1,9 @@
-//! How far the derivatives of a tool are from those that were measured: standard deviations as shares of the value.
+//! Relative errors of each tool's derivatives: standard deviations as shares of the value.
 //!
-//! `params/widths/widths.csv` holds them: the tool's errors beside aircraft whose derivatives were identified in flight or
-//! measured in a wind tunnel (`params/widths/measured.csv`, with sources), drawn together with a guess that counts as two
-//! aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n). `cargo run --no-default-features --example derivative_widths` computes them.
+//! `params/widths/widths.csv` holds them: the tool's errors on aircraft whose derivatives were identified in flight
+//! or measured in a wind tunnel (`params/widths/measured.csv`, with sources), combined with a prior guess that counts
+//! as two aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n). `cargo run --no-default-features --example
+//! derivative_widths` computes them.
 
 use std::fmt;
 use std::sync::LazyLock;
@@ -10,24 +11,24 @@ use std::sync::LazyLock;
 /// A tool that computes derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Tool {
-    /// Formulas from mass, span and area (`greylag aircraft new`).
+    /// Textbook formulas from mass, span and area (`greylag aircraft new`).
     Textbook,
-    /// AVL's text.
+    /// AVL, from its text output.
     Avl,
-    /// OptVL, which has AVL's lattice.
+    /// OptVL, with AVL's vortex lattice.
     OptVl,
-    /// AeroSandbox's `VortexLatticeMethod`.
+    /// AeroSandbox with its method `VortexLatticeMethod`.
     AeroSandboxLattice,
-    /// AeroSandbox's `AeroBuildup`.
+    /// AeroSandbox with its method `AeroBuildup`.
     AeroBuildup,
-    /// AeroSandbox's `LiftingLine`.
+    /// AeroSandbox with its method `LiftingLine`.
     LiftingLine,
-    /// XFLR5's stability analysis.
+    /// XFLR5, from its stability analysis.
     Xflr5,
 }
 
 impl Tool {
-    /// All of them.
+    /// All tools whose derivatives can be read.
     pub const ALL: [Tool; 7] = [
         Tool::Textbook,
         Tool::Avl,
@@ -38,7 +39,7 @@ impl Tool {
         Tool::Xflr5,
     ];
 
-    /// Its name in the tables.
+    /// Name of the tool in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Tool::Textbook => "textbook",
@@ -51,7 +52,7 @@ impl Tool {
         }
     }
 
-    /// The tool whose errors stand for it: lattices err alike, but for what they leave out.
+    /// Tool whose errors are used for this one: lattice methods have similar errors, except for what they neglect.
     pub fn family(self) -> &'static str {
         match self {
             Tool::Avl | Tool::OptVl | Tool::Xflr5 => "lattice",
@@ -59,7 +60,7 @@ impl Tool {
         }
     }
 
-    /// What a coefficient's source says.
+    /// Source text for a coefficient.
     pub(super) fn source(self) -> &'static str {
         match self {
             Tool::Textbook => "textbook",
@@ -72,7 +73,7 @@ impl Tool {
         }
     }
 
-    /// Why a control's derivatives may be zero, and what is done.
+    /// Explanation why a control's derivatives may be zero, with the remedy.
     pub(super) fn of_controls(self, control: &str) -> String {
         match self {
             Tool::AeroSandboxLattice => format!(
@@ -84,7 +85,7 @@ impl Tool {
         }
     }
 
-    /// Why a damping may be missing.
+    /// Explanation why a damping may be missing.
     pub(super) fn of_damping(self) -> &'static str {
         match self {
             Tool::LiftingLine => "AeroSandbox's lifting line does not see rotation",
@@ -99,7 +100,7 @@ impl fmt::Display for Tool {
     }
 }
 
-/// Tool (or family), derivative, width.
+/// Entries: tool (or family), derivative, relative standard deviation.
 static WIDTHS: LazyLock<Vec<(&str, &str, f64)>> = LazyLock::new(|| {
     let lines = include_str!("../../../params/widths/widths.csv").lines();
     let columns = |line: &'static str| {
@@ -109,8 +110,7 @@ static WIDTHS: LazyLock<Vec<(&str, &str, f64)>> = LazyLock::new(|| {
     lines.filter(|line| !line.starts_with('#')).skip(1).filter_map(columns).collect()
 });
 
-/// Standard deviation of the derivative called `name` (`CLalpha`) by `tool`, as a share of its value; `None` of one that is in no
-/// table.
+/// Relative standard deviation of the derivative `name` (`CLalpha`) by `tool`; `None` if no table has it.
 pub fn of(tool: Tool, name: &str) -> Option<f64> {
     let by = |tool: &str| WIDTHS.iter().find(|w| w.0 == tool && w.1 == name).map(|w| w.2);
     by(tool.name()).or_else(|| by(tool.family()))

@@ -1,7 +1,8 @@
-//! XFLR5's log of a stability analysis: stability axes, derivatives by α, β, pb/2V, qc/2V, rb/2V, and by one control.
+//! Reader of XFLR5's log of a stability analysis: stability axes, derivatives by α, β, pb/2V, qc/2V, rb/2V, and by
+//! one control.
 //!
-//! The log has no reference area, chord and span: the user adds them as `Sref = …`. Its lift is that which carries the
-//! mass at the speed of the log, its pitching moment zero: the analysis is at trim.
+//! The log has no reference area, chord and span: the user adds them as `Sref = …`. The analysis is at trim: its lift
+//! balances the weight at the log's speed, and its pitching moment is zero.
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
@@ -10,7 +11,7 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 const FROM: &str = "it stands in the log of XFLR5's stability analysis (\"Longitudinal derivatives\" and below), and \
                     Sref, Cref and Bref are to be added on top as \"Sref = 0.45\"";
 
-/// Whether the text is XFLR5's.
+/// Whether the text is a log of XFLR5.
 pub(super) fn is_here(text: &str) -> bool {
     text.contains("Longitudinal derivatives") && text.contains("CLa=")
 }
@@ -55,7 +56,7 @@ pub(super) fn read(text: &str) -> Result<Derivatives, DerivativesError> {
     })
 }
 
-/// The one control of an analysis: what it moves most is what it is.
+/// The one control of an analysis, identified by its largest moment.
 fn control(numbers: &Numbers, alpha: f64, notes: &mut Vec<String>) -> Option<Control> {
     let get = |name: &str| numbers.get(name).unwrap_or(0.0);
     let moments = [get("CLde"), get("CMde"), get("CNde")];

@@ -1,4 +1,4 @@
-//! The aerodynamics of an exported aircraft: a function for each axis.
+//! Aerodynamics of an exported aircraft: a function for each axis.
 
 use std::fmt::Write;
 
@@ -7,14 +7,14 @@ use super::{AILERON, ALPHA, BETA, ELEVATOR, RUDDER, coefficient, engine, product
 use crate::GreyBox;
 use greylag_num::Table;
 
-/// Where a coefficient acts: axis, then the factors beside q S (and b or c for a moment).
+/// Axis and factors of a coefficient beside q S (and b or c for a moment).
 type Factor = (&'static str, &'static str, &'static [&'static str]);
 
 const P: [&str; 2] = ["aero/bi2vel", "velocities/p-aero-rad_sec"];
 const Q: [&str; 2] = ["aero/ci2vel", "velocities/q-aero-rad_sec"];
 const R: [&str; 2] = ["aero/bi2vel", "velocities/r-aero-rad_sec"];
 
-/// The coefficients that JSBSim has as products of properties.
+/// Coefficients that JSBSim expresses as products of properties.
 const FACTORS: &[Factor] = &[
     ("lift_linear.CL0", "LIFT", &[]),
     ("lift_linear.CLalpha", "LIFT", &[ALPHA]),
@@ -52,17 +52,17 @@ const FACTORS: &[Factor] = &[
     ("rudder_linear.Cndr", "YAW", &[RUDDER]),
 ];
 
-/// The tables over incidence: effect and axis.
+/// Tables over the angle of attack: effect and axis.
 const TABLES: &[(&str, &str)] =
     &[("lift_table", "LIFT"), ("drag_table", "DRAG"), ("pitch_table", "PITCH")];
 
-/// Whether the files have the coefficient of that full name, as part of the aerodynamics.
+/// Whether the exported aerodynamics contain the coefficient `name`.
 pub(super) fn knows(name: &str) -> bool {
     FACTORS.iter().any(|(factor, ..)| *factor == name)
         || TABLES.iter().any(|(table, _)| name.strip_suffix(".k") == Some(table))
 }
 
-/// The section of aerodynamics, in all conditions.
+/// The aerodynamics section, in all conditions.
 pub(super) fn section(conditions: &Conditions) -> String {
     let mut out = "  <aerodynamics>\n".to_owned();
     for (axis, length) in [
@@ -93,7 +93,7 @@ pub(super) fn section(conditions: &Conditions) -> String {
     out
 }
 
-/// The terms of one axis of `model`, to be summed.
+/// Terms of one axis of `model`, to be summed.
 fn terms(model: &GreyBox, axis: &str) -> String {
     let products = FACTORS
         .iter()

@@ -1,4 +1,4 @@
-//! Models of one aircraft in several conditions, as one aircraft that reads in which it is.
+//! Export of one aircraft's models in several conditions as one aircraft that interpolates between them.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -6,14 +6,14 @@ use std::fmt::Write;
 use super::aerodynamics;
 use crate::GreyBox;
 
-/// Settings that every aircraft of JSBSim has.
+/// Settings that every JSBSim aircraft has.
 const OF_JSBSIM: [&str; 4] =
     ["fcs/flap-cmd-norm", "fcs/speedbrake-cmd-norm", "fcs/spoiler-cmd-norm", "gear/gear-cmd-norm"];
 
-/// Why models are not those of one aircraft in several conditions.
+/// Error of combining models in several conditions.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConditionsError {
-    /// No model was given.
+    /// No model is given.
     #[error("no model to export: name one with --model")]
     Nothing,
     /// The airframes differ in no property, or in several.
@@ -25,54 +25,54 @@ pub enum ConditionsError {
     Properties {
         /// Names of the models.
         models: String,
-        /// The properties in which they differ.
+        /// Properties in which they differ.
         properties: Vec<String>,
     },
-    /// Two models are of the same setting.
+    /// Two models have the same setting.
     #[error(
         "cannot export the models {first} and {second} as one aircraft: both are of {property} = {setting}; leave one of \
          them out"
     )]
     Twice {
-        /// Name of a model.
+        /// Name of the first model.
         first: String,
-        /// Name of the other.
+        /// Name of the second model.
         second: String,
-        /// The property that tells the conditions apart.
+        /// Property that distinguishes the conditions.
         property: String,
-        /// Its value in both.
+        /// Value of the property in both.
         setting: f64,
     },
-    /// Something that no condition changes is not the same in all.
+    /// A quantity that conditions cannot change differs between models.
     #[error(
         "cannot export the models {first} and {second} as one aircraft: their {what} differ; a condition changes only \
          aerodynamic coefficients, so give both models the same {what}"
     )]
     Differ {
-        /// Name of a model.
+        /// Name of the first model.
         first: String,
-        /// Name of the other.
+        /// Name of the second model.
         second: String,
-        /// In what they differ.
+        /// The differing quantity, in words.
         what: String,
     },
 }
 
 /// Models of one aircraft, one for each setting of a property.
 pub(super) struct Conditions<'a> {
-    /// The property; empty if there is one model.
+    /// Name of the property; empty for a single model.
     property: String,
-    /// Settings, ascending, with the model of each.
+    /// Settings in ascending order, with their models.
     settings: Vec<(f64, &'a GreyBox)>,
 }
 
 impl<'a> Conditions<'a> {
-    /// One model: the aircraft is always in its condition.
+    /// A single model, whose condition always holds.
     pub(super) fn one(model: &'a GreyBox) -> Self {
         Conditions { property: String::new(), settings: vec![(0.0, model)] }
     }
 
-    /// Several, told apart by the one property in which their airframes' conditions differ.
+    /// Several models, distinguished by the one property in which their airframes' conditions differ.
     pub(super) fn of(models: &'a [GreyBox]) -> Result<Self, ConditionsError> {
         let Some((first, rest)) = models.split_first() else {
             return Err(ConditionsError::Nothing);
@@ -101,18 +101,18 @@ impl<'a> Conditions<'a> {
         self.settings.iter().map(|(_, model)| *model)
     }
 
-    /// The model of the lowest setting: what no condition changes is that of all.
+    /// Model of the lowest setting, from which all common quantities are taken.
     pub(super) fn first(&self) -> &'a GreyBox {
         self.settings[0].1
     }
 
-    /// The models' names, in a list.
+    /// Names of the models, joined.
     pub(super) fn names(&self) -> String {
         let names: Vec<&str> = self.models().map(|m| m.name.as_str()).collect();
         names.join(", ")
     }
 
-    /// Makes the property known, at the lowest setting, where JSBSim does not by itself.
+    /// Declares the property at the lowest setting, unless JSBSim has it already.
     pub(super) fn declaration(&self) -> String {
         match &self.settings[..] {
             [_] => String::new(),
@@ -126,7 +126,7 @@ impl<'a> Conditions<'a> {
         }
     }
 
-    /// The channel that weighs the conditions: each is one at its own setting and zero at the others.
+    /// Channel with the weights of the conditions: each is one at its own setting and zero at the others.
     pub(super) fn weights(&self) -> String {
         if self.settings.len() == 1 {
             return String::new();
@@ -152,7 +152,7 @@ impl<'a> Conditions<'a> {
         out
     }
 
-    /// What is to be summed for all conditions, `terms` being that of one.
+    /// Weighted sum over all conditions, `terms` being that of one model.
     pub(super) fn weighted(&self, terms: impl Fn(&GreyBox) -> String) -> String {
         if let [(_, model)] = &self.settings[..] {
             return terms(model);
@@ -171,12 +171,12 @@ impl<'a> Conditions<'a> {
     }
 }
 
-/// The property that holds the weight of the condition of that number.
+/// Property that holds the weight of condition `number`.
 fn weight(number: usize) -> String {
     format!("fcs/condition-{number}")
 }
 
-/// The property that tells `models` apart.
+/// The one property that distinguishes `models`.
 fn property(models: &[GreyBox]) -> Result<String, ConditionsError> {
     let names: BTreeSet<&String> =
         models.iter().flat_map(|m| m.airframe.conditions.keys()).collect();
@@ -193,7 +193,7 @@ fn property(models: &[GreyBox]) -> Result<String, ConditionsError> {
     }
 }
 
-/// That two models have in common what no condition changes.
+/// Checks that two models agree in all quantities that conditions cannot change.
 fn same(first: &GreyBox, second: &GreyBox) -> Result<(), ConditionsError> {
     let differ = |what: &str| ConditionsError::Differ {
         first: first.name.clone(),

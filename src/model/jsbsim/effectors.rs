@@ -1,4 +1,4 @@
-//! Surfaces that are commanded one by one, in the flight-control section of an exported aircraft.
+//! Individually commanded surfaces in the flight-control section of an exported aircraft.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use greylag_physics::airframe::ActuatorFigures;
 use greylag_physics::mixer::{CONTROLS, Does, Effector, Mixer};
 use greylag_physics::servos::{Surface, Travel};
 
-/// The surfaces of `mixer` that have JSBSim properties, with these; none if one has not.
+/// Surfaces of `mixer` with their JSBSim properties; `None` if a surface has none.
 fn named(mixer: &Mixer) -> Option<Vec<(&Effector, Travel, &str, &str)>> {
     let surfaces = mixer.effectors().iter().filter_map(|e| match e.does {
         Does::Deflects(travel) => Some((e, travel)),
@@ -63,7 +63,7 @@ pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<Strin
     Some(out)
 }
 
-/// The filter of the control that a surface follows most.
+/// Filter of the control with the surface's largest gain.
 fn like(effector: &Effector, figures: &ActuatorFigures) -> Surface {
     let [aileron, elevator, rudder, _] = effector.gains.map(f64::abs);
     match figures.rudder {

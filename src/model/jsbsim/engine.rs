@@ -5,16 +5,16 @@ use crate::GreyBox;
 use greylag_num::Grid;
 
 const SPEED: &str = "velocities/vt-fps";
-/// The throttle that acts on the engine where its thrust lags.
+/// Property of the throttle that acts on the engine if its thrust lags.
 const LATE_THROTTLE: &str = "fcs/engine-throttle-norm";
 const LAG: &str = "thrust_lag.tau_s";
 const DENSITY: &str = "fcs/density-ratio";
-/// The factor on the thrust's table.
+/// Coefficient that scales the thrust table.
 const TABLE: &str = "thrust_table.k";
 const ARM: &str = "thrust_line_offset.z_m";
 const TORQUE: &str = "motor_torque.k_nm";
 
-/// The thrust's terms: coefficient, factors; airspeed is in ft/s there.
+/// Thrust terms: coefficient, factors; airspeed is in ft/s there.
 const THRUST: &[(&str, &[&str])] = &[
     ("thrust_linear.Cp_n", &[THROTTLE]),
     ("propeller.T0_n", &[DENSITY]),
@@ -25,17 +25,17 @@ const THRUST: &[(&str, &[&str])] = &[
     ("propeller.TVV_ns2pm2", &[DENSITY, SPEED, SPEED]),
 ];
 
-/// Whether the files have the coefficient of that full name, as part of the engine.
+/// Whether the exported engine contains the coefficient `name`.
 pub(super) fn knows(name: &str) -> bool {
     THRUST.iter().any(|(term, _)| *term == name) || [TABLE, LAG, ARM, TORQUE].contains(&name)
 }
 
-/// The throttle that acts on the engine.
+/// Property of the throttle that acts on the engine.
 fn throttle(model: &GreyBox) -> &'static str {
     if coefficient(model, LAG) > 0.0 { LATE_THROTTLE } else { THROTTLE }
 }
 
-/// The filter behind the throttle's, of a thrust that lags.
+/// Filter after the throttle's, if the thrust lags.
 pub(super) fn lag(model: &GreyBox) -> String {
     let lag = coefficient(model, LAG);
     if lag <= 0.0 {
@@ -48,7 +48,7 @@ pub(super) fn lag(model: &GreyBox) -> String {
     )
 }
 
-/// The section of external reactions: the thrust along body x.
+/// Section of external reactions: the thrust along body x.
 pub(super) fn force(model: &GreyBox) -> String {
     let throttle = throttle(model);
     let terms: String = THRUST
@@ -73,7 +73,7 @@ pub(super) fn force(model: &GreyBox) -> String {
     )
 }
 
-/// The thrust's table times `factor`, in lbf over throttle and airspeed in ft/s.
+/// Thrust table times `factor`, in lbf over throttle and airspeed in ft/s.
 fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
     let [throttles, airspeeds] = grid.axes();
     let heads: String = airspeeds.iter().map(|v| format!(" {:?}", v / FT)).collect();
@@ -90,7 +90,7 @@ fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
     )
 }
 
-/// A function of the rolling moment: the engine's torque, to the left.
+/// Rolling-moment function of the engine's torque, to the left.
 pub(super) fn torque(model: &GreyBox) -> String {
     let torque = coefficient(model, TORQUE);
     if torque == 0.0 {

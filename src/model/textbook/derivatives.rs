@@ -1,12 +1,12 @@
-//! The coefficients of each effect, by the formulas of textbooks.
+//! Coefficients of each effect, by textbook formulas.
 
 use super::{Estimate, Figures, Measures, Tail, helmbold};
 
-/// Tailplane's volume, distance in chords, efficiency and share of its chord that moves, as lift.
+/// Tailplane: volume coefficient, distance in chords, efficiency, and elevator effectiveness.
 const TAIL: [f64; 4] = [0.5, 2.8, 0.95, 0.5];
-/// Fin's volume, distance in spans, lift slope, and share of its chord that moves, as lift.
+/// Fin: volume coefficient, distance in spans, lift slope, and rudder effectiveness.
 const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
-/// Span efficiency.
+/// Oswald efficiency factor of the wing.
 const EFFICIENCY: f64 = 0.85;
 
 impl Measures {
@@ -18,7 +18,7 @@ impl Measures {
         }
     }
 
-    /// Lift and pitching moment (about a chord) of the elevator, 1/rad.
+    /// Lift and pitching moment derivatives of the elevator, 1/rad.
     fn elevator(&self, f: &Figures) -> [f64; 2] {
         match self.tail {
             Tail::Conventional => {
@@ -112,7 +112,7 @@ impl Measures {
         ]
     }
 
-    /// T = Ts (δ² − δ V/Vp): thrust of a fixed pitch, voltage in proportion to the throttle.
+    /// Thrust T = Ts (δ² − δ V/Vp) of a fixed-pitch propeller, with the voltage proportional to the throttle.
     pub(super) fn thrust(&self) -> Vec<Estimate> {
         let (rest, source) = (self.static_thrust, "static thrust and pitch speed");
         vec![
@@ -126,7 +126,7 @@ impl Measures {
     }
 }
 
-/// Side force, rolling and yawing moment of a rudder on the fin.
+/// Side force, rolling and yawing moment derivatives of a rudder on the fin.
 pub(super) fn rudder() -> Vec<Estimate> {
     let force = FIN[2] * FIN[3] * FIN[0] / FIN[1];
     let source = "fin volume 0.04, half of it by the rudder";
@@ -137,17 +137,17 @@ pub(super) fn rudder() -> Vec<Estimate> {
     ]
 }
 
-/// Lift slope of the tailplane with its efficiency, 1/rad.
+/// Lift slope of the tailplane times its efficiency, 1/rad.
 fn tailplane() -> f64 {
     TAIL[2] * helmbold(4.5)
 }
 
-/// Change of the downwash at the tailplane with incidence.
+/// Downwash derivative dε/dα at the tailplane.
 fn downwash(f: &Figures) -> f64 {
     2.0 * f.wing / (std::f64::consts::PI * f.aspect)
 }
 
-/// π e AR.
+/// The factor π e AR of induced drag.
 pub(super) fn induced(f: &Figures) -> f64 {
     std::f64::consts::PI * EFFICIENCY * f.aspect
 }

@@ -1,9 +1,9 @@
-//! Tests of networks: by hand, over every scalar, against central differences.
+//! Tests of networks: against the definition, over every scalar, against central differences.
 
 use super::*;
 use crate::{Dual, Lanes, stream};
 
-/// A network none of whose layers is a multiple of the block.
+/// A network in which no layer is a multiple of the block.
 fn network() -> Dense {
     let mut network = Dense::silent(&[3, 21, 9, 2], &mut stream::stream(5, &[])).unwrap();
     let mut rng = stream::stream(6, &[]);
@@ -12,7 +12,7 @@ fn network() -> Dense {
     network
 }
 
-/// The definition, written out.
+/// The definition of the network, written out.
 fn by_hand(network: &Dense, input: [f64; 3]) -> Vec<f64> {
     let mut x = input.to_vec();
     let last = network.sizes().len() - 2;

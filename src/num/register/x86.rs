@@ -1,10 +1,10 @@
-//! Registers of x86: SSE2, AVX2 and AVX-512.
+//! Registers of x86 processors: SSE2, AVX2 and AVX-512.
 
 use std::arch::x86_64::*;
 
 use super::Register;
 
-/// SSE2, which every such processor has.
+/// SSE2, which every x86-64 processor has.
 impl Register for __m128 {
     intrinsics!(__m128, 4, 12, _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_min_ps _mm_max_ps
         _mm_sqrt_ps _mm_set1_ps _mm_loadu_ps _mm_storeu_ps);
@@ -17,7 +17,7 @@ impl Register for __m128 {
     fn abs(self) -> Self {
         unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self) }
     }
-    /// There is no such instruction: a call for each lane.
+    /// Without such an instruction, a library call for each lane.
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {
         let (mut x, mut f, mut a) = ([0.0_f32; 4], [0.0; 4], [0.0; 4]);
@@ -61,7 +61,7 @@ impl Register for __m128 {
     }
 }
 
-/// `then` where all bits of `mask` are set, `otherwise` where none is.
+/// Selects `then` where all bits of `mask` are set, `otherwise` where none is.
 #[inline(always)]
 unsafe fn chosen(mask: __m128, then: __m128, otherwise: __m128) -> __m128 {
     // SAFETY: SSE2
@@ -117,7 +117,7 @@ impl Register for __m256 {
     }
 }
 
-/// AVX-512 (F).
+/// AVX-512 Foundation (F).
 impl Register for __m512 {
     intrinsics!(__m512, 16, 16, _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_min_ps
         _mm512_max_ps _mm512_sqrt_ps _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps);

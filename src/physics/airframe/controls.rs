@@ -1,4 +1,4 @@
-//! The controls of an airframe file: which there are, and how each follows its command.
+//! Controls of an airframe file with their actuator filters.
 
 use serde::Deserialize;
 
@@ -7,23 +7,23 @@ use crate::servos::{ActuatorFigures, Surface, Travel};
 
 /// Time step of the filters, s.
 const STEP: f64 = 0.01;
-/// Largest deflection of a surface, rad.
+/// Largest accepted deflection of a surface, rad.
 const TRAVEL: f64 = 1.6;
-/// Largest frequency of a surface, rad/s.
+/// Largest accepted frequency of a surface, rad/s.
 const FREQUENCY: f64 = 1000.0;
-/// Largest rate of a surface, rad/s.
+/// Largest accepted rate of a surface, rad/s.
 const RATE: f64 = 200.0;
 
-/// Whether an airframe file states if there is a rudder.
+/// Statement of an airframe file on the rudder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Yaw {
-    /// A file of schema 1 has no place for a rudder.
+    /// The file has schema 1, which cannot state a rudder.
     Unstated,
-    /// A file of schema 2: the rudder is there if its figures are.
+    /// The file has schema 2: a rudder exists if its figures are given.
     Stated,
 }
 
-/// `[actuators]` of schema 1: ailerons and elevator alike, no word on a rudder.
+/// Section `[actuators]` of schema 1: ailerons and elevator alike, without a statement on a rudder.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Alike {
@@ -33,7 +33,7 @@ pub(super) struct Alike {
     throttle_lag_s: Sourced,
 }
 
-/// `[controls]` of schema 2: a control that is not there does not exist.
+/// Section `[controls]` of schema 2; a missing control does not exist.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Each {
@@ -112,7 +112,7 @@ impl SurfaceFile {
     }
 }
 
-/// Travel of `name`: either the same to both sides, or the two sides (`both`, `min`, `max`).
+/// Travel of `name`, either symmetric (`both`) or with two limits (`min`, `max`).
 pub(super) fn travel(
     name: &str,
     [both, min, max]: [&Option<Sourced>; 3],

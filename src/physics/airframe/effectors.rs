@@ -9,12 +9,12 @@ use super::controls::travel;
 use crate::mixer::{Does, Effector, Mixer};
 use crate::servos::{Travel, Travels};
 
-/// Servo outputs of a flight controller.
+/// Number of servo outputs of a flight controller.
 const CHANNELS: u8 = 32;
-/// Largest gain of an effector.
+/// Largest accepted gain of an effector.
 const GAIN: f64 = 2.0;
 
-/// `[surfaces.NAME]`.
+/// Section `[surfaces.NAME]` of an airframe file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SurfaceFile {
@@ -32,7 +32,7 @@ pub(super) struct SurfaceFile {
     position: Option<String>,
 }
 
-/// `[motors.NAME]`.
+/// Section `[motors.NAME]` of an airframe file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MotorFile {
@@ -44,10 +44,10 @@ pub(super) struct MotorFile {
     position: Option<String>,
 }
 
-/// The mixer that the file describes; `None` if it names neither surfaces nor motors.
+/// The mixer described by the file; `None` if it names neither surfaces nor motors.
 ///
-/// Where it names surfaces alone, one motor follows the throttle; where it names motors alone, the surfaces are those
-/// of `travels`.
+/// If it names surfaces only, one motor follows the throttle; if it names motors only, the surfaces are those of
+/// `travels`.
 pub(super) fn mixer(
     surfaces: &BTreeMap<String, SurfaceFile>,
     motors: &BTreeMap<String, MotorFile>,

@@ -1,13 +1,13 @@
-//! Surfaces that twist the wing under them as airspeed grows.
+//! Loss of control effectiveness by aeroelastic twist of the wing with airspeed.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed at which the effectiveness of the model holds, m/s: that of the neutral start.
+/// Airspeed at which the model's effectiveness is exact, m/s: that of the neutral start.
 const V0: f64 = State::NEUTRAL.airspeed;
 
-/// Effectiveness of aileron and elevator that falls with dynamic pressure.
+/// Effectiveness of aileron and elevator that decreases with dynamic pressure.
 pub struct AeroelasticLoss;
 
 impl Effect for AeroelasticLoss {

@@ -1,10 +1,10 @@
-//! Air that is denser or thinner than the model has it.
+//! Air density different from the model's.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Every aerodynamic force and moment changed by the same share.
+/// A common relative change of every aerodynamic force and moment.
 pub struct AirDensity;
 
 impl Effect for AirDensity {

@@ -1,4 +1,4 @@
-//! An airframe whose left half is not the mirror of its right half.
+//! Asymmetry of the airframe between left and right.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

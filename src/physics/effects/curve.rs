@@ -1,24 +1,24 @@
-//! Curves over the angle of attack: sums of hats, so that they are linear in their heights.
+//! Curves over the angle of attack as sums of hat functions, linear in their ordinates.
 //!
-//! Two knots of the grid stay at zero, else a straight line would be represented twice: by the curve, and by the
-//! coefficients `CL0` and `CLalpha` (`CD0`) of the effects it stands beside.
+//! Two knots of the grid are fixed at zero, since a straight line would otherwise be represented twice: by the curve,
+//! and by the coefficients `CL0` and `CLalpha` (`CD0`) of the effects beside it.
 
 use super::Terms;
 use crate::Channel;
 use greylag_num::Real;
 
-/// The first place of the grid, °.
+/// First knot of the grid, °.
 const FIRST_DEG: f64 = -8.0;
-/// Distance between places of the grid, °.
+/// Distance between knots of the grid, °.
 const SPACING_DEG: f64 = 2.0;
-/// Angles of attack between which the places lie half as far apart, °: there lift breaks.
+/// Range of angles of attack with half the distance between knots, °, because lift breaks there.
 const FINE_DEG: (f64, f64) = (10.0, 20.0);
-/// Places: from −8° to 30°.
+/// Number of knots, from −8° to 30°.
 const PLACES: usize = 25;
-/// Places at which a curve is zero, 0° and 4°: where an aircraft flies most.
+/// Indices of the knots at which a curve is zero, 0° and 4°, the usual range of flight.
 const ZERO: [usize; 2] = [4, 6];
 
-/// Coefficients of a curve: its height at every other place, as `CL_m8` or `CL_p20`.
+/// Coefficients of a curve: its ordinate at every other knot, named like `CL_m8` or `CL_p20`.
 macro_rules! heights {
     ($letter:literal, $bounds:expr) => {
         super::curve::heights!($letter, $bounds,
@@ -38,9 +38,9 @@ macro_rules! heights {
 }
 pub(super) use heights;
 
-/// Reports to `terms` each hat over `alpha` (rad) times `amount`; beyond its ends a curve stays level.
+/// Reports to `terms` each hat over `alpha` (rad) times `amount`; beyond its ends a curve is constant.
 ///
-/// A call, unlike all other effects, where that costs little: in line the hats would swell every fit.
+/// Unlike other effects it is not inlined where a call is cheap, because inlining would enlarge the code of every fit.
 #[inline(always)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
     #[inline(never)]

@@ -1,4 +1,4 @@
-//! Drag that grows with the square of incidence.
+//! Drag that grows with the square of the angle of attack.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

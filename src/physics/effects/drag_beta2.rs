@@ -1,4 +1,4 @@
-//! Drag of flying sideways.
+//! Drag due to sideslip.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -14,7 +14,7 @@ impl Effect for DragBeta2 {
     const SOURCE: &'static str = "Gryte18; JSBSim reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CDbeta", "drag due to the magnitude of sideslip", "1/rad", (-0.5, 0.5)),
-        // below zero where the side force is not turned with the wind: −|CYβ| β² of it stand in the drag
+        // negative where the side force is not rotated with the wind: −|CYβ| β² of it is then part of the drag
         coefficient("CDbeta2", "drag due to the square of sideslip", "1/rad²", (-0.5, 5.0)),
     ];
     const ENTRY: Option<Entry> = Some(Entry {

@@ -1,10 +1,10 @@
-//! Drag as flown: what no formula says of it.
+//! Additional drag as a curve over the angle of attack.
 
 use super::{Coefficient, Effect, Own, Terms, curve};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// What the drag has more than the other effects say, as a curve over the angle of attack.
+/// Drag beyond that of the other effects, as a curve over the angle of attack.
 pub struct DragCurve;
 
 impl Effect for DragCurve {

@@ -1,4 +1,4 @@
-//! Surfaces whose moments do not grow in proportion to their deflection.
+//! Control moments that are not proportional to the deflection.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,4 +1,4 @@
-//! A load that hangs on the aircraft and pulls straight down.
+//! A suspended load that pulls straight down.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -6,9 +6,9 @@ use crate::{Channel, Point, rigid_body};
 
 /// A constant force at the centre of gravity along gravity.
 ///
-/// A tether or a tow also pulls along the ground, in a direction fixed there; the state has no
-/// heading, so only the vertical part of such a force is here. It has no mass of its own: a load that
-/// swings with the aircraft is rather `mass_error`.
+/// A tether or a tow also pulls along the ground, in a direction fixed there; the state has no heading, so only the
+/// vertical part of such a force is modelled. It has no mass of its own: a load that moves with the aircraft
+/// corresponds to `mass_error` instead.
 pub struct ExternalLoad;
 
 impl Effect for ExternalLoad {

@@ -1,11 +1,11 @@
-//! A product of inertia that differs from the model's.
+//! Product of inertia different from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::rigid_body::RigidBody;
 use crate::{Channel, Point};
 
-/// An addition to the product of inertia Jxz.
+/// Addition to the product of inertia Jxz.
 pub struct InertiaXz;
 
 impl Effect for InertiaXz {

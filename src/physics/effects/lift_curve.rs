@@ -1,10 +1,10 @@
-//! Lift as flown: what no formula says of it.
+//! Additional lift as a curve over the angle of attack.
 
 use super::{Coefficient, Effect, Needs, Own, Terms, curve};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// What the lift has more than the other effects say, as a curve over the angle of attack.
+/// Lift beyond that of the other effects, as a curve over the angle of attack.
 pub struct LiftCurve;
 
 impl Effect for LiftCurve {
@@ -14,7 +14,7 @@ impl Effect for LiftCurve {
     const FORMULA: &'static str = "L = Q Σ CLk hk(α), hk falling from 1 at αk to 0 at the knots beside it";
     const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, zero at 0° and 4°";
     const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CL", (-0.5, 0.5));
-    /// Else a stall would take away what the curve adds beyond it.
+    /// Evaluated after the others, since a stall would otherwise remove the curve's part beyond it.
     const NEEDS: Needs = Needs::Base;
 
     #[inline(always)]

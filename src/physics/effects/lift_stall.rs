@@ -1,4 +1,4 @@
-//! Stall: lift that goes over from the linear law to that of a flat plate.
+//! Stall: blends the lift from the linear law to that of a flat plate.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -7,7 +7,7 @@ use crate::{Channel, Point};
 /// Lift lost beyond the stall, blended as in \[BM12\] section 4.2.
 pub struct LiftStall;
 
-/// e^(x · sharpness), a function and not a closure, which would leave a kernel's vector instructions.
+/// Computes e^(x · sharpness); a function rather than a closure, which would prevent vectorisation of a kernel.
 #[inline(always)]
 fn power<R: Real>(x: R, sharpness: f64) -> R {
     x.scale(sharpness).clamp(-40.0, 40.0).exp()

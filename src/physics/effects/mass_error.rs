@@ -1,11 +1,11 @@
-//! An aircraft that is heavier or lighter than the model has it.
+//! Mass different from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::rigid_body::RigidBody;
 use crate::{Channel, Point};
 
-/// Mass changed by a share; gravity, inertia and forces stay.
+/// Relative change of the mass; gravity, inertia and forces are unchanged.
 pub struct MassError;
 
 impl Effect for MassError {

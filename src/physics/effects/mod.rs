@@ -1,9 +1,8 @@
-//! Physical effects: each adds one group of forces or moments, in one file of its own.
+//! Physical effects, each a group of forces or moments in its own file.
 //!
-//! To add one: write its file beside these and name it in the list at the end of this file. It
-//! then takes part in the model, its trim and its linearisation, the planner, the parameter
-//! files, the search for missing effects and the report under its id. Effects on what the surfaces
-//! do with their commands are in [`inputs`](crate::inputs).
+//! To add one: write its file beside these and name it in the list at the end of this file. It then takes part in the
+//! model, its trim and its linearisation, the planner, the parameter files, the search for missing effects and the
+//! report under its id. Effects between actuator positions and acting deflections are in [`inputs`](crate::inputs).
 
 use crate::formula::{Written, register};
 use crate::rigid_body::RigidBody;
@@ -13,20 +12,19 @@ use greylag_num::{Grid, Real, Table};
 /// A coefficient of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coefficient {
-    /// Its name in parameter files.
+    /// Name in parameter files.
     pub name: &'static str,
-    /// What it is.
+    /// Physical meaning, in words.
     pub meaning: &'static str,
-    /// Its unit; empty for a number without one.
+    /// Unit of the value; empty if dimensionless.
     pub unit: &'static str,
-    /// The physically possible values.
+    /// Range of physically possible values.
     pub bounds: (f64, f64),
-    /// Whether `bounds` are those of an aircraft of up to 25 kg and grow with a larger one; see
-    /// [`Size`](crate::size::Size).
+    /// Whether `bounds` apply up to 25 kg and grow for a larger aircraft; see [`Size`](crate::size::Size).
     pub grows: bool,
 }
 
-/// Shorthand for the coefficient lists.
+/// Constructor for the coefficient lists.
 pub const fn coefficient(
     name: &'static str,
     meaning: &'static str,
@@ -37,128 +35,127 @@ pub const fn coefficient(
 }
 
 impl Coefficient {
-    /// The same with bounds that do not grow with the aircraft.
+    /// The coefficient with bounds that do not grow with the aircraft.
     pub(crate) const fn of_any_size(self) -> Coefficient {
         Coefficient { grows: false, ..self }
     }
 }
 
-/// Channels of the forces and moments that the air makes: all but thrust.
+/// Channels of aerodynamic forces and moments: all but thrust.
 const AERODYNAMIC: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// What an effect needs besides the point itself.
+/// Input of an effect beside the point itself.
 ///
-/// Effects that need more are evaluated after those that need only the point, and see what those make.
+/// Effects that need more are evaluated after those that need only the point, and receive their sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Needs {
-    /// The state, the controls and the airflow.
+    /// Only the state, the controls and the airflow.
     Point,
     /// Also [`Point::base`]: the forces and moments of the effects that need only the point.
     Base,
     /// Also [`Base::deflected`](crate::point::Base::deflected) and
     /// [`Base::still`](crate::point::Base::still).
     Parts,
-    /// Also [`Base::rate`](crate::point::Base::rate).
+    /// Also the state's rate, [`Base::rate`](crate::point::Base::rate).
     Rate,
 }
 
-/// What belongs to one effect of one model.
+/// Data of one effect of one model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Own<'a> {
-    /// Its table; present exactly if [`Effect::TABLE`] is.
+    /// Table of the effect; present exactly if [`Effect::TABLE`] is.
     pub table: Option<&'a Table>,
-    /// Its grid; present exactly if [`Effect::GRID`] is.
+    /// Grid of the effect; present exactly if [`Effect::GRID`] is.
     pub grid: Option<&'a Grid>,
-    /// The values of its shape constants: the last [`Effect::SHAPE`] coefficients.
+    /// Values of its shape constants, the last [`Effect::SHAPE`] coefficients.
     pub shape: &'a [f64],
-    /// Place of its first lag among those of the model, [`Controls::lagged`](crate::Controls::lagged).
+    /// Index of its first lag among those of the model, [`Controls::lagged`](crate::Controls::lagged).
     pub first_lag: usize,
 }
 
-/// What the search for missing effects knows of one.
+/// Properties of an effect for the search for missing effects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// Channels in which it acts; empty for an effect on the deflections, which acts wherever they do.
-    /// A changed mass or inertia acts as if it were a force or moment in these.
+    /// Channels in which it acts; empty for an input effect, which acts wherever the deflections do. A changed mass
+    /// or inertia acts like a force or moment in these channels.
     pub channels: &'static [Channel],
-    /// What it is easily mistaken for: ids of effects, full names (`effect.coefficient`) of a prior's
-    /// coefficients, or a sensor's error in words.
+    /// Quantities it may be confounded with: ids of effects, full names (`effect.coefficient`) of a model's
+    /// coefficients, or a sensor error in words.
     pub look_alikes: &'static [&'static str],
-    /// The manoeuvre that tells it from them, in words.
+    /// Manoeuvre that distinguishes it from them, in words.
     pub separated_by: &'static str,
-    /// Values of all coefficients at which the effect is plain to see on an aircraft like the X8; empty
-    /// for errors of the measurement.
+    /// Values of all coefficients with a clearly visible effect on an aircraft like the X8; empty for measurement
+    /// errors.
     pub example: &'static [f64],
-    /// Values of all coefficients at which a search over shape constants starts; empty for an effect
-    /// that is linear in all of them, or whose constants must be known beforehand.
+    /// Starting values of all coefficients for a search over shape constants; empty for an effect that is linear in
+    /// all of them, or whose constants must be given.
     pub starts: &'static [&'static [f64]],
 }
 
-/// What takes the terms that an effect reports.
+/// Receiver of the terms that an effect reports.
 ///
-/// A trait rather than a closure, because its one method can be made to be inlined: a planner's
-/// vector instructions end where a call begins.
+/// A trait rather than a closure, because its one method can be forced inline: a call would end a planner's
+/// vectorised code.
 pub trait Terms<R> {
-    /// What one unit of the effect's coefficient `index` contributes to `channel`, N or N m.
+    /// Receives the contribution of a unit of the effect's coefficient `index` to `channel`, N or N m.
     fn add(&mut self, index: usize, channel: Channel, amount: R);
 }
 
-/// A physical effect that is linear in its coefficients, but for shape constants.
+/// A physical effect that is linear in its coefficients, except for shape constants.
 pub trait Effect {
-    /// The id of parameter files, JSON and the command line.
+    /// Identifier in parameter files, JSON and the command line.
     const ID: &'static str;
-    /// What it is, in one sentence.
+    /// Description of the effect, in one sentence.
     const DESCRIPTION: &'static str;
-    /// The terms added, in textbook letters.
+    /// Formula of the terms added, in textbook notation.
     const FORMULA: &'static str;
-    /// Where the formula comes from.
+    /// Source of the formula.
     const SOURCE: &'static str;
     /// The coefficients, in the order of [`basis`](Effect::basis), then the shape constants.
     const COEFFICIENTS: &'static [Coefficient];
-    /// How many of the coefficients, at the end of the list, are constants in which the effect is not
-    /// linear.
+    /// Number of shape constants, in which the effect is nonlinear; they are the last coefficients.
     const SHAPE: usize = 0;
-    /// Name of the ordinate of a table over `alpha_rad` that the effect needs.
+    /// Name of the ordinate of the required table over `alpha_rad`, if there is one.
     const TABLE: Option<&'static str> = None;
-    /// Name of the ordinate of a grid over `throttle` and `airspeed_mps` that the effect needs.
+    /// Name of the ordinate of the required grid over `throttle` and `airspeed_mps`, if there is one.
     const GRID: Option<&'static str> = None;
-    /// What it needs.
+    /// Input that the effect needs.
     const NEEDS: Needs = Needs::Point;
-    /// Full names of coefficients in whose place it stands: they are zero in a model that it joins.
+    /// Full names of coefficients whose terms it replaces; they are zero in a model that it joins.
     const REPLACES: &'static [&'static str] = &[];
-    /// Its entry in the catalogue of effects that a model may lack; `None` for parts of a prior.
+    /// Entry in the catalogue of effects that a model may lack; `None` for parts of a basic model.
     const ENTRY: Option<Entry> = None;
 
-    /// Reports to `terms` what one unit of each coefficient contributes to each channel at `at`.
+    /// Reports to `terms` the contribution of one unit of each coefficient to each channel at `at`.
     fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>);
 
-    /// Changes the rigid body by the effect's coefficients.
+    /// Applies the effect's coefficients to the rigid body.
     fn change(_coefficients: &[f64], _body: &mut RigidBody) {}
 }
 
-/// What is known of an effect.
+/// Description of an effect with its coefficients.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
-    /// [`Effect::ID`].
+    /// Identifier, [`Effect::ID`].
     pub id: &'static str,
-    /// [`Effect::DESCRIPTION`].
+    /// Description in one sentence, [`Effect::DESCRIPTION`].
     pub description: &'static str,
-    /// [`Effect::FORMULA`].
+    /// Formula in textbook notation, [`Effect::FORMULA`].
     pub formula: &'static str,
-    /// [`Effect::SOURCE`].
+    /// Source of the formula, [`Effect::SOURCE`].
     pub source: &'static str,
-    /// [`Effect::COEFFICIENTS`].
+    /// Coefficients and shape constants, [`Effect::COEFFICIENTS`].
     pub coefficients: &'static [Coefficient],
-    /// How many coefficients at the end of the list are shape constants.
+    /// Number of shape constants at the end of the list.
     pub shape: usize,
-    /// [`Effect::TABLE`].
+    /// Ordinate of the required table, [`Effect::TABLE`].
     pub table: Option<&'static str>,
-    /// [`Effect::GRID`].
+    /// Ordinate of the required grid, [`Effect::GRID`].
     pub grid: Option<&'static str>,
-    /// [`Effect::REPLACES`].
+    /// Coefficients whose terms it replaces, [`Effect::REPLACES`].
     pub replaces: &'static [&'static str],
-    /// [`Effect::ENTRY`].
+    /// Entry for the search for missing effects, [`Effect::ENTRY`].
     pub entry: Option<Entry>,
 }
 
@@ -168,21 +165,21 @@ macro_rules! effects {
     ($($module:ident :: $type:ident),* $(,)?) => {
         $(mod $module; pub use $module::$type;)*
 
-        /// One of the effects of the list.
+        /// Identifies one effect of the list or of a file.
         #[derive(Clone, Copy, Debug)]
         pub enum Kind { $(
             #[doc = concat!("See [`", stringify!($type), "`].")]
             $type,
         )*
-            /// An effect of a file.
+            /// An effect of an effect file.
             Written(&'static Written),
         }
 
         impl Kind {
-            /// Every effect of the catalogue; those of files are not among them.
+            /// All effects of the catalogue, without those of files.
             pub const ALL: &'static [Kind] = &[$(Kind::$type),*];
 
-            /// What is known of the effect.
+            /// Description of the effect.
             pub const fn describe(self) -> Description {
                 match self { $(Kind::$type => Description {
                     id: $type::ID,
@@ -208,8 +205,8 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs only the point; else nothing. A sum over
-            /// such effects then holds no code of the others, which is half the time of a planner.
+            /// [`Effect::basis`] of this effect if it needs only the point; otherwise nothing. A sum over such
+            /// effects then contains no code of the others, which halves the time of a planner.
             #[inline(always)]
             pub fn independent_basis<R: Real>(
                 self,
@@ -225,7 +222,7 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs more than the point; else nothing.
+            /// [`Effect::basis`] of this effect if it needs more than the point; otherwise nothing.
             #[inline(always)]
             pub fn dependent_basis<R: Real>(
                 self,
@@ -259,13 +256,13 @@ impl PartialEq for Kind {
 }
 
 impl Kind {
-    /// The effect of that id: of the catalogue, or of a file that was read.
+    /// The effect with the id `id`, of the catalogue or of an effect file that was read.
     pub fn from_id(id: &str) -> Option<Kind> {
         let known = Kind::ALL.iter().copied().find(|kind| kind.describe().id == id);
         known.or_else(|| register::find(id).map(Kind::Written))
     }
 
-    /// The effect of a file, if it is one.
+    /// The effect of a file, if this is one.
     pub fn written(self) -> Option<&'static Written> {
         match self {
             Kind::Written(effect) => Some(effect),

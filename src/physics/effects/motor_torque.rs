@@ -1,10 +1,10 @@
-//! The torque that turns the propeller, taken up by the airframe.
+//! Reaction torque of the propeller on the airframe.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Rolling moment against the propeller's turn, proportional to throttle.
+/// Rolling moment opposite to the propeller's rotation, proportional to throttle.
 pub struct MotorTorque;
 
 impl Effect for MotorTorque {

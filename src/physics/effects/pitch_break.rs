@@ -1,4 +1,4 @@
-//! Pitching moment that breaks away from the straight line at large incidence.
+//! Pitching moment that is nonlinear at large angles of attack.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

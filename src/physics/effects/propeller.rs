@@ -5,11 +5,11 @@ use greylag_num::Real;
 use crate::atmosphere::SEA_LEVEL_DENSITY;
 use crate::{Channel, Point};
 
-/// Thrust of a motor with a propeller, as a polynomial of second degree in throttle and airspeed.
+/// Thrust of a motor with a propeller, as a second-degree polynomial in throttle and airspeed.
 ///
-/// With the voltage in proportion to the throttle, the torque balance of a motor and a propeller of
-/// quadratic CT(J) and CQ(J) gives a thrust that this polynomial follows to 0.2 N over the envelope of an
-/// Aerosonde. It holds the drag of a windmilling propeller: below some throttle the thrust is negative.
+/// With the voltage in proportion to the throttle, the torque balance of a motor and a propeller of quadratic CT(J)
+/// and CQ(J) gives a thrust that this polynomial follows to 0.2 N over the envelope of an Aerosonde. It includes the
+/// drag of a windmilling propeller: below some throttle the thrust is negative.
 pub struct Propeller;
 
 impl Effect for Propeller {

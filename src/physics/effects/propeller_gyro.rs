@@ -1,4 +1,4 @@
-//! A propeller that resists being turned out of its plane.
+//! Gyroscopic reaction of the propeller.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,10 +1,10 @@
-//! Surfaces that work better in the wash of the propeller.
+//! Control effectiveness increased by the propeller's slipstream.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Throttle at which the model's effectiveness holds: level flight of the X8 at 16.67 m/s.
+/// Throttle at which the model's effectiveness is exact: level flight of the X8 at 16.67 m/s.
 const THROTTLE0: f64 = 0.118;
 
 /// Effectiveness of aileron and elevator that grows with throttle.

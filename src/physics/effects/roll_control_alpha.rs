@@ -1,10 +1,10 @@
-//! Ailerons whose effect changes with incidence.
+//! Aileron effectiveness that depends on the angle of attack.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Rolling and yawing moments of the aileron in proportion to angle of attack.
+/// Rolling and yawing moments of the aileron, proportional to angle of attack.
 pub struct RollControlAlpha;
 
 impl Effect for RollControlAlpha {

@@ -1,10 +1,10 @@
-//! Thrust that is not in proportion to the throttle.
+//! Thrust that is not proportional to the throttle.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Thrust that bends over the throttle, as that of a motor whose voltage follows it.
+/// Thrust quadratic in throttle, as that of a motor whose voltage follows it.
 pub struct ThrottleCurve;
 
 impl Effect for ThrottleCurve {

@@ -1,13 +1,13 @@
-//! Thrust that falls with airspeed.
+//! Thrust that decreases with airspeed.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed at which nothing is lost, m/s: that of the neutral start.
+/// Airspeed at which the thrust is unchanged, m/s: that of the neutral start.
 const V0: f64 = State::NEUTRAL.airspeed;
 
-/// Thrust that changes in proportion to airspeed, as a propeller of fixed pitch loses it.
+/// Change of thrust proportional to airspeed, as with a fixed-pitch propeller.
 pub struct ThrustDecay;
 
 impl Effect for ThrustDecay {

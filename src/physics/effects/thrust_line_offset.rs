@@ -1,10 +1,10 @@
-//! A line of thrust that passes the centre of gravity.
+//! Thrust line that does not pass through the centre of gravity.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Pitching moment of a thrust that acts below the centre of gravity.
+/// Pitching moment of thrust acting below the centre of gravity.
 pub struct ThrustLineOffset;
 
 impl Effect for ThrustLineOffset {

@@ -1,10 +1,10 @@
-//! Thrust that the model has too much or too little of.
+//! Thrust larger or smaller than the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Thrust in proportion to throttle beside that of the model.
+/// Additional thrust proportional to throttle.
 pub struct ThrustScale;
 
 impl Effect for ThrustScale {

@@ -1,4 +1,4 @@
-//! Lift that depends on how fast the angle of attack changes.
+//! Lift that depends on the rate of the angle of attack.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;

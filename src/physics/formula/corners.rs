@@ -1,4 +1,4 @@
-//! Whether a formula is a number wherever an aircraft may be.
+//! Check that a formula is finite over the whole envelope of aircraft.
 
 use super::variable::Variable;
 use super::written::Written;
@@ -8,10 +8,10 @@ use crate::point::Base;
 use crate::rigid_body::ForceAxes;
 use crate::{AirData, Channel, Controls, Point, State};
 
-/// Variables whose corners are all tried; of more, as many corners are taken as these have.
+/// Number of variables whose corners are all tried; with more variables, the same number of corners is tried.
 const ALL_CORNERS: usize = 12;
 
-/// Terms that are all numbers.
+/// Whether all terms are finite.
 struct Finite(bool);
 
 impl Terms<f64> for Finite {
@@ -20,11 +20,11 @@ impl Terms<f64> for Finite {
     }
 }
 
-/// Refuses an effect that is no number somewhere: at the ends and in the middle of what its variables reach, with its
-/// shape constants as the file has them and with each of them at its bounds, up to which a fit may move it.
+/// Rejects an effect that is not finite at some point: at the ends and in the middle of its variables' ranges, with
+/// its shape constants as in the file and with each of them at its bounds, which a fit may reach.
 ///
 /// # Errors
-/// The place, and what to do.
+/// The point, and the remedy.
 pub fn check(effect: &Written) -> Result<(), String> {
     let linear = effect.about.coefficients.len() - effect.about.shape;
     let own = &effect.values[linear..];
@@ -41,7 +41,7 @@ pub fn check(effect: &Written) -> Result<(), String> {
     Ok(())
 }
 
-/// The same for given shape constants.
+/// Performs the check for given shape constants.
 fn everywhere(effect: &Written, shape: &[f64]) -> Result<(), String> {
     let variables = effect.variables();
     let tried = 1usize << variables.len().min(ALL_CORNERS);
@@ -80,7 +80,7 @@ fn try_at(
     ))
 }
 
-/// A point whose variables can be set one by one.
+/// A point whose variables can be set individually.
 struct Place {
     state: State,
     controls: Controls,

@@ -1,8 +1,9 @@
-//! Physical dimensions: what a unit is made of.
+//! Physical dimensions of units.
 
 use std::fmt;
 
-/// Exponents of kilogram, metre and second, doubled, so that a root of a unit is one too. A radian is a number.
+/// Exponents of kilogram, metre and second, doubled, so that the root of a unit is representable. A radian is
+/// dimensionless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dimension([i16; 3]);
 
@@ -20,42 +21,42 @@ const UNITS: &[(&str, [i16; 3])] = &[
 ];
 
 impl Dimension {
-    /// Of a number without a unit.
+    /// Dimension of a dimensionless number.
     pub const NONE: Dimension = Dimension([0; 3]);
-    /// Of a force.
+    /// Dimension of a force.
     pub const FORCE: Dimension = Dimension([2, 2, -4]);
-    /// Of a moment.
+    /// Dimension of a moment.
     pub const MOMENT: Dimension = Dimension([2, 4, -4]);
 
-    /// Of kg^`mass` m^`length` s^`time`.
+    /// The dimension kg^`mass` m^`length` s^`time`.
     pub const fn new(mass: i16, length: i16, time: i16) -> Dimension {
         Dimension([2 * mass, 2 * length, 2 * time])
     }
 
-    /// Of a product.
+    /// Dimension of a product.
     pub fn times(self, other: Dimension) -> Dimension {
         Dimension(std::array::from_fn(|i| self.0[i].saturating_add(other.0[i])))
     }
 
-    /// Of a quotient.
+    /// Dimension of a quotient.
     pub fn per(self, other: Dimension) -> Dimension {
         self.times(other.to_power(-1))
     }
 
-    /// Of a whole power.
+    /// Dimension of an integer power.
     pub fn to_power(self, exponent: i16) -> Dimension {
         Dimension(self.0.map(|x| x.saturating_mul(exponent)))
     }
 
-    /// Of the square root, if it has one.
+    /// Dimension of the square root, if it is representable.
     pub fn root(self) -> Option<Dimension> {
         self.0.iter().all(|x| x % 2 == 0).then(|| Dimension(self.0.map(|x| x / 2)))
     }
 
-    /// Reads a unit such as `N m`, `1/rad²`, `kg m^2` or `m/s`; empty for a number without one.
+    /// Parses a unit such as `N m`, `1/rad²`, `kg m^2` or `m/s`; empty if dimensionless.
     ///
     /// # Errors
-    /// If it names something that is no unit of the SI or is too long.
+    /// If it is not an SI unit or is too long.
     pub fn parse(text: &str) -> Result<Dimension, String> {
         let mut dimension = Dimension::NONE;
         let (mut sign, mut rest) = (1, text.trim());
@@ -82,7 +83,7 @@ impl Dimension {
     }
 }
 
-/// The power at the start of `text`, 1 if there is none, and what follows it.
+/// The exponent at the start of `text`, 1 if there is none, and the rest.
 fn exponent(text: &str) -> Option<(i16, &str)> {
     const RAISED: [(char, i16); 8] =
         [('¹', 1), ('²', 2), ('³', 3), ('⁴', 4), ('⁵', 5), ('⁶', 6), ('⁷', 7), ('⁸', 8)];

@@ -1,53 +1,53 @@
-//! A formula as a tree.
+//! Expression tree of a formula.
 
 use std::fmt;
 
 use super::variable::Variable;
 
-/// A node of a formula, with where it stands in the text.
+/// A node of a formula, with its position in the text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
-    /// What it is.
+    /// Kind of the node.
     pub node: Node,
-    /// Byte of the text at which it begins.
+    /// Byte offset of its start in the text.
     pub at: usize,
 }
 
-/// What a node is.
+/// Kind of a node with its children.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Node {
-    /// A number.
+    /// A numeric constant.
     Number(f64),
-    /// A variable of flight.
+    /// A flight variable.
     Variable(Variable),
-    /// A parameter, by its place in the effect's list.
+    /// A parameter, by its index in the effect's list.
     Parameter(usize),
-    /// A function of others.
+    /// A function or operator with its arguments.
     Call(Function, Vec<Expression>),
-    /// A whole power.
+    /// An integer power.
     Power(Box<Expression>, i16),
-    /// A function by points, linear between them, constant beyond.
+    /// A function by points, linear between them, constant outside.
     Table(Box<Expression>, Vec<[f64; 2]>),
 }
 
 macro_rules! functions {
     ($($id:ident $name:literal $count:literal $meaning:literal;)*) => {
-        /// A function, operators among them.
+        /// A function or operator.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function { $(#[doc = $meaning] $id,)* }
 
         impl Function {
-            /// All there are.
+            /// All functions and operators.
             pub const ALL: &'static [Function] = &[$(Function::$id),*];
-            /// Its name in a formula, or its sign.
+            /// Name in a formula, or operator sign.
             pub const fn name(self) -> &'static str {
                 match self { $(Function::$id => $name,)* }
             }
-            /// How many arguments it takes.
+            /// Number of arguments.
             pub const fn count(self) -> usize {
                 match self { $(Function::$id => $count,)* }
             }
-            /// What it is.
+            /// Meaning, in words.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Function::$id => $meaning,)* }
             }
@@ -77,18 +77,18 @@ functions! {
 }
 
 impl Function {
-    /// The function called `name`; no operator.
+    /// The function called `name`; operators are not found.
     pub fn from_name(name: &str) -> Option<Function> {
         Function::ALL.iter().copied().find(|f| f.name() == name && !f.is_operator())
     }
 
-    /// Whether it is written as a sign.
+    /// Whether it is an operator, written as a sign.
     pub fn is_operator(self) -> bool {
         use Function::{Add, Divide, Multiply, Negate, Subtract};
         matches!(self, Add | Subtract | Multiply | Divide | Negate)
     }
 
-    /// Whether it remembers what its argument was.
+    /// Whether it depends on the past of its argument.
     pub fn has_memory(self) -> bool {
         matches!(self, Function::Lag | Function::Delay)
     }
@@ -101,18 +101,18 @@ impl Function {
 }
 
 impl Expression {
-    /// A number.
+    /// A constant expression.
     pub fn number(x: f64) -> Expression {
         Expression { node: Node::Number(x), at: 0 }
     }
 
-    /// A function of `arguments`, where the first of them stands.
+    /// A call of `function`, positioned at its first argument.
     pub fn call(function: Function, arguments: Vec<Expression>) -> Expression {
         let at = arguments.first().map_or(0, |e| e.at);
         Expression { node: Node::Call(function, arguments), at }
     }
 
-    /// The product of two; none of them where it is one.
+    /// The product of two expressions; a factor of one is dropped.
     pub fn times(self, other: Expression) -> Expression {
         let one = |e: &Expression| e.node == Node::Number(1.0);
         match (one(&self), one(&other)) {
@@ -122,7 +122,7 @@ impl Expression {
         }
     }
 
-    /// What it is made of.
+    /// Child expressions of the node.
     pub fn children(&self) -> &[Expression] {
         match &self.node {
             Node::Call(_, all) => all,
@@ -131,41 +131,41 @@ impl Expression {
         }
     }
 
-    /// Calls `visit` for the node and all below it.
+    /// Calls `visit` for the node and all its descendants.
     pub fn visit(&self, visit: &mut impl FnMut(&Expression)) {
         visit(self);
         self.children().iter().for_each(|child| child.visit(visit));
     }
 
-    /// Whether `of` holds for it or any node below.
+    /// Whether `of` holds for the node or any descendant.
     pub fn any(&self, of: &impl Fn(&Node) -> bool) -> bool {
         of(&self.node) || self.children().iter().any(|child| child.any(of))
     }
 
-    /// The variables it names, each once, in the order of the list.
+    /// Variables that occur, each once, in the order of the list.
     pub fn variables(&self) -> Vec<Variable> {
         let named = |v: &Variable| self.any(&|node| *node == Node::Variable(*v));
         Variable::ALL.iter().copied().filter(named).collect()
     }
 
-    /// How many nodes it has.
+    /// Number of nodes.
     pub fn size(&self) -> usize {
         1 + self.children().iter().map(Expression::size).sum::<usize>()
     }
 
-    /// The formula in words that can be read again, parameters named by `names`.
+    /// The formula as text that can be parsed again, parameters named by `names`.
     pub fn written<'a>(&'a self, names: &'a [&'a str]) -> Written<'a> {
         Written { of: self, names }
     }
 }
 
-/// A formula to be written out.
+/// A formula to be formatted.
 pub struct Written<'a> {
     of: &'a Expression,
     names: &'a [&'a str],
 }
 
-/// How tightly a node binds: sums, products, powers, all else.
+/// Operator precedence of a node: sums, products, powers, all else.
 fn binding(node: &Node) -> u8 {
     match node {
         Node::Call(Function::Add | Function::Subtract, _) => 0,

@@ -1,4 +1,4 @@
-//! Effect files: TOML with one effect each.
+//! Effect files: TOML, each with one effect.
 
 use std::collections::BTreeMap;
 
@@ -20,11 +20,11 @@ use crate::airframe::{check_schema, toml_error};
 use crate::effects::{Coefficient, Description, Entry, Kind, Needs};
 use crate::inputs;
 
-/// Longest id and longest name of a parameter, bytes.
+/// Longest id, and longest name of a parameter, bytes.
 const LONGEST_NAME: usize = 40;
-/// Most parameters of an effect.
+/// Largest number of parameters of an effect.
 const MOST_PARAMETERS: usize = 16;
-/// Share of a parameter's bounds that is its width where none is given.
+/// Default prior width, as a share of the range between a parameter's bounds.
 const WIDTH: f64 = 0.25;
 
 #[derive(Deserialize)]
@@ -49,7 +49,7 @@ struct Parameter {
     value: f64,
     width: Option<f64>,
     bounds: [f64; 2],
-    /// Whether the bounds grow with an aircraft of more than 25 kg or 5 m, as those of the catalogue do.
+    /// Whether the bounds grow for an aircraft of more than 25 kg or 5 m, as those of the catalogue do.
     #[serde(default)]
     grows: bool,
     unit: String,
@@ -64,7 +64,7 @@ struct ChannelFile {
     shape: Spanned<String>,
 }
 
-/// The channels by name.
+/// Channels by their names in effect files.
 const CHANNELS: [(&str, Channel); 7] = [
     ("drag", Channel::Drag),
     ("lift", Channel::Lift),
@@ -80,7 +80,7 @@ pub fn channel_name(channel: Channel) -> &'static str {
     CHANNELS.iter().find(|(_, c)| *c == channel).map_or("", |(name, _)| name)
 }
 
-/// What an amount of `channel` is measured in.
+/// Dimension of an amount in `channel`.
 fn measured_in(channel: Channel) -> Dimension {
     match channel {
         Channel::Roll | Channel::Pitch | Channel::Yaw => Dimension::MOMENT,
@@ -88,10 +88,10 @@ fn measured_in(channel: Channel) -> Dimension {
     }
 }
 
-/// Reads the text of an effect file.
+/// Parses the text of an effect file.
 ///
 /// # Errors
-/// What is wrong with it, in which line, and what to do.
+/// Description of the fault with its line, and the remedy.
 pub fn parse(text: &str) -> Result<Written, String> {
     let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
     check_schema(file.schema, 1)?;
@@ -129,20 +129,20 @@ pub fn parse(text: &str) -> Result<Written, String> {
     Ok(written)
 }
 
-/// A line with where its texts stand in the file.
+/// A line with the positions of its texts in the file.
 struct Placed {
     line: Line,
     shape_at: usize,
 }
 
-/// The text of a file, for saying where in it something is wrong.
+/// The text of a file, to locate faults in it.
 struct Places<'a> {
     text: &'a str,
 }
 
 impl Places<'_> {
-    /// `fault` of the string whose value begins at byte `start` of the file.
-    fn said(&self, start: usize, fault: &Fault) -> String {
+    /// Message for the `fault` of the string whose value begins at byte `start` of the file.
+    fn message(&self, start: usize, fault: &Fault) -> String {
         // a string's value begins behind its quotes
         let quotes = self.text[start..].chars().take_while(|c| matches!(c, '"' | '\'')).count();
         let at = (start + if quotes >= 3 { 3 } else { 1 } + fault.at).min(self.text.len());
@@ -165,7 +165,7 @@ fn line(file: &ChannelFile, names: &[&str], place: &Places) -> Result<Placed, St
     };
     let read = |text: &Spanned<String>, names: &[&str]| {
         let start = text.span().start;
-        parser::parse(text.get_ref(), names).map_err(|fault| place.said(start, &fault))
+        parser::parse(text.get_ref(), names).map_err(|fault| place.message(start, &fault))
     };
     let factor = match &file.factor {
         Some(text) => read(text, &[])?,
@@ -209,15 +209,15 @@ fn built(
     }
     let bounds: Vec<[f64; 2]> = file.parameters.values().map(|p| p.bounds).collect();
     for Placed { line, shape_at } in &lines {
-        let said = |fault: Fault| place.said(*shape_at, &fault);
-        memory::check(&line.shape, &bounds).map_err(said)?;
+        let message = |fault: Fault| place.message(*shape_at, &fault);
+        memory::check(&line.shape, &bounds).map_err(message)?;
         memory::check(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
-        let parts = split::parts(&line.shape, linear).map_err(said)?;
+        let parts = split::parts(&line.shape, linear).map_err(message)?;
         let factor =
             units::dimension(&line.factor, &[]).map_err(|f| format!("factor: {}", f.why))?;
         for (k, part) in &parts {
             balance(line.channel, factor, part, names[*k], dimensions[*k], &dimensions)
-                .map_err(said)?;
+                .map_err(message)?;
         }
         let shared = parts.len() > 1 && line.factor.node != Node::Number(1.0);
         if shared {
@@ -258,7 +258,7 @@ fn built(
     })
 }
 
-/// Parameters by their place among the coefficients.
+/// Renumbers parameters by their index among the coefficients.
 fn renumber(of: &mut Expression, order: &[usize]) {
     match &mut of.node {
         Node::Parameter(k) => *k = order.iter().position(|o| o == k).unwrap_or_default(),
@@ -268,7 +268,7 @@ fn renumber(of: &mut Expression, order: &[usize]) {
     }
 }
 
-/// Refuses a term that does not come out in the unit of its channel.
+/// Rejects a term whose unit differs from its channel's.
 fn balance(
     channel: Channel,
     factor: Option<Dimension>,
@@ -366,8 +366,8 @@ fn formula(lines: &[Line], names: &[&str]) -> String {
     lines.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Where a search over shape constants starts: at the values of the file, and each constant a width to either
-/// side of its own. Coefficients of zero start at their width, since a shape without an amount says nothing.
+/// Starting points of a search over shape constants: the values of the file, and each constant one width to either
+/// side. Coefficients of zero start at their width, since a shape has no effect without an amount.
 fn starts(
     parameters: &[&Parameter],
     linear: usize,

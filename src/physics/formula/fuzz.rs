@@ -1,4 +1,4 @@
-//! Broken effect files by the thousand, none of which may make the reader panic.
+//! Fuzz test of the effect file reader: thousands of broken files, none of which may cause a panic.
 
 use rand::RngExt;
 
@@ -7,9 +7,9 @@ use super::file;
 use super::variable::Variable;
 use greylag_num::stream::{Stream, stream};
 
-/// Stream of the mutations.
+/// Random stream of the mutations.
 const DRAW: u64 = 31;
-/// An effect file to break.
+/// A valid effect file to mutate.
 const WHOLE: &str = r#"schema = 1
 id = "broken"
 description = "d"
@@ -32,21 +32,21 @@ factor = "qbar*S*b"
 shape = "k*max(abs(beta) - w, 0)^2 + k*table(alpha; -0.1:0, 0.2:1)"
 "#;
 
-/// Reads `count` files drawn from `seed`, each a formula of chance or a damaged file; `hear` has the text of each
-/// with what was said of it. Returns how many were effect files.
-pub fn run(count: usize, seed: u64, hear: &mut dyn FnMut(&str, &Result<(), String>)) -> usize {
+/// Reads `count` files drawn from `seed`, each with a random formula or with random damage; `observe` receives the text
+/// of each and the reader's result. Returns the number of valid effect files.
+pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), String>)) -> usize {
     let mut random = stream(seed, &[DRAW]);
     let mut good = 0;
     for _ in 0..count {
         let text = if random.random::<bool>() { grown(&mut random) } else { damaged(&mut random) };
-        let said = file::parse(&text).map(drop);
-        good += usize::from(said.is_ok());
-        hear(&text, &said);
+        let result = file::parse(&text).map(drop);
+        good += usize::from(result.is_ok());
+        observe(&text, &result);
     }
     good
 }
 
-/// The file with a formula of chance.
+/// The file with a random formula.
 fn grown(random: &mut Stream) -> String {
     let depth = random.random_range(0..7);
     let shape = format!("k*({})", term(random, depth));
@@ -84,7 +84,7 @@ fn pick<T: Copy>(random: &mut Stream, all: &[T]) -> T {
     all[random.random_range(0..all.len() as u32) as usize]
 }
 
-/// The file with bytes taken out, put in, doubled or changed.
+/// The file with bytes removed, inserted, doubled or changed.
 fn damaged(random: &mut Stream) -> String {
     const ODD: [&str; 24] = [
         "(",

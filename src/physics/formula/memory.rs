@@ -1,4 +1,4 @@
-//! What formulas remember: what stands in `lag(…)` and `delay(…)`, as it was.
+//! State of the `lag(…)` and `delay(…)` terms of a formula.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
@@ -11,23 +11,23 @@ use crate::rigid_body::ForceAxes;
 use crate::{AirData, Controls, Point, State};
 use greylag_num::Real;
 
-/// Longest delay, s: so many samples are remembered.
+/// Longest delay, s, limited by the number of remembered samples.
 pub const LONGEST_DELAY_S: f64 = (PAST - 2) as f64 * STEP;
 
-/// A lag or a delay of a formula.
+/// A lag or delay term of a formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Memory {
     pub(super) function: Function,
-    /// What is lagged or delayed.
+    /// Argument of the lag or delay.
     pub(super) argument: Tape,
-    /// Place of its time among the effect's shape constants.
+    /// Index of its time constant among the effect's shape constants.
     pub(super) time: u16,
 }
 
 impl Memory {
-    /// What the argument is under `controls`, to which the lag or delay settles.
+    /// Value of the argument under `controls`, to which the lag or delay settles.
     ///
-    /// Not in line: a copy of the tape in each planner's kernel would take minutes to compile, for few models.
+    /// Not inlined: a copy of the tape in each planner's kernel would take minutes to compile, for few models.
     #[inline(never)]
     pub fn settled<R: Real>(&self, controls: &Controls<R>, shape: &[f64]) -> R {
         let zero = R::zero();
@@ -69,10 +69,10 @@ impl Memory {
     }
 }
 
-/// Refuses a lag or delay in `of` that cannot be worked out; `bounds` are those of the effect's parameters.
+/// Rejects a lag or delay in `of` that cannot be evaluated; `bounds` are those of the effect's parameters.
 ///
 /// # Errors
-/// Where it stands, and what to do.
+/// The position in the text, and the remedy.
 pub fn check(of: &Expression, bounds: &[[f64; 2]]) -> Result<(), Fault> {
     let mut fault = None;
     of.visit(&mut |e| {

@@ -1,9 +1,9 @@
-//! Formulas that are read from files: effects that need no compiler.
+//! Formulas of effects that are read from files and need no compilation.
 //!
-//! A text becomes a tree ([`parser`]), its units are balanced ([`units`]), it is divided into what each coefficient
-//! multiplies ([`split`]), and that becomes a list of operations over [`Real`](greylag_num::Real) ([`tape`]). An
-//! effect file ([`mod@file`]) holds one effect; once read, [`Kind::Written`](crate::effects::Kind::Written)
-//! is an effect like all others.
+//! A text becomes a tree ([`parser`]), its units are checked ([`units`]), it is split into the factor of each
+//! coefficient ([`split`]), and these are compiled to a list of operations over [`Real`](greylag_num::Real)
+//! ([`tape`]). An effect file ([`mod@file`]) holds one effect; once read,
+//! [`Kind::Written`](crate::effects::Kind::Written) is an effect like all others.
 
 mod corners;
 pub mod dimension;

@@ -1,32 +1,32 @@
-//! From the text of a formula to its tree.
+//! Parser of formulas, from text to expression tree.
 
 use super::expression::{Expression, Function, Node};
 use super::variable::Variable;
 
-/// Longest formula, bytes.
+/// Longest formula in bytes.
 const LONGEST: usize = 2000;
-/// Most nodes of a formula.
+/// Largest number of nodes of a formula.
 const MOST_NODES: usize = 400;
-/// Deepest nesting of brackets.
+/// Deepest nesting of parentheses.
 const DEEPEST: usize = 40;
-/// Largest whole power.
+/// Largest integer power that is accepted.
 const LARGEST_POWER: i16 = 8;
 
-/// What is wrong with a formula, and where.
+/// A fault of a formula with its position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// Byte of the text.
+    /// Byte offset in the text.
     pub at: usize,
-    /// What is wrong, and what to do.
+    /// Description of the fault, and the remedy.
     pub why: String,
 }
 
 type Parsed = Result<Expression, Fault>;
 
-/// Reads `text`; a name that is in `parameters` is one, before variables and functions.
+/// Parses `text`; names in `parameters` take precedence over variables and functions.
 ///
 /// # Errors
-/// If it is no formula: where, why, and what to write instead.
+/// The position, the fault, and a correct form.
 pub fn parse(text: &str, parameters: &[&str]) -> Parsed {
     if text.len() > LONGEST {
         let why = format!(
@@ -65,7 +65,7 @@ impl Parser<'_> {
         &self.text[self.at..]
     }
 
-    /// The next character that is no space.
+    /// The next character that is not a space.
     fn peek(&mut self) -> Option<char> {
         let rest = self.rest();
         self.at += rest.len() - rest.trim_start().len();
@@ -320,7 +320,7 @@ impl Parser<'_> {
         self.call(function, all, at)
     }
 
-    /// clamp(x, low, high)
+    /// Parses the call clamp(x, low, high).
     fn clamp(&mut self, at: usize) -> Parsed {
         let all = self.list()?;
         let Ok([x, low, high]) = <[Expression; 3]>::try_from(all) else {
@@ -330,7 +330,7 @@ impl Parser<'_> {
         self.call(Function::Min, vec![raised, high], at)
     }
 
-    /// table(x; x1:y1, x2:y2, …)
+    /// Parses the call table(x; x1:y1, x2:y2, …).
     fn table(&mut self, at: usize) -> Parsed {
         let x = self.sum()?;
         if !self.take(';') {
@@ -383,7 +383,7 @@ fn no_function(name: &str) -> String {
     )
 }
 
-/// Letters to change, add or leave out between two names.
+/// Edit distance between two names: letters to change, add or remove.
 fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

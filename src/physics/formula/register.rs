@@ -1,8 +1,8 @@
-//! The effects of files: those that the program ships, and those that this process has read.
+//! Registry of effects from files: those shipped with the program, and those read by this process.
 //!
-//! An effect of a file is asked for by its id, as one of the catalogue is, and both live as long as the process: a
-//! file that is read again is the same effect, one that was edited in between takes its place for whoever asks
-//! next. Models that were loaded before keep what they have.
+//! An effect of a file is found by its id, like one of the catalogue, and both live as long as the process. A file
+//! that is read again gives the same effect; one that was edited in between replaces it for later look-ups. Models
+//! loaded before keep the earlier one.
 
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, PoisonError, RwLock};
@@ -22,22 +22,22 @@ static SHIPPED: LazyLock<Vec<Written>> = LazyLock::new(|| {
     texts.filter_map(|text| file::parse(text).ok()).collect()
 });
 
-/// The effects of the files that belong to the catalogue, in the order of their ids.
+/// Effects of the shipped files, in the order of their ids.
 pub fn shipped() -> &'static [Written] {
     &SHIPPED
 }
 
-/// The effect of that id: of a file that was read, or else of one that belongs to the catalogue.
+/// The effect with the id `id`, of a file that was read or else of a shipped file.
 pub fn find(id: &str) -> Option<&'static Written> {
     let read = READ.read().unwrap_or_else(PoisonError::into_inner);
     let own = read.iter().rev().copied().find(|effect| effect.about.id == id);
     own.or_else(|| shipped().iter().find(|effect| effect.about.id == id))
 }
 
-/// Reads the text of an effect file and notes the effect.
+/// Parses the text of an effect file and registers the effect.
 ///
 /// # Errors
-/// What is wrong with the text, where, and what to do.
+/// The fault with its position, and the remedy.
 pub fn read(text: &str) -> Result<&'static Written, String> {
     let known = |all: &[&'static Written]| all.iter().copied().find(|e| e.text == text);
     let parsed = match known(&READ.read().unwrap_or_else(PoisonError::into_inner)) {
@@ -54,7 +54,7 @@ pub fn read(text: &str) -> Result<&'static Written, String> {
 /// Reads an effect file, or every `.toml` of a folder, in the order of their names.
 ///
 /// # Errors
-/// If a file cannot be read or is no effect file.
+/// If a file cannot be read or is not an effect file.
 pub fn load(path: &Path) -> Result<Vec<&'static Written>, FileError> {
     let what = "effect file";
     let unread = |path: &Path, why| FileError::Read {

@@ -1,13 +1,13 @@
-//! A formula divided into what each coefficient multiplies.
+//! Splitting of a formula into the factor of each coefficient.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 
-/// What a formula is made of: for each parameter in which it is linear, what that multiplies.
+/// Parts of a formula: for each parameter in which it is linear, the factor of that parameter.
 pub type Parts = Vec<(usize, Expression)>;
 
-/// Which of `count` parameters all of `formulas` together are linear in: none of them stands in a function, under
-/// a fraction or beside another one in a product, where the one to the left counts.
+/// Marks which of `count` parameters all of `formulas` are linear in: those that occur in no function or denominator,
+/// and in no product with another one, of which the leftmost counts.
 pub fn linear(formulas: &[Expression], count: usize) -> Vec<bool> {
     let mut linear = vec![true; count];
     loop {
@@ -23,7 +23,7 @@ fn holds(of: &Expression, linear: &[bool]) -> bool {
     of.any(&|node| matches!(node, Node::Parameter(k) if linear[*k]))
 }
 
-/// Takes out of `linear` what `of` is not linear in.
+/// Clears in `linear` the parameters that `of` is not linear in.
 fn mark(of: &Expression, linear: &mut [bool]) {
     match &of.node {
         Node::Call(Function::Add | Function::Subtract | Function::Negate, all) => {
@@ -44,7 +44,7 @@ fn mark(of: &Expression, linear: &mut [bool]) {
     }
 }
 
-/// Takes all parameters in `of` out of `linear`.
+/// Clears in `linear` all parameters in `of`.
 fn bend(of: &Expression, linear: &mut [bool]) {
     of.visit(&mut |e| {
         if let Node::Parameter(k) = e.node {
@@ -53,10 +53,10 @@ fn bend(of: &Expression, linear: &mut [bool]) {
     });
 }
 
-/// What each parameter of `linear` multiplies in `formula`.
+/// The factor of each parameter of `linear` in `formula`.
 ///
 /// # Errors
-/// If a term has no such parameter: without one, the effect could not be zero.
+/// If a term has no such parameter: the effect could not be zero without one.
 pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     let mut all: Parts = Vec::new();
     for (parameter, part) in divided(formula, linear) {
@@ -78,7 +78,7 @@ pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     Ok(all)
 }
 
-/// The terms of a sum, each with the parameter that multiplies it.
+/// Terms of a sum, each with the parameter that multiplies it.
 fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)> {
     if !holds(of, linear) {
         return vec![(None, of.clone())];

@@ -1,4 +1,4 @@
-//! A formula as a list of operations, the same for all kinds of numbers.
+//! A formula compiled to a list of operations, generic over the scalar.
 //!
 //! It is a stack machine whose top is kept in a register. Derivatives come from running it with
 //! [`Dual`](greylag_num::Dual) numbers: of eight states and three controls at once.
@@ -9,13 +9,13 @@ use super::variable::Variable;
 use crate::{Channel, Point};
 use greylag_num::{Real, Table};
 
-/// Numbers that wait below the top.
+/// Largest depth of the stack below the top.
 const DEPTH: usize = 12;
 
-/// Operations and multiplied variables of an effect: what a model can carry in every step.
+/// Largest number of operations and multiplied variables of an effect, a limit on the cost of a model's step.
 const LONGEST: usize = 4000;
 
-/// One operation.
+/// An operation of the stack machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Operation {
     Number(f64),
@@ -37,26 +37,26 @@ enum Operation {
     Sqrt,
     Smoothstep,
     Deadband,
-    /// The lag or delay of that place, where the past is known; else what it settles to, the top.
+    /// Replaces the top by the lag or delay of that index if the past is known; else keeps it, the value it settles to.
     Remembered(u16),
     Square,
     Power(i16),
     Table(u16),
-    /// Adds, multiplies the top by what follows, without the stack between.
+    /// Adds a number to the top; as the following operations, without using the stack.
     AddNumber(f64),
     Scale(f64),
     AddVariable(Variable),
     Times(Variable),
     /// Multiplies the top by a run of variables of the list.
     TimesAll(u16, u16),
-    /// Keeps the top; has it again.
+    /// Stores the top as the shared factor and removes it.
     Keep,
     TimesKept,
-    /// Reports the top, and takes it.
+    /// Reports the top and removes it.
     Report(u16, Channel),
 }
 
-/// Operations with the tables they use.
+/// A list of operations with the tables they use.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tape {
     operations: Vec<Operation>,
@@ -68,14 +68,14 @@ pub struct Tape {
     deepest: usize,
 }
 
-/// The place of each parameter among the shape constants, if it is one.
+/// Index of each parameter among the shape constants, if it is one.
 pub type Places = [Option<u16>];
 
 impl Tape {
-    /// Adds the evaluation of `part` times `factor` for coefficient `index` in `channel`.
+    /// Appends the evaluation of `part` times `factor` for coefficient `index` in `channel`.
     ///
     /// # Errors
-    /// If too many intermediate results wait for one another.
+    /// If the stack would be too deep.
     pub fn report(
         &mut self,
         part: &Expression,
@@ -96,7 +96,7 @@ impl Tape {
         self.checked_length()
     }
 
-    /// Adds the evaluation of a factor that several parts share.
+    /// Appends the evaluation of a factor that several parts share.
     ///
     /// # Errors
     /// As [`Tape::report`].
@@ -107,12 +107,12 @@ impl Tape {
         Ok(())
     }
 
-    /// How many operations it has.
+    /// Number of operations.
     pub fn len(&self) -> usize {
         self.operations.len()
     }
 
-    /// Whether it has none.
+    /// Whether there are no operations.
     pub fn is_empty(&self) -> bool {
         self.operations.is_empty()
     }
@@ -139,7 +139,7 @@ impl Tape {
         }
     }
 
-    /// A product: its factors that are no variables one by one, then all variables in a run.
+    /// Appends a product: its factors other than variables one by one, then all variables in a run.
     fn product(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
         let mut factors = Vec::new();
         let number = factors_of(of, &mut factors);
@@ -256,7 +256,7 @@ impl Tape {
         Ok(())
     }
 
-    /// A lag or delay: the same one for all who name it.
+    /// The lag or delay of an expression; equal expressions share one.
     fn remembered(
         &mut self,
         function: Function,
@@ -283,13 +283,13 @@ impl Tape {
         Ok(())
     }
 
-    /// Its lags and delays, in the order of their places.
+    /// Lags and delays, in the order of their indices.
     pub fn memories(&self) -> &[Memory] {
         &self.memories
     }
 
-    /// Runs at `at` with shape constants `shape`, its lags being those of the model from `first_lag` on, and reports
-    /// each part's value.
+    /// Evaluates at `at` with shape constants `shape`, its lags being those of the model from `first_lag` on, and
+    /// reports each part's value.
     #[inline(always)]
     pub fn run<R: Real>(
         &self,
@@ -374,7 +374,7 @@ impl Tape {
     }
 }
 
-/// Notes what `of` is a product of, and returns the product of the numbers in it.
+/// Appends the factors of the product `of`, and returns the product of its constants.
 fn factors_of<'a>(of: &'a Expression, factors: &mut Vec<&'a Expression>) -> f64 {
     match &of.node {
         Node::Number(x) => *x,
@@ -389,7 +389,7 @@ fn factors_of<'a>(of: &'a Expression, factors: &mut Vec<&'a Expression>) -> f64 
     }
 }
 
-/// The variables among `factors`, a square as two of them, and the others.
+/// The variables among `factors`, a square as two of them, and the other factors.
 fn divided<'a>(factors: &[&'a Expression]) -> (Vec<Variable>, Vec<&'a Expression>) {
     let (mut variables, mut others) = (Vec::new(), Vec::new());
     for factor in factors {
@@ -405,7 +405,7 @@ fn divided<'a>(factors: &[&'a Expression]) -> (Vec<Variable>, Vec<&'a Expression
     (variables, others)
 }
 
-/// Puts what an airflow knows, the dynamic pressure times the wing area, in the place of both.
+/// Replaces dynamic pressure and wing area by their product, which the airflow holds.
 fn of_area(variables: &mut Vec<Variable>) {
     let place = |v: Variable| variables.iter().position(|other| *other == v);
     if let (Some(pressure), Some(area)) = (place(Variable::Pressure), place(Variable::Area)) {
@@ -414,7 +414,7 @@ fn of_area(variables: &mut Vec<Variable>) {
     }
 }
 
-/// The operation that takes a leaf at once.
+/// The operation that applies a leaf directly.
 fn direct(function: Function, leaf: &Node) -> Option<Operation> {
     Some(match (function, leaf) {
         (Function::Add, Node::Number(x)) => Operation::AddNumber(*x),
@@ -425,7 +425,7 @@ fn direct(function: Function, leaf: &Node) -> Option<Operation> {
 
 #[inline(always)]
 fn put<R: Real>(below: &mut [R; DEPTH], depth: &mut usize, x: R) {
-    // the first one puts nothing of worth there, which keeps the top a plain number
+    // the first push stores a meaningless value there, so that the top need not be optional
     if let Some(place) = below.get_mut(*depth) {
         *place = x;
     }

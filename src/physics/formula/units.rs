@@ -1,22 +1,22 @@
-//! Whether the units of a formula balance.
+//! Check of the units of a formula.
 
 use super::dimension::Dimension;
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 
-/// What a part of a formula measures.
+/// Dimension of a part of a formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Measure {
-    /// A quantity of that dimension.
+    /// A definite dimension.
     Of(Dimension),
-    /// Nought, which is of any dimension.
+    /// Zero, which is compatible with any dimension.
     Any,
 }
 
-/// The dimension of `formula` with parameters of `dimensions`.
+/// Dimension of `formula` with parameters of `dimensions`.
 ///
 /// # Errors
-/// Where two sides do not have the same, with both.
+/// The position of two operands with different dimensions, with both.
 pub fn dimension(
     formula: &Expression,
     dimensions: &[Dimension],
@@ -78,7 +78,7 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
     })
 }
 
-/// A lag or delay: what it holds, its time being in s.
+/// Dimension of a lag or delay: that of its argument; its time must be in s.
 fn timed(
     function: Function,
     all: &[Expression],

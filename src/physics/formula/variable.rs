@@ -1,4 +1,4 @@
-//! The variables that a formula may name: one line each.
+//! Variables of formulas, one line each.
 
 use super::dimension::Dimension;
 use crate::effects::Needs;
@@ -20,40 +20,40 @@ macro_rules! variables {
         pub enum Variable { $(#[doc = $meaning] $id,)* }
 
         impl Variable {
-            /// All there are.
+            /// All variables, in the order of the list.
             pub const ALL: &'static [Variable] = &[$(Variable::$id),*];
 
-            /// Its name in a formula.
+            /// Name in a formula.
             pub const fn name(self) -> &'static str {
                 match self { $(Variable::$id => $name,)* }
             }
 
-            /// Another name for it.
+            /// Alternative name in a formula.
             pub const fn alias(self) -> &'static str {
                 match self { $(Variable::$id => $alias,)* }
             }
 
-            /// What it is, with its unit.
+            /// Meaning, with its unit.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Variable::$id => $meaning,)* }
             }
 
-            /// Its dimension.
+            /// Dimension of the variable.
             pub const fn dimension(self) -> Dimension {
                 match self { $(Variable::$id => $dimension,)* }
             }
 
-            /// What it reaches in the flight of any aircraft that formulas are tried with.
+            /// Range in the flight of any aircraft, used to test formulas.
             pub const fn range(self) -> [f64; 2] {
                 match self { $(Variable::$id => [$low, $high],)* }
             }
 
-            /// What must be known to evaluate it.
+            /// Input needed to evaluate it.
             pub const fn needs(self) -> Needs {
                 match self { $(Variable::$id => Needs::$needs,)* }
             }
 
-            /// Its value at `at`.
+            /// Value at the point `at`.
             #[inline(always)]
             pub fn value<R: Real>(self, at: &Point<R>) -> R {
                 match self { $(Variable::$id => { let $at = at; $value })* }
@@ -93,7 +93,7 @@ variables! {
 const FORCE: Dimension = Dimension::FORCE;
 
 impl Variable {
-    /// The variable of that name.
+    /// The variable called `name`, or by its alternative name.
     pub fn from_name(name: &str) -> Option<Variable> {
         Variable::ALL.iter().copied().find(|v| v.name() == name || v.alias() == name)
     }

@@ -1,4 +1,4 @@
-//! An effect as its file has it, ready to be evaluated.
+//! An effect from a file, ready for evaluation.
 
 use super::expression::{Expression, Node};
 use super::memory::Memory;
@@ -9,39 +9,39 @@ use crate::effects::{Description, Needs, Own, Terms};
 use crate::{Channel, Point};
 use greylag_num::Real;
 
-/// Whether an effect may fly.
+/// Acceptance status of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// A search proposed it, and nobody has looked at it yet.
+    /// A search proposed it, and no person has reviewed it.
     Proposed,
     /// A person has accepted it.
     Accepted,
 }
 
-/// What an effect adds to one channel.
+/// Contribution of an effect to one channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// The channel.
+    /// Channel of the contribution.
     pub channel: Channel,
-    /// What the shape is multiplied by.
+    /// Factor of the shape.
     pub factor: Expression,
-    /// A sum of terms, each with a parameter.
+    /// Sum of terms, each with a parameter.
     pub shape: Expression,
 }
 
-/// An effect of a file.
+/// An effect read from a file.
 #[derive(Debug)]
 pub struct Written {
-    /// What is known of it, as of any effect.
+    /// Description, as of any effect.
     pub about: Description,
-    /// Whether it may fly.
+    /// Acceptance status.
     pub status: Status,
-    /// What it adds to each channel; parameters in the order of `about.coefficients`.
+    /// Contributions to each channel; parameters in the order of `about.coefficients`.
     pub lines: Vec<Line>,
-    /// The values that the file gives the coefficients.
+    /// Values of the coefficients in the file.
     pub values: Vec<f64>,
-    /// Their widths as priors.
+    /// Prior standard deviations of the coefficients.
     pub widths: Vec<f64>,
     /// The text of the file.
     pub text: String,
@@ -50,13 +50,13 @@ pub struct Written {
 }
 
 impl Written {
-    /// What it needs: never only the point, so that a planner's sum over the effects that need no more
-    /// holds no code of formulas.
+    /// Input it needs: never only the point, so that a planner's sum over effects that need only the point contains
+    /// no code of formulas.
     pub const fn needs(&self) -> Needs {
         self.needs
     }
 
-    /// What one unit of each coefficient contributes.
+    /// Reports the contribution of one unit of each coefficient.
     #[inline(always)]
     pub fn basis<R: Real>(&self, at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let Own { shape, first_lag, .. } = own;
@@ -65,12 +65,12 @@ impl Written {
         });
     }
 
-    /// Its lags and delays; at most [`LAGS`](crate::actuators::LAGS).
+    /// Lags and delays of the effect; at most [`LAGS`](crate::actuators::LAGS).
     pub fn memories(&self) -> &[Memory] {
         self.tape.memories()
     }
 
-    /// The value of a coefficient as the file gives it.
+    /// Value of a coefficient in the file, with its source.
     pub fn number(&self, coefficient: usize) -> Sourced {
         Sourced {
             bounds: None,
@@ -80,18 +80,18 @@ impl Written {
         }
     }
 
-    /// How many operations an evaluation takes.
+    /// Number of operations of an evaluation.
     pub fn operations(&self) -> usize {
         self.tape.len()
     }
 
-    /// The variables it depends on.
+    /// Variables it depends on.
     pub fn variables(&self) -> Vec<Variable> {
         let named = |v: &Variable| self.lines.iter().any(|l| l.uses(*v));
         Variable::ALL.iter().copied().filter(named).collect()
     }
 
-    /// Functions with kinks or jumps in it, each once.
+    /// Names of its functions with kinks or jumps, each once.
     pub fn kinks(&self) -> Vec<&'static str> {
         let mut all = Vec::new();
         let mut note = |e: &Expression| {

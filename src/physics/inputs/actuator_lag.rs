@@ -1,4 +1,4 @@
-//! Surfaces that follow their measured position with a lag.
+//! Lag of the surfaces behind their measured position.
 
 use super::{InputEffect, Past, STEP};
 use greylag_num::Real;

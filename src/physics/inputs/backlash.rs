@@ -1,10 +1,10 @@
-//! Play in the linkage.
+//! Backlash in the linkage.
 
 use super::{InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A play that must be crossed whenever the direction turns.
+/// A play that is crossed at every reversal.
 pub struct Backlash;
 
 impl InputEffect for Backlash {

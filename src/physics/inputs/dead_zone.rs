@@ -1,10 +1,10 @@
-//! Surfaces that do nothing for small deflections.
+//! Dead zone of the surfaces at small deflections.
 
 use super::{InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A dead zone about the centre.
+/// A dead zone about the neutral position.
 pub struct DeadZone;
 
 impl InputEffect for DeadZone {

@@ -1,14 +1,13 @@
-//! Effects between the actuators' measured positions and what acts on the air: one file each.
+//! Input effects, between the actuators' measured positions and the acting deflections: one file each.
 //!
 //! They have memory and are not linear in their constant. Several of one model act one after the other in
 //! the order of the list at the end of this file. To add one: write its file beside these and name it
 //! there.
 //!
-//! They take part wherever a model is stepped: free runs, imagined flights, the planner (which takes the
-//! surfaces and the throttle to have been at rest, as it does not observe what acted before). Trim needs none of them but
-//! for the dead zone, which it leaves out; the linear model, and so the design of the
-//! LQI, leaves out all. The LQI's integrators take up what is constant in them; what a lag or delay costs
-//! is shown in `tests/effects_lqi.rs`.
+//! They apply wherever a model is stepped: free runs, imagined flights, the planner (which assumes surfaces and
+//! throttle at rest before, since it does not observe the acting deflections). In trim only the dead zone would
+//! matter, and trim neglects it; the linear model, and thus the design of the LQI, neglects all. The LQI's integrators
+//! compensate their constant part; the cost of a lag or delay is measured in `tests/effects_lqi.rs`.
 
 use crate::Controls;
 use crate::actuators::LAGS;
@@ -18,60 +17,60 @@ use greylag_num::Real;
 /// Time between two calls of [`InputEffect::act`], s.
 pub const STEP: f64 = 0.01;
 
-/// Past deflections that an effect may remember.
+/// Number of past deflections that an effect may use.
 pub const PAST: usize = 24;
 
-/// Effects that one model may have.
+/// Largest number of input effects of a model.
 pub const MOST: usize = 3;
 
-/// What an input effect acts on.
+/// Controls that an input effect acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Acts {
-    /// On aileron and elevator, rad.
+    /// Aileron and elevator, rad.
     OnSurfaces,
-    /// On the throttle, 0 to 1.
+    /// The throttle, 0 to 1.
     OnThrottle,
 }
 
-/// An effect on what the surfaces or the throttle do, with one constant.
+/// An effect on the surfaces or the throttle, with one constant.
 pub trait InputEffect {
-    /// The id of parameter files, JSON and the command line.
+    /// Identifier in parameter files, JSON and the command line.
     const ID: &'static str;
-    /// What it is, in one sentence.
+    /// Description of the effect, in one sentence.
     const DESCRIPTION: &'static str;
-    /// What it does to a deflection or throttle u, in textbook letters.
+    /// Formula of its effect on a deflection or throttle u, in textbook notation.
     const FORMULA: &'static str;
-    /// Where the formula comes from.
+    /// Source of the formula.
     const SOURCE: &'static str;
-    /// Its constant.
+    /// The effect's single constant.
     const COEFFICIENTS: &'static [Coefficient; 1];
-    /// Its entry in the catalogue of effects.
+    /// Entry in the catalogue of effects.
     const ENTRY: Entry;
-    /// What it acts on.
+    /// Controls that it acts on.
     const ACTS: Acts = Acts::OnSurfaces;
 
-    /// The deflection (rad) or throttle (0 to 1) that acts now, `input` being its measured position, `constant`
-    /// the effect's. Called once every [`STEP`].
+    /// Acting deflection (rad) or throttle (0 to 1) at the measured position `input`, with the effect's `constant`.
+    /// Must be called once every [`STEP`].
     fn act<R: Real>(constant: f64, memory: &mut Past<R>, input: R) -> R;
 }
 
-/// What an effect remembers of one surface (rad) or of the throttle.
+/// Memory of an effect for one surface (rad) or for the throttle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Past<R = f64> {
-    /// The value that acted last.
+    /// Previous acting value.
     pub output: R,
     /// Earlier inputs, newest first.
     pub inputs: [R; PAST],
 }
 
 impl<R: Real> Past<R> {
-    /// A surface or throttle that has been at `position` for long.
+    /// Memory of a surface or throttle at rest at `position`.
     #[inline(always)]
     pub fn at_rest(position: R) -> Self {
         Past { output: position, inputs: [position; PAST] }
     }
 
-    /// Puts `input` at the front of the inputs.
+    /// Prepends `input` to the inputs.
     #[inline(always)]
     pub fn push(&mut self, input: R) {
         self.inputs.copy_within(0..PAST - 1, 1);
@@ -79,17 +78,17 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// What a model remembers of its controls' past; `GreyBox::at_rest` of the crate `greylag-model` makes it.
+/// Memory of a model's past controls; `GreyBox::at_rest` of the crate `greylag-model` creates it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMemory<R = f64> {
-    /// What its input effects remember of aileron, elevator and throttle; on a rudder they do not act.
+    /// Memories of its input effects for aileron, elevator and throttle; they do not act on a rudder.
     inputs: [[Past<R>; 3]; MOST],
-    /// What its formulas remember of what they lag or delay.
+    /// Memories of its formulas' lags and delays.
     pub formulas: [Past<R>; LAGS],
 }
 
 impl<R: Real> InputMemory<R> {
-    /// Surfaces and throttle that have been at `controls` for long, and what formulas lag, which has been at `lagged`.
+    /// Memory of surfaces and throttle at rest at `controls`, with lagged arguments at rest at `lagged`.
     #[inline(always)]
     pub fn at_rest(controls: &Controls<R>, lagged: [R; LAGS]) -> Self {
         let Controls { aileron, elevator, throttle, .. } = *controls;
@@ -99,7 +98,7 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// What `then` remembers where `chosen` is above zero, else this.
+    /// Selects the memory `then` where `chosen` is above zero, else this one.
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
         let past = |old: &Past<R>, new: &Past<R>| Past {
@@ -116,7 +115,7 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// What acts now through the effect in `place` (below [`MOST`]) of a model's list.
+    /// Acting controls after the effect at index `place` (below [`MOST`]) of a model's list.
     #[inline(always)]
     pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {
         let [aileron, elevator, throttle] = &mut self.inputs[place];
@@ -137,7 +136,7 @@ macro_rules! inputs {
     ($($module:ident :: $type:ident),* $(,)?) => {
         $(mod $module; pub use $module::$type;)*
 
-        /// One of the input effects of the list.
+        /// Identifies one input effect of the list.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Kind { $(
             #[doc = concat!("See [`", stringify!($type), "`].")]
@@ -145,10 +144,10 @@ macro_rules! inputs {
         )* }
 
         impl Kind {
-            /// Every input effect there is.
+            /// All input effects.
             pub const ALL: &'static [Kind] = &[$(Kind::$type),*];
 
-            /// What is known of the effect.
+            /// Description of the effect.
             pub const fn describe(self) -> Description {
                 match self { $(Kind::$type => Description {
                     id: $type::ID,
@@ -164,7 +163,7 @@ macro_rules! inputs {
                 },)* }
             }
 
-            /// What the effect acts on.
+            /// Controls that the effect acts on.
             pub const fn acts(self) -> Acts {
                 match self { $(Kind::$type => $type::ACTS,)* }
             }
@@ -179,7 +178,7 @@ macro_rules! inputs {
 }
 
 impl Kind {
-    /// The input effect of that id.
+    /// The input effect with the id `id`.
     pub fn from_id(id: &str) -> Option<Kind> {
         Kind::ALL.iter().copied().find(|kind| kind.describe().id == id)
     }

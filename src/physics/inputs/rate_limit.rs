@@ -1,10 +1,10 @@
-//! Surfaces that cannot move faster than a limit.
+//! Rate limit of the surfaces.
 
 use super::{InputEffect, Past, STEP};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A limit to how fast a surface moves.
+/// A limit on the rate of a surface.
 pub struct RateLimit;
 
 impl InputEffect for RateLimit {

@@ -1,4 +1,4 @@
-//! Thrust that follows the throttle with a lag: a propeller's inertia, a turbine's spool.
+//! Lag of the thrust behind the throttle: a propeller's inertia, a turbine's spool.
 
 use super::{ActuatorLag, Acts, InputEffect, Past};
 use greylag_num::Real;

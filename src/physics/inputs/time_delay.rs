@@ -1,4 +1,4 @@
-//! Surfaces that act later than their measured position says.
+//! Time delay of the surfaces behind their measured position.
 
 use super::{InputEffect, PAST, Past, STEP};
 use greylag_num::Real;

@@ -1,4 +1,4 @@
-//! The amendment: the prior tuned, effects added one after the other, each judged on unseen flights.
+//! The amendment: tunes the prior coefficients, then adds effects one by one, each judged by held-out flights.
 
 mod selection;
 
@@ -21,23 +21,23 @@ use greylag_physics::catalogue;
 use greylag_physics::effects::{Coefficient, Description, Kind};
 use selection::{Ask, Selection};
 
-/// An effect to add.
+/// An effect to add, with an optional starting point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Added {
-    /// Its id.
+    /// Identifier of the effect in the catalogue, or that of an effect file.
     pub id: String,
-    /// Values of its coefficients near which to search, where known.
+    /// Starting values of its coefficients, in their order, where they are known.
     pub start: Option<Vec<f64>>,
 }
 
 impl Added {
-    /// A candidate of a diagnosis, to be searched for near where the diagnosis has it.
+    /// A diagnosis's candidate, started at the values that the diagnosis estimated.
     pub fn of(candidate: &Candidate) -> Added {
         let of = |name: &str| candidate.parameters.iter().find(|p| p.name == name);
         Added::near(&candidate.id, |name| of(name).map(|p| p.value))
     }
 
-    /// The effect `id`, to be searched for near `value` of its coefficients' names, if that knows them all.
+    /// The effect `id`, started at `value` of each coefficient's name if that is known for all of them.
     pub fn near(id: &str, value: impl Fn(&str) -> Option<f64>) -> Added {
         let coefficients = catalogue::describe(id).map(|about| about.coefficients);
         let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
@@ -45,41 +45,42 @@ impl Added {
     }
 }
 
-/// What becomes of an effect that the data refuse.
+/// Treatment of an effect that the data refuse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// It is left out of the model.
+    /// The effect is left out of the model.
     Left,
-    /// It stays in the model all the same.
+    /// The effect stays in the model nevertheless.
     Kept,
 }
 
-/// What is known of the model's coefficients before the flights are seen.
+/// Prior knowledge of the model's coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Prior {
-    /// The values of its file, with their standard deviations.
+    /// The values of the model file with their standard deviations.
     #[default]
     File,
-    /// What is physically possible.
+    /// Only the bounds of what is physically possible.
     Bounds,
 }
 
-/// What an amendment is asked for.
+/// Options of an amendment.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Effects to add, in this order; none to tune the prior only.
+    /// Effects to add, in this order; empty to tune the prior only.
     pub effects: Vec<Added>,
-    /// What is known of the coefficients beforehand.
+    /// Prior on the model's coefficients.
     pub prior: Prior,
-    /// What becomes of those that the data refuse.
+    /// Treatment of effects that the data refuse.
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// Whether the model's other conventions are tried too.
+    /// Whether the model's other conventions are tried as well.
     pub conventions: bool,
-    /// What each flight has of its own beside its sensors' constants.
+    /// Constants estimated for each flight beside those of its sensors.
     pub per_flight: PerFlight,
-    /// The model tuned to the same flights without any effect ([`tune`](super::tune)), where that is known already.
+    /// The model tuned to the same flights without any effect ([`tune`](super::tune)), if that has been computed
+    /// already.
     pub tuned: Option<Fit>,
 }
 
@@ -103,36 +104,36 @@ impl Default for Options {
     }
 }
 
-/// An amendment with the models it is about.
+/// An amendment with the models it compares.
 #[derive(Clone, Debug)]
 pub struct Amended {
-    /// The story.
+    /// The amendment's result, as `amend.json` holds it.
     pub amendment: Amendment,
     /// The model with its prior tuned and the accepted effects.
     pub model: GreyBox,
-    /// The model with its prior tuned alone.
+    /// The model with its prior tuned and no effect added.
     pub tuned: GreyBox,
 }
 
 impl Amended {
-    /// Coefficients that are zero for the sake of an effect that has joined, each with that effect.
+    /// Coefficients set to zero because an effect that joined replaces their term, each with that effect.
     pub fn dropped(&self) -> Vec<(String, &'static str)> {
         dropped(&self.tuned, &self.model)
     }
 }
 
-/// Coefficients of `before` that an effect of `after` stands in the place of.
+/// Coefficients of `before` whose term an effect of `after` replaces.
 fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
     let still = |name: &str| before.replaced(name).is_none();
     let named = before.coefficients().iter().filter(|c| still(&c.name));
     named.filter_map(|c| Some((c.name.clone(), after.replaced(&c.name)?))).collect()
 }
 
-/// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; `progress`
-/// hears what is being done.
+/// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; reports to `progress`, which
+/// may cancel.
 ///
 /// # Errors
-/// An effect cannot join the model, the flights do not allow a fit, or `progress` ended it.
+/// An effect cannot join the model, the flights do not allow a fit, or `progress` cancelled.
 pub fn amend(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -192,7 +193,7 @@ pub fn amend(
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 
-/// `model` with an effect more, at its start.
+/// Adds the effect `added` to `model` at its starting values.
 pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendError> {
     let start = match (&added.start, parameters::describe(&added.id)) {
         (Some(start), _) => start.clone(),
@@ -202,17 +203,18 @@ pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendErro
     Ok(model.join_most(&added.id, &start)?)
 }
 
-/// The middle one of the catalogue's starts, else zero or what lies nearest to it within bounds.
+/// The middle one of the catalogue's starting points; without any, zero or the bound nearest to it.
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    // the first of a file's is what the file says; of the catalogue's, the middle one is the usual amount
+    // the first of a file's is the file's own value; of the catalogue's, the middle one is the usual amount
     let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
     let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 
-/// What the reader of an amendment of `model` must know: of the fit, of what it left alone, of what contradicts itself.
+/// Notes for the reader of an amendment of `model`: on the fit, on coefficients left unchanged, on contradictions
+/// between flights.
 fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     let mut notes = fit.notes.clone();
     notes.extend(
@@ -236,7 +238,7 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     notes
 }
 
-/// The first two thirds of a flight to fit to, the last one to judge by.
+/// Splits a flight into its first two thirds, to fit, and its last third, to judge.
 pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
     let total: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     let mut left = total * 2 / 3;

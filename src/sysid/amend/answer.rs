@@ -39,16 +39,16 @@ pub fn answer(story: &Amendment) -> Answer {
     })
 }
 
-/// The models that a diagnosis speaks of, by equation error over its flights, and its answer.
+/// The models behind a diagnosis, by equation error over its flights, and its answer.
 #[derive(Clone, Debug)]
 pub struct Diagnosed {
     /// The model with its own coefficients tuned, no effect added.
     pub tuned: GreyBox,
-    /// By how much the error falls on the flights of the diagnosis, by what.
+    /// The fall of the free-run error on the flights of the diagnosis, with its causes.
     pub answer: Answer,
 }
 
-/// What tuning and the asserted effects of `diagnosis` are worth on its own `flights`.
+/// Evaluates tuning and the asserted effects of `diagnosis` on its own `flights`.
 ///
 /// # Errors
 /// An effect cannot join the model, or a flight has no clock.
@@ -89,13 +89,13 @@ pub fn diagnosed(
         baseline: None,
     });
     let said = diagnosis.sentences.first().filter(|_| asserted.is_empty());
-    let answer = said.map_or(answer.clone(), |said| answer.saying(said.clone()));
+    let answer = said.map_or(answer.clone(), |said| answer.with_effect(said.clone()));
     let mut tuned = tuned.model;
     tuned.name = "tuned".into();
     Ok(Diagnosed { tuned, answer })
 }
 
-/// A fitted coefficient as files have it.
+/// A fitted coefficient as read from a file.
 #[derive(Clone, Debug, Deserialize)]
 struct Known {
     name: String,
@@ -112,7 +112,7 @@ impl Known {
     }
 }
 
-/// The clearest of the effect's coefficients among `known`.
+/// The effect's most significant coefficient among `known`.
 fn decisive(id: &str, description: &str, known: impl Iterator<Item = Known>) -> Option<Decisive> {
     let of = |p: Known| {
         let (effect, coefficient) = p.name.split_once('.')?;
@@ -138,10 +138,10 @@ fn unit(id: &str, coefficient: &str) -> &'static str {
     of.map_or("", |c| c.unit).trim_matches('-')
 }
 
-/// What `amend.json` beside a model tells of where it came from.
+/// Origin of an amended model, read from the `amend.json` beside it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Origin {
-    /// The model before.
+    /// Name of the model before the amendment.
     model: String,
     effects: Vec<Effect>,
     parameters: Vec<Known>,
@@ -162,21 +162,23 @@ struct Log {
 }
 
 impl Origin {
-    /// The story beside the model file `model`; `None` where there is none, or the model was not made of `before`.
+    /// The amendment beside the model file `model`; `None` if there is none, or if the model was not made from
+    /// `before`.
     pub fn beside(model: &Path, before: &GreyBox) -> Option<Origin> {
         let text = std::fs::read_to_string(model.parent()?.join(STORY)).ok()?;
         let origin: Origin = serde_json::from_str(&text).ok()?;
         (origin.model == before.name).then_some(origin)
     }
 
-    /// `before` with its coefficients as the amendment tuned them, no effect added.
+    /// `before` with the coefficients that the amendment tuned, no effect added.
     pub fn tuned(&self, before: &GreyBox) -> Option<GreyBox> {
         let mut tuned = before.clone();
         let set = |p: &Known| tuned.set_coefficient(&p.name, p.value);
         self.tuned.iter().all(set).then_some(tuned)
     }
 
-    /// The answer of a comparison of the model before with the one after; `tuned` are the free-run errors between.
+    /// The answer of a comparison between the model before and the one after; `tuned` holds the free-run errors of
+    /// the tuned model.
     pub fn answer(&self, c: &Comparison, tuned: &[HorizonScore], logs: &[PathBuf]) -> Answer {
         let stage =
             |k: usize, way| Stage { way, model: &c.models[k].name, scores: &c.models[k].free_run };

@@ -1,4 +1,4 @@
-//! What a model assumes beside its effects, and no coefficient can make up for.
+//! Modelling conventions beside the effects, whose choice no coefficient can make up for.
 
 use serde::Serialize;
 
@@ -8,9 +8,9 @@ use greylag_model::{GreyBox, Integrator};
 use greylag_physics::atmosphere::Density;
 use greylag_physics::rigid_body::ForceAxes;
 
-/// Standard errors of the difference between two fits that are clear (two-sided 95 %, as Vuong has it).
+/// Standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
 const CLEARLY: f64 = 1.96;
-/// Share of the error of unseen flights that is much.
+/// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
 
 /// By how many standard errors `other` follows the shots more closely than `fit`: the mean difference of the shots'
@@ -53,11 +53,11 @@ pub enum Convention {
 }
 
 impl Convention {
-    /// All of them.
+    /// All conventions, in the order in which they are tried.
     pub const ALL: [Convention; 3] =
         [Convention::Integrator, Convention::ForceAxes, Convention::Density];
 
-    /// Its key in a model file, with the table that holds it.
+    /// Key path of the convention in a model file, its table first.
     pub fn key(self) -> &'static [&'static str] {
         match self {
             Convention::Integrator => &["integrator"],
@@ -66,7 +66,7 @@ impl Convention {
         }
     }
 
-    /// What `model` has there, as its file says it; "constant" for a density of its own.
+    /// The convention of `model` in the model file's spelling; "constant" for a density of its own.
     pub fn of(self, model: &GreyBox) -> &'static str {
         match self {
             Convention::Integrator => match model.integrator {
@@ -84,10 +84,10 @@ impl Convention {
         }
     }
 
-    /// Whether the other one is taken if the fit's own flights are followed `closer` by so many standard errors
-    /// with it, and the error of unseen flights goes from the first of `error` to the second. Steps and axes are the
-    /// simulator's or the author's choice, which the flights must bear out; air does thin with height, which they
-    /// must not deny.
+    /// Whether the alternative is adopted, given that it fits its own flights `closer` by so many standard errors and
+    /// takes the held-out error from the first to the second of `error`. Integrator and axes are choices of the
+    /// simulator or the author and need positive evidence; air does thin with height, so the standard atmosphere only
+    /// needs to be not contradicted.
     pub(super) fn is_borne_out(self, closer: f64, error: [f64; 2]) -> bool {
         let fall = 1.0 - error[1] / error[0];
         match self {
@@ -98,7 +98,7 @@ impl Convention {
         }
     }
 
-    /// `model` with the other one; `None` if there is none to try.
+    /// `model` with the alternative convention; `None` if there is none to try.
     pub(super) fn other(self, model: &GreyBox) -> Option<GreyBox> {
         let mut other = model.clone();
         match self {
@@ -121,20 +121,20 @@ impl Convention {
     }
 }
 
-/// A convention that was tried.
+/// A convention that was tried, with its evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tried {
-    /// Which.
+    /// The convention that was changed.
     pub convention: Convention,
-    /// What the model had, as its file says it.
+    /// The model's own choice, in the model file's spelling.
     pub from: &'static str,
-    /// What was tried in its place.
+    /// The alternative, in the model file's spelling.
     pub to: &'static str,
-    /// Error of unseen flights at the horizon of judgement before and with it, all coefficients refitted;
-    /// NaN where no run gets there or the fit fails.
+    /// Held-out free-run error at the horizon of judgement without and with the alternative, all coefficients
+    /// refitted; NaN where no run reaches the horizon or the fit fails.
     pub error: [f64; 2],
-    /// Standard errors by which the fit follows its own flights more closely; NaN where it fails.
+    /// Standard errors by which the alternative fits its own flights more closely; NaN if the fit fails.
     pub closer: f64,
-    /// Whether the amended model has it.
+    /// Whether the amended model adopts the alternative.
     pub kept: bool,
 }

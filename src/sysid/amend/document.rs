@@ -1,4 +1,4 @@
-//! An amendment as files hold it: the model file's new text, and the story as JSON.
+//! An amendment as files: the model file's new text, and the result as JSON.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use greylag_model::edit::{Edit, EditError, Number};
 use greylag_physics::catalogue;
 use greylag_physics::formula::Written;
 
-/// Characters of a file's SHA-256 that sources carry.
+/// Hexadecimal digits of a log's SHA-256 that a coefficient's source quotes.
 const PREFIX: usize = 12;
 /// Longest name of a model, bytes.
 const NAME: usize = 64;
@@ -19,14 +19,14 @@ const NAME: usize = 64;
 /// A log with its hash.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Hashed {
-    /// Its path.
+    /// Path of the log.
     pub path: String,
     /// SHA-256 of its content, hexadecimal.
     pub sha256: String,
 }
 
 impl Hashed {
-    /// The log at `path` with its `content`.
+    /// The log at `path`, hashed from its `content`.
     pub fn new(path: &Path, content: &[u8]) -> Hashed {
         Hashed { path: path.display().to_string(), sha256: sha256(content) }
     }
@@ -37,7 +37,7 @@ pub fn sha256(content: &[u8]) -> String {
     Sha256::digest(content).iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// What goes into `amend.json`.
+/// Content of `amend.json`.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]
@@ -47,40 +47,40 @@ struct Document<'a> {
     hold_out: &'a [Hashed],
 }
 
-/// The file of the amended model.
+/// File name of the amended model.
 pub const MODEL: &str = "model.toml";
-/// The file of what was done.
+/// File name of the amendment's result.
 pub const STORY: &str = "amend.json";
 
-/// Why the files of an amended model cannot be made.
+/// Error of making an amended model's files.
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
-    /// A file of the model amended cannot be read.
+    /// A file of the original model cannot be read.
     #[error("cannot read {}: {source}; check that it exists and may be read", path.display())]
     Read {
-        /// The file.
+        /// Path of the unreadable file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The model file cannot be edited.
     #[error(transparent)]
     Edit(#[from] EditError),
-    /// A number of the story has no place in JSON.
+    /// The result holds a number that JSON cannot represent.
     #[error("cannot write {STORY}: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// The model to start from, as its files have it.
+/// The original model as its files hold it.
 #[derive(Clone, Debug)]
 pub struct Original {
-    /// The model file.
+    /// Path of the model file.
     pub path: PathBuf,
-    /// Its text.
+    /// Text of the model file.
     pub text: String,
-    /// The name of its airframe's file.
+    /// File name of its airframe.
     pub airframe: String,
-    /// The airframe's text.
+    /// Text of the airframe file.
     pub airframe_text: String,
 }
 
@@ -108,11 +108,11 @@ impl Original {
     }
 }
 
-/// The files of an amended model, name and text: airframe, effects, model, story. `logs` are those fitted to and
+/// The files of an amended model, name and text: airframe, effects, model, result. `logs` are those fitted to and
 /// those held out.
 ///
 /// # Errors
-/// The original is no model file, or a number of the story has no place in JSON.
+/// The original is no model file, or the result holds a number that JSON cannot represent.
 pub fn files(
     original: &Original,
     before: &GreyBox,
@@ -130,7 +130,7 @@ pub fn files(
     Ok(files)
 }
 
-/// What changes in the model file.
+/// The changes to the model file.
 fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) -> Edit {
     let fitted = &amended.amendment.parameters;
     let known = before.coefficients().len();
@@ -164,7 +164,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
     }
 }
 
-/// The file of an effect beside a model.
+/// Name of an effect's file beside a model.
 pub fn effect_file(effect: &Written) -> String {
     format!("{}.toml", effect.about.id)
 }
@@ -174,7 +174,7 @@ fn short(log: &Hashed) -> String {
     format!("{name} (sha256 {})", &log.sha256[..PREFIX])
 }
 
-/// A coefficient that is not the same to the bit, or a convention that is not the same.
+/// The first coefficient that differs in any bit between `read` and `meant`, or convention that differs, in words.
 pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
     if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
         return Some(other.key().join("."));

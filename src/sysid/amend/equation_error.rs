@@ -1,4 +1,4 @@
-//! Equation error in weak form: a first fit that no poor start can lead astray.
+//! Equation error in weak form: a first fit that converges from poor starting values.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -8,19 +8,19 @@ use super::parameters::{self, Free};
 use crate::weak_form::windows;
 use greylag_model::GreyBox;
 
-/// Channels that tell of coefficients: three forces, NaN where they are not measured, and three moments.
+/// Number of fitted channels: three forces (NaN without an accelerometer), three moments.
 const CHANNELS: usize = 6;
-/// Iterations of one search.
+/// Largest number of iterations of one search.
 const ITERATIONS: usize = 5;
-/// Iterations before starts are compared.
+/// Iterations of each starting point before they are compared.
 const TRIAL: usize = 2;
-/// Fall of the weighted sum of squares below which a search has settled: a tenth of a standard deviation.
-const SETTLED: f64 = 0.01;
-/// Neighbouring windows overlap by half.
-const INDEPENDENT: f64 = 0.5;
+/// Convergence tolerance on the weighted sum of squares: a tenth of a standard deviation.
+const COST_TOLERANCE: f64 = 0.01;
+/// Windows overlap by half, so each counts as half a sample.
+const INDEPENDENT_FRACTION: f64 = 0.5;
 
-/// Values of the free coefficients from forces and moments in weak form, the best over the starts of
-/// the catalogue for shape constants of effects being added.
+/// Estimates the free coefficients from forces and moments in weak form; the best result over the catalogue's
+/// starting points for shape constants of added effects.
 pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f64> {
     let starts = starts(free);
     let trials = if starts.len() > 1 { TRIAL } else { 0 };
@@ -31,7 +31,7 @@ pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f
     search(model, free, flights, theta, ITERATIONS).1
 }
 
-/// The model's own values, and those of the catalogue for the shape constants being added.
+/// Starting points: the model's own values, and those of the catalogue for the shape constants of added effects.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {
@@ -57,7 +57,7 @@ fn replaced(values: &[f64], place: usize, value: f64) -> Vec<f64> {
     values
 }
 
-/// Residuals of the channels over all flights, one after the other: measured − predicted.
+/// Residuals (measured − predicted) of the channels over all flights, concatenated.
 struct Residuals {
     values: Vec<f64>,
     channel: Vec<usize>,
@@ -78,7 +78,7 @@ fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
     all
 }
 
-/// Gauss–Newton from `theta`: cost and place.
+/// Gauss–Newton search from `theta`: its cost and the coefficients.
 fn search(
     model: &GreyBox,
     free: &[Free],
@@ -99,7 +99,9 @@ fn search(
             break;
         }
         let next = step(&present, free, flights, &theta, &r, &weights);
-        let Some(Step { change, .. }) = next.filter(|step| step.gain > SETTLED) else { break };
+        let Some(Step { change, .. }) = next.filter(|step| step.gain > COST_TOLERANCE) else {
+            break;
+        };
         for (k, f) in free.iter().enumerate() {
             let change = change[k].clamp(-f.stride, f.stride);
             theta[k] = (theta[k] + change).clamp(f.bounds.0, f.bounds.1);
@@ -119,16 +121,16 @@ fn mean_square(r: &Residuals, channel: usize) -> f64 {
     if n > 0.0 { sum / n } else { 1.0 }
 }
 
-/// The concentrated likelihood: Σ ln of the channels' mean squares.
+/// Concentrated negative log-likelihood: Σ ln of the channels' mean squares.
 fn misfit(r: &Residuals) -> f64 {
     (0..CHANNELS).map(|k| mean_square(r, k).max(1e-12).ln()).sum()
 }
 
-/// A step of Gauss–Newton.
+/// A Gauss–Newton step.
 struct Step {
-    /// What it changes each free coefficient by.
+    /// Change of each free coefficient.
     change: DVector<f64>,
-    /// How much lower the weighted sum of squares is behind it, as the linear model has it.
+    /// Decrease of the weighted sum of squares that the linear model predicts.
     gain: f64,
 }
 
@@ -154,7 +156,7 @@ fn step(
         low.iter().zip(high).map(|(a, b)| (a - b) / between).collect()
     };
     let j: Vec<Vec<f64>> = free.iter().enumerate().map(column).collect();
-    let weight = |row: usize| INDEPENDENT * weights[r.channel[row]];
+    let weight = |row: usize| INDEPENDENT_FRACTION * weights[r.channel[row]];
     let used: Vec<usize> = (0..r.values.len())
         .filter(|row| r.values[*row].is_finite() && j.iter().all(|c| c[*row].is_finite()))
         .collect();

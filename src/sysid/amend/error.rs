@@ -1,16 +1,16 @@
-//! Why a model cannot be amended.
+//! Errors of an amendment.
 
 use crate::progress::Cancelled;
 use crate::weak_form::prepared::ClockError;
 use greylag_model::JoinError;
 
-/// Why a model cannot be amended.
+/// Error of an amendment.
 #[derive(Debug, thiserror::Error)]
 pub enum AmendError {
     /// An effect cannot join the model.
     #[error("cannot amend the model: {0}")]
     Effect(#[from] JoinError),
-    /// A flight cannot be put on the models' clock.
+    /// A flight cannot be resampled to the models' clock.
     #[error("cannot amend the model: {0}")]
     Flight(#[from] ClockError),
     /// There is too little flight to fit to.
@@ -19,11 +19,11 @@ pub enum AmendError {
          least; fly two or three flights of a minute with doublets on every control"
     )]
     TooLittle {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// Seconds flown.
+        /// Usable duration of the flights, s.
         flown_s: f64,
-        /// Seconds needed.
+        /// Least duration that a fit needs, s.
         needed_s: f64,
     },
     /// There are too few flights to leave one out.
@@ -32,67 +32,67 @@ pub enum AmendError {
          or cut one into parts with `greylag logs convert`"
     )]
     TooFewFlights {
-        /// Flights that there are.
+        /// Number of flights given.
         flights: usize,
-        /// Flights needed.
+        /// Least number of flights needed.
         needed: usize,
     },
-    /// Nothing may be changed.
+    /// No coefficient is free.
     #[error(
         "cannot fit {model}: every coefficient is zero without a stated sd, so none may change; give \
          the model file an sd for those in doubt"
     )]
     NothingFree {
-        /// The model.
+        /// Name of the model.
         model: String,
     },
-    /// The flights say nothing of the coefficients.
+    /// The flights do not excite any free coefficient.
     #[error(
         "cannot fit {model}: these flights tell no coefficient better than the model file does, for \
          the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
          throttle, and turns at several speeds"
     )]
     NoExcitation {
-        /// The model.
+        /// Name of the model.
         model: String,
     },
-    /// The search did not settle.
+    /// The search did not converge.
     #[error(
         "cannot fit {model}: the search had not settled after {iterations} iterations, the last \
          change being {change:.2} standard deviations of {parameter}; leave out flights in which the \
          aircraft spins or hits something, or fly more of what moves {parameter}"
     )]
     NotConverged {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// Iterations made.
+        /// Number of iterations made.
         iterations: usize,
-        /// Largest change of the last iteration in standard deviations.
+        /// Largest change in the last iteration, in standard deviations.
         change: f64,
-        /// The parameter that changed most.
+        /// The parameter with that largest change.
         parameter: String,
     },
-    /// Free runs leave the flights at once.
+    /// Free runs diverge from the flights at once.
     #[error(
         "cannot fit {model}: its free runs leave the flights within {reach_s:.1} s, too early to \
          learn from; begin with a model closer to this aircraft, or check signs and units of the log"
     )]
     Diverges {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// How far runs get, s.
+        /// Typical duration until free runs diverge, s.
         reach_s: f64,
     },
-    /// The equations could not be solved.
+    /// The normal equations have no finite solution.
     #[error(
         "cannot fit {model}: the equations have no solution that is a number; check the log for \
          values that are not physical"
     )]
     Singular {
-        /// The model.
+        /// Name of the model.
         model: String,
     },
-    /// Whoever listened ended it.
+    /// The progress listener cancelled.
     // not transparent: this error itself must stand in the chain of causes
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),

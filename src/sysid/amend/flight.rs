@@ -1,4 +1,4 @@
-//! A flight with what is left in doubt of its sensors.
+//! A flight with the priors of its sensors' remaining errors.
 
 use crate::diagnose::search::clocks::{BLURRED, Doubt};
 use crate::flight_path::reconstruction::Reconstruction;
@@ -6,56 +6,56 @@ use crate::per_flight::trims::TRIMS;
 use crate::per_flight::{PerFlight, askew};
 use crate::weak_form::prepared::{ClockError, Prepared};
 
-/// Constants of a flight's sensors that are estimated along.
+/// Number of sensor constants estimated for each flight.
 pub(super) const SENSORS: usize = 8;
-/// Place of the actuators' delay among them, s.
+/// Index of the actuators' delay among them, s.
 pub(super) const SKEW: usize = 0;
-/// The state that each of those behind it offsets; the airspeed's is a share of it.
+/// Index of the state that each constant after the delay offsets; that of the airspeed is relative.
 pub(super) const OFFSETS: [usize; SENSORS - 2] = [2, 3, 4, 5, 6, 7];
-/// Place of the actuators' blur behind those: half the variance, in squared samples, of the time over which a
-/// recorded deflection is a mean.
+/// Index of the actuators' blur, the last constant: half the variance, in squared samples, of the interval over which
+/// a recorded deflection is averaged.
 pub(super) const BLUR: usize = SENSORS - 1;
-/// The airspeed among the eight states.
+/// Index of the airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
-/// Least standard deviation of the actuators' clock as forces tell it, s (0.3 ms root mean square against the
-/// truth of simulated flights).
+/// Least standard deviation of the actuators' delay estimated from forces, s (against simulated truth its root mean
+/// square error is 0.3 ms).
 pub(super) const SKEW_LEAST: f64 = 5e-4;
-/// Standard deviation of the actuators' clock against the gyros', s: that of ±1.5 samples, both of
-/// them late by 0 to 10 ms or the like.
+/// Prior standard deviation of the actuators' delay against the gyros, s: that of ±1.5 samples, both recorded 0 to 10
+/// ms late.
 const SKEW_SD: f64 = 7.7e-3;
-/// What is left in doubt if the reconstruction does not say: share of the airspeed, body rates
-/// (rad/s), α and β (rad).
+/// Prior standard deviations where the reconstruction gives none: airspeed scale (relative), body rates (rad/s), α
+/// and β (rad).
 const DOUBT: [f64; 6] = [0.003, 2e-4, 2e-4, 2e-4, 0.002, 0.002];
-/// Names of the reconstruction's constants, in that order.
+/// The reconstruction's names of those constants, in the same order.
 const NAMES: [&str; 6] =
     ["airspeed_scale", "gyro_bias_p", "gyro_bias_q", "gyro_bias_r", "alpha_bias", "beta_bias"];
 
-/// What is estimated of a flight.
+/// Constants estimated for one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Own {
-    /// Its sensors' constants.
+    /// Its sensors' constants, in the order of [`Flight::doubt`].
     pub sensors: [f64; SENSORS],
-    /// By how much its measured axes are turned, rad; zero where that is not asked for.
+    /// Misalignment of its measured axes, rad; zero unless it is estimated.
     pub askew: [f64; askew::NAMES.len()],
-    /// Its trims; zero where they are not asked for.
+    /// Its trims; zero unless they are estimated.
     pub trims: [f64; TRIMS.len()],
 }
 
 impl Own {
-    /// Nothing but `sensors`.
+    /// The `sensors`' constants alone; misalignment and trims are zero.
     pub fn of(sensors: [f64; SENSORS]) -> Own {
         Own { sensors, askew: Default::default(), trims: Default::default() }
     }
 
-    /// What `asked` makes unknown, in the order of the unknowns: sensors, angles, trims.
+    /// The unknowns that `asked` selects, in order: sensors, misalignment, trims.
     pub fn unknowns(&self, asked: &PerFlight) -> impl Iterator<Item = f64> {
         let askew = self.askew.into_iter().take(asked.angles());
         let trims = self.trims.into_iter().take(if asked.has_trims() { TRIMS.len() } else { 0 });
         self.sensors.into_iter().chain(askew).chain(trims)
     }
 
-    /// Adds `step`, in that order.
+    /// Adds `step` to those unknowns, in the same order.
     pub fn step(&mut self, asked: &PerFlight, step: &[f64]) {
         let askew = self.askew.iter_mut().take(asked.angles());
         let all = self.sensors.iter_mut().chain(askew).chain(&mut self.trims);
@@ -63,20 +63,20 @@ impl Own {
     }
 }
 
-/// A flight as the fit takes it.
+/// A flight prepared for the fit.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// The flight on the models' clock, its deflections as recorded.
+    /// The flight on the models' clock, deflections as recorded.
     pub prepared: Prepared,
-    /// Means and standard deviations of the actuators' delay (s), the airspeed's scale (a share), the biases
-    /// of p, q, r (rad/s), α and β (rad) that the reconstruction has left, and of the actuators' blur.
+    /// Prior means and standard deviations: the actuators' delay (s), the airspeed's scale (relative), the biases of
+    /// p, q, r (rad/s), α and β (rad) that remain after reconstruction, and the actuators' blur (squared samples).
     pub doubt: [[f64; 2]; SENSORS],
-    /// What forces and moments are judged by.
+    /// Uncertainty of the measured forces and moments.
     pub(super) forces: Doubt,
 }
 
 impl Flight {
-    /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
+    /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
     ///
     /// # Errors
     /// It has no clock.
@@ -92,7 +92,7 @@ impl Flight {
         Ok(Flight { prepared, doubt, forces })
     }
 
-    /// Seconds flown.
+    /// Usable duration of the flight, s.
     pub fn seconds(&self) -> f64 {
         self.prepared.sample_count() as f64 * self.prepared.dt
     }

@@ -1,29 +1,29 @@
-//! How well coefficients are known: posterior covariance, corrected for errors that hang together.
+//! Uncertainty of the coefficients: posterior covariance, corrected for correlated errors.
 
 use nalgebra::{DMatrix, DVector};
 
-/// What is left in doubt of every unknown.
+/// Posterior covariance of all unknowns.
 pub(super) struct Covariance {
     /// Standard deviations, in the order of the unknowns.
     pub sd: Vec<f64>,
-    /// The inverse information.
+    /// Inverse of the information matrix.
     inverse: DMatrix<f64>,
 }
 
 impl Covariance {
-    /// How two unknowns' errors go together.
+    /// Correlation of the errors of two unknowns.
     pub fn correlation(&self, a: usize, b: usize) -> f64 {
         let of = |a: usize, b: usize| self.inverse[(a, b)];
         of(a, b) / (of(a, a) * of(b, b)).sqrt()
     }
 }
 
-/// The covariance at the optimum: `information` with the prior's, whose diagonal is `prior`, and the
-/// `scores` (gradients of the data's cost) of blocks of data that are taken for independent.
+/// The covariance at the optimum from `information` (the prior's included, whose diagonal is `prior`) and `scores`,
+/// the gradients of the data's cost over blocks of data taken as independent.
 ///
-/// The inverse information holds if the weights tell the truth, the sandwich between the blocks' scores
-/// if there are many blocks. With few, the sandwich is both narrow and uncertain, so each unknown's
-/// variance is the larger of the two, the sandwich multiplied by B/(B − 1).
+/// The inverse information is the covariance if the weights are right; with many blocks, the sandwich estimator needs
+/// no such assumption. With few blocks the sandwich is biased low and uncertain, so each unknown's variance is the
+/// larger of the two, the sandwich multiplied by B/(B − 1).
 pub(super) fn covariance(
     information: &DMatrix<f64>,
     prior: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! What decides whether an effect joins: flights that the fit has not seen, and what the fit says of its coefficients.
+//! Acceptance of an effect: by free runs over held-out flights, and by the estimates of its coefficients.
 
 use super::amendment::{Added, Refused};
 use super::error::AmendError;
@@ -11,23 +11,23 @@ use greylag_model::GreyBox;
 
 /// Horizon at which improvement is judged, s.
 pub const JUDGED_AT_S: f64 = 5.0;
-/// Least share by which an effect must lower the error of unseen flights.
+/// Least relative fall of the held-out error for an effect to join.
 pub(super) const IMPROVED: f64 = 0.01;
-/// An effect that lowers it to less than this share joins though the search has not settled with it: others may be
-/// needed for that.
-pub const SETTLED_OR_NOT: f64 = 0.5;
-/// Standard deviations by which an effect's coefficient must exceed zero.
+/// An effect that lowers the held-out error below this share joins although the search has not converged with it:
+/// convergence may need further effects.
+pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
+/// An effect's coefficient must differ from zero by this many standard deviations.
 const CLEAR: f64 = 1.96;
-/// The same for effects with more coefficients than three, one of which exceeds that by chance.
+/// The same for effects of more than three coefficients, of which one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
-/// Least distance of a flight's own estimate from that of all, in standard deviations, at which flights disagree; it
-/// must exceed [`DISAGREE_SHARE`] too.
+/// Flights disagree if one flight's estimate differs from the common one by this many standard deviations and by
+/// [`DISAGREE_SHARE`] too.
 const DISAGREE: f64 = 4.0;
-/// Least such distance as a share of the value.
+/// Least relative difference at which flights disagree.
 const DISAGREE_SHARE: f64 = 0.3;
 
 impl AddedEffect {
-    /// The effect `id`, nothing said of it yet.
+    /// The record of the requested effect `id` before it is judged.
     pub fn asked_for(id: &str) -> AddedEffect {
         let about = parameters::describe(id).map(|(about, _)| about);
         AddedEffect {
@@ -40,15 +40,15 @@ impl AddedEffect {
     }
 }
 
-/// What judges fits: flights that they have not seen.
+/// Judge of fits by free runs over flights that they were not fitted to.
 pub struct Judge<'a> {
-    /// The flights.
+    /// Held-out flights.
     pub test: &'a [Flight],
-    /// Horizons of the free runs, s; that of judgement is the longest up to `JUDGED_AT_S`.
+    /// Horizons of the free runs, s; the longest one up to `JUDGED_AT_S` judges.
     pub horizons_s: &'a [f64],
 }
 
-/// A fit that is kept, with its scores.
+/// An accepted fit with its held-out scores.
 pub type Kept = (Fit, Vec<HorizonScore>);
 
 impl Judge<'_> {
@@ -59,7 +59,7 @@ impl Judge<'_> {
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
-    /// What the data say of an effect, and the fit with it if it is kept.
+    /// Judges an effect; returns its record, and the fit with it if it is accepted.
     pub fn verdict(
         &self,
         added: &Added,
@@ -79,7 +79,7 @@ impl Judge<'_> {
         let after = self.scores(&fit.model);
         effect.refused = objections(&added.id, &fit.parameters);
         let errors = judged(&after).zip(judged(before));
-        if !errors.is_some_and(|(a, b)| a < SETTLED_OR_NOT * b) {
+        if !errors.is_some_and(|(a, b)| a < ACCEPTED_UNCONVERGED * b) {
             effect.refused.extend(fit.unsettled.clone());
         }
         if let Some((a, b)) = errors
@@ -89,7 +89,7 @@ impl Judge<'_> {
                 "free runs of {} s on flights that the fit did not see come no closer \
                  ({b:.5} without it, {a:.5} with it){}",
                 judged_at(before).unwrap_or(JUDGED_AT_S),
-                said_by_the_model(&added.id, &fit.parameters)
+                confounded_with_model(&added.id, &fit.parameters)
             ));
         }
         effect.joined = effect.refused.is_empty() || refused == Refused::Kept;
@@ -98,7 +98,7 @@ impl Judge<'_> {
     }
 }
 
-/// What a fit came to; `None` if it failed at what was asked of it.
+/// The result of a fit; `None` if it did not converge or its equations have no solution. Other errors are returned.
 pub fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
     match of {
         Ok(of) => Ok(Some(of)),
@@ -107,17 +107,17 @@ pub fn settled<T>(of: Result<T, AmendError>) -> Result<Option<T>, AmendError> {
     }
 }
 
-/// Whether a fit failed at what was asked of it rather than at the flights.
+/// Whether a fit did not converge, or its equations have no solution.
 fn failed(why: &AmendError) -> bool {
     matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
 }
 
-/// The error at the horizon of judgement, if any run gets there.
+/// The error at the horizon of judgement, if any run reaches it.
 pub fn judged(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.rmse_scaled)
 }
 
-/// The horizon of judgement, s: the longest up to [`JUDGED_AT_S`] that a run reaches.
+/// The horizon of judgement, s: the longest one up to [`JUDGED_AT_S`] that a run reaches.
 pub fn judged_at(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.horizon_s)
 }
@@ -127,19 +127,19 @@ fn judge_of(scores: &[HorizonScore]) -> Option<&HorizonScore> {
     reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))
 }
 
-/// Whether the error falls from `before` to `after` by more than is nothing.
+/// Whether the error falls from `before` to `after` by more than the least relevant share.
 pub fn better(after: &[HorizonScore], before: &[HorizonScore]) -> bool {
     judged(after).zip(judged(before)).is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b)
 }
 
-/// Whether coefficients of the model itself say nearly the same as all of the effect `id`.
+/// Whether each coefficient of the effect `id` is confounded with a coefficient of the model itself.
 pub fn doubled(id: &str, parameters: &[Parameter]) -> bool {
     let mut own = own(id, parameters).peekable();
     own.peek().is_some() && own.all(|p| p.same_as.is_some())
 }
 
-/// Which coefficients of the model itself say what the effect `id` says, in words; empty if none do.
-fn said_by_the_model(id: &str, parameters: &[Parameter]) -> String {
+/// The model's own coefficients that are confounded with the effect `id`, in words; empty if there are none.
+fn confounded_with_model(id: &str, parameters: &[Parameter]) -> String {
     if !doubled(id, parameters) {
         return String::new();
     }
@@ -156,7 +156,7 @@ fn own<'a>(id: &'a str, parameters: &'a [Parameter]) -> impl Iterator<Item = &'a
     parameters.iter().filter(of)
 }
 
-/// Why the fitted coefficients of the effect `id` cannot be believed.
+/// Reasons to reject the fitted coefficients of the effect `id`.
 pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     let own: Vec<&Parameter> = own(id, parameters).collect();
     let mut objections = Vec::new();
@@ -183,7 +183,7 @@ pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     objections
 }
 
-/// What to do about coefficients of the model itself that end at a bound, in words.
+/// Advice on the model's own coefficients that end at a bound, in words.
 pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
     let ended = parameters.iter().filter(|p| p.at_bound && !p.added);
     ended
@@ -205,13 +205,14 @@ pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// A range that reaches to twice a bound.
+/// A range up to twice the bound.
 fn wider(bound: f64) -> String {
     let far = 2.0 * bound.abs();
     format!("-{far}..{far}")
 }
 
-/// Coefficients whose fitted sign is that of the prior no more, by more than its width and beyond doubt, in words.
+/// Coefficients whose fitted sign is significantly opposite to their prior's, by more than the prior's width, in
+/// words.
 pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
     let turned = |p: &&Parameter| {
         !p.added
@@ -232,7 +233,7 @@ pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// A flight whose own estimate cannot be that of all.
+/// The flight whose own estimate is incompatible with the common one, and the difference.
 fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     let far = |value: f64, sd: f64| {
         let off = (value - p.value).abs();
@@ -242,7 +243,7 @@ fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     found.map(|e| (e.flight.as_str(), e.value))
 }
 
-/// Coefficients that one flight sees clearly otherwise than all flights together, in words.
+/// Coefficients whose estimate from one flight contradicts that from all flights, in words.
 pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
     let named = parameters.iter().filter(|p| !p.added);
     named

@@ -1,4 +1,5 @@
-//! Which structure of a model the flights bear out: each flight predicted by a fit to all others.
+//! Selection of a model's structure by leave-one-out cross-validation: each flight is predicted by a fit to all
+//! others.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -12,66 +13,66 @@ use super::parameters;
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::PerFlight;
-use crate::progress::{Progress, say, unheard};
+use crate::progress::{Progress, ignore_progress, report};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
 /// Least number of flights of which one can be left out.
 pub const LEAST_FLIGHTS: usize = 3;
 
-/// A structure that is tried.
+/// A candidate structure.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// What it is, as the user would ask for it.
+    /// Its description, as a user would request it.
     pub name: String,
-    /// What is fitted of it.
+    /// The part of it that is fitted.
     pub fitted: Fitted,
 }
 
-/// What is fitted of a structure.
+/// The fitted part of a structure.
 #[derive(Clone, Debug)]
 pub enum Fitted {
-    /// Nothing: the model as given.
+    /// No coefficient: the model as given.
     Nothing,
-    /// The model's coefficients, with effects added and what each flight has of its own.
+    /// The model's coefficients, with added effects and constants of each flight.
     Coefficients {
-        /// The effects.
+        /// Effects that are added.
         effects: Vec<Added>,
-        /// What each flight has of its own.
+        /// Constants estimated for each flight.
         per_flight: PerFlight,
     },
-    /// The same from what is physically possible alone, zeros too.
+    /// The model's coefficients with physical bounds as their only prior, those of value zero included.
     FromScratch,
 }
 
-/// What leaving out one flight after the other says of a structure.
+/// Cross-validation result of a structure.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scored {
-    /// The structure.
+    /// Description of the structure.
     pub structure: String,
-    /// Coefficients that are free, and constants of a flight of its own.
+    /// Number of free coefficients plus constants of one flight.
     pub free: usize,
-    /// Free-run error of each flight, of the reference scale, by the fit to the others; NaN where that failed.
+    /// Scaled free-run error of each flight by the fit to the others; NaN where that failed.
     pub errors: Vec<f64>,
-    /// Their mean; infinite where a fit failed.
+    /// Mean of `errors`; infinite where a fit failed.
     pub mean: f64,
     /// Standard error of the mean over the flights.
     pub standard_error: f64,
-    /// Standard error of the mean difference to the best structure, flight by flight.
+    /// Standard error of the mean paired difference to the best structure.
     pub beside_best: f64,
-    /// Whether it is the simplest within that of the best.
+    /// Whether it is chosen: the simplest one within one standard error of the best.
     pub chosen: bool,
 }
 
-/// Leaves out one of `flights` after the other and scores each of `structures` of `model` on it; behind them stand, not to
-/// be chosen, what knows no aerodynamics.
+/// Leaves out each of `flights` in turn and scores each of `structures` of `model` on it; forecasts without
+/// aerodynamics follow as baselines, which are never chosen.
 ///
 /// The one chosen has the fewest free coefficients among those whose mean error exceeds the best one's by at most one
 /// standard error of the difference, taken flight by flight, or by 1 % (the rule of Breiman et al., Classification and Regression
 /// Trees, 1984, section 3.4.3, in pairs).
 ///
 /// # Errors
-/// There are fewer than [`LEAST_FLIGHTS`], an effect cannot join the model, or `progress` ended it.
+/// There are fewer than [`LEAST_FLIGHTS`], an effect cannot join the model, or `progress` cancelled.
 pub fn leave_one_out(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -91,7 +92,7 @@ pub fn leave_one_out(
     let mut all = Vec::new();
     for (k, structure) in structures.iter().enumerate() {
         let doing = format!("{}: leaving out one flight after the other", structure.name);
-        say(progress, &doing, k as f64 / structures.len() as f64)?;
+        report(progress, &doing, k as f64 / structures.len() as f64)?;
         let one = |left: usize| error_of(model, &ready, left, &structure.fitted, at);
         let errors: Vec<f64> =
             (0..ready.len()).into_par_iter().map(one).collect::<Result<_, _>>()?;
@@ -102,7 +103,7 @@ pub fn leave_one_out(
     Ok(all)
 }
 
-/// What a structure must beat: the state held, straight flight, and a linear model fitted to the other flights.
+/// Baselines without aerodynamics: constant state, straight flight, and a linear model fitted to the other flights.
 fn black_boxes(model: &GreyBox, flights: &[Flight], at: f64) -> Vec<Scored> {
     let prepared: Vec<Prepared> = flights.iter().map(|f| f.prepared.clone()).collect();
     let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];
@@ -130,7 +131,7 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of the flight number `left` at the horizon `at` (s) by the fit to the others; NaN where that fails.
+/// Error of flight `left` at the horizon `at` (s) by the fit to the others; NaN if that fails.
 fn error_of(
     model: &GreyBox,
     flights: &[Flight],
@@ -151,7 +152,7 @@ fn error_of(
             (with(model, effects)?, options)
         }
     };
-    match output_error::fit(&start, &others, &options, &unheard) {
+    match output_error::fit(&start, &others, &options, &ignore_progress) {
         Ok(fit) => Ok(error(&fit.model)),
         Err(_) => Ok(f64::NAN),
     }
@@ -163,7 +164,7 @@ fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
     Ok(with)
 }
 
-/// How many numbers a structure lets the flights decide.
+/// Number of constants that the flights determine in a structure.
 fn free(model: &GreyBox, fitted: &Fitted) -> Result<usize, AmendError> {
     Ok(match fitted {
         Fitted::Nothing => 0,
@@ -182,7 +183,7 @@ fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
     Scored { structure, free, errors, mean, standard_error, beside_best: f64::NAN, chosen: false }
 }
 
-/// Mean and its standard error.
+/// Mean and standard error of the mean.
 fn mean_with_error(x: &[f64]) -> [f64; 2] {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
@@ -190,7 +191,8 @@ fn mean_with_error(x: &[f64]) -> [f64; 2] {
     [mean, (variance / n).sqrt()]
 }
 
-/// Marks the simplest within one standard error of the best, or so near that no effect would join for it.
+/// Marks the simplest structure within one standard error of the best, or within the least improvement for which an
+/// effect joins.
 fn choose(all: &mut [Scored]) {
     let best = all.iter().min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
     let Some(best) = best.filter(|b| b.mean.is_finite()) else { return };

@@ -1,8 +1,7 @@
 //! A model refitted to flights, effects added, by output error.
 //!
-//! The method stands in `docs/explanation/diagnosis.md`: an equation-error fit brings the
-//! coefficients near, multi-step shooting finishes them, and flights that the fit never saw say what
-//! it was worth.
+//! The method is described in `docs/explanation/diagnosis.md`: an equation-error fit starts the coefficients,
+//! multi-step shooting refines them, and held-out flights judge the result.
 
 mod amendment;
 mod answer;

@@ -1,4 +1,4 @@
-//! The normal equations of a shot, the errors of its initial state eliminated.
+//! Normal equations of a shot, with the errors of its initial state eliminated.
 
 use std::borrow::Cow;
 
@@ -11,74 +11,73 @@ use crate::per_flight::{PerFlight, trims};
 use greylag_model::GreyBox;
 use greylag_physics::Controls;
 
-/// Steps of derivatives in the initial state, in the units of the state.
+/// Finite-difference steps of the initial state, in the units of the state.
 const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];
-/// Step of the derivative in the actuators' delay, s: half a sample, over which interpolation is
-/// smooth.
+/// Finite-difference step of the actuators' delay, s: half a sample, over which interpolation is smooth.
 const SKEW_STEP: f64 = 5e-3;
 
-/// The same in their blur, squared samples.
+/// Finite-difference step of the actuators' blur, squared samples.
 const BLUR_STEP: f64 = 0.05;
 
-/// Step of the derivative in a trim, as a share of its width.
+/// Finite-difference step of a trim, as a share of its prior width.
 const TRIM_STEP: f64 = 1e-3;
 
-/// Where the search stands.
+/// Current point of the search.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
-    /// The free coefficients.
+    /// Values of the free coefficients.
     pub theta: Vec<f64>,
-    /// What each flight has of its own.
+    /// Constants of each flight.
     pub own: Vec<Own>,
     /// Error of each shot's initial state.
     pub starts: Vec<[f64; 8]>,
 }
 
-/// How residuals are weighted.
+/// Weights of the residuals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
-    /// Inverse variance of each state's residual times its samples that hang together.
+    /// Inverse variance of each state's residual divided by its correlation length.
     pub output: [f64; 8],
     /// Inverse variance of the initial state's errors.
     pub start: [f64; 8],
 }
 
-/// What acts: a list a flight, a segment, a sample.
+/// Acting deflections, by flight, segment and sample.
 pub(super) type Acting = Vec<Vec<Vec<Controls>>>;
 
-/// Models beside the present one in one coefficient.
+/// Perturbed models for the derivative with respect to one coefficient.
 struct Variant {
-    /// The lower one; the present model if there is none.
+    /// The lower model; the present model if `None`.
     low: Option<Side>,
     high: Side,
-    /// Difference of the coefficient between them.
+    /// Difference of the coefficient between the two models.
     between: f64,
 }
 
 struct Side {
     model: GreyBox,
-    /// What acts, where it differs from what acts under the present model.
+    /// Acting deflections, if they differ from those under the present model.
     acting: Option<Acting>,
 }
 
-/// The present model with what its derivatives need.
+/// The present model with the perturbed models of its derivatives.
 pub(super) struct Neighbourhood {
     pub model: GreyBox,
-    /// What is unknown of each flight beside its sensors' constants.
+    /// Constants estimated for each flight beside those of its sensors.
     pub asked: PerFlight,
-    /// What acts under it.
+    /// Acting deflections under the present model.
     pub acting: Acting,
     variants: Vec<Variant>,
     late: [Acting; 2],
     blurred: [Acting; 2],
 }
 
-/// What acts in every flight under `model`.
+/// Acting deflections of every flight under `model`.
 pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place) -> Acting {
     moved(model, flights, place, SKEW, 0.0)
 }
 
-/// The same with the sensors' constant `which` greater `by` so much.
+/// The same with the sensor constant `which` increased by `by`.
 fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f64) -> Acting {
     let one = |(f, own): (&Flight, &Own)| {
         let mut s = own.sensors;
@@ -89,7 +88,7 @@ fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f
 }
 
 impl Neighbourhood {
-    /// The models around `place`.
+    /// Perturbed models around `place`.
     pub fn new(
         base: &GreyBox,
         free: &[Free],
@@ -117,20 +116,20 @@ impl Neighbourhood {
     }
 }
 
-/// A shot's normal equations in the free coefficients and what is its flight's own.
+/// Normal equations of a shot in the free coefficients and the constants of its flight.
 pub(super) struct Normal {
-    /// Information, after the initial state is eliminated.
+    /// Information matrix after elimination of the initial state.
     pub information: DMatrix<f64>,
-    /// Gradient, likewise.
+    /// Gradient after elimination of the initial state.
     pub gradient: DVector<f64>,
-    /// Inverse information of the initial state, its coupling to the rest, its gradient.
+    /// Inverse information of the initial state, its coupling to the other unknowns, its gradient.
     inverse: SMatrix<f64, 8, 8>,
     coupling: DMatrix<f64>,
     start_gradient: SVector<f64, 8>,
 }
 
 impl Normal {
-    /// The best change of the initial state when the rest changes by `step`.
+    /// Optimal change of the initial state for a change `step` of the other unknowns.
     pub fn start_step(&self, step: &DVector<f64>) -> [f64; 8] {
         let moved = self.coupling.transpose() * step;
         let gradient = SVector::<f64, 8>::from_fn(|i, _| self.start_gradient[i] + moved[i]);
@@ -139,14 +138,14 @@ impl Normal {
     }
 }
 
-/// Half the weighted sum of squares of a shot, errors of its initial state included.
+/// Half the weighted sum of squares of a shot, the errors of its initial state included.
 pub(super) fn cost(shot: &Shot, residuals: &[[f64; 8]], start: &[f64; 8], w: &Weights) -> f64 {
     let square = |x: &[f64; 8], w: &[f64; 8]| (0..8).map(|k| w[k] * x[k] * x[k]).sum::<f64>();
     let output: f64 = residuals.iter().map(|r| square(r, &w.output)).sum();
     0.5 * (shot.weight * output + square(start, &w.start))
 }
 
-/// `model` with the trims of a flight, which have joined it if there are any.
+/// `model` with the flight's trims, if the trim terms are part of it.
 pub(super) fn of_flight<'a>(model: &'a GreyBox, own: &Own) -> Cow<'a, GreyBox> {
     if own.trims.iter().all(|trim| *trim == 0.0) {
         return Cow::Borrowed(model);
@@ -156,7 +155,7 @@ pub(super) fn of_flight<'a>(model: &'a GreyBox, own: &Own) -> Cow<'a, GreyBox> {
     Cow::Owned(of_flight)
 }
 
-/// The run of a shot whose flight has `own`, as residuals.
+/// Residuals of the free run of a shot whose flight has the constants `own`.
 pub(super) fn run(
     model: &GreyBox,
     controls: &Acting,
@@ -172,8 +171,8 @@ pub(super) fn run(
     shooting::residuals(flight, shot, own, &model.scale(), &path)
 }
 
-/// Derivatives of the residuals of shot number `index`: columns for the free coefficients, what is unknown of its
-/// flight and its initial state, eight rows a sample.
+/// Derivatives of the residuals of shot `index`: columns for the free coefficients, the flight's constants and its
+/// initial state; eight rows for each sample.
 pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],
@@ -229,7 +228,7 @@ pub(super) fn jacobian(
     j
 }
 
-/// The normal equations of a shot whose residuals have the derivatives `jacobian`.
+/// Normal equations of a shot from `jacobian`, the derivatives of its residuals.
 pub(super) fn normal(
     jacobian: &DMatrix<f64>,
     residuals: &[[f64; 8]],
@@ -246,7 +245,7 @@ pub(super) fn normal(
     eliminate(&j, &r, from, w)
 }
 
-/// The offsets of the sensors: what they add, less what they take from the initial state.
+/// Columns of the sensors' offsets: their direct part less their effect through the initial state.
 fn sensor_columns(
     j: &mut DMatrix<f64>,
     [count, starts]: [usize; 2],
@@ -267,7 +266,7 @@ fn sensor_columns(
     }
 }
 
-/// The angles of the measured axes, likewise, in the columns from `first` on.
+/// Columns of the misalignment angles, from `first` on, likewise.
 fn askew_columns(
     j: &mut DMatrix<f64>,
     [first, starts]: [usize; 2],

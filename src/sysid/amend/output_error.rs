@@ -1,9 +1,9 @@
-//! Output error by multi-step shooting: the coefficients whose free runs stay with the flights.
+//! Output-error estimation by multiple shooting: fits the coefficients so that free runs follow the flights.
 //!
-//! Each shot starts from a reconstructed state whose error is an unknown of its own, eliminated from
-//! the normal equations; the sensors' remaining biases and the actuators' delay are unknowns of each
-//! flight. Residuals are weighted by their own variance and, all alike, by how long they hang together,
-//! both estimated along. Priors are Gaussian, with [`Named::width`](greylag_model::Named::width).
+//! Each shot starts from a reconstructed state, whose error is an unknown eliminated from the normal equations; the
+//! sensors' remaining biases and the actuators' delay are unknowns of each flight. Residuals are weighted by their
+//! variance and by one common correlation length, both re-estimated during the search. Priors are Gaussian, with
+//! [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
 mod gauss_newton;
@@ -21,35 +21,35 @@ use super::result::{FittedFlight, Parameter};
 use super::shooting::{self, Shot};
 use crate::diagnose::search::clocks::{self, Clocks};
 use crate::per_flight::{PerFlight, trims};
-use crate::progress::{Cancelled, Progress, say};
+use crate::progress::{Cancelled, Progress, report};
 use greylag_model::GreyBox;
 use greylag_num::statistics::quantile;
 
-/// Shortest flight to fit to, s.
+/// Least usable duration of the flights, s.
 pub const LEAST_S: f64 = 10.0;
-/// Settled: no coefficient changes by more than this share of its standard deviation.
-const SETTLED: f64 = 0.03;
-/// Renewed derivatives that change no coefficient by more standard deviations than this are the last.
+/// Convergence tolerance: largest change of a coefficient in its standard deviations.
+const STEP_TOLERANCE: f64 = 0.03;
+/// Derivatives are renewed until the renewal changes no coefficient by more than this many standard deviations.
 const RENEWED: f64 = 0.1;
-/// The same for lengths before the last.
+/// The same tolerance for all shot lengths but the last.
 const NEAR: f64 = 5.0;
-/// Most steps under the same derivatives.
+/// Largest number of steps with the same derivatives.
 const INNER: usize = 6;
-/// Standard deviations of residuals assumed before any are known.
+/// Standard deviations of the residuals assumed at the start, in the units of the state.
 const COARSE: [f64; 8] = [0.02, 0.02, 0.4, 0.05, 0.05, 0.05, 0.02, 0.02];
-/// Standard deviations of a reconstructed state's errors, at least.
+/// Least standard deviations of a reconstructed state's errors, in the units of the state.
 const START: [f64; 8] = [3e-3, 3e-3, 0.15, 5e-3, 5e-3, 5e-3, 3e-3, 3e-3];
 
-/// What a fit is asked for.
+/// Options of a fit.
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    /// Ids of effects of the model that are new: their coefficients have no prior but their bounds.
+    /// Ids of the model's effects that are new: their coefficients have no prior but their bounds.
     pub added: Vec<String>,
-    /// Lengths of shots, s, one after the other.
+    /// Lengths of the shots, s, fitted one after the other.
     pub lengths_s: Vec<f64>,
-    /// Times that the derivatives may be renewed for the last length.
+    /// Largest number of renewals of the derivatives for the last length.
     pub renewals: usize,
-    /// What each flight has of its own beside its sensors' constants.
+    /// Constants estimated for each flight beside those of its sensors.
     pub per_flight: PerFlight,
 }
 
@@ -60,37 +60,37 @@ impl Default for FitOptions {
     }
 }
 
-/// A fitted model.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The model with the fitted coefficients.
     pub model: GreyBox,
     /// The coefficients that were free.
     pub parameters: Vec<Parameter>,
-    /// What was found of each flight.
+    /// Estimated constants of each flight.
     pub flights: Vec<FittedFlight>,
     /// Standard deviations of the residuals, in the order and the units of the state.
     pub residual_sd: [f64; 8],
-    /// Shots of the last length, and how many of them count less or were cut short.
+    /// Number of shots of the last length.
     pub shots: usize,
-    /// See `shots`.
+    /// Number of them that are down-weighted or cut short.
     pub weakened: usize,
-    /// What each shot of the last length leaves.
+    /// Residuals of each shot of the last length.
     pub(super) left: Vec<Left>,
-    /// What weighs it.
+    /// Weights of those residuals.
     pub(super) weights: Weights,
-    /// Iterations made.
+    /// Number of iterations made.
     pub iterations: usize,
-    /// What had not settled when the search ended, in words; its change widens all intervals.
+    /// The parameter that had not converged when the search ended, in words; all intervals are widened by its change.
     pub unsettled: Option<String>,
-    /// What the reader must know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
-/// What a shot leaves.
+/// Residuals of one shot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Left {
-    /// Flight, segment and first sample.
+    /// Indices of flight, segment and first sample.
     pub shot: [usize; 3],
     /// Sum of the squared residuals of each state.
     pub output: [f64; 8],
@@ -98,11 +98,11 @@ pub(super) struct Left {
     pub start: [f64; 8],
 }
 
-/// Fits the free coefficients of `model` to `flights`; `progress` hears what is being done.
+/// Fits the free coefficients of `model` to `flights`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-/// There is too little flight, nothing is free, nothing is excited, runs diverge at once, the search
-/// does not settle, or `progress` ended it.
+/// There is too little flight, nothing is free, nothing is excited, runs diverge at once, the search does not
+/// converge, or `progress` cancelled.
 pub fn fit(
     model: &GreyBox,
     flights: &[Flight],
@@ -120,7 +120,7 @@ pub fn fit(
         return Err(AmendError::NothingFree { model: name() });
     }
     let doing = format!("{}: equation error over {} flight(s)", model.name, flights.len());
-    say(progress, &doing, 0.0)?;
+    report(progress, &doing, 0.0)?;
     let clocks = match free.iter().any(|f| f.input && f.added) {
         true => clocks(model, &free, flights, options.per_flight),
         false => None,
@@ -140,7 +140,7 @@ pub fn fit(
         let doing = format!("{}: output error over {length_s} s", model.name);
         let share = 0.9 / options.lengths_s.len() as f64;
         let from = 0.1 + share * k as f64;
-        let step = |share_done: f64| say(progress, &doing, from + share * share_done);
+        let step = |share_done: f64| report(progress, &doing, from + share * share_done);
         step(0.0)?;
         if k == 0 {
             search.start_from_the_closer(&given, *length_s);
@@ -155,7 +155,8 @@ pub fn fit(
     search.finish(model)
 }
 
-/// The actuators' clocks with an effect on the deflections in the model, which free runs cannot tell from it.
+/// The actuators' delays estimated with an effect on the deflections in the model, since free runs cannot distinguish
+/// the two.
 fn clocks(
     model: &GreyBox,
     free: &[Free],
@@ -167,34 +168,34 @@ fn clocks(
     clocks::clocks(model, given, &flights, per_flight)
 }
 
-/// The free coefficients as `model` has them, within their bounds.
+/// Values of the free coefficients in `model`, limited to their bounds.
 fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
     let of = |f: &Free| model.coefficients()[f.index].value.clamp(f.bounds.0, f.bounds.1);
     free.iter().map(of).collect()
 }
 
-/// A search under way.
+/// State of a search.
 struct Search<'a> {
-    /// The model, with trims if they are asked for.
+    /// The model, with trim terms if trims are estimated.
     base: &'a GreyBox,
-    /// What is unknown of each flight beside its sensors' constants.
+    /// Constants estimated for each flight beside those of its sensors.
     asked: PerFlight,
     flights: &'a [Flight],
     free: Vec<Free>,
     shots: Vec<Shot>,
-    /// Derivatives of each shot's residuals, not always the newest.
+    /// Derivatives of each shot's residuals, which may be older than the present point.
     jacobians: Vec<DMatrix<f64>>,
-    /// Shots cut short because their runs leave the flight.
+    /// Number of shots cut short because their runs diverge.
     short: usize,
     place: Place,
     /// Prior means and standard deviations of the sensors' constants of each flight.
     expected: Vec<[[f64; 2]; SENSORS]>,
     weights: Weights,
     iterations: usize,
-    /// The last change in standard deviations, and of which coefficient.
+    /// Largest change of the last step in standard deviations, and the coefficient's index.
     change: (f64, usize),
-    /// Whether that change was only wanted: no part of it lowers the cost, as where a run that stalls or does not
-    /// makes the cost jump.
+    /// Whether that step was rejected: no fraction of it lowers the cost, for example where a run that stalls or does
+    /// not makes the cost jump.
     stuck: bool,
 }
 
@@ -209,7 +210,7 @@ impl<'a> Search<'a> {
         let expected: Vec<_> = flights.iter().map(|f| f.doubt).collect();
         let own = flights.iter().map(|f| Own::of(f.doubt.map(|[mean, _]| mean))).collect();
         let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
-        // samples of a coarse model's residual hang together for about a fifth of a second
+        // residuals of a coarse model are correlated over about a fifth of a second
         let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
         Search {
             base,
@@ -228,7 +229,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Begins with the actuators' clocks, late (s) with standard deviations, as they are known.
+    /// Sets the prior means (s) and standard deviations of the actuators' delays.
     fn set_clocks(&mut self, clocks: &[[f64; 2]]) {
         let flights = self.expected.iter_mut().zip(&mut self.place.own);
         for ((expected, own), [late, sd]) in flights.zip(clocks) {
@@ -237,7 +238,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Cuts the flights anew and shortens the shots that the present model cannot follow.
+    /// Cuts the flights into shots and shortens those that the present model cannot follow.
     fn shots_of(&mut self, length_s: f64) -> Result<(), AmendError> {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];
@@ -258,7 +259,7 @@ impl<'a> Search<'a> {
         self.short = 0;
         for (shot, reach) in self.shots.iter_mut().zip(&reach) {
             if *reach < shot.steps {
-                // short of where it leaves, the run still tells something
+                // short of where it leaves, the run still carries information
                 shot.steps = reach * 3 / 4;
                 self.short += 1;
             }
@@ -282,9 +283,9 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Iterates until nothing moves, weights included: the derivatives, which cost most, are renewed
-    /// once nothing moves under the old ones, until that changes nothing by more than `tolerance`
-    /// standard deviations. `step` hears the share of the renewals that is done.
+    /// Iterates to convergence, weights included. The derivatives, the most expensive part, are renewed once the
+    /// search has converged under the old ones, until a renewal changes nothing by more than `tolerance` standard
+    /// deviations. `step` receives the share of the renewals that is done.
     fn settle(
         &mut self,
         renewals: usize,
@@ -309,7 +310,7 @@ impl<'a> Search<'a> {
                 if self.change.0 < 3.0 || renewal + inner < 2 {
                     self.reweigh();
                 }
-                if !moved || self.change.0 < SETTLED {
+                if !moved || self.change.0 < STEP_TOLERANCE {
                     break;
                 }
             }
@@ -342,7 +343,7 @@ impl<'a> Search<'a> {
         self.shots.par_iter().zip(&place.starts).map(one).collect()
     }
 
-    /// Half the sum of all squares.
+    /// Half the sum of all weighted squares.
     fn cost(&self, place: &Place) -> f64 {
         let residuals = self.residuals_at(place);
         let data: f64 = (self.shots.iter().zip(&residuals).zip(&place.starts))

@@ -1,4 +1,4 @@
-//! The coefficients that a fit may change, with their priors, bounds and steps.
+//! The free coefficients of a fit, with their priors, bounds and steps.
 
 use greylag_model::{GreyBox, Named};
 use greylag_physics::catalogue;
@@ -6,65 +6,67 @@ use greylag_physics::effects::Description;
 use greylag_physics::formula::register;
 use greylag_physics::inputs;
 
-/// Coefficients of added effects that stay where they start: shares of a whole, which cannot be determined
-/// from the shape beside them.
+/// Coefficients of added effects that are held at their starting values: fractions that cannot be identified beside
+/// the shape they scale.
 const HELD: &[&str] = &["lift_stall.k"];
-/// Effects without a formula of their own (curves): their heights stay small where little was flown.
+/// Effects without a formula of their own (curves), whose ordinates have a narrow prior about zero where few data
+/// lie.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
-/// Prior width of a height of those effects, as a share of the range that is possible.
+/// Prior width of an ordinate of those effects, as a share of its range.
 const SLIGHT_SHARE: f64 = 0.1;
-/// Such an effect with the one whose shape it takes over: the constants of that formula stay as they are, since
-/// the curve can take up whatever they could.
+/// Pairs of such an effect and the effect whose shape it takes over: the constants of that formula are held, since
+/// the curve can represent any change of them.
 const TAKES_OVER: &[(&str, &str)] = &[("lift_curve", "lift_stall")];
-/// Step of a derivative in a coefficient of the prior, as a share of its prior width.
+/// Finite-difference step of a coefficient with a prior, as a share of its prior width.
 const STEP: f64 = 1e-3;
-/// Step of a derivative in a shape constant or that of an input effect, as a share of its value.
+/// Finite-difference step of a shape constant or of an input effect's constant, as a share of its value.
 const SHAPE_STEP: f64 = 0.02;
 /// Largest change of such a constant in one iteration, as a share of its value.
 const SHAPE_STRIDE: f64 = 0.4;
 
-/// A coefficient that the fit may change.
+/// A coefficient that the fit estimates.
 #[derive(Clone, Debug)]
 pub(super) struct Free {
-    /// Its place in the model's list.
+    /// Index in the model's list of coefficients.
     pub index: usize,
-    /// `effect.coefficient`.
+    /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
-    /// What it is, with its unit.
+    /// Meaning, with its unit.
     pub meaning: &'static str,
-    /// Value and standard deviation before the data is seen.
+    /// Prior mean and standard deviation.
     pub prior: f64,
     pub width: f64,
-    /// The physically possible values.
+    /// Physically possible range.
     pub bounds: (f64, f64),
-    /// Step of numerical derivatives.
+    /// Finite-difference step of its derivatives.
     pub step: f64,
     /// Largest change in one iteration.
     pub stride: f64,
     /// Whether the model is linear in it.
     pub linear: bool,
-    /// Whether it belongs to an effect between measured deflections and what acts.
+    /// Whether it belongs to an input effect, between measured and acting deflections.
     pub input: bool,
-    /// Whether it changes what acts for given measured deflections, or what a formula remembers of them.
+    /// Whether it changes the acting deflections for given measured ones, or the state of a formula's lags and
+    /// delays.
     pub acting: bool,
     /// Whether it belongs to an effect that is being added.
     pub added: bool,
 }
 
-/// What is known of the effect `id`, and whether it acts on inputs.
+/// Description of the effect `id`, and whether it is an input effect.
 pub(super) fn describe(id: &str) -> Option<(Description, bool)> {
     catalogue::describe(id).map(|about| (about, inputs::Kind::from_id(id).is_some()))
 }
 
-/// Whether `id` is an effect of a file with a lag or delay.
+/// Whether `id` is an effect of a file with a `lag(…)` or `delay(…)` term.
 fn remembers(id: &str) -> bool {
     register::find(id).is_some_and(|effect| !effect.memories().is_empty())
 }
 
-/// The coefficients of `model` that may change when `added` are the ids of new effects.
+/// The free coefficients of `model`; `added` are the ids of new effects.
 ///
-/// A coefficient of the prior is held if its width is zero; one of a new effect has no prior but its
-/// bounds, or a share of them. Constants of a formula whose shape a curve takes over are held.
+/// A coefficient with a prior is held if its width is zero; one of a new effect has no prior but its bounds, or a
+/// share of them. Constants of a formula whose shape a curve takes over are held.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -109,8 +111,8 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
         .collect()
 }
 
-/// `model` with nothing known of its coefficients beforehand but what is physically possible: the prior of every
-/// coefficient that the model is linear in is as wide as its bounds, zero or not.
+/// `model` with physical bounds as its only prior: every coefficient that the model is linear in has a prior as wide
+/// as its bounds, zero or not.
 pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     let linear = model.linear();
     let names: Vec<&str> = model.coefficients().iter().map(|c| c.name.as_str()).collect();
@@ -125,7 +127,7 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     model.clone().with_widths(range)
 }
 
-/// Coefficients of `model` that no fit changes: they are zero and their file states no standard deviation.
+/// Coefficients of `model` that no fit changes, because they are zero and their file states no standard deviation.
 pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     let held = model.coefficients().iter().filter(|c| c.width() == 0.0 && c.sd.is_none());
     let known =
@@ -150,8 +152,8 @@ pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
     changed
 }
 
-/// The models beside `values` in coefficient `place`, the difference between them: on both sides of it
-/// for what the model is not linear in, else one side and `None`, the present model.
+/// The models perturbed in coefficient `place` of `values`, and the difference between them: central for coefficients
+/// that the model is not linear in, else one-sided with `None` for the present model.
 pub(super) fn beside(
     model: &GreyBox,
     free: &[Free],

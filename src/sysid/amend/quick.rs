@@ -1,4 +1,4 @@
-//! What is known of an effect at once, before free runs have fitted it.
+//! Quick estimates by equation error, before free runs have been fitted.
 
 use rayon::prelude::*;
 
@@ -14,19 +14,19 @@ use crate::flight_path::reconstruction::Reconstruction;
 use crate::progress::Progress;
 use greylag_model::GreyBox;
 
-/// A model by equation error alone: forces and moments fitted, no free run.
+/// A model estimated by equation error alone, from forces and moments without free runs.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// The model.
+    /// The estimated model.
     pub model: GreyBox,
     /// Its free-run errors on the flights held out, at the horizons of [`Options`].
     pub after: Vec<HorizonScore>,
 }
 
-/// `model` tuned to `flights`, no effect added: what [`Options::tuned`] takes.
+/// Tunes `model` to `flights`, no effect added: the value of [`Options::tuned`].
 ///
 /// # Errors
-/// The flights do not allow a fit, or `progress` ended it.
+/// The flights do not allow a fit, or `progress` cancelled.
 pub fn tune(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -35,7 +35,7 @@ pub fn tune(
     output_error::fit(model, &ready(model, flights)?, &FitOptions::default(), progress)
 }
 
-/// `model` with `effects` by equation error over `flights`, and how its free runs do on `held_out`.
+/// Estimates `model` with `effects` by equation error over `flights` and scores its free runs on `held_out`.
 ///
 /// # Errors
 /// An effect cannot join the model, or a flight has no clock.
@@ -59,7 +59,7 @@ pub fn estimate(
     Ok(Estimate { model, after })
 }
 
-/// The flights as a fit takes them.
+/// The flights prepared for a fit.
 fn ready(model: &GreyBox, flights: &[Reconstruction]) -> Result<Vec<Flight>, AmendError> {
     let slowest = model.airframe.envelope.flying_from_mps();
     Ok(flights.par_iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?)

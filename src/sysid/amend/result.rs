@@ -1,4 +1,4 @@
-//! What an amendment says, as it goes into JSON (`greylag.amend/1`).
+//! The result of an amendment, serialized to JSON (`greylag.amend/1`).
 
 use serde::Serialize;
 
@@ -8,81 +8,81 @@ use super::judge::{judged, judged_at};
 use crate::compare::{Answer, HorizonScore};
 use crate::per_flight::{Constant, PerFlight};
 
-/// Share by which the error of unseen flights must rise for a fit to be worse than the model as given.
+/// Relative rise of the held-out error above which the fit is worse than the model as given.
 const WORSE: f64 = 0.01;
 
-/// A fitted coefficient.
+/// A fitted coefficient with its prior and its uncertainty.
 #[derive(Clone, Debug, Serialize)]
 pub struct Parameter {
-    /// `effect.coefficient`, as in the model file.
+    /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
-    /// What it is, with its unit.
+    /// Meaning, with its unit.
     pub meaning: &'static str,
-    /// Whether it belongs to an effect that was added.
+    /// Whether it belongs to an added effect.
     pub added: bool,
     /// Value before the fit.
     pub prior: f64,
-    /// Its standard deviation as a prior; for an added effect, the width of its bounds.
+    /// Prior standard deviation; for an added effect, the width of its bounds.
     pub prior_sd: f64,
-    /// The fitted value.
+    /// Estimate, in the coefficient's unit.
     pub value: f64,
-    /// Its standard deviation.
+    /// Posterior standard deviation of `value`.
     pub sd: f64,
-    /// Its 95 % interval.
+    /// 95 % interval of `value`.
     pub ci95: [f64; 2],
-    /// Whether it stands at a bound of what is physically possible.
+    /// Whether the estimate is at a bound of what is physically possible.
     pub at_bound: bool,
-    /// What each flight alone says of it, to first order.
+    /// Estimates of each flight alone, to first order.
     pub by_flight: Vec<FlightEstimate>,
-    /// The coefficient of the model itself that says nearly the same as this one of an added effect (errors
-    /// correlated beyond 0.9), if there is one.
+    /// The model's own coefficient that this one of an added effect is confounded with (error correlation beyond
+    /// 0.9), if there is one.
     pub same_as: Option<String>,
 }
 
-/// One flight's say on a coefficient.
+/// One flight's estimate of a coefficient.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightEstimate {
-    /// The flight.
+    /// Name of the flight.
     pub flight: String,
-    /// The value.
+    /// Estimate from this flight and the prior.
     pub value: f64,
-    /// Its standard deviation, the prior's included.
+    /// Standard deviation of `value`, the prior included.
     pub sd: f64,
 }
 
-/// What was found of one flight's sensors.
+/// Estimated constants of one flight.
 #[derive(Clone, Debug, Serialize)]
 pub struct FittedFlight {
-    /// The flight.
+    /// Name of the flight.
     pub flight: String,
-    /// Seconds used.
+    /// Duration of the data used, s.
     pub seconds: f64,
-    /// How late its actuators are recorded, s, with standard deviation.
+    /// Delay of the recorded actuators, s, and its standard deviation.
     pub actuators_late_s: [f64; 2],
-    /// What was left of its airspeed's scale, a share, with standard deviation.
+    /// Remaining scale error of its airspeed (relative), and its standard deviation.
     pub airspeed_scale: [f64; 2],
-    /// Likewise the angle-of-attack vane's bias, rad.
+    /// Remaining bias of the angle-of-attack vane, rad, and its standard deviation.
     pub alpha_bias_rad: [f64; 2],
-    /// Likewise the sideslip vane's bias, rad.
+    /// Remaining bias of the sideslip vane, rad, and its standard deviation.
     pub beta_bias_rad: [f64; 2],
-    /// What it has of its own beside them, where that was asked for.
+    /// Its trims and misalignment angles, where they were estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub own: Vec<OwnConstant>,
 }
 
-/// A trim of one flight, or an angle by which its measured axes are turned.
+/// A trim of one flight, or a misalignment angle of its measured axes.
 #[derive(Clone, Debug, Serialize)]
 pub struct OwnConstant {
     /// `askew_roll`, `askew_pitch`, `askew_yaw` (rad), or one of the trims `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`,
     /// `thrust_share` (dimensionless), which are added to the model's coefficients in this flight.
     pub name: &'static str,
-    /// Its standard deviation as a prior, about zero.
+    /// Prior standard deviation, about zero.
     pub prior_sd: f64,
-    /// Its value.
+    /// Estimate, in the unit of `name`.
     pub value: f64,
-    /// Its standard deviation, what is not sure of the model's coefficient included.
+    /// Standard deviation of `value`, the uncertainty of the model's own coefficient included.
     pub sd: f64,
-    /// The same less the mean of all flights, with its standard deviation; `None` of a single flight.
+    /// Estimate less the mean of all flights, and its standard deviation; `None` for a single flight.
     pub beside_mean: Option<[f64; 2]>,
 }
 
@@ -111,22 +111,22 @@ impl FittedFlight {
     }
 }
 
-/// An effect that was asked for.
+/// The outcome for a requested effect.
 #[derive(Clone, Debug, Serialize)]
 pub struct AddedEffect {
-    /// Its id.
+    /// Identifier of the effect.
     pub id: String,
-    /// What it is, in one sentence.
+    /// Description of the effect, in one sentence.
     pub description: &'static str,
-    /// Whether the amended model has it.
+    /// Whether it joined the amended model.
     pub joined: bool,
-    /// Why the data refuse it; empty if they do not.
+    /// Reasons of the data to refuse it; empty if there are none.
     pub refused: Vec<String>,
-    /// What to fly so that the data decide.
+    /// Manoeuvre that would let the data decide.
     pub fly_next: String,
 }
 
-/// What an amendment was asked for.
+/// Settings of an amendment.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
     /// Lengths of shots, s.
@@ -135,50 +135,50 @@ pub struct Settings {
     pub horizons_s: Vec<f64>,
     /// Horizon at which improvement is judged, s.
     pub judged_at_s: f64,
-    /// What each flight had of its own.
+    /// Constants estimated for each flight.
     #[serde(flatten)]
     pub per_flight: PerFlight,
 }
 
-/// An amended model's story.
+/// The result of an amendment.
 #[derive(Clone, Debug, Serialize)]
 pub struct Amendment {
-    /// `greylag.amend/1`.
+    /// Schema of the document, `greylag.amend/1`.
     pub schema: &'static str,
     /// Version of the program.
     pub version: &'static str,
-    /// Name of the model before.
+    /// Name of the model as given.
     pub model: String,
-    /// The answer in a few sentences, with their numbers.
+    /// Short answer in sentences, with their numbers.
     pub answer: Answer,
-    /// The story in plain sentences.
+    /// Result in plain sentences.
     pub sentences: Vec<String>,
-    /// The effects that were asked for.
+    /// Outcome for each requested effect.
     pub effects: Vec<AddedEffect>,
-    /// The conventions that were tried.
+    /// Conventions that were tried.
     pub conventions: Vec<Tried>,
-    /// Every coefficient that was free, with the effects.
+    /// All free coefficients of the final model, those of effects included.
     pub parameters: Vec<Parameter>,
-    /// The prior's coefficients when tuned without the effects.
+    /// Coefficients of the model tuned without effects.
     pub tuned: Vec<Parameter>,
-    /// What was found of the flights' sensors.
+    /// Estimated constants of each flight.
     pub flights: Vec<FittedFlight>,
-    /// Names of the flights that the fit never saw.
+    /// Names of the held-out flights.
     pub held_out: Vec<String>,
-    /// Free-run errors on them: of the model as given,
+    /// Held-out free-run errors of the model as given.
     pub given: Vec<HorizonScore>,
-    /// with its coefficients tuned,
+    /// Held-out free-run errors with its coefficients tuned.
     pub before: Vec<HorizonScore>,
-    /// with the effects.
+    /// Held-out free-run errors with the effects added.
     pub after: Vec<HorizonScore>,
-    /// What the reader must know besides.
+    /// Further notes for the reader.
     pub notes: Vec<String>,
-    /// What was asked for.
+    /// Settings of the amendment.
     pub settings: Settings,
 }
 
 impl Amendment {
-    /// Why the model as given is to be kept, in a sentence: the fit flies flights that it did not see worse.
+    /// Why the model as given is to be kept, in a sentence: the fit predicts held-out flights worse.
     pub fn worse(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
         (after > (1.0 + WORSE) * given || after.is_nan()).then(|| {
@@ -190,7 +190,7 @@ impl Amendment {
         })
     }
 
-    /// Whether effects were asked for and none of them joined the model.
+    /// Whether effects were requested and none of them joined.
     pub fn all_refused(&self) -> bool {
         !self.effects.is_empty() && !self.effects.iter().any(|e| e.joined)
     }

@@ -10,21 +10,21 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Memory};
 use greylag_physics::{Controls, State};
 
-/// A run whose scaled error exceeds this has left the flight.
+/// A run has diverged once its scaled error exceeds this.
 const LEFT: f64 = 0.7;
-/// Shortest shot worth flying, s.
+/// Shortest shot that is fitted, s.
 pub(super) const SHORTEST_S: f64 = 0.4;
 
-/// A stretch that the model flies freely.
+/// A shot: a stretch of a flight that the model flies freely.
 #[derive(Clone, Debug)]
 pub(super) struct Shot {
     pub flight: usize,
     pub segment: usize,
     /// Its first sample in the segment.
     pub start: usize,
-    /// Samples that it is compared on, those after the first.
+    /// Number of compared samples, those after the first.
     pub steps: usize,
-    /// Weight, 1 for a shot that the model can follow.
+    /// Weight in the cost; 1 for a shot that the model can follow.
     pub weight: f64,
 }
 
@@ -50,8 +50,8 @@ pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
     shots
 }
 
-/// The controls that act during each model step of each segment of a flight under `model`, the record being late and blurred as
-/// `sensors` say.
+/// Deflections that act during each model step of each segment of a flight under `model`, the record corrected for
+/// the delay and blur in `sensors`.
 pub(super) fn acting(
     model: &GreyBox,
     flight: &Prepared,
@@ -61,7 +61,7 @@ pub(super) fn acting(
     flight.segments.iter().map(|segment| act(model, flight, segment, record)).collect()
 }
 
-/// The controls that act during each model step of a segment, `substeps` of them a sample.
+/// Deflections that act during each model step of a segment, `substeps` steps for each sample.
 fn act(
     model: &GreyBox,
     flight: &Prepared,
@@ -82,7 +82,8 @@ fn act(
     (0..segment.len() * flight.substeps).map(one).collect()
 }
 
-/// The controls at `place` (samples), by cubic interpolation, whose slope in the place has no steps, less `blur` times the second difference, which a mean over that time has added.
+/// Deflections at `place` (samples) by cubic interpolation, whose derivative is continuous, less `blur` times the
+/// second difference, which undoes the recording's average.
 fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     let last = segment.len() as f64 - 1.0;
     let place = place.clamp(0.0, last);
@@ -104,7 +105,7 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     }
 }
 
-/// What a unit of each angle by which the measured axes are turned adds to the state.
+/// Change of the state for a unit of each misalignment angle.
 pub(super) fn turned(flight: &Prepared, state: &[f64; 8]) -> [[f64; 8]; askew::NAMES.len()] {
     let [roll, pitch, _, p, q, r, alpha, beta] = *state;
     let attitude = askew::attitude(roll, pitch);
@@ -115,7 +116,7 @@ pub(super) fn turned(flight: &Prepared, state: &[f64; 8]) -> [[f64; 8]; askew::N
     })
 }
 
-/// What a flight's sensors add to the state, their constants and axes being those of `own`.
+/// Offsets that a flight's sensors add to the state, with the constants and axes of `own`.
 pub(super) fn offset(flight: &Prepared, own: &Own, state: &[f64; 8]) -> [f64; 8] {
     let sensors = &own.sensors;
     let mut offset = [0.0; 8];
@@ -131,14 +132,14 @@ pub(super) fn offset(flight: &Prepared, own: &Own, state: &[f64; 8]) -> [f64; 8]
     offset
 }
 
-/// The state in which a shot starts: as reconstructed, less what the sensors add, plus `from`.
+/// Initial state of a shot: the reconstruction, less the sensors' offsets, plus `from`.
 pub(super) fn start(shot: &Shot, flight: &Prepared, own: &Own, from: &[f64; 8]) -> [f64; 8] {
     let measured = flight.segments[shot.segment][shot.start].state.to_array();
     let offset = offset(flight, own, &measured);
     std::array::from_fn(|k| measured[k] - offset[k] + from[k])
 }
 
-/// The states of a run after each sample; shorter than the shot if it leaves the flight.
+/// States of a run after each sample; fewer than the shot's samples if the run diverges.
 pub(super) fn fly(
     model: &GreyBox,
     flight: &Prepared,
@@ -175,15 +176,15 @@ pub(super) fn fly(
     path
 }
 
-/// Predicted − measured; roll the short way round. Weak form and report take the opposite sign.
+/// Predicted − measured, roll wrapped to ±π. Weak form and report use the opposite sign.
 pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error
 }
 
-/// Predicted − measured after each sample of a shot, sensors' constants included; where a run has left
-/// the flight, its last error stays. `scale` is x_c.
+/// Predicted − measured after each sample of a shot, the sensors' offsets included; after divergence the last error
+/// is held. `scale` is x_c.
 pub(super) fn residuals(
     flight: &Prepared,
     shot: &Shot,

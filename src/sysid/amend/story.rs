@@ -5,7 +5,7 @@ use super::judge::{judged, judged_at};
 use super::result::Amendment;
 use crate::per_flight::PerFlight;
 
-/// The amendment in words: what became of the error, of the conventions, and of every effect.
+/// The amendment in sentences: the change of the error, the conventions, and the outcome for every effect.
 pub fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
     let (given, before, after) =
@@ -57,7 +57,7 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     all
 }
 
-/// What becomes of `asked`, which each flight has of its own, outside the fit; nothing if nothing was asked for.
+/// Effect of the constants `asked` of each flight outside the fit; `None` if there are none.
 pub fn apart(asked: &PerFlight) -> Option<String> {
     let what = match (asked.has_trims(), asked.angles() > 0) {
         (false, false) => return None,

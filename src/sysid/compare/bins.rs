@@ -1,4 +1,4 @@
-//! Mean residuals over the regime variables, each with its interval and its support.
+//! Mean residuals over the regime variables, with intervals and support.
 
 use super::bootstrap::{self, BLOCK_S, Block};
 use super::doubt::{self, NORMAL_95, Shift};
@@ -10,31 +10,31 @@ use greylag_num::statistics::{mean, quantile};
 
 /// Fewest independent samples that support a bin.
 pub const SUPPORT: usize = 20;
-/// Number of bins aimed at between the outermost edges.
+/// Number of bins intended between the outermost edges.
 const BINS: f64 = 8.0;
-/// The same for each side of the α–β map.
+/// Number of bins intended along each side of the α–β map.
 const MAP_BINS: f64 = 10.0;
 
-/// A window's residual with its place, over all flights.
+/// Residual of a window with its regime, over all flights.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
     /// Measured − model, in the channel's unit.
     pub value: f64,
-    /// Measured.
+    /// Measured value, in the channel's unit.
     pub measured: f64,
-    /// Index of the flight.
+    /// Index of the window's flight.
     pub flight: usize,
-    /// Number of the block of the bootstrap, ascending.
+    /// Index of its bootstrap block, ascending.
     pub block: usize,
-    /// Its place in the order of [`RegimeVariable::CONTINUOUS`].
+    /// Values of the regime variables, in the order of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
-    /// Independent samples that it stands for: the stride over the kernel's length.
+    /// Number of independent samples it represents: the stride over the kernel's length.
     pub weight: f64,
-    /// How far one standard deviation of each of the flight's sensor errors moves it.
+    /// Change of the residual for one standard deviation of each of the flight's sensor errors.
     pub shift: Shift,
 }
 
-/// The finite residuals of `channel` over all flights; `series` and `shifts` hold a list a flight.
+/// The finite residuals of `channel` over all flights; `series` and `shifts` hold one list for each flight.
 pub fn residuals(
     channel: ChannelId,
     flights: &[Prepared],
@@ -64,13 +64,13 @@ pub fn residuals(
     all
 }
 
-/// Independent samples in `residuals`.
+/// Number of independent samples in `residuals`.
 pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
 
-/// Mean residual and its 95 % interval: block bootstrap, widened by what the sensor errors may be off;
-/// `path` names the bootstrap's random stream.
+/// Mean residual and its 95 % interval: block bootstrap, widened by the uncertainty of the sensor errors; `path`
+/// selects the bootstrap's random stream.
 pub fn mean_interval<'a>(
     residuals: impl Iterator<Item = &'a Residual> + Clone,
     seed: u64,
@@ -86,7 +86,7 @@ pub fn mean_interval<'a>(
     (mean, [mean - (mean - low).hypot(doubt), mean + (high - mean).hypot(doubt)])
 }
 
-/// Bins over every variable that the flights vary.
+/// Bins over every variable that varies in the flights.
 pub fn all(
     residuals: &[Residual],
     flights: &[Prepared],
@@ -150,7 +150,7 @@ fn by_flight(residuals: &[Residual], flights: &[Prepared], seed: u64, channel: u
     }
 }
 
-/// A bin's numbers; its edges are the caller's.
+/// Statistics of a bin; the caller sets its edges.
 fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     let (mean, interval) = mean_interval(members.iter().copied(), seed, path);
     let independent = independent(members.iter().copied());
@@ -168,7 +168,7 @@ fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     }
 }
 
-/// Share of the variance that the groups' means explain, adjusted for the number of groups.
+/// Share of the variance that the group means explain, adjusted for the number of groups.
 fn explained(groups: &[Vec<&Residual>]) -> f64 {
     let total: Vec<f64> = groups.iter().flatten().map(|r| r.value).collect();
     let squares = |of: &[f64]| {
@@ -184,13 +184,13 @@ fn explained(groups: &[Vec<&Residual>]) -> f64 {
     if share.is_finite() && count > k { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The share of values that each end bin takes: enough to be supported, 2 to 20 %.
+/// Share of the samples in each end bin: enough for support, within 2 to 20 %.
 fn tail(independent: usize) -> f64 {
     (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
 }
 
-/// Share of the variance that a straight line over `values` explains: bins are coarse where a few
-/// far values carry the error.
+/// Share of the variance that a straight line over `values` explains; bins are too coarse where a few extreme values
+/// carry the error.
 fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     let (mx, my) =
         (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
@@ -205,8 +205,8 @@ fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     if share.is_finite() && count > 2.0 { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Round edges that cut what lies between the quantiles `tail` and 1 − `tail` into about `bins`
-/// bins; `None` if it does not vary.
+/// Round edges that divide the range between the quantiles `tail` and 1 − `tail` into about `bins` bins; `None` for a
+/// constant variable.
 fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
     let (low, high) = (quantile(values, tail), quantile(values, 1.0 - tail));
     let width = round_width((high - low) / bins);
@@ -261,7 +261,7 @@ pub fn map(residuals: &[Residual]) -> Map {
     Map { alpha_deg: alpha, beta_deg: beta, cells }
 }
 
-/// Edges of one side of the map, the outermost beyond all values (at least one cell).
+/// Edges of one side of the map; the outermost enclose all values, with at least one cell.
 fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
     let mut edges = edges(&values, MAP_BINS, 0.02).filter(|e| e.len() > 1).unwrap_or_default();

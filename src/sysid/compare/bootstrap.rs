@@ -7,19 +7,19 @@ use greylag_num::stream::stream;
 
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 1.0;
-/// Number of resamples.
+/// Number of bootstrap resamples.
 pub const RESAMPLES: usize = 500;
 
-/// A block's share in a bin: sum and number of its samples.
+/// A block's contribution to a bin: sum and number of its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Block {
     /// Sum of the samples.
     pub sum: f64,
-    /// Their number.
+    /// Number of the samples.
     pub count: f64,
 }
 
-/// Gathers `(block, value)`, blocks ascending, into blocks.
+/// Groups pairs `(block, value)`, ascending in block, into blocks.
 pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     let mut current = None;
@@ -36,8 +36,8 @@ pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     blocks
 }
 
-/// The 95 % interval of the mean over `blocks` resampled as wholes; `seed` and `path` name the
-/// random stream. NaN for fewer than two blocks.
+/// 95 % percentile interval of the mean by resampling whole `blocks`; `seed` and `path` select the random stream. NaN
+/// for fewer than two blocks.
 pub fn interval(blocks: &[Block], seed: u64, path: &[u64]) -> [f64; 2] {
     if blocks.len() < 2 {
         return [f64::NAN; 2];

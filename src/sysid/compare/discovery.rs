@@ -1,18 +1,17 @@
-//! In which cells a model fails, the share of false discoveries among them controlled.
+//! Cells in which a model fails, with a controlled false discovery rate.
 //!
-//! A cell is a channel in a bin of a regime variable. A model has some hundred cells, of which one in twenty
-//! lies outside of its own 95 % interval by chance. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57,
-//! 1995, p. 289) keeps the expected share of such cells among those named at the level that is asked for;
-//! cells that share windows depend positively on one another, which it allows (Benjamini and Yekutieli, Ann.
-//! Stat. 29, 2001, p. 1165).
+//! A cell is a channel in a bin of a regime variable. A model has some hundred cells, of which one in twenty lies
+//! outside of its own 95 % interval by chance. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p.
+//! 289) keeps the expected share of such cells among those named at the given level; cells that share windows depend
+//! positively on one another, which it allows (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p. 1165).
 
 use super::doubt::NORMAL_95;
 use super::result::{Bin, RegimeBins};
 
-/// Expected share of false ones among the cells that are named.
+/// False discovery rate among the cells reported as failing.
 pub const FALSE_SHARE: f64 = 0.05;
 
-/// Gives every supported cell of a model its q-value; the others keep NaN.
+/// Computes the q-value of every supported cell of a model; the others keep NaN.
 pub fn control(channels: &mut [Vec<RegimeBins>]) {
     let mut cells: Vec<&mut Bin> = channels
         .iter_mut()
@@ -34,8 +33,8 @@ pub fn found(bin: &Bin) -> bool {
     bin.q_value <= FALSE_SHARE
 }
 
-/// Two-sided: how probable a mean so far from zero is by chance, taking the interval's half that faces zero
-/// for 1.96 standard deviations of a normal distribution.
+/// Two-sided p-value of a zero mean, taking the half of the interval that faces zero as 1.96 standard deviations of a
+/// normal distribution.
 fn p_value(bin: &Bin) -> f64 {
     let [low, high] = bin.interval;
     let half = if bin.mean > 0.0 { bin.mean - low } else { high - bin.mean };

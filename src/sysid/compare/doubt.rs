@@ -1,8 +1,8 @@
-//! What the uncertainty of a flight's sensor errors does to each channel's residual.
+//! Effect of uncertain sensor errors on each channel's residual.
 //!
-//! A bias that the reconstruction took out too much or too little moves every window of its flight
-//! alike, so no bootstrap over windows sees it. The constants are taken as independent of one
-//! another, with the standard deviations that the reconstruction gives them.
+//! An error of a bias estimated by the reconstruction shifts every window of its flight alike, so a bootstrap over
+//! windows does not cover it. The constants are taken as independent, with the standard deviations of the
+//! reconstruction.
 
 use crate::flight_path::reconstruction::{Instant, Nuisance};
 use crate::weak_form::channels::ChannelId;
@@ -15,10 +15,10 @@ use greylag_physics::{Controls, State};
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
 
-/// What an error of so many units does to an instant; the change of the controls with time comes along, 1/s.
+/// Applies an error of the given size to an instant; receives the rate of the controls, 1/s.
 type Move = fn(&mut Instant, &Controls, f64);
 
-/// The constants that move a residual.
+/// Sensor constants that shift a residual.
 const CONSTANTS: [(&str, Move); COUNT] = [
     ("gyro_bias_p", |i, _, by| i.state.p += by),
     ("gyro_bias_q", |i, _, by| i.state.q += by),
@@ -38,16 +38,16 @@ const CONSTANTS: [(&str, Move); COUNT] = [
         i.controls.rudder += rate.rudder * by;
     }),
 ];
-/// How many constants there are.
+/// Number of those constants.
 pub const COUNT: usize = 12;
 
-/// How far one standard deviation of each constant moves a residual, in the channel's unit.
+/// Shift of a residual for one standard deviation of each constant, in the channel's unit.
 pub type Shift = [f64; COUNT];
 
-/// The shifts of every channel's residual, `[window][channel]` in the order of [`ChannelId::ALL`].
+/// Shifts of every channel's residual, `[window][channel]` in the order of [`ChannelId::ALL`].
 ///
-/// Worked out at the middle of each window, where the kernel is heaviest. Zero for a constant that
-/// `nuisances` does not hold.
+/// They are evaluated at the middle of each window, where the kernel is largest. Zero for a constant that `nuisances`
+/// does not hold.
 pub fn shifts(
     model: &GreyBox,
     flight: &Prepared,
@@ -78,7 +78,7 @@ pub fn shifts(
     flight.windows.iter().map(|window| of_window(flight.samples(window))).collect()
 }
 
-/// How fast the controls change at sample `k`, 1/s: the central difference.
+/// Rates of the controls at sample `k`, 1/s, by central difference.
 fn controls_rate(samples: &[Instant], k: usize) -> Controls {
     let (a, b) = (&samples[k.saturating_sub(1)], &samples[(k + 1).min(samples.len() - 1)]);
     let time = b.time_s - a.time_s;
@@ -92,8 +92,8 @@ fn controls_rate(samples: &[Instant], k: usize) -> Controls {
     }
 }
 
-/// Standard deviation that the constants bring into a mean of residuals, given their shifts with
-/// the flight of each: within a flight they add up, between flights they are independent.
+/// Standard deviation that the constants add to a mean of residuals, from pairs of flight and shift: shifts add up
+/// within a flight and are independent between flights.
 pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     let mut sums: Vec<Shift> = Vec::new();
     let mut count = 0.0;
@@ -108,7 +108,7 @@ pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     if square.is_finite() { square.sqrt() } else { 0.0 }
 }
 
-/// Root mean square over windows of what the constants bring into a residual, all together.
+/// Root mean square over windows of the residual's standard deviation from all constants.
 pub fn level<'a>(shifts: impl Iterator<Item = &'a Shift>) -> f64 {
     let squares: Vec<f64> = shifts.map(|s| s.iter().map(|x| x * x).sum()).collect();
     if squares.is_empty() { 0.0 } else { mean(&squares).sqrt() }

@@ -1,4 +1,5 @@
-//! The worst regime of a channel: the variable that tells it apart, with the range that fails.
+//! The worst regime of a channel: the variable that best separates the residual, with the range in which the model
+//! fails.
 
 use super::bins::{self, Residual, SUPPORT};
 use super::discovery;
@@ -6,36 +7,36 @@ use super::result::{Bin, Regime, RegimeBins};
 use crate::weak_form::channels::RegimeVariable;
 use crate::weak_form::prepared::Prepared;
 
-/// A variable that explains less of the residual's variance than this tells nothing apart.
+/// A variable must explain at least this share of the residual's variance to define a regime.
 const SHARE_FLOOR: f64 = 0.1;
-/// Time, altitude and flight are named only if they explain this much more than any other variable.
+/// Time, altitude and flight must explain this much more than any other variable to define a regime.
 const CIRCUMSTANCE_MARGIN: f64 = 0.15;
 /// A residual follows a variable that explains at least this much of its variance.
 const FOLLOWS: f64 = 0.5;
 /// A bin belongs to the worst range if its mean is at least this part of the worst bin's.
 const RANGE_PART: f64 = 0.5;
-/// Fewest independent samples by which a flight shows a regime.
+/// Fewest independent samples for a flight to count as showing a regime.
 const FLIGHT_SUPPORT: usize = 5;
 
-/// How the residual changes along the variable.
+/// Trend of the residual along the variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trend {
-    /// Its size grows with the variable.
+    /// The magnitude grows with the variable.
     Grows,
-    /// Its size falls with the variable.
+    /// The magnitude falls with the variable.
     Falls,
-    /// It changes sign with the variable.
+    /// The sign changes along the variable.
     Reverses,
-    /// None of these.
+    /// There is no such trend.
     None,
 }
 
-/// The worst regime with how the residual runs along its variable.
+/// The worst regime with the residual's trend.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The regime.
+    /// The regime, with its range and mean residual.
     pub regime: Regime,
-    /// The trend along its variable.
+    /// Trend along its variable.
     pub trend: Trend,
 }
 
@@ -55,7 +56,7 @@ pub fn worst(
             Finding { regime, trend: Trend::None }
         })
     };
-    let Some(decisive) = telling(bins).filter(|b| !is_constant(residuals, b)) else {
+    let Some(decisive) = most_informative(bins).filter(|b| !is_constant(residuals, b)) else {
         return everywhere();
     };
     let Some((from, to)) = range(&decisive.bins) else { return everywhere() };
@@ -71,15 +72,15 @@ pub fn worst(
 
 /// The variable that a residual mainly follows, whether or not some range of it is supported.
 pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
-    telling(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
+    most_informative(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
 }
 
 fn excludes_zero([low, high]: [f64; 2]) -> bool {
     low > 0.0 || high < 0.0
 }
 
-/// The variable that explains most, time, altitude and flight by a margin only.
-fn telling(bins: &[RegimeBins]) -> Option<&RegimeBins> {
+/// The variable that explains most; time, altitude and flight only by `CIRCUMSTANCE_MARGIN`.
+fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
         let circumstance = matches!(b.variable, Time | Altitude | Flight);
@@ -89,7 +90,7 @@ fn telling(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     (worth(best) > SHARE_FLOOR).then_some(best)
 }
 
-/// Whether the residual is an offset rather than something that the variable tells apart.
+/// Whether the residual is a constant offset rather than a function of the variable.
 fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     let count = residuals.len() as f64;
     let mean = residuals.iter().map(|r| r.value).sum::<f64>() / count;
@@ -97,7 +98,7 @@ fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     decisive.explained * (square - mean * mean) < 0.1 * mean * mean
 }
 
-/// First and last of the adjacent bins around the surest failure.
+/// First and last of the adjacent bins around the most significant failure.
 fn range(bins: &[Bin]) -> Option<(usize, usize)> {
     let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
     let peak = (0..bins.len())
@@ -152,7 +153,7 @@ fn relative_percent(inside: &[&Residual], mean: f64) -> f64 {
     if same >= 0.9 * inside.len() as f64 { -100.0 * mean / measured } else { f64::NAN }
 }
 
-/// How the means of the supported bins run along the variable.
+/// Trend of the supported bins' means along the variable.
 fn trend(bins: &[Bin]) -> Trend {
     let known: Vec<&Bin> = bins.iter().filter(|b| b.supported).collect();
     if known.len() < 4 {

@@ -1,10 +1,10 @@
-//! What a comparison says of one flight.
+//! The part of a comparison's result on one flight.
 
 use crate::compare::result::{FlightResult, FlightTrace, NuisanceResult};
 use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction};
 use crate::weak_form::prepared::Prepared;
 
-/// What the result says of `flight`, which was made from `from`.
+/// The result for `flight`, which was prepared from the reconstruction `from`.
 pub fn result(flight: &Prepared, from: &Reconstruction) -> FlightResult {
     let ends = |s: &Vec<Instant>| Some([s.first()?.time_s, s.last()?.time_s]);
     let nuisance = |n: &Nuisance| NuisanceResult {

@@ -1,4 +1,4 @@
-//! Forecasts that know no aerodynamics: what a model has to beat.
+//! Baseline forecasts without aerodynamics.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -10,26 +10,27 @@ use crate::weak_form::prepared::Prepared;
 
 /// Regressors of the linear model: the eight states, the four deflections, one.
 const REGRESSORS: usize = 13;
-/// Singular values below this part of the largest are taken as zero: a rudder that never moves.
+/// Singular values below this share of the largest are treated as zero, for example those of a rudder that never
+/// moves.
 const RANK: f64 = 1e-9;
 
-/// The free-run error of a trivial forecast, over the same starts as those of the models.
+/// Free-run error of a baseline forecast, over the same starts as those of the models.
 #[derive(Clone, Debug, Serialize)]
 pub struct ForecastResult {
-    /// What it does.
+    /// Name of the forecast.
     pub name: &'static str,
-    /// Its error, one entry a horizon.
+    /// Error at each horizon.
     pub free_run: Vec<HorizonScore>,
 }
 
 /// A rule for the next state.
 enum Forecast {
-    /// The state stays as it is at the start.
+    /// The initial state is held.
     Hold,
-    /// The aircraft flies straight on: attitude, airspeed and flow angles stay, rates are zero.
+    /// Attitude, airspeed and flow angles are held at the initial values, rates are zero.
     Straight,
-    /// A linear model of first order with the deflections as inputs (ARX), fitted by least squares to the
-    /// flights that it is judged on: the figure flatters it.
+    /// A first-order linear model with the deflections as inputs (ARX), fitted by least squares to the flights it is
+    /// judged on, so its error is optimistic.
     Linear(DMatrix<f64>),
 }
 
@@ -57,7 +58,7 @@ impl Forecast {
         }
     }
 
-    /// One run from sample `start` of `segment`, looked at after each number of samples in `looks`.
+    /// One run from sample `start` of `segment`, sampled after each number of samples in `looks`.
     fn run(
         &self,
         segment: &[Instant],
@@ -110,14 +111,15 @@ fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
     slopes.iter().all(|x| x.is_finite()).then_some(slopes)
 }
 
-/// The errors of all forecasts at the `horizons` (s), states over `scale`, the linear one fitted to the same flights.
+/// Errors of all forecasts at the `horizons` (s), states over `scale`; the linear model is fitted to the same
+/// flights.
 pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec<ForecastResult> {
     let linear = linear(flights).map(Forecast::Linear);
     let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
     results(all, flights, scale, horizons)
 }
 
-/// The same on flights that the linear one, fitted to `seen`, has not seen.
+/// The same with the linear model fitted to the flights `seen` instead.
 pub fn on_unseen(
     seen: &[Prepared],
     flights: &[Prepared],
@@ -144,7 +146,7 @@ fn results(
     .collect()
 }
 
-/// The runs of one flight, from the starts that the models have.
+/// The runs of one flight, from the same starts as those of the models.
 fn flown(
     forecast: &Forecast,
     flight: &Prepared,

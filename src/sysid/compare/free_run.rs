@@ -13,20 +13,20 @@ use greylag_physics::State;
 
 /// Time between starts, s.
 pub const START_EVERY_S: f64 = 3.0;
-/// A run has diverged once its scaled error (root mean square over the states of error / x_c)
-/// exceeds this: as if every state were off by its whole scale, 1 rad, V0, 2 V0/b and so on.
+/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this: as if
+/// every state were off by its whole scale, 1 rad, V0, 2 V0/b and so on.
 pub const DIVERGENCE_BOUND: f64 = 1.0;
-/// Points of the growth curve.
+/// Number of points of the growth curve.
 pub const GROWTH_POINTS: usize = 25;
 
-/// Where a run stands at a moment: measured and predicted state; `None` once diverged.
+/// Measured and predicted state at a time; `None` once diverged.
 pub(super) type Look = Option<[[f64; 8]; 2]>;
 
 /// All free runs of a model over all flights.
 pub struct Runs {
-    /// Moments at which they are looked at, s after the start, ascending.
+    /// Sampled times, s after the start, ascending.
     times: Vec<f64>,
-    /// A list a run: its looks, as far as the flight goes on.
+    /// One list for each run: its samples, as far as the flight lasts.
     runs: Vec<Vec<Look>>,
     scale: [f64; 8],
 }
@@ -82,7 +82,7 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
     (runs, trace)
 }
 
-/// A run from a moment of a flight.
+/// A run from one time of a flight.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
     /// Time on the log's clock, s.
@@ -111,7 +111,7 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     Some(path)
 }
 
-/// One run from sample `start`: its looks, and its path over the first `keep` samples.
+/// One run from sample `start`: its samples, and its path over the first `keep` samples.
 fn run(
     model: &GreyBox,
     flight: &Prepared,
@@ -154,20 +154,20 @@ fn run(
     (seen, path)
 }
 
-/// Predicted − measured; roll the short way round. Weak form and report take the opposite sign.
+/// Predicted − measured, roll wrapped to ±π. Weak form and report use the opposite sign.
 pub fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error
 }
 
-/// Root mean square of error / x_c; NaN if anything is.
+/// Root mean square of error / x_c; NaN if any component is.
 pub(super) fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
     (error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0).sqrt()
 }
 
 impl Runs {
-    /// The `runs`, each looked at at the `times` (s), states over `scale`.
+    /// Combines `runs`, each sampled at the `times` (s), states over `scale`.
     pub(super) fn new(times: Vec<f64>, runs: Vec<Vec<Look>>, scale: [f64; 8]) -> Runs {
         Runs { times, runs, scale }
     }
@@ -177,7 +177,7 @@ impl Runs {
         place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
     }
 
-    /// The scaled error of each run at a time, a diverged one at the bound.
+    /// Scaled error of each run at one time; a diverged run has the bound.
     fn errors(&self, looks: &[Look]) -> Vec<f64> {
         let one = |look: &Look| match look {
             Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),

@@ -1,8 +1,7 @@
-//! Models against flights: how far free runs stray, and in which channel and regime a model fails.
+//! Models against flights: the error of free runs, and the channels and regimes in which a model fails.
 //!
-//! The method stands in `docs/explanation/comparison.md`. "Before" is the
-//! model as given; tuning it is the business of what ranks missing effects, for which
-//! [`columns`](crate::weak_form::windows::columns) gives what to regress on.
+//! The method is described in `docs/explanation/comparison.md`. Models are compared as given, without tuning. The
+//! diagnosis of missing effects regresses on [`columns`](crate::weak_form::windows::columns).
 
 pub mod answer;
 mod bins;

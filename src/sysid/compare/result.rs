@@ -1,7 +1,7 @@
-//! What a comparison finds, as plain data for the terminal, the JSON and the report.
+//! The result of a comparison, as plain data for the terminal, the JSON and the report.
 //!
-//! Residuals are measured − model: a positive one means that the model is too low. A number that
-//! cannot be given is NaN, which JSON writes as `null`.
+//! Residuals are measured − model: a positive one means that the model is too low. A number that does not exist is
+//! NaN, which JSON writes as `null`.
 
 use serde::Serialize;
 
@@ -12,25 +12,25 @@ use crate::weak_form::channels::{ChannelId, RegimeVariable};
 /// The comparison of one or several models with one or several flights.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// `greylag.comparison/1`.
+    /// Schema of the document, `greylag.comparison/1`.
     pub schema: &'static str,
     /// Name and version of the program.
     pub program: String,
     /// Seed of the bootstrap.
     pub seed: u64,
-    /// The answer in a few sentences, with their numbers.
+    /// Short answer in sentences, with their numbers.
     pub answer: Answer,
-    /// The finding in plain words: the sentences of the first model, the leading ones first.
+    /// Findings in sentences: those of the first model, the most important ones first.
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
-    /// What a model has to beat: the same free runs by forecasts that know no aerodynamics.
+    /// Free-run errors of baseline forecasts without aerodynamics.
     pub forecasts: Vec<ForecastResult>,
     /// The flights, in the order of the command line.
     pub flights: Vec<FlightResult>,
-    /// Lengths and bounds that the figures depend on.
+    /// Settings that the figures depend on.
     pub settings: Settings,
-    /// What the reader must know: what was skipped, assumed or lost.
+    /// Notes for the reader: what was skipped, assumed or lost.
     pub notes: Vec<String>,
 }
 
@@ -50,7 +50,7 @@ impl Comparison {
         models.chain(self.forecasts.iter().map(|f| (f.name, f.free_run.as_slice())))
     }
 
-    /// The JSON document.
+    /// The comparison as the JSON document.
     pub fn document(&self) -> Document<'_> {
         let first = self.models.first();
         Document {
@@ -61,7 +61,7 @@ impl Comparison {
     }
 }
 
-/// Lengths and bounds that the figures depend on.
+/// Settings that the figures depend on.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
     /// Time between the starts of free runs, s.
@@ -83,15 +83,15 @@ pub struct Settings {
 /// One model against all flights.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelResult {
-    /// The model's name, from its file.
+    /// Name of the model, from its file.
     pub name: String,
-    /// What it finds in plain words, the leading sentences first.
+    /// Findings in sentences, the most important ones first.
     pub sentences: Vec<String>,
-    /// Free-run error, one entry a horizon.
+    /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
     pub growth: Vec<GrowthPoint>,
-    /// The channels D, L, Y, l, m, n and the rates of V, α, β, those that the logs allow.
+    /// Channels D, L, Y, l, m, n and the rates of V, α, β, as far as the logs allow.
     pub channels: Vec<ChannelResult>,
     /// Its predictions over time, one entry a flight, in the order of [`Comparison::flights`].
     #[serde(skip)]
@@ -103,23 +103,23 @@ pub struct ModelResult {
 pub struct HorizonScore {
     /// Time after the start, s.
     pub horizon_s: f64,
-    /// Runs that the flights are long enough for.
+    /// Number of runs for which the flights are long enough.
     pub runs: usize,
-    /// Those of them that diverged by then.
+    /// Number of those runs that have diverged by then.
     pub diverged: usize,
     /// `diverged / runs`, 0..1.
     pub divergence_rate: f64,
     /// Root mean square, over runs, of the scaled error: the root mean square over the eight states
     /// of error / x_c (eq. 21). A diverged run counts with the divergence bound.
     pub rmse_scaled: f64,
-    /// State by state, over the runs that did not diverge.
+    /// Errors of each state over the runs that did not diverge.
     pub states: Vec<StateScore>,
 }
 
 /// Free-run error of one state at one horizon.
 #[derive(Clone, Debug, Serialize)]
 pub struct StateScore {
-    /// The state, with its unit, as in `State::NAMES`.
+    /// State with its unit, as in `State::NAMES`.
     pub state: &'static str,
     /// Root mean square error, in the state's unit.
     pub rmse: f64,
@@ -130,11 +130,11 @@ pub struct StateScore {
     pub r2: f64,
     /// Theil's U: RMSE / (RMS of measured + RMS of predicted), 0 (perfect) to 1.
     pub theil_u: f64,
-    /// Share of the mean square error that is a constant offset, 0..1.
+    /// Share of the mean square error due to a constant offset, 0..1.
     pub bias_share: f64,
-    /// Share that is too much or too little variation, 0..1.
+    /// Share due to a difference in the amount of variation, 0..1.
     pub variance_share: f64,
-    /// Share that is lack of correlation, 0..1; the three shares add up to 1.
+    /// Share due to lack of correlation, 0..1; the three shares add up to 1.
     pub covariance_share: f64,
 }
 
@@ -143,13 +143,13 @@ pub struct StateScore {
 pub struct GrowthPoint {
     /// Time after the start, s.
     pub time_s: f64,
-    /// Runs that reach so far.
+    /// Number of runs that reach this time.
     pub runs: usize,
-    /// Those of them that diverged by then.
+    /// Number of those runs that have diverged by then.
     pub diverged: usize,
-    /// As [`HorizonScore::rmse_scaled`].
+    /// Scaled error at this time, as [`HorizonScore::rmse_scaled`].
     pub rmse_scaled: f64,
-    /// Median over runs of the scaled error, a diverged run counting with the bound.
+    /// Median over runs of the scaled error; a diverged run counts with the bound.
     pub median_scaled: f64,
     /// 90 % quantile over runs of the scaled error, likewise.
     pub p90_scaled: f64,
@@ -158,32 +158,32 @@ pub struct GrowthPoint {
 /// One channel of one model over all flights, in weak form: averages over the kernel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelResult {
-    /// Which.
+    /// Identifier of the channel.
     pub channel: ChannelId,
-    /// [`ChannelId::name`].
+    /// Name of the channel, [`ChannelId::name`].
     pub name: &'static str,
     /// Unit of the channel.
     pub unit: &'static str,
-    /// Windows (half overlapping kernels) that it was compared in.
+    /// Number of windows (half overlapping kernels) compared.
     pub windows: usize,
     /// Standard deviation of the measured channel, in `unit`.
     pub measured_sd: f64,
     /// Root mean square residual, in `unit`.
     pub residual_rms: f64,
-    /// Part of it that the sensors' noise accounts for, standard deviation in `unit`.
+    /// Standard deviation of the residual that sensor noise accounts for, in `unit`.
     pub noise_sd: f64,
     /// Mean square residual less noise, divided by the measured variance less noise, 0 (the model
     /// explains everything) upwards (over 1: worse than a constant). NaN if the flights do not move
     /// the channel above the noise.
     pub unexplained_fraction: f64,
-    /// What the residual beyond noise does to the state: scaled error (error / x_c) a second, RMS.
-    /// Comparable between channels.
+    /// Rate of the scaled state error (error / x_c) caused by the residual beyond noise, RMS, 1/s. Comparable between
+    /// channels.
     pub effect_per_s: f64,
-    /// Share of the mean square residual that is a constant offset, 0..1.
+    /// Share of the mean square residual due to a constant offset, 0..1.
     pub offset_share: f64,
     /// The worst regime in one sentence.
     pub worst_regime: String,
-    /// Why these flights cannot judge the model here; `None` where they can.
+    /// Reason why these flights cannot judge the model in this channel; `None` if they can.
     pub abstained: Option<&'static str>,
     /// The worst regime as numbers; `None` if no supported regime differs from zero.
     pub regime: Option<Regime>,
@@ -207,44 +207,43 @@ pub struct Abstention {
 /// Mean residual over one regime variable.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegimeBins {
-    /// The variable.
+    /// The regime variable.
     pub variable: RegimeVariable,
-    /// What it is called, for example `angle of attack`.
+    /// Name of the variable, for example `angle of attack`.
     pub name: &'static str,
-    /// Its unit here, chosen for people: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
+    /// Display unit of the variable: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
     pub unit: &'static str,
-    /// Share of the residual's variance that the bins, or a straight line, explain, whichever is
-    /// more, adjusted for their number of parameters, 0..1.
+    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, adjusted for
+    /// their number of parameters, 0..1.
     pub explained: f64,
-    /// The bins, ascending; for flights one each, in their order.
+    /// Bins in ascending order; for the variable flight, one each in the flights' order.
     pub bins: Vec<Bin>,
 }
 
 /// Mean residual in a bin.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bin {
-    /// Lower edge in the variable's unit; for flights the flight's index − 0.5. NaN if open.
+    /// Lower edge in the variable's unit; for the variable flight, the flight's index − 0.5. NaN if open.
     pub low: f64,
     /// Upper edge; NaN if open.
     pub high: f64,
     /// Mean of the variable over the bin's windows.
     pub center: f64,
-    /// Label of a bin that is no interval: the flight's name; else empty.
+    /// Label of a bin that is no interval, the flight's name; otherwise empty.
     pub label: String,
     /// Mean residual (measured − model), in the channel's unit.
     pub mean: f64,
-    /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors that
-    /// the reconstruction took out.
+    /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated by the
+    /// reconstruction.
     pub interval: [f64; 2],
-    /// Expected share of false ones among the cells of the model that are at least as sure as this one, 0..1
-    /// (Benjamini and Hochberg); NaN if it is not supported. A cell up to 0.05 is one in which the model
-    /// fails.
+    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model at least as
+    /// significant as this one; NaN without support. The model fails in cells of at most 0.05.
     pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
     /// Number of independent samples: kernel lengths that the windows cover.
     pub independent: usize,
-    /// Whether they are enough ([`Settings::support`]); draw grey if not.
+    /// Whether there are enough independent samples ([`Settings::support`]); draw grey otherwise.
     pub supported: bool,
 }
 
@@ -262,22 +261,22 @@ pub struct Map {
 /// One cell of a [`Map`].
 #[derive(Clone, Debug, Serialize)]
 pub struct MapCell {
-    /// Column, from 0.
+    /// Index of the column, from 0.
     pub alpha: usize,
-    /// Row, from 0.
+    /// Index of the row, from 0.
     pub beta: usize,
     /// Mean residual, in the channel's unit.
     pub mean: f64,
     /// Number of independent samples.
     pub independent: usize,
-    /// Whether they are enough.
+    /// Whether there are enough independent samples.
     pub supported: bool,
 }
 
 /// A regime in which a model fails.
 #[derive(Clone, Debug, Serialize)]
 pub struct Regime {
-    /// The variable that tells it apart; `None`: everywhere alike.
+    /// The variable that separates the regime; `None` if the residual is a constant offset.
     pub variable: Option<RegimeVariable>,
     /// Lower end in `unit`; NaN if open.
     pub low: f64,
@@ -287,55 +286,55 @@ pub struct Regime {
     pub unit: &'static str,
     /// Mean residual (measured − model) there, in the channel's unit.
     pub mean: f64,
-    /// 95 % interval, likewise.
+    /// 95 % interval of `mean`.
     pub interval: [f64; 2],
-    /// The same relative to the measured mean there, in %, model − measured; NaN if the measured
-    /// channel passes through zero there.
+    /// Relative error, model − measured over the measured mean there, %; NaN if the measured channel passes through
+    /// zero there.
     pub relative_percent: f64,
     /// Number of independent samples.
     pub independent: usize,
-    /// The flights that show it.
+    /// Names of the flights that show it.
     pub flights: Vec<String>,
 }
 
 /// One flight as compared.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightResult {
-    /// Its name: the file.
+    /// Name of the flight, from its file.
     pub name: String,
     /// Time between samples, s.
     pub step_s: f64,
-    /// Number of samples.
+    /// Total number of samples.
     pub samples: usize,
     /// Start and end of each stretch without gaps, s on the log's clock.
     pub segments_s: Vec<[f64; 2]>,
-    /// Sensor errors and wind that the reconstruction found.
+    /// Sensor errors and wind estimated by the reconstruction.
     pub nuisances: Vec<NuisanceResult>,
-    /// What the reconstruction says.
+    /// Notes of the reconstruction.
     pub notes: Vec<String>,
-    /// What was flown.
+    /// Reconstructed states and controls over time.
     #[serde(skip)]
     pub trace: FlightTrace,
 }
 
-/// An error of a sensor, or the wind.
+/// A sensor error, or a component of the wind.
 #[derive(Clone, Debug, Serialize)]
 pub struct NuisanceResult {
-    /// What it is, for example `gyro_bias_p`.
+    /// Name, for example `gyro_bias_p`.
     pub name: String,
-    /// Its value, in `unit`.
+    /// Estimate, in `unit`.
     pub value: f64,
     /// Its standard deviation, in `unit`.
     pub sd: f64,
-    /// The unit.
+    /// Unit of the values.
     pub unit: &'static str,
-    /// Its value before the flight; absent if it was not estimated along with the path.
+    /// Prior mean; absent if it was not estimated along with the path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<f64>,
-    /// Its standard deviation before the flight.
+    /// Prior standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior_sd: Option<f64>,
-    /// How far it moved, in standard deviations of its prior.
+    /// Change from the prior mean, in standard deviations of the prior.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moved_sd: Option<f64>,
 }
@@ -354,8 +353,8 @@ pub struct FlightTrace {
 /// A model's predictions for one flight.
 #[derive(Clone, Debug, Default)]
 pub struct ModelTrace {
-    /// The states of free runs restarted from the reconstruction every [`Settings::start_every_s`],
-    /// at the times of [`FlightTrace::time_s`]; NaN where there is none.
+    /// States of free runs restarted from the reconstruction every [`Settings::start_every_s`], at the times of
+    /// [`FlightTrace::time_s`]; NaN where there is none.
     pub states: [Vec<f64>; 8],
     /// The channels in weak form.
     pub channels: Vec<ChannelTrace>,
@@ -364,13 +363,13 @@ pub struct ModelTrace {
 /// A channel over time, measured and predicted, in weak form and in the model's force axes.
 #[derive(Clone, Debug)]
 pub struct ChannelTrace {
-    /// Which.
+    /// Identifier of the channel.
     pub channel: ChannelId,
     /// Middle of each window, s on the log's clock, ascending; between segments a row of NaN
     /// values stands at the segment's end.
     pub time_s: Vec<f64>,
-    /// Measured, in the channel's unit.
+    /// Measured values, in the channel's unit.
     pub measured: Vec<f64>,
-    /// Predicted, in the channel's unit.
+    /// Predicted values, in the channel's unit.
     pub predicted: Vec<f64>,
 }

@@ -1,4 +1,4 @@
-//! The comparison itself: every model over every flight, then what it amounts to.
+//! The comparison: evaluates every model over every flight and collects the findings.
 
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ use super::result::{
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::progress::{Progress, say};
+use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::channels::ChannelId;
 use crate::weak_form::kernel::KERNEL_S;
@@ -27,15 +27,14 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 use crate::weak_form::windows::{self, Series};
 use greylag_model::GreyBox;
 
-/// Why a channel is abstained from.
+/// Reason for abstaining from a channel.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
 const DOUBTFUL: &str = "the remaining errors of the sensors may account for all that is left";
 
-/// The channel's variance, less noise, must be at least this part of itself for a share to mean
-/// something.
+/// A channel is excited if its variance less noise is at least this share of its variance.
 const EXCITED: f64 = 0.05;
 
-/// What a comparison is asked for.
+/// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Horizons of the free runs, s.
@@ -50,10 +49,11 @@ impl Default for Options {
     }
 }
 
-/// Compares `models` with reconstructed `flights`; `progress` hears what is being done.
+/// Compares `models` with reconstructed `flights`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-/// Nothing was given, no log holds a flight, a clock or horizon does not fit, or `progress` ended it.
+/// No model or flight is given, no log holds a usable flight, a flight has no clock, a horizon is not usable, or
+/// `progress` cancelled.
 pub fn compare(
     models: &[GreyBox],
     flights: &[Reconstruction],
@@ -74,7 +74,7 @@ pub fn compare(
         .enumerate()
         .map(|(k, model)| {
             let doing = format!("comparing {} with {} flight(s)", model.name, prepared.len());
-            say(progress, &doing, k as f64 * share)?;
+            report(progress, &doing, k as f64 * share)?;
             let mut result = one_model(model, &prepared, &used, options);
             result.sentences.extend(verdict::beaten(&result.free_run, &forecasts));
             let rudder = rudder::unmodelled(flights, model).map(rudder::warning);
@@ -104,7 +104,7 @@ pub fn compare(
     })
 }
 
-/// Free-run errors of `model` over `flights` at `horizons_s` (s), one for each.
+/// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s).
 ///
 /// # Errors
 /// A flight's clock does not fit.
@@ -122,7 +122,7 @@ pub fn scores(
 
 type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
 
-/// The flights that can be compared, with what was left out and why.
+/// The flights that can be compared, with notes on those left out.
 fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
     if flights.is_empty() {
         return Err(CompareError::NoLog);
@@ -170,7 +170,7 @@ fn why_unusable(flight: &Reconstruction, slowest: f64) -> String {
     }
 }
 
-/// A note for each horizon that no stretch of flight is long enough for.
+/// A note for each horizon that exceeds every stretch of flight.
 fn short_of(flights: &[Prepared], horizons: &[f64]) -> Vec<String> {
     let longest = flights
         .iter()
@@ -212,7 +212,8 @@ fn one_model(
     }
 }
 
-/// Why `flights` cannot judge `model`, channel by channel; `None` where they can, or where a channel was not measured.
+/// Reasons why `flights` cannot judge `model`, channel by channel; `None` where they can, or where a channel was not
+/// measured.
 ///
 /// # Errors
 /// No flight can be compared.
@@ -234,7 +235,7 @@ pub fn abstentions(
 
 type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
 
-/// What `flights` measure in every channel, and what the doubts of their sensors do there.
+/// Measured channels of `flights` with the shifts due to uncertain sensor errors.
 fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
     let series = flights.par_iter().map(|f| windows::channels(model, f)).collect();
     let pairs = flights.par_iter().zip(from);
@@ -242,14 +243,14 @@ fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Meas
     (series, shifts.collect())
 }
 
-/// The flights as one model sees them, a list a flight.
+/// Windows of the flights under one model, one list for each flight.
 struct Seen<'a> {
     flights: &'a [Prepared],
     series: &'a [Vec<Series>],
     shifts: &'a [Vec<[Shift; ChannelId::ALL.len()]>],
 }
 
-/// The channels that the flights have.
+/// The results of all channels that the flights hold.
 fn all_channels(model: &GreyBox, seen: &Seen, seed: u64) -> Vec<ChannelResult> {
     let Seen { flights, series, shifts } = *seen;
     let cut = |(k, id): (usize, &ChannelId)| {
@@ -314,7 +315,7 @@ fn channel(
     }
 }
 
-/// What one unit of a channel does to the state it drives: scaled error a second, 1/s.
+/// Rate of the scaled state error for one unit of a channel, 1/s.
 fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     let [_, _, v, p, q, r, alpha, beta] = model.scale();
     let body = &model.body;
@@ -341,13 +342,13 @@ fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
 
 /// Mean squares of a channel.
 struct Power {
-    /// Variance of what was measured.
+    /// Variance of the measured values.
     measured: f64,
-    /// Mean square residual.
+    /// Mean square of the residuals.
     residual: f64,
     /// Variance that noise accounts for.
     noise: f64,
-    /// Share of the mean square residual that is its mean.
+    /// Share of the mean square residual due to its mean.
     offset: f64,
 }
 

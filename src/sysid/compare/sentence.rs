@@ -4,30 +4,30 @@ use super::finding::{Finding, Trend};
 use super::result::Regime;
 use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
-/// A channel that the model explains but for less than this is said to be explained.
+/// A channel counts as explained if its unexplained share is below this.
 const EXPLAINED: f64 = 0.01;
-/// Below this no regime is worth naming.
+/// Unexplained share below which no regime is named.
 pub const NOTHING_LEFT: f64 = 0.001;
 
-/// What a sentence about a channel is made from.
+/// Input of a channel's sentence.
 pub struct Subject<'a> {
-    /// The channel.
+    /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Its unexplained share; NaN if the flights do not move it above the noise.
+    /// Unexplained share; NaN if the flights do not move it above the noise.
     pub unexplained: f64,
-    /// Its worst regime.
+    /// Worst regime of the channel, if there is one.
     pub finding: Option<&'a Finding>,
     /// The variable that the residual mainly follows.
     pub follows: Option<RegimeVariable>,
-    /// Whether the sensors' errors that the reconstruction leaves may account for all of it (95 %).
+    /// Whether the uncertainty of the sensor errors may account for all of it (95 %).
     pub within_doubt: bool,
-    /// Mass of the aircraft as the model believes it, kg.
+    /// Mass of the aircraft in the model, kg.
     pub mass: f64,
     /// Number of flights compared.
     pub flights: usize,
 }
 
-/// Unexplained share of a variation beyond which the axis is quiet, and a percentage says nothing.
+/// Unexplained share beyond which the channel is hardly excited, so that a percentage means nothing.
 const QUIET: f64 = 9.995;
 
 /// The sentence, without a full stop, beginning in lower case.
@@ -90,7 +90,7 @@ fn noun(channel: ChannelId) -> &'static str {
     }
 }
 
-/// How the model is off, by its own sign: `(model too low, model too high)`.
+/// Descriptions of the model's error by its sign: `(model too low, model too high)`.
 fn directions(channel: ChannelId) -> (&'static str, &'static str) {
     match channel {
         // measured is drag less thrust; people think of the forward force
@@ -104,7 +104,7 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
     }
 }
 
-/// "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
+/// The error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
     let [least, most] = regime.interval;
     // what counts is the side of zero: an interval that does not hold it must not read as if it did
@@ -130,7 +130,7 @@ fn error(subject: &Subject, regime: &Regime) -> String {
     }
 }
 
-/// For moments, what the error is of the measured one, where that has one sign.
+/// For moments, the error relative to the measured one, where that has one sign.
 fn strength(channel: ChannelId, regime: &Regime) -> String {
     let moment = matches!(channel, ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw);
     match regime.relative_percent {
@@ -141,7 +141,7 @@ fn strength(channel: ChannelId, regime: &Regime) -> String {
     }
 }
 
-/// Where: " for α > 9°", with how the error runs along the variable.
+/// The regime in words (" for α > 9°") with the residual's trend along the variable.
 fn place(subject: &Subject, Finding { regime, trend }: &Finding) -> String {
     let Some(variable) = regime.variable else {
         let along = subject.follows.map(|v| format!(", and the error follows {}", spoken(v)));
@@ -172,7 +172,7 @@ fn spoken(variable: RegimeVariable) -> &'static str {
     }
 }
 
-/// "α > 9°", "throttle 0.2 to 0.4", "the aileron moving right faster than 20 °/s".
+/// The range in words: "α > 9°", "throttle 0.2 to 0.4", "the aileron moving right faster than 20 °/s".
 fn range(regime: &Regime, variable: RegimeVariable) -> String {
     use RegimeVariable::{AileronRate, ElevatorRate};
     let (low, high) = (regime.low, regime.high);
@@ -206,7 +206,7 @@ fn between(low: f64, high: f64, unit: &str) -> String {
     }
 }
 
-/// "210 samples, both flights".
+/// Samples and flights in words: "210 samples, both flights".
 fn who(regime: &Regime, flights: usize) -> String {
     let seen = regime.flights.len();
     let who = match (seen, flights) {
@@ -219,7 +219,7 @@ fn who(regime: &Regime, flights: usize) -> String {
     format!("{} samples, {who}", regime.independent)
 }
 
-/// "8.2 ± 0.3": as many places as the uncertainty warrants.
+/// Value and uncertainty, rounded to the uncertainty's figures: "8.2 ± 0.3".
 fn plus_minus(value: f64, half: f64) -> String {
     if !(half.is_finite() && half > 0.0) {
         return significant(value, 3);

@@ -1,12 +1,11 @@
-//! The findings of a model in the order in which they are stated.
+//! A model's findings in the order in which they are reported.
 
 use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
 use crate::weak_form::channels::ChannelId;
 
-/// The sentences of a model: the worst of forces (they move V, α, β) and the worst of moments (they
-/// move p, q, r) lead, the others follow. The rates of V, α, β repeat the forces and are left out
-/// where the logs have those.
+/// Sentences on a model: the worst force (forces drive V, α, β) and the worst moment (moments drive p, q, r) lead,
+/// the others follow. The rates of V, α, β repeat the forces and are left out where the logs have those.
 pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<String> {
     use ChannelId::{Drag, Lift, Pitch, Roll, Side, Yaw};
     let is_force = |c: &&ChannelResult| matches!(c.channel, Drag | Lift | Side);
@@ -28,8 +27,8 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
     diverges(free_run).into_iter().chain(stated).collect()
 }
 
-/// The part of a channel's effect that its sentence accounts for: what its offset and its most
-/// telling variable explain.
+/// The part of a channel's effect that its sentence accounts for: the shares of its offset and of the variable that
+/// explains most.
 fn weight(channel: &ChannelResult) -> f64 {
     let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
     let weight = channel.offset_share + (1.0 - channel.offset_share) * share;
@@ -41,7 +40,7 @@ fn capital(text: &str) -> String {
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
 }
 
-/// Says so if most free runs are lost by the shortest horizon.
+/// A warning if most free runs have diverged by the shortest horizon.
 fn diverges(scores: &[HorizonScore]) -> Option<String> {
     let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
     (first.divergence_rate > 0.5).then(|| {
@@ -52,7 +51,7 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
     })
 }
 
-/// Says so if a forecast that knows no aerodynamics is better than the model at the longest horizon.
+/// A warning if a forecast without aerodynamics is better than the model at the longest horizon.
 pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
     let score = free_run.iter().rev().find(|s| s.runs > 0 && s.rmse_scaled.is_finite())?;
     let horizon = score.horizon_s;

@@ -1,9 +1,8 @@
-//! Which physical effect a model lacks: candidates ranked, thresholds from null flights, or none of these.
+//! Diagnosis: finds the physical effect that a model lacks, by ranked candidates with thresholds from null flights.
 //!
-//! The method stands in `docs/explanation/diagnosis.md`. Flights must be
-//! reconstructed with their deflections as recorded
-//! ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)): what is clock and what is
-//! physics is decided here.
+//! The method is described in `docs/explanation/diagnosis.md`. Flights must be reconstructed with their deflections
+//! as recorded ([`ActuatorClock::AsRecorded`](crate::flight_path::ActuatorClock)), because the diagnosis itself
+//! separates clock errors from physical effects.
 
 mod answer;
 mod error;

@@ -1,36 +1,36 @@
-//! What a diagnosis is asked for.
+//! Options of a diagnosis.
 
 use crate::per_flight::PerFlight;
 
-/// How much a diagnosis works out besides its answer.
+/// Extent of a diagnosis's result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Everything.
+    /// The result with curves and decoys.
     Full,
-    /// The same numbers without curves and decoys, which only show and check.
+    /// The same numbers without curves and decoys, which only illustrate and check.
     Lean,
 }
 
-/// What a diagnosis is asked for.
+/// Options of a diagnosis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Seed of nulls, bootstraps, decoys and the flexible model.
+    /// Seed of null flights, bootstraps, decoys and the flexible model.
     pub seed: u64,
-    /// Nulls drawn.
+    /// Number of null flights.
     pub nulls: usize,
-    /// Block bootstraps.
+    /// Number of block bootstraps.
     pub bootstraps: usize,
-    /// Chance that is allowed of any assertion in a flight that lacks nothing.
+    /// Significance level: probability of any assertion on flights that lack nothing.
     pub level: f64,
-    /// Ids of effects of files, tried beside the catalogue.
+    /// Ids of effects from files, tried in addition to the catalogue.
     pub with: Vec<String>,
-    /// Ids left out of the catalogue.
+    /// Ids excluded from the catalogue.
     pub without: Vec<String>,
-    /// What is worked out besides.
+    /// Extent of the result.
     pub detail: Detail,
-    /// Whether the search for a formula tries free forms where the shapes of its library are not all.
+    /// Whether the search for a formula tries free forms if the shapes of its library do not suffice.
     pub free_forms: bool,
-    /// What each flight has of its own beside its sensors' errors.
+    /// Constants estimated for each flight beside its sensor errors.
     pub per_flight: PerFlight,
 }
 

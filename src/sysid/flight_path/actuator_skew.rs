@@ -1,10 +1,11 @@
-//! The delay of the recorded actuators behind the gyros, from the moments that they make.
+//! Delay of the recorded actuators behind the gyros, estimated from the moments they cause.
 //!
-//! Kinematics do not know the actuators; the angular accelerations do. Roll and pitch accelerations
-//! are regressed, averaged over a short kernel so that nothing is differentiated, on rates, flow
-//! angles, inertial coupling, deflection and rate of deflection: the last coefficient over the one
-//! before it is the delay. A lag of the surfaces that the record does not show looks the same. What is slower than half a
-//! second is taken off both sides: there the errors of unmeasured flow angles are, up to 0.2° beside PX4, and a clock is not.
+//! The kinematics do not depend on the actuators, but the angular accelerations do. Roll and pitch accelerations are
+//! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, with averages over a short
+//! kernel so that nothing is differentiated: the ratio of the last coefficient to the one before it is the delay. A
+//! lag of the surfaces that the record does not show is confounded with it. Both sides are high-pass filtered at half
+//! a second, because slower variations contain the errors of unmeasured flow angles, up to 0.2° with PX4, and no
+//! information on a delay.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,42 +15,41 @@ use greylag_logs::Sampling;
 
 /// Length of the averaging kernel, s.
 const KERNEL: f64 = 0.15;
-/// Windows whose residuals are taken to hang together: about 1 s.
+/// Number of windows over which residuals are taken as correlated: about 1 s.
 const BLOCK: usize = 14;
-/// Windows over which the mean is taken off: about 0.5 s.
+/// Number of windows of the moving mean that is subtracted: about 0.5 s.
 const SLOW: usize = 7;
-/// What the regression itself leaves out of the delay, s: the most seen on 16 axes of noise-free flights
-/// of the X8 in calm air.
+/// Systematic error of the regression's delay, s: the largest one on 16 axes of noise-free flights of the X8 in calm
+/// air.
 const SYSTEMATIC: f64 = 2e-5;
-/// What gusts add to it, s for each m/s of their level: they turn the aircraft, the autopilot answers, so
-/// that deflections follow moments that no term explains. Measured: beside a stated 1.1 ms, 2.2 ms rms on 20
-/// flights of the X8 in light turbulence, level 2.4 m/s.
+/// Additional standard deviation due to gusts, s for each m/s of their level: they rotate the aircraft and the
+/// autopilot responds, so deflections follow moments that no term explains. Measured: 2.2 ms rms against a stated 1.1
+/// ms on 20 flights of the X8 in light turbulence, level 2.4 m/s.
 const BY_GUSTS: f64 = 8e-4;
-/// Part of the states' pull on the delay that a linear extrapolation may leave.
+/// Share of the extrapolated bias correction that may be wrong because the extrapolation is linear.
 const CURVED: f64 = 0.5;
-/// Fewest windows for each unknown.
+/// Least number of windows for each unknown.
 const SUPPORT: usize = 10;
 
 /// A delay with its standard deviation, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Skew {
-    /// How late the record is.
+    /// Delay of the record, s.
     pub late: f64,
-    /// Standard deviation, that of the prior included.
+    /// Standard deviation of the delay, s, the prior included.
     pub deviation: f64,
 }
 
 /// Reads a body rate, rad/s.
 type Rate = fn(&Instant) -> f64;
-/// The terms that explain its change.
+/// Regressors of the rate's derivative.
 type Terms = fn(&Instant) -> Vec<f64>;
 
-/// The delay of the recorded deflections, from roll and pitch together with the prior of ±1.5 samples, in
-/// `gusts` of that level, m/s.
+/// Delay of the recorded deflections from roll and pitch together with the prior of ±1.5 samples, in gusts of level
+/// `gusts` (m/s).
 ///
-/// Errors of the states on the right-hand side of a regression pull its coefficients. `erring` holds the
-/// same flight with one more error each like those that it has: what they pull once more is taken off
-/// (simulation extrapolation, Cook and Stefanski 1994, linear).
+/// Errors in the regressors bias the coefficients. `erring` holds copies of the flight with an additional error like
+/// its own: the additional bias in them is subtracted (simulation extrapolation, Cook and Stefanski 1994, linear).
 pub fn estimate(
     segments: &[Segment],
     erring: &[Vec<Segment>],
@@ -76,7 +76,7 @@ pub fn estimate(
     Skew { late: weighted / information, deviation }
 }
 
-/// The delay without the pull of the states' errors, given what they pull `again`.
+/// The delay corrected for the bias from the states' errors, given the additional bias in the copies, `again`.
 fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     if again.len() < 2 {
         return skew;
@@ -90,14 +90,14 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     Skew { late: skew.late - pulled, deviation }
 }
 
-/// What the roll acceleration depends on, the deflection last.
+/// Regressors of the roll acceleration, the deflection last.
 fn roll_terms(i: &Instant) -> Vec<f64> {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
     vec![v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
 }
 
-/// What the pitch acceleration depends on, the deflection last.
+/// Regressors of the pitch acceleration, the deflection last.
 fn pitch_terms(i: &Instant) -> Vec<f64> {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
@@ -137,7 +137,7 @@ fn from_axis(
     regress(&rows, &values)
 }
 
-/// The terms over the interval that starts with each sample.
+/// Regressors over the interval that starts at each sample.
 fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
     match sampling {
         Sampling::Held => terms,
@@ -150,7 +150,7 @@ fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
     }
 }
 
-/// Each row less the mean of the rows about it.
+/// Each row less the moving mean around it.
 fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let about = |i: usize| &rows[i.saturating_sub(SLOW / 2)..(i + SLOW / 2 + 1).min(rows.len())];
     let less_mean = |(i, row): (usize, &Vec<f64>)| {
@@ -161,7 +161,7 @@ fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     rows.iter().enumerate().map(less_mean).collect()
 }
 
-/// Kernel averages from sample `start`: the terms with the last one's rate of change, the acceleration.
+/// Kernel averages from sample `start`: the regressors with the rate of the last one, and the acceleration.
 fn window(
     kernel: &[f64],
     terms: &[Vec<f64>],
@@ -183,7 +183,7 @@ fn window(
     (row, value)
 }
 
-/// Least squares with a covariance that allows for residuals which hang together in blocks.
+/// Least squares with a covariance that is robust to correlation within blocks of residuals.
 fn regress(rows: &[Vec<f64>], values: &[f64]) -> Option<Skew> {
     let columns = rows.first()?.len();
     if rows.len() < SUPPORT * columns {

@@ -1,41 +1,41 @@
 //! Normal equations that are block-tridiagonal in time, bordered by constants.
 //!
-//! The right-hand side is carried as one more constant, the last column: what is eliminated of it is
-//! the solution, what remains in the corner's last place is the least sum of squares. Both ends of a
-//! stretch are eliminated towards its middle at once, which costs no more than one after the other.
+//! The right-hand side is carried as an additional constant, the last column: elimination turns it into the solution,
+//! and its last entry in the corner is the least sum of squares. Both ends of a stretch are eliminated towards its
+//! middle at once, at the same cost as in sequence.
 
-/// A square block of an instant's unknowns.
+/// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];
-/// An instant's unknowns by the constants, right-hand side last.
+/// One instant's unknowns by the constants, the right-hand side last.
 pub type Wide<const N: usize, const W: usize> = [[f64; W]; N];
-/// The constants by the constants, right-hand side last.
+/// Constants by constants, the right-hand side last.
 pub type Corner<const W: usize> = [[f64; W]; W];
 
-/// Instants under which a stretch is not worth a second thread.
+/// Number of instants below which a second thread does not pay off.
 const WORTH_A_THREAD: usize = 2000;
 
-/// The equations of one instant.
+/// Normal equations of one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Node<const N: usize, const W: usize> {
-    /// Its own block.
+    /// Block of the instant's unknowns.
     pub own: Block<N>,
-    /// Its coupling with the constants.
+    /// Coupling with the constants.
     pub rest: Wide<N, W>,
 }
 
-/// What ties an instant to the next one.
+/// Normal equations between an instant and the next one.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<const N: usize, const W: usize> {
-    /// Share of the first instant.
+    /// Contribution to the first instant.
     pub first: Node<N, W>,
-    /// Share of the second instant.
+    /// Contribution to the second instant.
     pub second: Node<N, W>,
     /// Coupling: rows of the first, columns of the second instant.
     pub coupling: Block<N>,
 }
 
 impl<const N: usize, const W: usize> Node<N, W> {
-    /// No equations.
+    /// A node without equations.
     pub const ZERO: Self = Node { own: [[0.0; N]; N], rest: [[0.0; W]; N] };
 
     fn add(&mut self, other: &Self) {
@@ -44,28 +44,28 @@ impl<const N: usize, const W: usize> Node<N, W> {
     }
 }
 
-/// What the elimination leaves for the constants.
+/// Equations of the constants after elimination.
 #[derive(Clone, Copy, Debug)]
 pub struct Left<const W: usize> {
-    /// Their equations; the sum of squares in the last place.
+    /// Normal equations of the constants; the sum of squares is the last entry.
     pub corner: Corner<W>,
-    /// Logarithm of the determinant of what was eliminated.
+    /// Logarithm of the determinant of the eliminated block.
     pub log_det: f64,
 }
 
 impl<const W: usize> Left<W> {
-    /// Nothing yet.
+    /// The neutral element of `add`.
     pub const ZERO: Self = Left { corner: [[0.0; W]; W], log_det: 0.0 };
 
-    /// Adds what another part leaves.
+    /// Adds the contribution of another part.
     pub fn add(&mut self, other: &Self) {
         add(&mut self.corner, &other.corner);
         self.log_det += other.log_det;
     }
 }
 
-/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`, x' that of its neighbour
-/// nearer the middle.
+/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`, where x' is that of its neighbour nearer
+/// the middle and p the constants.
 #[derive(Clone, Copy, Debug)]
 struct Eliminated<const N: usize, const W: usize> {
     factor: Block<N>,
@@ -76,10 +76,10 @@ struct Eliminated<const N: usize, const W: usize> {
 /// A stretch after elimination.
 #[derive(Clone, Debug)]
 pub struct Stretch<const N: usize, const W: usize> {
-    /// From the start to before the middle.
+    /// Instants from the start to the one before the middle.
     head: Vec<Eliminated<N, W>>,
     middle: Eliminated<N, W>,
-    /// From the end to after the middle.
+    /// Instants from the end to the one after the middle.
     tail: Vec<Eliminated<N, W>>,
 }
 
@@ -118,7 +118,7 @@ fn add<const A: usize, const B: usize>(into: &mut [[f64; B]; A], other: &[[f64; 
     }
 }
 
-/// The lower triangle L with L Lᵀ = `a`; `None` if `a` is not positive.
+/// Lower Cholesky factor L with L Lᵀ = `a`; `None` if `a` is not positive definite.
 fn cholesky<const N: usize>(a: &Block<N>) -> Option<Block<N>> {
     let mut l = [[0.0; N]; N];
     for i in 0..N {
@@ -169,10 +169,10 @@ fn transposed<const N: usize>(a: &Block<N>) -> Block<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
 }
 
-/// Eliminates the instants `0..count` of a stretch; `None` if a block is not positive.
+/// Eliminates the instants `0..count` of a stretch; `None` if a block is not positive definite.
 ///
-/// `instant(k, node, corner)` adds the equations of instant `k`, `link(k, corner)` makes those that
-/// tie it to the next one.
+/// `instant(k, node, corner)` adds the equations of instant `k`, `link(k, corner)` makes those that couple it to the
+/// next one.
 pub fn eliminate<const N: usize, const W: usize>(
     count: usize,
     instant: impl Fn(usize, &mut Node<N, W>, &mut Corner<W>) + Sync,
@@ -232,7 +232,7 @@ impl<const N: usize, const W: usize> Eliminated<N, W> {
 }
 
 impl<const N: usize, const W: usize> Stretch<N, W> {
-    /// The unknowns in order of time; `by` holds the constants with the sign turned, and one.
+    /// The unknowns in order of time; `by` holds the negated constants, followed by one.
     pub fn substitute(&self, by: &[f64; W]) -> Vec<[f64; N]> {
         let middle = self.middle.solve(by, &[0.0; N]);
         let walk = |side: &[Eliminated<N, W>]| {

@@ -1,30 +1,30 @@
-//! Errors that an instrument has seldom, freed one after the other where a flight shows them beyond doubt.
+//! Rare instrument errors, freed one by one where a flight shows them significantly.
 //!
-//! Gains of gyros, accelerometers and vanes, an offset of airspeed or heading, a delay far beyond a sample: free in every
-//! flight, they would cost every flight what it knows of its biases. Each is therefore held until what it would be without
-//! a prior is clearly not zero (a score test with the path and all other constants fitted along; Klein and Morelli, Aircraft
-//! System Identification, section 5.3.3) and large enough to matter.
+//! Gains of gyros, accelerometers and vanes, an offset of airspeed or heading, a delay far beyond a sample: if they
+//! were free in every flight, the biases would be less certain in all of them. Each is therefore held until its
+//! estimate without a prior differs significantly from zero (a score test with the path and all other constants
+//! fitted along; Klein and Morelli, Aircraft System Identification, section 5.3.3) and large enough to matter.
 
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
     self, AIRSPEED_OFFSET, COUNT, HEADING, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VELOCITY,
 };
 
-/// Standard deviations beyond which an error is beyond doubt: fifteen of them are looked at in every flight, whose noise is
-/// not quite white.
+/// Standard deviations for significance; high because fifteen errors are tested in every flight, whose noise is not
+/// quite white.
 const BEYOND_DOUBT: f64 = 6.0;
-/// Least size that matters: a gain, an airspeed (m/s), a heading (rad).
+/// Least relevant size: of a gain, an airspeed (m/s), a heading (rad).
 const GAIN: f64 = 0.01;
 const AIRSPEED: f64 = 0.3;
 const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
-/// Prior standard deviations of a delay beyond which it is none of the usual ones.
+/// Prior standard deviations beyond which a delay is unusual.
 const UNUSUAL: f64 = 4.0;
-/// A delay's least size that matters, s.
+/// Least relevant size of a delay, s.
 const DELAY: f64 = 0.02;
-/// A constant that the data know to no better than this part of its width is not freed.
+/// A constant is freed only if its standard deviation is below this share of its width.
 const KNOWN: f64 = 0.25;
 
-/// The next constant to be freed with its width from then on; `None` if no other one is beyond doubt.
+/// The next constant to free with its new prior width; `None` if no other one is significant.
 pub fn next(problem: &Problem, found: &Found, bound: f64) -> Option<(usize, f64)> {
     let open = |place: &usize| {
         let freed = nuisance::wide(*place).is_some_and(|wide| problem.widths[*place] >= wide);
@@ -48,7 +48,7 @@ pub fn next(problem: &Problem, found: &Found, bound: f64) -> Option<(usize, f64)
     Some((place, wide))
 }
 
-/// The size under which an error does not matter.
+/// Size below which an error is irrelevant.
 fn least(problem: &Problem, place: usize) -> f64 {
     match place {
         AIRSPEED_OFFSET => AIRSPEED,

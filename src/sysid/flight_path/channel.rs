@@ -1,39 +1,38 @@
-//! A channel of a log: its samples in time order, missing ones left out.
+//! A channel of a log: its finite samples in time order.
 
 use std::ops::{Add, Mul, Sub};
 
 use greylag_num::statistics::quantile;
 
-/// Share of repeated values above which a channel is taken to be slower than the log's rows.
+/// Share of repeated values above which a channel's sensor is taken to be slower than the log's rows.
 const HELD_SHARE: f64 = 0.3;
-/// Periods of the slower sensor after which a repeated value is a measurement again.
+/// Number of the slower sensor's periods after which a repeated value counts as a measurement again.
 const LONGEST_PERIODS: f64 = 2.5;
 
-/// What a channel is made of.
+/// Kind of a channel's values, which determines interpolation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// A number.
+    /// A real number, interpolated linearly.
     Linear,
     /// An angle that wraps at ±π, rad.
     Angle,
-    /// A command or a position, which may well stay where it is.
+    /// A command or a position, whose repeated values are measurements.
     Kept,
 }
 
-/// The finite samples of a channel.
+/// Finite samples of a channel.
 #[derive(Clone, Debug)]
 pub struct Channel {
     time: Vec<f64>,
     value: Vec<f64>,
-    /// Whether it showed one and the same value all the time.
+    /// Whether all its values are equal.
     pub stuck: bool,
 }
 
 impl Channel {
-    /// The finite ones of `samples` (time in s, value); values that repeat the last one are left out
-    /// if they are many, for then the log holds a slower sensor's value. Of a value that stays longer than
-    /// that sensor's period, as a coarsely quantised one does, some repeats are kept, the last one always.
-    /// Angles are unwrapped.
+    /// The finite ones of `samples` (time in s, value). If many values repeat the previous one, the log holds a
+    /// slower sensor's value, and repeats are dropped. Of a value that persists longer than that sensor's period,
+    /// such as a coarsely quantised one, some repeats are kept, always including the last one. Angles are unwrapped.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Interpolation) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();
@@ -57,7 +56,7 @@ impl Channel {
         Channel { time, value, stuck }
     }
 
-    /// Whether it has no sample.
+    /// Whether it has no samples.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
@@ -68,7 +67,7 @@ impl Channel {
         if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) }
     }
 
-    /// The number of samples from `start` to `end`, s.
+    /// Number of samples from `start` to `end`, s.
     pub fn count(&self, start: f64, end: f64) -> usize {
         let (a, b) =
             (self.time.partition_point(|t| *t < start), self.time.partition_point(|t| *t <= end));
@@ -115,7 +114,7 @@ impl Channel {
     }
 }
 
-/// Which samples are kept where repeats are left out.
+/// Marks the samples that are kept where repeats are dropped.
 fn kept(time: &[f64], fresh: &[bool]) -> Vec<bool> {
     let new: Vec<f64> = time.iter().zip(fresh).filter(|(_, f)| **f).map(|(t, _)| *t).collect();
     let periods: Vec<f64> = new.windows(2).map(|w| w[1] - w[0]).collect();
@@ -138,7 +137,7 @@ fn unwrap(angles: &mut [f64]) {
     }
 }
 
-/// The angle between −π and π, rad.
+/// The angle wrapped to −π to π, rad.
 pub fn wrap(angle: f64) -> f64 {
     use std::f64::consts::TAU;
     angle - TAU * (angle / TAU).round()

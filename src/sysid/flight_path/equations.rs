@@ -1,4 +1,4 @@
-//! The equations of a fit: all stretches linearised at what was found, eliminated, solved.
+//! Normal equations of a fit: all stretches linearised at the present estimate, eliminated, solved.
 
 mod erring;
 
@@ -16,68 +16,70 @@ use crate::flight_path::{Options, ReconstructError, noise};
 use greylag_logs::Sampling;
 use greylag_num::statistics;
 
-/// Columns where the constants are free: all, those between instants; right-hand side last.
+/// Number of columns if the constants are free: all constants, then the right-hand side.
 const WIDTH: usize = COUNT + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
-/// What was found so far.
+/// Present estimate.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The path of each track.
+    /// Path of each track.
     pub paths: Vec<Path>,
-    /// The constants.
+    /// Values of the constants.
     pub values: Values,
-    /// Their standard deviations.
+    /// Standard deviations of the constants.
     pub deviations: Values,
-    /// Their standard deviations before the data was seen, wider for those that it showed beyond doubt.
+    /// Prior standard deviations of the constants, wider for those that were freed because the data shows them
+    /// significantly.
     pub widths: Values,
-    /// Noise levels.
+    /// Noise levels of the sensors.
     pub levels: Levels,
 }
 
-/// What is fitted.
+/// Data and priors of a fit.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
-    /// The log.
+    /// The log on uniform clocks.
     pub log: &'a Log,
-    /// The settings of the reconstruction.
+    /// Settings of the reconstruction.
     pub options: &'a Options,
-    /// What a rate sample stands for.
+    /// Meaning of a rate sample: held, or at an instant.
     pub sampling: Sampling,
-    /// Means of the constants before the data is seen.
+    /// Prior means of the constants.
     pub means: Values,
-    /// Standard deviations of the constants before the data is seen.
+    /// Prior standard deviations of the constants.
     pub widths: Values,
 }
 
-/// One linearisation, solved: `N` unknowns an instant.
+/// Solution of one linearisation with `N` unknowns for each instant.
 pub struct Solved<const N: usize> {
-    /// Moves of every instant of every stretch.
+    /// Changes of every instant of every stretch.
     moves: Vec<Vec<[f64; N]>>,
-    /// Moves of the constants; zero where they are held.
+    /// Changes of the constants; zero where they are held.
     constants: Values,
     /// Standard deviations of the constants; zero where they are held.
     pub deviations: Values,
-    /// The readings before the move.
+    /// Measurements predicted before the change.
     pub readings: Vec<Vec<Reading>>,
 }
 
-/// Beyond so many of the measurements' bounds a step of the kinematics counts less: a launcher, an impact or an estimator that aligns
-/// itself moves the logged path by more than gyros and accelerometers say.
+/// A kinematic step is down-weighted beyond this many times the measurements' bound: a launcher, an impact or an
+/// estimator that aligns itself moves the logged path by more than gyros and accelerometers show.
 const PROCESS: f64 = 1.5;
 
 impl Problem<'_> {
-    /// The path's motion with the constants, gusts as they are.
+    /// Solves for the path's motion and the constants, with gusts held.
     pub fn calm(&self, found: &Found, bound: f64) -> Option<Solved<MOTION>> {
         self.solve::<MOTION, WIDTH, AT, BETWEEN>(found, bound)
     }
 
-    /// Motion with gusts, the constants held.
+    /// Solves for motion and gusts, with the constants held.
     pub fn held(&self, found: &Found, bound: f64) -> Option<Solved<MOTION_AND_GUST>> {
         self.solve::<MOTION_AND_GUST, 1, 1, 1>(found, bound)
     }
 
-    /// −2 ln L of the path and the constants at levels that are held, up to a constant: what a step has to lessen.
+    /// −2 ln L of the path and the constants at fixed noise levels, up to a constant: the merit function of the line
+    /// search.
     pub fn merit(&self, found: &Found, bound: f64) -> f64 {
         let before = |i: usize| ((found.values[i] - self.means[i]) / self.widths[i]).powi(2);
         let pairs = self.log.tracks.par_iter().zip(&found.paths);
@@ -105,9 +107,9 @@ impl Problem<'_> {
         measured + between.sum::<f64>()
     }
 
-    /// What the steps between samples leave, in the standard deviations that gyros and accelerometers are given: robust
-    /// scale of each axis of turn and velocity. It is below one where these are large enough.
-    pub fn strain(&self, found: &Found) -> [f64; MOTION] {
+    /// Residuals of the kinematic steps in the assumed standard deviations of gyros and accelerometers: robust scale
+    /// for each axis of rotation and velocity. Below one, the assumed noise suffices.
+    pub fn step_residuals(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
         let mut left: [Vec<f64>; MOTION] = Default::default();
@@ -121,8 +123,8 @@ impl Problem<'_> {
         left.map(|mut left| noise::level(&mut left))
     }
 
-    /// Root mean square of what the measured roll, pitch and yaw are off the path over blocks of `block` (s), rad; zero where
-    /// they were not measured.
+    /// Root mean square difference between measured and estimated roll, pitch and yaw averaged over blocks of `block`
+    /// (s), rad; zero where they were not measured.
     pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
         let vanes_at = self.log.sensors.vanes_at();
         let mut sums = [(0.0, 0.0); 3];
@@ -143,7 +145,7 @@ impl Problem<'_> {
         sums.map(|(sum, count): (f64, f64)| (sum / count.max(1.0)).sqrt())
     }
 
-    /// −2 ln L of the levels, up to what does not change with the gusts' level, with the constants held.
+    /// −2 ln L of the noise levels with the constants held, up to terms independent of the gusts' level.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
         let (_, _, left) = self.eliminate::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
         let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
@@ -151,8 +153,8 @@ impl Problem<'_> {
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
     }
 
-    /// What is known of the constants, before the data and by them (the last columns but one), those
-    /// that the log cannot tell before the data alone.
+    /// Information on the constants from prior and data (the last columns but one); from the prior alone where the
+    /// log carries none.
     fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
         let first = W.checked_sub(WIDTH)?;
         Some(SMatrix::from_fn(|i, j| {
@@ -162,8 +164,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// What `place` would be, were nothing known of it before the data, with its standard deviation, for each of `places`
-    /// alone; NaN where the data cannot tell.
+    /// Estimate of each of `places` without a prior, with its standard deviation, one at a time; NaN where the data
+    /// carries no information on it.
     pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
         let (_, _, left) = self.eliminate::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
         let bound = self.information(&left)?;
@@ -181,7 +183,7 @@ impl Problem<'_> {
         Some(places.iter().map(of).collect())
     }
 
-    /// Where the data and what was known before pull the constants.
+    /// Gradient of prior and data with respect to the constants.
     fn pull<const W: usize>(&self, found: &Found, left: &Left<W>) -> SVector<f64, COUNT> {
         SVector::<f64, COUNT>::from_fn(|i, _| {
             let data =
@@ -273,7 +275,7 @@ impl Problem<'_> {
     }
 }
 
-/// Huber's loss of a residual of so many standard deviations: its square, beyond `bound` linear.
+/// Huber's loss of a residual in standard deviations: quadratic up to `bound`, then linear.
 fn huber(size: f64, bound: f64) -> f64 {
     if size <= bound { size * size } else { bound * (2.0 * size - bound) }
 }
@@ -288,7 +290,7 @@ fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     })
 }
 
-/// A start of which nothing is known but the size of gusts.
+/// Equations of an initial instant, on which only the size of gusts is known.
 fn start<const N: usize, const W: usize>(
     gust: &Vector3<f64>,
     level: f64,
@@ -306,7 +308,8 @@ fn start<const N: usize, const W: usize>(
     }
 }
 
-/// The equations of a step whose rows have the standard deviations `sd`; a residual beyond `bound` of them counts less.
+/// Equations of a step whose rows have the standard deviations `sd`; a residual beyond `bound` of them is
+/// down-weighted.
 fn weigh<const N: usize, const W: usize, const D: usize>(
     mut step: Step<N, D>,
     sd: &[f64; N],
@@ -340,11 +343,11 @@ fn weigh<const N: usize, const W: usize, const D: usize>(
 }
 
 impl<const N: usize> Solved<N> {
-    /// Moves the path and the constants by a `part` of the step; returns the largest move of a constant in its
-    /// deviation.
+    /// Changes the path and the constants by a `part` of the step; returns the largest change of a constant in its
+    /// standard deviation.
     ///
     /// # Errors
-    /// The path left the numbers.
+    /// The path is not finite.
     pub fn apply(
         &self,
         found: &mut Found,
@@ -376,7 +379,7 @@ impl<const N: usize> Solved<N> {
     }
 }
 
-/// The search ended without numbers.
+/// The error of a search without a finite result.
 pub fn no_path(flight: &str, why: &'static str) -> ReconstructError {
     ReconstructError::NoPath { flight: flight.into(), why }
 }

@@ -1,8 +1,8 @@
-//! What gusts like those found would do to the constants, by drawing them.
+//! Uncertainty of the constants due to gusts of the estimated level, by simulation.
 //!
-//! The constants are fitted as if the sensors of the air had white noise, though wide enough to hold the
-//! gusts. Gusts last for many seconds, so that this says neither how far a mean wind may be off nor that
-//! a delay is known better than a bias. Draws of gusts, sent through the very equations of the fit, do.
+//! The constants are fitted as if the air-data sensors had white noise, wide enough to cover the gusts. Gusts persist
+//! for many seconds, so this neither covers the error of a mean wind nor shows that a delay is better known than a
+//! bias. Draws of gusts passed through the equations of the fit do both.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,13 +14,13 @@ use crate::flight_path::nuisance::{COUNT, Values};
 use crate::flight_path::path::Path;
 use greylag_num::stream::{Stream, stream};
 
-/// Pairs of draws in one set of equations: without gusts, with them.
+/// Number of pairs of draws in one set of equations: without gusts, with gusts.
 const PAIRS: usize = OTHERS / 2;
-/// Sets of equations: 32 pairs know a standard deviation to an eighth of itself.
+/// Number of sets of equations: 32 pairs determine a standard deviation to an eighth of itself.
 const SETS: u64 = 4;
 
-/// The standard deviations of the constants of the calm fit `found`, were its noise that of `rough`:
-/// gusts of that level beside the white noise of the sensors of the air.
+/// Standard deviations of the constants of the calm fit `found` if its noise were that of `rough`: gusts of that
+/// level in addition to white noise of the air-data sensors.
 pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
     let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
     for set in 0..SETS {
@@ -45,8 +45,8 @@ pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -
     }))
 }
 
-/// Residuals of airspeed, α, β along a path: first with the noise that the fit assumes, then, of the same
-/// numbers, with white noise and gusts.
+/// Residuals of airspeed, α, β along a path: with the noise that the fit assumes, and, from the same random numbers,
+/// with white noise and gusts.
 fn draws(
     problem: &Problem,
     path: &Path,

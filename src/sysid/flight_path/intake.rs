@@ -1,4 +1,4 @@
-//! Intake: a log's rows on one uniform clock a segment.
+//! Intake: resamples a log's rows to one uniform clock for each segment.
 
 mod channels;
 mod stretches;
@@ -13,10 +13,10 @@ use greylag_physics::{Command, Controls, Sensors};
 use stretches::{gap, step, stretches};
 use track::track;
 
-/// Fewest samples of a sensor in a segment that are worth using.
+/// Least number of samples for a sensor to be used in a segment.
 const FEWEST: usize = 10;
 
-/// What is said of a log without vanes.
+/// Note on a log without vanes.
 const ESTIMATED: &str = "α and β of this log are the flight controller's estimates, not measurements: left out. If the \
                          aircraft has vanes, map alpha_rad and beta_rad to them.";
 
@@ -25,56 +25,56 @@ const ESTIMATED: &str = "α and β of this log are the flight controller's estim
 pub struct Log {
     /// Time between samples, s.
     pub step: f64,
-    /// The stretches without gaps.
+    /// Stretches without gaps.
     pub tracks: Vec<Track>,
-    /// Which sensors the log has.
+    /// Sensors that the log contains.
     pub has: Present,
-    /// How often they measure.
+    /// Measurement periods of the sensors.
     pub periods: Periods,
-    /// How the rudder moves, if it does.
+    /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
-    /// What is known of its sensors and of the wind.
+    /// Stated errors and noise of its sensors and of the wind.
     pub sensors: Sensors,
-    /// What the reader must know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
-/// Which of the optional sensors a log has.
+/// Optional sensors that a log contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Present {
-    /// Heading.
+    /// Whether the heading is logged.
     pub yaw: bool,
-    /// Accelerometers.
+    /// Whether accelerometers are logged.
     pub force: bool,
-    /// Vane for the angle of attack.
+    /// Whether a vane measures the angle of attack.
     pub alpha: bool,
-    /// Vane for sideslip.
+    /// Whether a vane measures sideslip.
     pub beta: bool,
-    /// Velocity over ground.
+    /// Whether the velocity over ground is logged.
     pub velocity: bool,
-    /// Altitude.
+    /// Whether the altitude is logged.
     pub altitude: bool,
 }
 
 /// Mean time between the measurements of a sensor, s; zero where it is unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Periods {
-    /// Attitude.
+    /// Period of the attitude, s.
     pub attitude: f64,
-    /// Airspeed.
+    /// Period of the airspeed, s.
     pub airspeed: f64,
-    /// Vanes.
+    /// Period of the vanes, s.
     pub vanes: f64,
-    /// Velocity over ground.
+    /// Period of the velocity over ground, s.
     pub velocity: f64,
 }
 
-/// The extent in time of a flight with all its stretches.
+/// Extent in time of a flight with all its stretches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Span {
     /// Its middle on the log's clock, s.
     pub middle: f64,
-    /// Its length, s.
+    /// Length of the flight, s.
     pub length: f64,
 }
 
@@ -83,46 +83,46 @@ pub struct Span {
 pub struct Track {
     /// Time of the first sample, s.
     pub start: f64,
-    /// The extent in time of the flight that it is a stretch of.
+    /// Extent in time of the whole flight.
     pub span: Span,
-    /// p, q, r: never missing.
+    /// Body rates p, q, r; never missing.
     pub rates: Vec<[f64; 3]>,
-    /// Specific force: never missing if the log has it.
+    /// Specific force, body axes; never missing if the log has it.
     pub force: Vec<[f64; 3]>,
-    /// Roll, pitch, yaw, within ±π.
+    /// Roll, pitch, yaw, wrapped to ±π.
     pub attitude: Vec<[f64; 3]>,
-    /// True airspeed.
+    /// Measured true airspeed.
     pub airspeed: Vec<f64>,
-    /// α, β.
+    /// Measured angles of attack and sideslip.
     pub vanes: Vec<[f64; 2]>,
-    /// Velocity over ground.
+    /// Measured velocity over ground: north, east, down.
     pub velocity: Vec<[f64; 3]>,
     /// Altitude, interpolated; never missing if the segment has it at all.
     pub altitude: Vec<f64>,
-    /// Air density: never missing.
+    /// Air density; never missing.
     pub density: Vec<f64>,
-    /// Commands.
+    /// Command in force at each sample, if it is logged.
     pub commands: Vec<Option<Command>>,
-    /// Deflections: never missing.
+    /// Deflections and throttle position; never missing.
     pub controls: Vec<Controls>,
 }
 
 impl Track {
-    /// The number of samples.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.rates.len()
     }
 
-    /// Time of sample `k`, s; samples `step` (s) apart.
+    /// Time of sample `k`, s, for a sampling interval of `step` (s).
     pub fn time(&self, k: usize, step: f64) -> f64 {
         self.start + k as f64 * step
     }
 }
 
-/// Takes a log in: one clock, gaps split, commands held.
+/// Reads a log: resamples to one clock, splits at gaps, holds commands.
 ///
 /// # Errors
-/// A needed channel is missing, the log holds no flight, or no stretch is long enough.
+/// A required channel is missing, the log contains no flight, or no stretch is long enough.
 pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructError> {
     let channels = Channels::of(flight);
     channels.check(&options.name)?;

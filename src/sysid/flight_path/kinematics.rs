@@ -1,4 +1,4 @@
-//! The inertial part: how gyros and accelerometers carry the path from one sample to the next.
+//! Kinematic propagation of the path from one sample to the next by gyros and accelerometers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,44 +12,44 @@ use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
 
-/// Time over which a gust is forgotten, s: the length scale of turbulence some hundred metres up over
-/// the airspeed of a small aircraft.
+/// Correlation time of gusts, s: the length scale of turbulence some hundred metres up over the airspeed of a small
+/// aircraft.
 const GUST_TIME: f64 = 20.0;
 
-/// The part of a gust that is left after `step`, s.
+/// Share of a gust that remains after `step`, s.
 pub fn gust_kept(step: f64) -> f64 {
     (-step / GUST_TIME).exp()
 }
 
-/// Mean rates and forces over each interval, as the gyros and accelerometers have them.
+/// Mean rates and forces over each interval, from gyros and accelerometers.
 #[derive(Clone, Debug)]
 pub struct Drive {
     /// Mean rate from each sample to the next, body axes, rad/s.
     rate: Vec<Vector3<f64>>,
-    /// Mean specific force from each sample to the next, axes of the body at the first one, m/s².
+    /// Mean specific force from each sample to the next, body axes at the first one, m/s².
     force: Vec<Vector3<f64>>,
-    /// Its change with the delay of the accelerometers, m/s³.
+    /// Derivative of `force` with respect to the accelerometers' delay, m/s³.
     force_by_skew: Vec<Vector3<f64>>,
     /// Time of the first sample, s.
     start: f64,
-    /// The flight's extent in time.
+    /// Extent in time of the flight.
     span: Span,
 }
 
-/// Attitude and velocity, unknowns of every instant; the gust's three may follow.
+/// Number of unknowns of an instant: attitude and velocity.
 pub const MOTION: usize = 6;
-/// With the gust.
+/// Number of unknowns of an instant with the gust's three components.
 pub const MOTION_AND_GUST: usize = 9;
 
-/// The difference between one sample carried on and the next one, and how it depends on both: rows
-/// of attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
+/// Difference between the propagated state of one sample and that of the next one, with its derivatives: rows of
+/// attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
 pub struct Step<const N: usize, const D: usize> {
-    /// By the first sample.
+    /// Derivatives with respect to the first sample.
     pub first: Block<N>,
-    /// By the second sample.
+    /// Derivatives with respect to the second sample.
     pub second: Block<N>,
-    /// By the constants that act between samples, then the difference itself with its sign turned:
-    /// the last `D` columns of the equations.
+    /// Derivatives with respect to the constants that act between samples, then the negated difference: the last `D`
+    /// columns of the equations.
     pub rest: Wide<N, D>,
 }
 
@@ -67,9 +67,9 @@ fn put<const N: usize, const W: usize>(
 }
 
 impl Drive {
-    /// The drive of `track` at the constants `values`, samples `step` (s) apart.
+    /// Propagation input of `track` at the constants `values`, for a sampling interval of `step` (s).
     ///
-    /// Without accelerometers the velocity is carried on unchanged.
+    /// Without accelerometers the velocity is propagated unchanged.
     pub fn new(
         track: &Track,
         values: &Values,
@@ -172,15 +172,15 @@ impl Drive {
     }
 }
 
-/// The specific force that holds the velocity where it is.
+/// Specific force that keeps the velocity constant.
 fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     let [roll, pitch, _] = track.attitude[k].map(|x| if x.is_finite() { x } else { 0.0 });
     let r = rotation::from_euler([roll, pitch, 0.0]);
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples` that came `late` samples late, put right by cubics through four of them, with the change of each by one more
-/// sample of lateness.
+/// `samples` with a delay of `late` samples removed by cubic interpolation through four of them, and the derivative
+/// of each with respect to the delay.
 pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);

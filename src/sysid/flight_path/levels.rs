@@ -1,4 +1,4 @@
-//! The noise levels: first from the data alone, then from what the fit leaves.
+//! Noise levels, estimated first from the data alone, then from the residuals of the fit.
 
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::measurement::{self, Reading};
@@ -6,62 +6,64 @@ use crate::flight_path::noise;
 use crate::flight_path::path::CHANNELS;
 use greylag_physics::sensors::Noisy;
 
-/// Smallest noise levels, of the size of what the kinematics leave out: gyro rad/s, force m/s².
+/// Smallest noise levels, of the size of the errors of discrete kinematics: gyro rad/s, force m/s².
 const GYRO_FLOOR: f64 = 2e-4;
 const FORCE_FLOOR: f64 = 5e-3;
 /// Smallest noise levels of the measured channels.
 const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
-/// Least level of a channel in what the noise of gyros or accelerometers moves the path by between two
-/// samples. Were it less, the path would follow every single measurement, and the likeliest delay be half
-/// a sample, whatever the delay: there interpolation averages neighbours.
+/// Least level of a channel, relative to the path's change between two samples due to noise of gyros or
+/// accelerometers. With a smaller level the path would follow every single measurement, and the most likely delay
+/// would be half a sample, whatever the true one, because interpolation there averages neighbours.
 const CARRIED: f64 = 30.0;
-/// Levels where too few samples tell: rad, m/s, rad, m/s.
+/// Levels used where too few samples allow an estimate: rad, m/s, rad, m/s.
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
-/// Largest levels, colour included: errors of attitude, airspeed, vanes and velocity that somebody would still log. Without them a path
-/// that departs from a sensor makes that sensor count less, and departs further.
+/// Largest levels, colour included: the largest plausible errors of attitude, airspeed, vanes and velocity. Without a
+/// limit, a path that departs from a sensor would lower that sensor's weight and depart further.
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
-/// Strain of the path from which its gyros or accelerometers err by more than their noise; that of a launch is 8.
-const STRAINED: f64 = 2.0;
-/// What the velocity may do where no accelerometer says it, m/s².
+/// Scaled residual of the kinematic steps above which gyros or accelerometers have larger errors than their noise;
+/// that of a launch is 8.
+const EXCESSIVE: f64 = 2.0;
+/// Standard deviation of the acceleration where no accelerometer measures it, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
-/// Gusts of calm air, m/s.
+/// Gust level of calm air, m/s.
 pub const CALM: f64 = 0.002;
-/// Place of the airspeed among the measured channels.
+/// Index of the airspeed among the measured channels.
 const AIRSPEED: usize = 3;
-/// Blocks over which residuals are averaged to see their colour, s.
+/// Lengths of the blocks over which residuals are averaged to detect coloured noise, s.
 const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
-/// Slow error of an airspeed's dynamic pressure, Pa, and the time over which it lasts, s: the zero of the pressure sensor drifts, and the
-/// static port errs with attitude. A guess, 0.3 % of the airspeed at 17 m/s; no sensor was measured.
+/// Slow error of a dynamic pressure sensor, Pa, and its correlation time, s: the sensor's zero drifts, and the static
+/// port errs with attitude. An assumption, 0.3 % of the airspeed at 17 m/s; no sensor was measured.
 const PITOT: (f64, f64) = (1.0, 30.0);
-/// Density by which that is turned into a speed, kg/m³: the error is known to no better than its order.
+/// Air density for converting it to a speed, kg/m³; sufficient because the error is known to its order only.
 const NEAR_THE_GROUND: f64 = 1.2;
 
 /// Noise levels, as standard deviations.
 #[derive(Clone, Copy, Debug)]
 pub struct Levels {
-    /// Gyros, rad/s.
+    /// Gyro noise, rad/s.
     pub gyro: [f64; 3],
-    /// Accelerometers, m/s².
+    /// Accelerometer noise, m/s².
     pub force: [f64; 3],
-    /// Gusts, each component, m/s.
+    /// Gusts, standard deviation of each component, m/s.
     pub gusts: f64,
-    /// The measured channels.
+    /// Noise of the measured channels, in their units.
     pub measured: [f64; CHANNELS],
-    /// Their least levels: the white part of what was measured, where the samples come fast enough to
-    /// tell. A path that may follow the measurements closely leaves residuals that are too small.
+    /// Least levels of the channels: the white part of the measurements, where the sampling rate is high enough to
+    /// estimate it. A path that can follow the measurements closely has residuals that are too small.
     pub white: [f64; CHANNELS],
-    /// How much wider than white noise their means scatter.
+    /// Ratio of the scatter of the channels' block means to that of white noise.
     pub colour: [f64; CHANNELS],
-    /// Whether a level is stated, not estimated.
+    /// Whether a level is stated and therefore not estimated.
     pub stated: [bool; CHANNELS],
-    /// White noise of the airspeed whose means scatter as its slow error does, m/s. Zero where a vane measures α or no velocity over
-    /// ground was logged: elsewhere the mean vertical wind, and with it α, follows from how the airspeed goes with climb. In 13 minutes of a PX4 flight without wind,
-    /// 0.01 m/s of such an error was read as 0.18 ± 0.04 m/s of wind.
+    /// White noise of the airspeed whose means scatter like its slow error, m/s. Zero where a vane measures α or no
+    /// velocity over ground was logged: otherwise the mean vertical wind, and with it α, follows from the change of
+    /// airspeed with climb. In 13 minutes of a PX4 flight without wind, 0.01 m/s of such an error was estimated as
+    /// 0.18 ± 0.04 m/s of wind.
     slow_airspeed: f64,
 }
 
 impl Levels {
-    /// Levels before anything is fitted: the white part of every channel.
+    /// Levels before the fit: the white part of every channel.
     pub fn first(log: &Log) -> Levels {
         let over = |get: &dyn Fn(&Track, usize) -> f64| {
             noise::white(log.tracks.iter().flat_map(|t| (0..t.len()).map(move |k| get(t, k))))
@@ -92,7 +94,7 @@ impl Levels {
         let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
         let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
-        // what is not known of forces is no noise that could be averaged
+        // an unknown force is no noise that averages out
         let gain = if log.has.force { between(force) } else { 0.0 };
         let turn = between(gyro);
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
@@ -117,7 +119,7 @@ impl Levels {
         .as_stated(log)
     }
 
-    /// The same with the noise that is stated for the log's sensors.
+    /// These levels with the stated noise of the log's sensors in place of the estimates.
     fn as_stated(mut self, log: &Log) -> Levels {
         let kinds = [(Noisy::Attitude, 0..3), (Noisy::Airspeed, 3..4), (Noisy::Vanes, 4..6)];
         for (kind, channels) in kinds.into_iter().chain([(Noisy::Velocity, 6..9)]) {
@@ -130,26 +132,26 @@ impl Levels {
         self
     }
 
-    /// Raises the levels of gyros and accelerometers whose steps strain the path by more than chance: one level for the
-    /// three axes of each. Returns the largest relative change.
-    pub fn loosen(&mut self, strain: &[f64; 6]) -> f64 {
+    /// Raises the levels of gyros and accelerometers whose kinematic residuals exceed chance, one level for the three
+    /// axes of each. Returns the largest relative change.
+    pub fn loosen(&mut self, step_residuals: &[f64; 6]) -> f64 {
         let worst = |of: &[f64]| {
             let worst = of.iter().copied().fold(1.0, f64::max);
-            if worst > STRAINED { worst } else { 1.0 }
+            if worst > EXCESSIVE { worst } else { 1.0 }
         };
-        let (turn, pull) = (worst(&strain[..3]), worst(&strain[3..]));
+        let (turn, pull) = (worst(&step_residuals[..3]), worst(&step_residuals[3..]));
         self.gyro.iter_mut().for_each(|level| *level *= turn);
         self.force.iter_mut().for_each(|level| *level *= pull);
         turn.max(pull).ln()
     }
 
-    /// What slow errors make of a channel's colour at least, where a sample has the noise `level`.
+    /// Least colour of a channel due to slow errors, if a sample has the noise `level`.
     fn least_colour(&self, channel: usize, level: f64) -> f64 {
         let least = if channel == AIRSPEED { self.slow_airspeed } else { 0.0 };
         1.0_f64.hypot(least / level)
     }
 
-    /// Takes the levels anew from the residuals of every stretch; returns the largest relative change.
+    /// Estimates the levels again from the residuals of every stretch; returns the largest relative change.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for (channel, widest) in WIDEST.into_iter().enumerate() {
@@ -175,7 +177,7 @@ impl Levels {
     }
 }
 
-/// The white noise that stands for [`PITOT`] at `airspeed`, m/s: see [`Levels::slow_airspeed`].
+/// The white noise that represents [`PITOT`] at `airspeed`, m/s: see [`Levels::slow_airspeed`].
 fn slow_airspeed(log: &Log, airspeed: f64) -> f64 {
     if log.has.alpha || !log.has.velocity {
         return 0.0;

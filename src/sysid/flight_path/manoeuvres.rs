@@ -1,4 +1,4 @@
-//! Manoeuvres: what was flown when, from rates, surfaces, bank and throttle.
+//! Classification of a flight into manoeuvres by rates, surfaces, bank and throttle.
 //!
 //! A moment belongs to a roll or pitch manoeuvre if the root mean square of the roll rate (of the
 //! rate of pitch angle), or of the surface about its mean, over the second around it exceeds a bound;
@@ -7,25 +7,25 @@
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 
-/// Roll rate that is a manoeuvre, rad/s.
+/// Roll rate from which a moment belongs to a manoeuvre, rad/s.
 const ROLL_RATE: f64 = 0.15;
-/// Rate of pitch angle that is a manoeuvre, rad/s.
+/// Rate of pitch angle from which a moment belongs to a manoeuvre, rad/s.
 const PITCH_RATE: f64 = 0.08;
-/// Deflection about its mean that is a manoeuvre, rad.
+/// Deflection about its mean from which a moment belongs to a manoeuvre, rad.
 const DEFLECTION: f64 = 0.03;
-/// Throttle about its mean that is a manoeuvre.
+/// Throttle about its mean from which a moment belongs to a change of thrust.
 const THROTTLE: f64 = 0.05;
-/// Bank that is a turn, rad.
+/// Bank angle from which a moment belongs to a turn, rad.
 const BANK: f64 = 0.26;
-/// Time over which activity is taken, s.
+/// Length of the window in which activity is measured, s.
 const WINDOW: f64 = 1.0;
-/// Shortest stretch, s.
+/// Shortest stretch of one manoeuvre, s.
 const SHORTEST: f64 = 0.5;
 
-/// What was flown.
+/// Kind of a manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ManoeuvreKind {
-    /// Nothing moves.
+    /// Neither surfaces nor throttle move.
     Steady,
     /// Banked, nothing else moves.
     Turn,
@@ -35,18 +35,18 @@ pub enum ManoeuvreKind {
     Roll,
     /// The elevator or the pitch angle moves.
     Pitch,
-    /// Both.
+    /// Roll and pitch move together.
     RollAndPitch,
 }
 
-/// A stretch of one kind.
+/// A stretch of flight with one kind of manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Manoeuvre {
     /// Start on the log's clock, s.
     pub start_s: f64,
-    /// End, s.
+    /// End on the log's clock, s.
     pub end_s: f64,
-    /// What was flown.
+    /// Kind of the manoeuvre.
     pub kind: ManoeuvreKind,
 }
 

@@ -1,4 +1,4 @@
-//! The measured part: what the sensors show of the path, with their errors.
+//! Measurement equations: predicted sensor values along the path, with the sensors' errors.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -15,24 +15,24 @@ use crate::flight_path::nuisance::{
 use crate::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
 use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
 
-/// Columns of the constants that act at instants, right-hand side last.
+/// Number of columns of the constants that act at instants, the right-hand side last.
 pub const AT: usize = INERTIAL + 1;
-/// How many further residuals the equations can be solved for at once.
+/// Number of additional residuals that the equations can be solved for at once.
 pub const OTHERS: usize = 16;
-/// Further residuals of a channel.
+/// Additional residuals of a channel.
 pub type Others = [f64; OTHERS];
 
-/// The measurements of an instant against what its path should show; NaN where there is none.
+/// Measurements of an instant less their predictions; NaN where there is none.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    /// Measured less shown.
+    /// Measured less predicted, by channel.
     pub residual: [f64; CHANNELS],
-    /// How what should be shown changes with the delay, per s.
+    /// Derivative of the predictions with respect to the delay, per s.
     by_late: [f64; CHANNELS],
 }
 
 impl Reading {
-    /// The same with other residuals where there are measurements.
+    /// This reading with other residuals, where there are measurements.
     pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
         for (residual, other) in self.residual.iter_mut().zip(residuals) {
             *residual = if residual.is_nan() { f64::NAN } else { other };
@@ -41,7 +41,7 @@ impl Reading {
     }
 }
 
-/// The delay that a channel is read with.
+/// Index of the delay that applies to a channel.
 pub fn skew_of(channel: usize) -> usize {
     match channel {
         0..3 => SKEW_ATTITUDE,
@@ -61,7 +61,7 @@ pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// How airspeed, α and β change with the velocity through the air; `None` if it is slow.
+/// Derivatives of airspeed, α and β with respect to the velocity through the air; `None` at low speed.
 fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let (v, plane) = (u.norm(), u.x.hypot(u.z));
     (plane >= SLOW).then(|| {
@@ -72,7 +72,7 @@ fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
     })
 }
 
-/// What sensors without errors would show at sample `k`, vanes at `vanes_at`.
+/// Values of sensors without errors at sample `k`, vanes at the position `vanes_at`.
 fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) -> [f64; CHANNELS] {
     let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
     let u = path.air_velocity(k);
@@ -82,21 +82,21 @@ fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) ->
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
 
-/// Turns the slopes of what is true into those of what its sensors show.
+/// Converts derivatives of true air data to those of measured air data.
 fn scale(slopes: &mut Matrix3<f64>, values: &Values) {
     for (row, place) in [SCALE, VANE_GAIN, VANE_GAIN + 1].into_iter().enumerate() {
         slopes.row_mut(row).scale_mut(1.0 + values[place]);
     }
 }
 
-/// How airspeed, α and β as measured change with a gust at sample `k`, earth axes.
+/// Derivatives of measured airspeed, α and β with respect to a gust at sample `k`, earth axes.
 pub fn by_gust(path: &Path, k: usize, values: &Values) -> Option<Matrix3<f64>> {
     let mut slopes = air_slopes(&path.air_velocity(k))?;
     scale(&mut slopes, values);
     Some(slopes * -path.attitude[k].transpose())
 }
 
-/// The readings at every sample of `track`, samples `step` (s) apart.
+/// Readings at every sample of `track`, for a sampling interval of `step` (s).
 pub fn readings(
     track: &Track,
     path: &Path,
@@ -137,7 +137,7 @@ pub fn readings(
     (0..n).into_par_iter().with_min_len(1000).map(read).collect()
 }
 
-/// What a sensor without errors shows `part` of a sample behind sample `j`, with its slope (per sample).
+/// Value of a sensor without errors a fraction `part` of a sample after sample `j`, and its slope (per sample).
 fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f64, f64) {
     let (here, last) = (shown[j][channel], shown.len() as isize - 1);
     let beside = |i: isize| turn(channel, shown[i.clamp(0, last) as usize][channel] - here);
@@ -147,12 +147,12 @@ fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f
     (here + beside, slope)
 }
 
-/// A difference of a channel, that of angles the short way round.
+/// A difference of a channel, wrapped to ±π for angles.
 fn turn(channel: usize, x: f64) -> f64 {
     if channel < 3 { wrap(x) } else { x }
 }
 
-/// What a sensor with its errors shows where one without shows `h`, and the gain from one to the other.
+/// Value of a sensor with its errors where the error-free value is `h`, and its derivative with respect to `h`.
 fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     match channel {
         2 => (h + values[HEADING], 1.0),
@@ -163,9 +163,9 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     }
 }
 
-/// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the
-/// channels; a residual beyond `bound` of them counts less. The first columns are `others`, further
-/// residuals of the sensors of the air; then come the constants that act at instants, none if `M` is 1.
+/// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the channels; a
+/// residual beyond `bound` of them is down-weighted. The first columns are `others`, additional residuals of the
+/// air-data sensors; then come the constants that act at instants, none if `M` is 1.
 #[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
 pub fn add<const N: usize, const W: usize, const M: usize>(
     path: &Path,
@@ -209,14 +209,14 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
     }
 }
 
-/// Adds the first columns and the last one to theirs.
+/// Adds the first columns and the last one of `part` to those of `row`.
 fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
     row.iter_mut().zip(&part[..M - 1]).for_each(|(x, y)| *x += y);
     row[W - 1] += part[M - 1];
 }
 
-/// How every channel depends on the path at sample `k`, `None` where it says nothing, and on the
-/// constants.
+/// Derivatives of every channel with respect to the path at sample `k`, `None` where a channel carries no
+/// information, and to the constants.
 fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,

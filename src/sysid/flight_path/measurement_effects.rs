@@ -1,7 +1,7 @@
-//! Errors of the measurement that look like missing physics, as entries of the catalogue of effects.
+//! Measurement errors that look like missing physics, as entries of the catalogue of effects.
 //!
-//! They are decided by the reconstruction of the flight path, before any aerodynamics: their
-//! parameters are its [nuisances](crate::flight_path), under the same names.
+//! The reconstruction of the flight path estimates them without any aerodynamics: their parameters are its
+//! [nuisances](crate::flight_path), under the same names.
 
 use greylag_physics::effects::{Coefficient, Description, Entry, coefficient};
 
@@ -9,7 +9,7 @@ use greylag_physics::effects::{Coefficient, Description, Entry, coefficient};
 const PATH: &str = "kinematics of a rigid body, which hold no aerodynamics; Klein and Morelli, Aircraft System \
                     Identification, section 10.2";
 
-/// Every measurement effect there is.
+/// All measurement effects.
 pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     Description {
         id: "steady_wind",
@@ -199,7 +199,7 @@ const SKEW: [Coefficient; 5] = [
     coefficient("skew_velocity", "delay of the velocity over ground", "s", (-2.0, 2.0)),
 ];
 
-/// What all of them share: no shape constants, no table.
+/// Common properties of all of them: no shape constants, no table.
 const fn measured(entry: &Entry) -> Description {
     Description {
         id: "",

@@ -1,7 +1,7 @@
-//! Flight-path reconstruction: from a log to states without sensor errors.
+//! Flight-path reconstruction (data compatibility check): estimates states without sensor errors from a log.
 //!
-//! Kinematics hold no aerodynamics, so what the sensors do wrong, and what the wind does, is decided
-//! here, before any model of the aircraft is looked at.
+//! Kinematics need no aerodynamics, so sensor errors and wind are estimated here, before any model of the aircraft is
+//! used.
 
 pub mod measurement_effects;
 pub mod reconstruction;
@@ -38,46 +38,45 @@ use greylag_model::GreyBox;
 use greylag_physics::Sensors;
 use greylag_physics::airframe::ActuatorFigures;
 
-/// Which clock the deflections are handed out on.
+/// Clock of the reconstructed deflections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActuatorClock {
-    /// The gyros': recorded deflections that came late beyond doubt are put right. A time delay or a lag
-    /// of the surfaces that the record does not show looks the same, so it goes with the delay.
+    /// The gyros' clock: recorded deflections are shifted if their delay is significant. A time delay or a lag of the
+    /// surfaces that the record does not show is confounded with it, so it is removed too.
     Estimated,
-    /// The log's: deflections stay as recorded, so that whoever looks for missing effects decides what
-    /// is clock, what is physics. `skew_actuators` is estimated all the same, for information.
+    /// The log's clock: deflections stay as recorded, so that a later search for missing effects can separate clock
+    /// errors from physics. `skew_actuators` is estimated nevertheless, for information.
     AsRecorded,
 }
 
-/// What a reconstruction needs besides the log.
+/// Options of a reconstruction.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// What the flight is called in reports: its file.
+    /// Name of the flight in reports, from its file.
     pub name: String,
-    /// The airframe's actuators: commands become deflections through them where the log has none.
+    /// Actuator model of the airframe, which converts commands to deflections where the log has none.
     pub actuators: ActuatorFigures,
-    /// Effective gravity, m/s².
+    /// Effective gravity at the site, m/s².
     pub gravity: f64,
-    /// What a rate sample stands for; `None` to take it from the log: from its
-    /// column `rate_hold_s`, else from its clocks. Clock skews
-    /// are relative to the gyros' samples so understood.
+    /// Meaning of a rate sample; `None` to read it from the log's column `rate_hold_s`, or to infer it from the log's
+    /// clocks. Clock skews are relative to the gyros' samples thus defined.
     pub sampling: Option<Sampling>,
-    /// Which clock the deflections are handed out on.
+    /// Clock of the reconstructed deflections.
     pub actuators_clock: ActuatorClock,
     /// Shortest time between reconstructed samples, s; a slower log keeps its own median period.
     pub step_s: f64,
-    /// Longest time between rows that is no gap, s.
+    /// Longest time between rows that does not count as a gap, s.
     pub gap_s: f64,
-    /// Shortest segment worth reconstructing, s.
+    /// Shortest segment that is reconstructed, s.
     pub shortest_s: f64,
-    /// Airspeed under which the aircraft is taken not to fly, m/s.
+    /// Airspeed below which the aircraft counts as not flying, m/s.
     pub airspeed_min_mps: f64,
-    /// What is known of the aircraft's sensors; what the flight itself says goes before it.
+    /// Stated properties of the aircraft's sensors; those stated in the log itself take precedence.
     pub sensors: Sensors,
 }
 
 impl Options {
-    /// The usual figures for the flight `name` of an aircraft with `actuators`.
+    /// Default options for the flight `name` of an aircraft with `actuators`.
     pub fn new(name: impl Into<String>, actuators: ActuatorFigures) -> Options {
         Options {
             name: name.into(),
@@ -93,10 +92,9 @@ impl Options {
         }
     }
 
-    /// The same for the aircraft and the gravity of `model`, deflections on `clock`.
+    /// Options for the aircraft and the gravity of `model`, deflections on `clock`.
     ///
-    /// An aircraft that flies more slowly than usual is followed to a lower airspeed and in shorter
-    /// stretches.
+    /// An aircraft slower than usual is reconstructed down to a lower airspeed and in shorter stretches.
     pub fn of(name: &str, model: &GreyBox, clock: ActuatorClock) -> Options {
         let usual = Options::new(name, model.airframe.actuators);
         let flies = Flying::from(model.airframe.envelope.flying_from_mps());
@@ -111,31 +109,31 @@ impl Options {
     }
 }
 
-/// Why a flight cannot be reconstructed.
+/// Error of a reconstruction.
 #[derive(Debug, thiserror::Error)]
 pub enum ReconstructError {
-    /// A needed channel is missing altogether.
+    /// A required channel is missing.
     #[error(
         "cannot reconstruct {flight}: it has no usable {channel}; log it, or map the message that \
          holds it to the column {column}"
     )]
     Missing {
-        /// The flight.
+        /// Name of the flight.
         flight: String,
-        /// What is missing.
+        /// The missing channel, in words.
         channel: &'static str,
-        /// The column of the log format that would satisfy it.
+        /// Column of the log format that would provide it.
         column: &'static str,
     },
-    /// There is no flight in the log.
+    /// The log contains no flight.
     #[error(
         "cannot reconstruct {flight}: its airspeed never exceeds {fastest_mps:.1} m/s, so there is no \
          flight in it; check the unit of airspeed_mps, or give a log of a flight"
     )]
     NoFlight {
-        /// The flight.
+        /// Name of the flight.
         flight: String,
-        /// The largest airspeed in it, m/s.
+        /// Largest airspeed in the log, m/s.
         fastest_mps: f64,
     },
     /// No stretch is long enough.
@@ -144,31 +142,31 @@ pub enum ReconstructError {
          under {shortest_s:.1} s; give a longer log, or one with a steadier logging rate"
     )]
     TooShort {
-        /// The flight.
+        /// Name of the flight.
         flight: String,
-        /// Its longest stretch, s.
+        /// Longest stretch, s.
         longest_s: f64,
-        /// The shortest stretch worth reconstructing, s.
+        /// Shortest stretch that can be reconstructed, s.
         shortest_s: f64,
     },
-    /// The sensors contradict one another so that no path was found.
+    /// The sensors contradict one another, so that no path fits them.
     #[error(
         "cannot reconstruct {flight}: no flight path fits its sensors ({why}); check the units and \
          signs of attitude, rates and accelerations"
     )]
     NoPath {
-        /// The flight.
+        /// Name of the flight.
         flight: String,
-        /// How the search ended.
+        /// Reason, in words.
         why: &'static str,
     },
 }
 
-/// Reconstructs `flight`: one uniform clock a segment, sensor errors and wind estimated and removed.
+/// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors and wind.
 ///
 /// # Errors
-/// A needed channel is missing, there is no flight in the log or no stretch of it is long enough, or
-/// its sensors contradict one another.
+/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors
+/// contradict one another.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));

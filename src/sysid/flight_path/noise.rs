@@ -1,12 +1,12 @@
-//! Noise levels, taken from the data.
+//! Estimation of noise levels from data.
 
 use greylag_num::statistics::quantile;
 
-/// Fewest values from which a level is taken.
+/// Least number of values for an estimate.
 const FEWEST: usize = 8;
 
-/// Standard deviation of the white part of `samples`, from their fourth differences, which a
-/// smooth signal hardly has; NaN for too few samples. Missing ones are passed over.
+/// Standard deviation of the white part of `samples`, from their fourth differences, in which a smooth signal
+/// vanishes; NaN for too few samples. Missing ones are skipped.
 pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     let x: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
     let differences: Vec<f64> =
@@ -22,8 +22,8 @@ pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     if median > 0.0 { median } else { mean_square.sqrt() / gain }
 }
 
-/// Root mean square of `residuals` with outliers pulled in to four times the median level; NaN for
-/// too few. Their order is lost.
+/// Root mean square of `residuals` with outliers limited to four times the median level; NaN for too few. Reorders
+/// the slice.
 pub fn level(residuals: &mut [f64]) -> f64 {
     if residuals.len() < FEWEST {
         return f64::NAN;
@@ -36,8 +36,8 @@ pub fn level(residuals: &mut [f64]) -> f64 {
     (sum / residuals.len() as f64).sqrt()
 }
 
-/// How much wider than for white noise a mean of `residuals` scatters: the ratio of standard
-/// deviations, at least 1, from the means of blocks of `block` values.
+/// Ratio of the scatter of block means of `residuals` to that for white noise: ratio of standard deviations, at least
+/// 1, for blocks of `block` values.
 pub fn colour(residuals: &[f64], block: usize) -> f64 {
     let count = residuals.len() / block.max(1);
     if block < 2 || count < FEWEST {

@@ -1,59 +1,59 @@
-//! The constants estimated along with the path: their names, units and prior widths.
+//! Constants estimated along with the path: names, units and prior widths.
 
 use crate::flight_path::Options;
 use crate::flight_path::intake::{Log, Present, Span};
 use greylag_physics::sensors::CONSTANTS;
 
-/// Number of constants.
+/// Number of estimated constants.
 pub const COUNT: usize = 41;
-/// Place of the bias of the angle-of-attack vane.
+/// Index of the angle-of-attack vane's bias.
 pub const ALPHA: usize = 0;
-/// Place of the bias of the sideslip vane.
+/// Index of the sideslip vane's bias.
 pub const BETA: usize = 1;
-/// Place of the airspeed scale less one: measured = (1 + scale) · true.
+/// Index of the airspeed scale less one: measured = (1 + scale) · true.
 pub const SCALE: usize = 2;
-/// Place of the wind north, east, down: the steady part, about which gusts vary.
+/// Index of the wind north, east, down: its steady part, about which gusts vary.
 pub const WIND: usize = 3;
-/// Place of the delay of the attitude behind the gyros.
+/// Index of the attitude's delay behind the gyros.
 pub const SKEW_ATTITUDE: usize = 6;
-/// Place of the delay of the airspeed.
+/// Index of the airspeed's delay.
 pub const SKEW_AIRSPEED: usize = 7;
-/// Place of the delay of the vanes.
+/// Index of the vanes' delay.
 pub const SKEW_VANES: usize = 8;
-/// Place of the delay of the velocity over ground.
+/// Index of the ground velocity's delay.
 pub const SKEW_VELOCITY: usize = 9;
-/// Place of the gains of the vanes of α and β less one: upwash of a wing or a body.
+/// Index of the gains of the α and β vanes less one, caused by upwash of a wing or a body.
 pub const VANE_GAIN: usize = 10;
 const BETA_GAIN: usize = VANE_GAIN + 1;
-/// Place of the offset of the airspeed: measured = (1 + scale) · true + offset.
+/// Index of the airspeed's offset: measured = (1 + scale) · true + offset.
 pub const AIRSPEED_OFFSET: usize = 12;
-/// Place of the offset of the measured heading against the velocity over ground.
+/// Index of the measured heading's offset against the velocity over ground.
 pub const HEADING: usize = 13;
-/// The first of the constants that act between instants; those before it act at instants.
+/// Index of the first constant that acts between instants; those before it act at instants.
 pub const INERTIAL: usize = 14;
-/// Place of the gyro biases p, q, r in the middle of the flight.
+/// Index of the gyro biases p, q, r in the middle of the flight.
 pub const GYRO: usize = 14;
-/// Place of the accelerometer biases x, y, z.
+/// Index of the accelerometer biases x, y, z.
 pub const FORCE: usize = 17;
-/// Place of the delay of the accelerometers.
+/// Index of the accelerometers' delay.
 pub const SKEW_FORCE: usize = 20;
-/// Place of the drifts of the gyro biases p, q, r: their change with time, rad/s². A gyro that warms up drifts
-/// by 0.05°/s a minute (so does ArduPilot's SITL): held constant, its bias turned the heading by 1.5° in four minutes.
+/// Index of the drifts of the gyro biases p, q, r: their rate of change, rad/s². A gyro that warms up drifts by
+/// 0.05°/s a minute (so does ArduPilot's SITL): with a constant bias, the heading error was 1.5° in four minutes.
 pub const DRIFT: usize = 21;
-/// Place of the gains of the gyros p, q, r less one.
+/// Index of the gains of the gyros p, q, r less one.
 pub const GYRO_GAIN: usize = 24;
-/// Place of the gains of the accelerometers x, y, z less one.
+/// Index of the gains of the accelerometers x, y, z less one.
 pub const FORCE_GAIN: usize = 27;
-/// Place of what bends the drifts, rad/s²: their changes at the inner knots of the flight, p, q, r of each. The drift of
-/// ArduPilot's SITL turns back after five minutes.
+/// Index of the changes of the drifts, rad/s², at the inner knots of the flight, p, q, r of each. The drift of
+/// ArduPilot's SITL reverses after five minutes.
 pub const BEND: usize = 30;
-/// Number of inner knots, as far from one another as from the ends of the flight.
+/// Number of inner knots, equally spaced between the ends of the flight.
 const KNOTS: usize = 3;
-/// Place of the Earth's rate north and down, rad/s: a log without a latitude does not say them, and
-/// their Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice what a minute's accelerometer bias is known to.
+/// Index of the Earth's rate north and down, rad/s. A log without a latitude does not determine it, and the Coriolis
+/// acceleration, 0.003 m/s² at 20 m/s, is twice the uncertainty of an accelerometer bias after a minute.
 pub const EARTH: usize = 39;
 
-/// The constants in the order in which they are handed out.
+/// Order of the constants in the result.
 pub const ORDER: [usize; BEND] = [
     14, 15, 16, 21, 22, 23, 24, 25, 26, 17, 18, 19, 27, 28, 29, 0, 1, 10, 11, 2, 12, 13, 3, 4, 5,
     6, 20, 7, 8, 9,
@@ -65,7 +65,7 @@ pub const SKEW_SAMPLES: f64 = 0.77;
 /// Values of the constants.
 pub type Values = [f64; COUNT];
 
-/// Names and units, by place: what can be stated of sensors and wind, then the Earth's rate.
+/// Names and units, by index: sensor errors and wind, then the Earth's rate.
 pub const NAMES: [(&str, &str); COUNT] = {
     let mut all = [("gyro_bend", "rad/s²"); COUNT];
     all[EARTH] = ("earth_rate_north", "rad/s");
@@ -79,28 +79,28 @@ pub const NAMES: [(&str, &str); COUNT] = {
     all
 };
 
-/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: it filters
-/// over about as long as it takes to measure.
+/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: its filter is about as
+/// long as its period.
 const SKEW_PERIODS: f64 = 0.5;
 
 /// Usual drift of a gyro's bias, rad/s²: somewhat more than ArduPilot's SITL has (0.05°/s a minute, 1.45e-5).
 const DRIFTING: f64 = 2e-5;
-/// Time over which a drift changes by about itself, s: of 300 and 3000 the better one on ArduPlane's logs, whose
-/// heading errs slowly by itself and would be followed.
+/// Time over which a drift changes by about its own size, s: the better one of 300 and 3000 on ArduPlane's logs,
+/// whose slow heading errors would otherwise be followed.
 const STEADY: f64 = 3000.0;
 
 impl Span {
-    /// Time between two knots of the gyros' biases, s.
+    /// Time between two knots of the gyro biases, s.
     fn apart(&self) -> f64 {
         self.length / (KNOTS + 1) as f64
     }
 }
 
-/// Part of its usual width to which a constant is held that is known exactly: the equations stay regular.
+/// Share of its usual width used for a constant that is known exactly, which keeps the equations regular.
 const HELD: f64 = 1e-4;
 
-/// Errors that an instrument has seldom: held at zero until a flight shows them beyond doubt (see `calibration`), with how
-/// wide each is then.
+/// Rare instrument errors, held at zero until a flight shows them significantly (see `calibration`), with their prior
+/// widths from then on.
 const SELDOM: [(usize, f64); 10] = [
     (VANE_GAIN, 0.2),
     (VANE_GAIN + 1, 0.2),
@@ -113,21 +113,21 @@ const SELDOM: [(usize, f64); 10] = [
     (FORCE_GAIN + 1, 0.1),
     (FORCE_GAIN + 2, 0.1),
 ];
-/// Standard deviation of a delay that is beyond its usual width, s.
+/// Prior standard deviation of a delay that exceeds its usual width, s.
 const LATE: f64 = 0.5;
 
-/// How wide a constant is once a flight has shown it beyond doubt; `None` of one that is free anyway.
+/// Prior width of a constant once a flight has shown it significantly; `None` if it is free anyway.
 pub fn wide(place: usize) -> Option<f64> {
     let late = matches!(place, SKEW_ATTITUDE..=SKEW_VELOCITY | SKEW_FORCE);
     SELDOM.iter().find(|(of, _)| *of == place).map(|(_, width)| *width).or(late.then_some(LATE))
 }
 
-/// Whether a constant of the prior width `width` is one of those that a flight has to show first, and is held.
+/// Whether a constant with the prior width `width` is held until a flight shows it.
 pub fn held(place: usize, width: f64) -> bool {
     SELDOM.iter().any(|(of, wide)| *of == place && width <= 2.0 * HELD * wide)
 }
 
-/// Standard deviations before the data of `log` is seen: those of its sensors, else the usual ones.
+/// Prior standard deviations of the constants for `log`: those stated for its sensors, else the usual ones.
 pub fn prior_widths(log: &Log) -> Values {
     let mut widths = usual_widths(log);
     for (place, (width, (name, _))) in widths.iter_mut().zip(NAMES).enumerate() {
@@ -168,9 +168,9 @@ fn usual_widths(log: &Log) -> Values {
     width
 }
 
-/// Means before the data is seen: what is known of the log's sensors, else zero but for the Earth's rate,
-/// 7.29e-5 rad/s at any latitude from −65° to 65°, whose north component is never negative. Its deviations
-/// are those of the same latitudes.
+/// Prior means of the constants: those stated for the log's sensors, else zero except for the Earth's rate, 7.29e-5
+/// rad/s at any latitude from −65° to 65°, whose north component is never negative. Its standard deviations cover the
+/// same latitudes.
 pub fn prior_means(log: &Log) -> Values {
     let mut mean = [0.0; COUNT];
     mean[EARTH] = 5.8e-5;
@@ -182,7 +182,7 @@ pub fn prior_means(log: &Log) -> Values {
     mean
 }
 
-/// The constants of which the bias of the gyro on an axis (0 to 2) is made at `time`, each with its factor.
+/// The constants that add up to the gyro bias of an axis (0 to 2) at `time`, each with its factor.
 pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + KNOTS] {
     let since_middle = time - span.middle;
     std::array::from_fn(|i| match i {
@@ -200,24 +200,25 @@ pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + K
     })
 }
 
-/// The gyro biases p, q, r at `time`, rad/s.
+/// Gyro biases p, q, r at `time`, rad/s.
 pub fn gyro_bias(values: &Values, time: f64, span: &Span) -> [f64; 3] {
     std::array::from_fn(|axis| {
         gyro_bias_of(axis, time, span).iter().map(|(place, by)| values[*place] * by).sum()
     })
 }
 
-/// `measured` on three axes without their gains, which stand from `first` on: measured = (1 + gain) · (true + bias).
+/// `measured` on three axes corrected for their gains, whose indices start at `first`: measured = (1 + gain) · (true
+/// + bias).
 pub fn without_gain(values: &Values, first: usize, measured: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| measured[axis] / (1.0 + values[first + axis]))
 }
 
-/// What is added to a constant where it is handed out: the airspeed scale is a factor there.
+/// Offset added to a constant in the result, where the airspeed scale is a factor.
 pub fn offset(place: usize) -> f64 {
     if place == SCALE { 1.0 } else { 0.0 }
 }
 
-/// Whether the log has the sensor that a constant belongs to.
+/// Whether the log contains the sensor that a constant belongs to.
 pub fn concerned(place: usize, has: &Present) -> bool {
     match place {
         ALPHA | VANE_GAIN => has.alpha,
@@ -232,9 +233,9 @@ pub fn concerned(place: usize, has: &Present) -> bool {
     }
 }
 
-/// Whether nothing in the log can tell a constant. Without accelerometers and velocity over ground no
-/// sensor of the air meets another one: only the smoothness of the path is left, and that favours whatever
-/// makes the aircraft slower (an airspeed scale of four in a flight without any error).
+/// Whether a constant is unobservable in the log. Without accelerometers and velocity over ground, no air-data sensor
+/// is related to another one: only the smoothness of the path remains, which favours slower flight (an airspeed scale
+/// of four in a flight without any error).
 pub fn unseeable(place: usize, has: &Present) -> bool {
     let of_the_air = place < SKEW_ATTITUDE
         || place == SKEW_AIRSPEED
@@ -242,7 +243,7 @@ pub fn unseeable(place: usize, has: &Present) -> bool {
     of_the_air && !has.force && !has.velocity
 }
 
-/// What would let the data see a constant that they do not.
+/// Measurement that would make an unobservable constant observable, in words.
 pub fn remedy(place: usize, has: &Present) -> &'static str {
     match place {
         _ if unseeable(place, has) => "log the accelerometers or the velocity over ground",
@@ -254,7 +255,7 @@ pub fn remedy(place: usize, has: &Present) -> &'static str {
     }
 }
 
-/// The notes on the constants that keep their prior: one for each remedy.
+/// Notes on the constants that keep their prior, one for each remedy.
 pub fn unseen(places: &[usize], has: &Present, options: &Options) -> Vec<String> {
     let mut by_remedy: Vec<(&str, Vec<&str>)> = Vec::new();
     for place in places {

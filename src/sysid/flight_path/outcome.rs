@@ -1,4 +1,4 @@
-//! The outcome: what the smoother found, as a reconstruction with its notes.
+//! Result of the smoother, as a reconstruction with its notes.
 
 use nalgebra::Vector3;
 
@@ -19,29 +19,29 @@ use greylag_num::stream::stream;
 use greylag_physics::sensors::Known;
 use greylag_physics::{Controls, State};
 
-/// Part of the prior width above which the data is said not to see a constant.
+/// A constant counts as unobservable if its posterior width exceeds this share of the prior's.
 const UNSEEN: f64 = 0.7;
-/// Standard deviations of its prior from which a constant's place is worth a note.
+/// Distance from the prior mean, in prior standard deviations, that gets a note.
 const FAR: f64 = 3.0;
-/// Gusts worth a note, m/s.
+/// Gust level that gets a note, m/s.
 const ROUGH: f64 = 0.1;
-/// Smallest delay of the actuators that is put right, samples: less is within what the regression that
-/// finds it leaves out.
+/// Smallest actuator delay that is corrected, samples: a smaller one is within the regression's own error.
 const CORRECTED: f64 = 0.25;
 
-/// Time over which a disagreement of path and measured attitude is no noise, s.
+/// Time scale from which a difference between path and measured attitude is no noise, s.
 const DISAGREEING: f64 = 4.0;
 
-/// How well a flight controller's pitch and heading are known for a whole flight, rad: the board is levelled by hand, the compass calibrated, and an
-/// estimator that takes a bias of its accelerometers for a pitch corrects the accelerations by the same, so that the log agrees with itself. PX4 in
-/// SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading (docs/validation/real-firmware.md); a calibration by hand is taken to be no better.
+/// Uncertainty of a flight controller's pitch and heading over a whole flight, rad: the board is levelled by hand,
+/// the compass calibrated, and an estimator that attributes an accelerometer bias to pitch corrects the accelerations
+/// accordingly, so that the log is consistent. PX4 in SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading
+/// (docs/validation/real-firmware.md); a calibration by hand is assumed to be no better.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Draws of the path's errors: their rms over a flight is then known to a few percent.
+/// Number of draws of the path's errors: enough for their rms over a flight to a few percent.
 const DRAWS: usize = 3;
 
-/// Puts together what is handed out.
+/// Assembles the reconstruction.
 ///
 /// # Errors
 /// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
@@ -105,7 +105,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     })
 }
 
-/// Flights with one more error each like those that the path has.
+/// Copies of the flight, each with an additional error like those of the path.
 fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, ReconstructError> {
     let mut random = stream(0, &[]);
     let draw = |_| {
@@ -116,7 +116,7 @@ fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, Reconstr
     all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
 }
 
-/// Root mean square of the errors drawn, in the order of the state.
+/// Root mean square of the drawn errors, in the order of the state.
 fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64; 8] {
     let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
     for draw in erring {
@@ -135,7 +135,7 @@ fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64;
     left
 }
 
-/// The tracks along `paths`, the rates with the gyros' noise `gyro` on top.
+/// The tracks with the states of `paths`, and the gyros' noise `gyro` added to the rates.
 fn path_as_segments(
     problem: &Problem,
     found: &Found,
@@ -181,7 +181,7 @@ fn segment(
                 let gain = if log.has.force { 1.0 + values[FORCE_GAIN + i] } else { 1.0 };
                 force[k][i] / gain - values[FORCE + i]
             }),
-            // Without an altitude the air is that of sea level, as the notes say.
+            // Without an altitude the air density is that at sea level, as the notes state.
             altitude: Some(track.altitude[k]).filter(|h| h.is_finite()).unwrap_or(0.0),
             density: track.density[k],
         }
@@ -189,8 +189,8 @@ fn segment(
     Segment { instants: (0..track.len()).map(instant).collect() }
 }
 
-/// The specific force of a path without accelerometers: its acceleration less gravity, body axes; NaN where
-/// no velocity was measured, or at an end.
+/// Specific force of a path without accelerometers: acceleration less gravity, body axes; NaN where no velocity was
+/// measured, and at the ends.
 fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector3<f64>> {
     let nan = Vector3::repeat(f64::NAN);
     let down = Vector3::new(0.0, 0.0, gravity);
@@ -204,12 +204,12 @@ fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector
     (0..path.len()).map(at).collect()
 }
 
-/// Whether the recorded deflections came late by more than the estimate may err.
+/// Whether the delay of the recorded deflections exceeds its possible error.
 fn late_beyond_doubt(skew: &Skew, step: f64) -> bool {
     skew.late.abs() >= CORRECTED * step && skew.late.abs() >= 2.0 * skew.deviation
 }
 
-/// Puts late deflections right, by linear interpolation.
+/// Removes the delay of the deflections by linear interpolation.
 fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
     let late = skew.late / step;
     for segment in segments {
@@ -231,7 +231,7 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
     }
 }
 
-/// The constants that the log's sensors have, the airspeed scale as a factor.
+/// Constants of the log's sensors, the airspeed scale as a factor.
 fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
     nuisance::ORDER
         .into_iter()
@@ -252,11 +252,11 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// How well α and β are known where no vane measures them: by the wind, by the path, by how far its pitch and heading
-/// are from the measured ones for long, and by how well those are aligned. Their values are zero.
+/// Uncertainty of α and β where no vane measures them: from the wind, the path, the slow difference between its pitch
+/// and heading and the measured ones, and the alignment of those. Their values are zero.
 ///
-/// A heading of which gyros and compass disagree by a degree for half a minute is known to no better than that,
-/// whatever the noise of either; β errs with it.
+/// A heading for which gyros and compass differ by a degree for half a minute is not known better than that, whatever
+/// the noise of either; the error of β includes it.
 fn unmeasured_angles(
     problem: &Problem,
     smoothed: &Found,

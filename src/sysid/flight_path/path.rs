@@ -1,4 +1,4 @@
-//! The flight path of a stretch: motion and air at every sample, with what the sensors should show along it.
+//! Flight path of a stretch: motion and air at every sample, with the sensors' predicted values.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,13 +8,13 @@ use crate::flight_path::rotation;
 
 /// Number of measured channels: roll, pitch, yaw, airspeed, α, β, velocity north, east, down.
 pub const CHANNELS: usize = 9;
-/// Airspeed under which the flow angles mean nothing, m/s.
+/// Airspeed below which the flow angles are undefined, m/s.
 pub const SLOW: f64 = 2.0;
 
 /// Attitude and velocity at every sample.
 #[derive(Clone, Debug)]
 pub struct Path {
-    /// Body to earth axes.
+    /// Rotation from body to earth axes.
     pub attitude: Vec<Matrix3<f64>>,
     /// Velocity over ground, earth axes, m/s.
     pub velocity: Vec<Vector3<f64>>,
@@ -25,7 +25,7 @@ pub struct Path {
 }
 
 impl Path {
-    /// A first guess: the measurements, the last one where one is missing.
+    /// Initial guess: the measurements, the previous one where one is missing.
     pub fn guess(track: &Track) -> Path {
         let course = track.velocity.iter().find(|v| v[0].is_finite() && v[1].is_finite());
         let first = |mut values: Box<dyn Iterator<Item = f64> + '_>, default: f64| {
@@ -68,8 +68,7 @@ impl Path {
         path
     }
 
-    /// The wind that the velocities over ground measured in `track` leave for this path: their sum and
-    /// number.
+    /// Wind implied by the measured ground velocities of `track` for this path: sum and number of the differences.
     pub fn wind_left(&self, track: &Track) -> (Vector3<f64>, f64) {
         let mut sum = (Vector3::zeros(), 0.0);
         for (measured, own) in track.velocity.iter().zip(&self.velocity) {
@@ -81,14 +80,14 @@ impl Path {
         sum
     }
 
-    /// Takes the same motion through the air in a wind.
+    /// Changes the wind to `wind`, with the same motion through the air.
     pub fn carry(&mut self, wind: Vector3<f64>) {
         self.wind = wind;
         self.velocity.iter_mut().for_each(|v| *v += wind);
     }
 
-    /// Moves sample `k` by a turn (rad, body axes), a velocity and, if there are nine, a gust (m/s, earth
-    /// axes).
+    /// Changes sample `k` by a rotation (rad, body axes), a velocity and, if `by` has nine components, a gust (m/s,
+    /// earth axes).
     pub fn shift<const N: usize>(&mut self, k: usize, by: &[f64; N]) {
         let three = |i: usize| Vector3::new(by[i], by[i + 1], by[i + 2]);
         self.attitude[k] = rotation::orthonormal(&(self.attitude[k] * rotation::exp(&three(0))));
@@ -98,7 +97,7 @@ impl Path {
         }
     }
 
-    /// The number of samples.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.attitude.len()
     }

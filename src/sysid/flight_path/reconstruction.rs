@@ -1,4 +1,4 @@
-//! A flight after reconstruction: one clock, no sensor errors, no gaps inside a segment.
+//! A reconstructed flight: one clock, sensor errors removed, no gaps within a segment.
 
 use greylag_logs::rudder::RudderMotion;
 use greylag_logs::{Flight, Sample, Sampling};
@@ -10,7 +10,7 @@ use greylag_physics::{Command, Controls, State};
 pub struct Instant {
     /// Time on the log's clock, s.
     pub time_s: f64,
-    /// The state, sensor errors removed.
+    /// Flight state, sensor errors removed.
     pub state: State,
     /// Heading ψ, rad; NaN if the log has none.
     pub yaw: f64,
@@ -22,7 +22,7 @@ pub struct Instant {
     pub specific_force: [f64; 3],
     /// Altitude above mean sea level, m.
     pub altitude: f64,
-    /// Air density, kg/m³.
+    /// Density of the air, kg/m³.
     pub density: f64,
 }
 
@@ -33,63 +33,63 @@ pub struct Segment {
     pub instants: Vec<Instant>,
 }
 
-/// An error of a sensor, or the wind, as estimated together with the path.
+/// A sensor error or a component of the wind, as estimated together with the path.
 ///
-/// The wind is the steady one, about which gusts vary; its deviation holds how far a mean over the flight
-/// may be from it. The velocity through the air at an instant has the gust in it.
+/// The wind is the steady one, about which gusts vary; its standard deviation covers the difference to a mean over
+/// the flight. The velocity through the air at an instant includes the gust.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
-    /// What it is, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
+    /// Name, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
     pub name: String,
-    /// Its value, in `unit`.
+    /// Estimate, in `unit`.
     pub value: f64,
-    /// Its standard deviation, in `unit`.
+    /// Standard deviation, in `unit`.
     pub sd: f64,
-    /// Unit, for example `rad/s`.
+    /// Unit of the values, for example `rad/s`.
     pub unit: &'static str,
-    /// What was known of it before the flight; `None` if it was not estimated along with the path.
+    /// Prior mean and standard deviation; `None` if it was not estimated along with the path.
     pub prior: Option<Known>,
 }
 
 impl Nuisance {
-    /// How far it moved from its prior, in standard deviations of the prior; zero without one.
+    /// Change from the prior mean in prior standard deviations; zero without a prior.
     pub fn moved(&self) -> f64 {
         self.prior.filter(|p| p.sd > 0.0).map_or(0.0, |p| (self.value - p.value) / p.sd)
     }
 }
 
-/// A reconstructed flight.
+/// A reconstructed flight with its estimated constants and noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reconstruction {
-    /// What the flight is called in reports: its file.
+    /// Name of the flight in reports, from its file.
     pub name: String,
     /// Time between samples, s.
     pub step_s: f64,
-    /// What the body rates stand for, and with them the deflections: held from sample to sample, or
-    /// samples of what moves on between them.
+    /// Meaning of body rates and deflections between samples: held from one sample to the next, or samples of
+    /// continuous signals.
     pub sampling: Sampling,
-    /// The flight without its gaps.
+    /// Stretches of the flight without gaps.
     pub segments: Vec<Segment>,
-    /// What was estimated along.
+    /// Sensor errors and wind estimated along with the path.
     pub nuisances: Vec<Nuisance>,
-    /// Standard deviations of the noise of the measurements as logged, in the order roll, pitch,
-    /// airspeed, p, q, r, alpha, beta (units of [`State`]): the sensors', before smoothing.
+    /// Standard deviations of the measurement noise as logged, before smoothing, in the order roll, pitch, airspeed,
+    /// p, q, r, alpha, beta (units of [`State`]).
     pub noise: [f64; 8],
-    /// Standard deviations of what is left of it in the states of [`Self::segments`], in the same order:
-    /// rates are the gyros' less their biases, not smoothed; the others err slowly, over tenths of
-    /// seconds. The constant part of the errors is in [`Self::nuisances`], not here.
+    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the same order: rates are
+    /// the gyros' less their biases, not smoothed; the other errors are slow, over tenths of seconds. The constant
+    /// part of the errors is covered by [`Self::nuisances`], not here.
     pub left: [f64; 8],
     /// Standard deviation of the accelerometers' noise, m/s².
     pub force_noise: [f64; 3],
-    /// How the rudder moves, if it does.
+    /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
-    /// What the reader must know: assumptions made, power lost, for example for want of a vane.
+    /// Notes for the reader: assumptions made, and lost accuracy, for example without a vane.
     pub notes: Vec<String>,
 }
 
 impl Reconstruction {
-    /// The standard deviation of a constant by its name, in its unit; without a vane that of `alpha_bias` is how well α is known, and likewise
-    /// β. `None` if it was not estimated.
+    /// Standard deviation of the constant `name`, in its unit; without a vane that of `alpha_bias` is the uncertainty
+    /// of α, and likewise for β. `None` if it was not estimated.
     pub fn deviation(&self, name: &str) -> Option<f64> {
         let angle = match name {
             "alpha_bias" => "alpha_path",
@@ -100,7 +100,7 @@ impl Reconstruction {
         Some(found.sd).filter(|sd| sd.is_finite())
     }
 
-    /// The flight as a log: reconstructed states and what was measured beside them.
+    /// The flight as a log, with reconstructed states and the measurements beside them.
     pub fn to_flight(&self) -> Flight {
         let rate_hold_s = if self.sampling == Sampling::Held { self.step_s } else { 0.0 };
         let sample = |i: &Instant| {

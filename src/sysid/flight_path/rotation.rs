@@ -2,12 +2,12 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// The matrix that takes the cross product with `v` from the left.
+/// Matrix of the cross product with `v` from the left.
 pub fn cross(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// The rotation by the vector `turn`, rad.
+/// Rotation by the vector `turn`, rad.
 pub fn exp(turn: &Vector3<f64>) -> Matrix3<f64> {
     let angle2 = turn.norm_squared();
     let angle = angle2.sqrt();
@@ -20,7 +20,7 @@ pub fn exp(turn: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * a + k * k * b
 }
 
-/// The vector of a small rotation, rad.
+/// Rotation vector of a small rotation, rad.
 pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     let half = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12) * 0.5;
     let sine = half.norm();
@@ -28,7 +28,7 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     if sine < 1e-8 { half } else { half * (sine.atan2(cosine) / sine) }
 }
 
-/// Body to earth axes at the Euler angles roll, pitch, yaw (ZYX), rad.
+/// Rotation from body to earth axes for the Euler angles roll, pitch, yaw (ZYX), rad.
 pub fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
     Matrix3::new(
@@ -49,8 +49,7 @@ pub fn to_euler(r: &Matrix3<f64>) -> [f64; 3] {
     [r.m32.atan2(r.m33), (-r.m31).clamp(-1.0, 1.0).asin(), r.m21.atan2(r.m11)]
 }
 
-/// How roll, pitch and yaw of a rotation change with a small turn in body axes; `None` close to the
-/// vertical.
+/// Derivatives of roll, pitch and yaw with respect to a small rotation in body axes; `None` close to the vertical.
 pub fn euler_by_turn(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (sp, cp) = (-r.m31, r.m32.hypot(r.m33));
     (cp > 0.05).then(|| {
@@ -59,7 +58,7 @@ pub fn euler_by_turn(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     })
 }
 
-/// A rotation matrix made orthonormal again after many small turns.
+/// Restores the orthonormality of a rotation matrix after many small rotations.
 pub fn orthonormal(r: &Matrix3<f64>) -> Matrix3<f64> {
     let x = r.column(0).normalize();
     let y = (r.column(1) - x * x.dot(&r.column(1))).normalize();

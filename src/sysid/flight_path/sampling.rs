@@ -1,11 +1,10 @@
-//! How a log's rates were sampled: as it says itself, or as its clocks bear out.
+//! Sampling of a log's rates, as stated in the log or as inferred from its clocks.
 //!
-//! A simulator that steps by explicit Euler logs the rate that it holds until the next sample. Read as a
-//! sample at an instant, that rate is half a sample period early, and every other sensor seems late by as
-//! much. A log that does not say how it was sampled is therefore read as samples at instants first. If all
-//! its clocks then agree on half a period, and agree on zero with held rates, the rates are held.
-//! Means over a sample period need no case of their own: their gyros are late by half a period, which the
-//! clock skews take up.
+//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. Interpreted as a sample
+//! at an instant, that rate is half a sample period early, and every other sensor seems delayed by as much. A log
+//! that does not state its sampling is therefore first interpreted as samples at instants. If all its clocks then
+//! agree on half a period, and agree on zero with held rates, the rates are held. Means over a sample period need no
+//! case of their own: their gyros are delayed by half a period, which the estimated clock skews absorb.
 
 use crate::flight_path::ReconstructError;
 use crate::flight_path::equations::{Found, Problem};
@@ -16,29 +15,30 @@ use crate::flight_path::nuisance::{
 use crate::flight_path::smoother::smooth;
 use greylag_logs::Sampling;
 
-/// Clocks that must agree.
+/// Least number of clocks that must agree.
 const FEWEST: usize = 2;
-/// A clock is known if its standard deviation is below this part of the sample period.
+/// A clock counts as known if its standard deviation is below this share of the sample period.
 const KNOWN: f64 = 0.1;
-/// Part of the sample period by which the clocks of one simulator may differ: the interpolation's error.
+/// Largest difference between the clocks of one simulator, as a share of the sample period, due to interpolation
+/// errors.
 const AGREE: f64 = 0.03;
-/// The same in standard deviations of each clock.
+/// The same limit in standard deviations of each clock.
 const DEVIATIONS: f64 = 3.0;
 
-/// The sampling of a log with the path found under it, and what is to be said of the choice.
+/// The sampling of a log with the path estimated under it, and a note on the choice.
 pub struct Chosen {
-    /// What a rate sample stands for.
+    /// Meaning of a rate sample.
     pub sampling: Sampling,
-    /// The path and the constants.
+    /// Estimated path and constants.
     pub found: Found,
-    /// The evidence, if the log does not say it.
+    /// Evidence for the choice, if the log does not state the sampling.
     pub note: Option<String>,
 }
 
-/// Smooths the log of `problem` under the sampling `declared`, or under the one that its clocks bear out.
+/// Smooths the log of `problem` under the sampling `declared`, or under the one that its clocks support.
 ///
 /// # Errors
-/// [`ReconstructError::NoPath`] if the search does not settle on numbers.
+/// [`ReconstructError::NoPath`] if the search has no finite result.
 pub fn choose(problem: &Problem, declared: Option<Sampling>) -> Result<Chosen, ReconstructError> {
     let under = |sampling| smooth(&Problem { sampling, ..*problem });
     if let Some(sampling) = declared {
@@ -60,7 +60,7 @@ pub fn choose(problem: &Problem, declared: Option<Sampling>) -> Result<Chosen, R
     Ok(Chosen { sampling: Sampling::Instants, found: instants, note: None })
 }
 
-/// Whether all known clocks of the log are `late` (s) against the gyros, and enough of them.
+/// Whether all known clocks of the log are `late` (s) behind the gyros, and there are enough of them.
 fn agree(log: &Log, found: &Found, late: f64) -> bool {
     let clocks = [SKEW_ATTITUDE, SKEW_AIRSPEED, SKEW_VANES, SKEW_VELOCITY, SKEW_FORCE];
     let known: Vec<usize> = clocks

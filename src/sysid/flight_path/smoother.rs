@@ -1,9 +1,9 @@
-//! The smoother: the path and the constants that fit all sensors best, by Gauss–Newton.
+//! The smoother: fits path and constants to all sensors by Gauss–Newton.
 //!
-//! First gusts are noise of the sensors of the air, with which motion and constants are fitted. Where the
-//! data find gusts likelier, the air then gusts along the path, the constants held; what gusts of that
-//! level may have done to the constants goes into their deviations. To seek path, gusts and constants
-//! together would find an airspeed scale far above one, for it makes every gust smaller.
+//! At first, gusts count as noise of the air-data sensors, and motion and constants are fitted. If the data make
+//! gusts more likely, gusts along the path are then estimated with the constants held, and the effect of gusts of
+//! that level on the constants is added to their standard deviations. Estimating path, gusts and constants together
+//! would give an airspeed scale far above one, because that makes every gust smaller.
 
 use nalgebra::Vector3;
 
@@ -16,27 +16,26 @@ use crate::flight_path::levels::{CALM, Levels};
 use crate::flight_path::nuisance::WIND;
 use crate::flight_path::path::Path;
 
-/// Levels of gusts that are tried, m/s, then the factors around the best of them.
+/// Gust levels tried, m/s, before refinement by factors around the best of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
-/// Residuals beyond this many standard deviations count less.
+/// Residuals beyond this many standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
-/// Iterations with gusts.
+/// Largest number of iterations with gusts.
 const GUSTY: usize = 4;
-/// Iterations before levels are taken from residuals, and in all.
+/// Number of iterations before levels are estimated from residuals, and in total.
 const FIRST: usize = 2;
 const LAST: usize = 25;
-/// The fit has settled where no constant moves by more than this part of its deviation, and no level
-/// by more than that part of itself.
-const SETTLED: f64 = 0.05;
-const LEVEL_SETTLED: f64 = 0.02;
-/// Least part of a step that is tried.
+/// Convergence tolerance: largest change of a constant in its standard deviation, and relative change of a level.
+const STEP_TOLERANCE: f64 = 0.05;
+const LEVEL_TOLERANCE: f64 = 0.02;
+/// Smallest share of a step that is tried.
 const LEAST_PART: f64 = 1.0 / 64.0;
 
 /// Smooths all stretches of the log together.
 ///
 /// # Errors
-/// [`ReconstructError::NoPath`] if the search does not settle on numbers.
+/// [`ReconstructError::NoPath`] if the search has no finite result.
 pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     let Problem { log, options, means, widths, .. } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
@@ -59,7 +58,7 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     Ok(found)
 }
 
-/// Fits motion and constants as if the air were calm, from iteration `from` on.
+/// Fits motion and constants for calm air, from iteration `from` on.
 fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), ReconstructError> {
     let Problem { log, options, .. } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
@@ -71,19 +70,19 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
             continue;
         }
         let change = found.levels.renew(&solved.readings, log.step);
-        let change = change.max(found.levels.loosen(&problem.strain(found)));
-        if iteration > from.max(FIRST) && moved < SETTLED && change < LEVEL_SETTLED {
+        let change = change.max(found.levels.loosen(&problem.step_residuals(found)));
+        if iteration > from.max(FIRST) && moved < STEP_TOLERANCE && change < LEVEL_TOLERANCE {
             break;
         }
     }
     Ok(())
 }
 
-/// Goes the step, or the largest part of it (halved from try to try) that fits the data better; none if there is none.
-/// Returns the largest move of a constant in its deviation.
+/// Takes the step, or its largest fraction (by halving) that lowers the merit function; no step if there is none.
+/// Returns the largest change of a constant in its standard deviation.
 ///
-/// Without it a flight that is nearly straight, in which wind, airspeed scale and path stand for each other, ends in a wind
-/// of 5 m/s that nobody measured: real ArduPlane's first minute did.
+/// Without this line search a nearly straight flight, in which wind, airspeed scale and path are confounded, ends in
+/// a wrong wind of 5 m/s, as the first minute of a real ArduPlane flight did.
 fn search(
     problem: &Problem,
     found: &mut Found,
@@ -105,7 +104,7 @@ fn search(
     Ok(0.0)
 }
 
-/// Lets the air gust along the path where the data find that likelier.
+/// Estimates gusts along the path if the data make them more likely.
 fn gusty(
     problem: &Problem,
     found: &mut Found,
@@ -134,7 +133,7 @@ fn gusty(
     Ok(())
 }
 
-/// The level of the gusts that the data find likeliest, m/s.
+/// The most likely gust level, m/s.
 fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
     let mut trial = found.clone();
     let mut misfit = |gusts: f64| {
@@ -164,7 +163,7 @@ fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
     Some(best)
 }
 
-/// Sets out in the wind that is stated, else in that which the measurements leave.
+/// Initialises the wind with the stated one, else with the mean implied by the measurements.
 fn start(found: &mut Found, problem: &Problem) {
     let mut sum = (Vector3::zeros(), 0.0);
     for (path, track) in found.paths.iter().zip(&problem.log.tracks) {

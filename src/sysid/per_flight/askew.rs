@@ -1,49 +1,50 @@
-//! Measured axes that stand askew: turned against the body by a small constant rotation.
+//! Misaligned measured axes: rotated against the body by a small constant angle.
 //!
-//! ε (rad, body axes) is the rotation that takes the body's axes to those of the board or the markers. The coordinates
-//! of a vector x in the turned axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft Control
-//! and Simulation, section 1.3): so it is with body rates, specific force and the velocity through the air. The path is
-//! smoothed in the axes of gyros and attitude, so α and β are of these axes too. Vanes keep the body's: what the turn makes of α
-//! and β on the average the reconstruction takes for their bias, and the rest the path has from the vanes.
+//! ε (rad, body axes) is the rotation from the body's axes to those of the board or the markers. The coordinates of a
+//! vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft
+//! Control and Simulation, section 1.3): this applies to body rates, specific force and the velocity through the air.
+//! The path is smoothed in the axes of gyros and attitude, so α and β are of these axes too. Vanes measure in the
+//! body's axes: the reconstruction attributes the mean effect of the misalignment on α and β to their bias, and the
+//! path follows the vanes otherwise.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
-/// Id of the angles among the errors of the measurement.
+/// Id of the misalignment angles among the measurement errors.
 pub const ID: &str = "axes_askew";
-/// Names of the angles: about body x, y and z.
+/// Names of the angles, about body x, y and z.
 pub const NAMES: [&str; 3] = ["askew_roll", "askew_pitch", "askew_yaw"];
 
-/// What a unit of each angle adds to the coordinates `x` of a vector: x × e.
+/// Change of the coordinates `x` of a vector for a unit of each angle: x × e.
 pub fn vector(x: [f64; 3]) -> [[f64; 3]; 3] {
     let [x, y, z] = x;
     [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
 }
 
-/// What a unit of each angle adds to α and β (rad): those of the velocity V (cos α cos β, sin β, sin α cos β), turned
-/// like any vector.
+/// Change of α and β (rad) for a unit of each angle: those of the velocity V (cos α cos β, sin β, sin α cos β),
+/// rotated like any vector.
 pub fn flow(alpha: f64, beta: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_beta) = (alpha.sin_cos(), beta.tan());
     [[-cos * tan_beta, sin], [1.0, 0.0], [-sin * tan_beta, -cos]]
 }
 
-/// What a unit of each angle adds to roll and pitch (rad), away from vertical flight: a turn about body axes, as body
-/// rates turn them.
+/// Change of roll and pitch (rad) for a unit of each angle, away from vertical flight: a rotation about body axes, as
+/// by body rates.
 pub fn attitude(roll: f64, pitch: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_pitch) = (roll.sin_cos(), pitch.tan());
     [[1.0, 0.0], [tan_pitch * sin, cos], [tan_pitch * cos, -sin]]
 }
 
-/// What a unit of each angle adds to α and β of a flight's path.
+/// Change of α and β of a flight's path for a unit of each angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Turning {
-    /// Of α where a vane measures it: the mean over the flight.
+    /// Mean change of α over the flight, where a vane measures it.
     alpha: Option<[f64; 3]>,
-    /// Of β likewise.
+    /// Mean change of β over the flight, where a vane measures it.
     beta: Option<[f64; 3]>,
 }
 
 impl Turning {
-    /// That of `flight`, of which `segments` are used.
+    /// The changes for `flight`, of which `segments` are used.
     pub fn of(flight: &Reconstruction, segments: &[Vec<Instant>]) -> Turning {
         let vane = |name: &str| flight.nuisances.iter().any(|n| n.name == name);
         let mut sums = [[0.0; 3]; 2];
@@ -60,7 +61,7 @@ impl Turning {
         }
     }
 
-    /// At `alpha` and `beta` (rad), as [`flow`] has it where no vane measures.
+    /// The changes at `alpha` and `beta` (rad): those of [`flow`] where no vane measures.
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {

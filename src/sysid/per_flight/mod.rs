@@ -1,37 +1,37 @@
-//! What may differ from flight to flight of one aircraft: its trims, and how its measured axes stand.
+//! Constants that differ from flight to flight of one aircraft: its trims, and the misalignment of its measured axes.
 //!
 //! Loading, the setting of a surface, a battery or a propeller change between flights; an autopilot's board and the
-//! markers of motion capture are mounted anew. Neither is an effect that the model lacks. Both are estimated only where
-//! they are asked for, each flight's own beside what all flights have in common.
+//! markers of motion capture are mounted again. Neither is an effect that the model lacks. Both are estimated only on
+//! request, for each flight beside the coefficients common to all flights.
 
 pub mod askew;
 pub mod trims;
 
 use serde::Serialize;
 
-/// What each flight is to have of its own.
+/// Selection of the constants estimated for each flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PerFlight {
-    /// Its trims, with the widths of [`trims::TRIMS`] times this; `None` for one set of trims for all flights.
+    /// Trims, with this multiple of the widths of [`trims::TRIMS`]; `None` for one set of trims for all flights.
     #[serde(rename = "flight_trims", skip_serializing_if = "Option::is_none")]
     pub trims: Option<f64>,
-    /// How its measured axes stand against the body's: standard deviation of each of three angles before the flight
-    /// is seen, °; `None` for axes that are the body's.
+    /// Misalignment of the measured axes: prior standard deviation of each of three angles, °; `None` for aligned
+    /// axes.
     #[serde(rename = "axes_askew_deg", skip_serializing_if = "Option::is_none")]
     pub askew_deg: Option<f64>,
 }
 
-/// A constant that each flight has of its own.
+/// A constant estimated for each flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant {
-    /// Its name.
+    /// Name of the constant.
     pub name: &'static str,
-    /// Its standard deviation before the flight is seen; its mean is zero.
+    /// Prior standard deviation; the prior mean is zero.
     pub width: f64,
 }
 
 impl PerFlight {
-    /// The constants of a flight: the angles of its axes (rad), then its trims; empty if nothing is asked for.
+    /// Constants of a flight: misalignment angles (rad), then trims; empty if nothing is selected.
     pub fn constants(&self) -> Vec<Constant> {
         let askew = self
             .askew_deg
@@ -42,12 +42,12 @@ impl PerFlight {
         askew.into_iter().flatten().chain(trims.into_iter().flatten()).collect()
     }
 
-    /// How many of them are angles of axes; the trims stand behind.
+    /// Number of misalignment angles; the trims follow.
     pub fn angles(&self) -> usize {
         if self.askew_deg.is_some() { askew::NAMES.len() } else { 0 }
     }
 
-    /// Whether each flight has trims of its own.
+    /// Whether trims are estimated for each flight.
     pub fn has_trims(&self) -> bool {
         self.trims.is_some()
     }

@@ -1,14 +1,14 @@
-//! Trims that each flight has of its own: constant coefficients beside the model's, and a share of its thrust.
+//! Trims of each flight: constant coefficients beside the model's, and a share of its thrust.
 //!
-//! They join a model as an effect that the catalogue does not have, so that a model needs no coefficient of such a name.
+//! They join a model as an effect outside the catalogue, so a model needs no coefficient of such a name.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::formula::register;
 
-/// A trim with its width.
+/// A trim with its prior width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
-    /// Its name; those of coefficients are as in the catalogue.
+    /// Name; those of coefficients are as in the catalogue.
     pub name: &'static str,
     /// Standard deviation from flight to flight, dimensionless.
     pub width: f64,
@@ -18,7 +18,8 @@ const fn trim(name: &'static str, width: f64) -> Trim {
     Trim { name, width }
 }
 
-/// The trims in the order of the effect's coefficients, with how far flights of one aircraft usually differ.
+/// The trims in the order of the effect's coefficients, with their usual standard deviations between flights of one
+/// aircraft.
 ///
 /// Lift: half a degree of a wing that is put on anew, at a slope of 4 to 5 per rad. Pitch: a centre of gravity that is
 /// off by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator. Roll and yaw: a degree of

@@ -1,4 +1,4 @@
-//! The channels with the regime variables, as they are named everywhere.
+//! Channels and regime variables, with their names and units.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum ChannelId {
     /// Drag less thrust along the airflow, N, positive backwards. An effect's `physics::Channel::Drag` is drag alone:
-    /// accelerometers do not tell it from thrust.
+    /// accelerometers do not distinguish it from thrust.
     #[serde(rename = "D")]
     Drag,
     /// Lift, thrust's part included, N, positive upwards.
@@ -49,7 +49,7 @@ impl ChannelId {
         ChannelId::Beta,
     ];
 
-    /// What it is called in tables and plots.
+    /// Name in tables and plots.
     pub const fn name(self) -> &'static str {
         match self {
             ChannelId::Drag => "drag less thrust",
@@ -64,7 +64,7 @@ impl ChannelId {
         }
     }
 
-    /// The letter of the equations.
+    /// Symbol in the equations.
     pub const fn symbol(self) -> &'static str {
         match self {
             ChannelId::Drag => "D",
@@ -79,7 +79,7 @@ impl ChannelId {
         }
     }
 
-    /// The unit of its residuals.
+    /// Unit of its residuals.
     pub const fn unit(self) -> &'static str {
         match self {
             ChannelId::Drag | ChannelId::Lift | ChannelId::Side => "N",
@@ -90,29 +90,29 @@ impl ChannelId {
     }
 }
 
-/// A quantity that says where in the envelope a window lies.
+/// A quantity that locates a window in the flight envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RegimeVariable {
-    /// Angle of attack.
+    /// Angle of attack α.
     Alpha,
-    /// Sideslip.
+    /// Sideslip angle β.
     Beta,
-    /// True airspeed.
+    /// True airspeed V.
     Airspeed,
-    /// Throttle position.
+    /// Throttle position, 0..1.
     Throttle,
-    /// Roll rate.
+    /// Roll rate p.
     P,
-    /// Pitch rate.
+    /// Pitch rate q.
     Q,
-    /// Yaw rate.
+    /// Yaw rate r.
     R,
-    /// Aileron deflection.
+    /// Deflection of the ailerons.
     Aileron,
-    /// Elevator deflection.
+    /// Deflection of the elevator.
     Elevator,
-    /// Rate of the aileron deflection: what a dynamic error follows.
+    /// Rate of the aileron deflection, with which dynamic errors vary.
     AileronRate,
     /// Rate of the elevator deflection.
     ElevatorRate,
@@ -120,12 +120,12 @@ pub enum RegimeVariable {
     Altitude,
     /// Time since the log's first sample.
     Time,
-    /// The flight.
+    /// Index of the flight.
     Flight,
 }
 
 impl RegimeVariable {
-    /// Those that are numbers: all but the flight.
+    /// The numeric variables: all but the flight.
     pub const CONTINUOUS: [RegimeVariable; 13] = [
         RegimeVariable::Alpha,
         RegimeVariable::Beta,
@@ -142,7 +142,7 @@ impl RegimeVariable {
         RegimeVariable::Time,
     ];
 
-    /// What it is called in plots.
+    /// Name in plots.
     pub const fn name(self) -> &'static str {
         match self {
             RegimeVariable::Alpha => "angle of attack",
@@ -162,7 +162,7 @@ impl RegimeVariable {
         }
     }
 
-    /// The unit that it is binned in.
+    /// Unit of its bins.
     pub const fn unit(self) -> &'static str {
         use RegimeVariable as V;
         match self {

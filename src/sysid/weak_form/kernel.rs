@@ -1,4 +1,4 @@
-//! The smooth test kernel of the weak form.
+//! Smooth test function of the weak form.
 
 use std::f64::consts::TAU;
 
@@ -7,21 +7,21 @@ pub const KERNEL_S: f64 = 0.37;
 
 /// A Hann window over `steps` time steps, that is `steps + 1` samples.
 ///
-/// Multiplying ẋ = f by the kernel K and summing by parts moves the difference from the data onto
-/// K: Σ K (x₊ − x)/Δt = −Σ K′ x. The sums are exact for the discrete steps, so that a model that
-/// steps as the flight did leaves nothing.
+/// Multiplying ẋ = f by the kernel K and summing by parts moves the difference from the data onto K: Σ K (x₊ − x)/Δt
+/// = −Σ K′ x. The sums are exact for the discrete steps, so the residual of a model with the flight's own integrator
+/// is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
-    /// K on the steps, adding up to 1.
+    /// Weights K of the steps, which sum to 1.
     pub step: Vec<f64>,
-    /// K on the samples (mean of the two steps beside each), adding up to 1.
+    /// Weights K of the samples (mean of the two adjacent steps), which sum to 1.
     pub sample: Vec<f64>,
-    /// −K′ on the samples, 1/s: Σ `slope` x is the smoothed rate of x.
+    /// Weights −K′ of the samples, 1/s: Σ `slope` x is the smoothed rate of x.
     pub slope: Vec<f64>,
 }
 
 impl Kernel {
-    /// The kernel of [`KERNEL_S`] on samples `dt` (s) apart; at least two steps long.
+    /// Kernel of length [`KERNEL_S`] for a sampling interval of `dt` (s), at least two steps long.
     pub fn hann(dt: f64) -> Kernel {
         let steps = ((KERNEL_S / dt).round() as usize).max(2);
         let raw: Vec<f64> =
@@ -37,18 +37,18 @@ impl Kernel {
         Kernel { step, sample, slope }
     }
 
-    /// Its length in steps.
+    /// Length in steps.
     pub fn steps(&self) -> usize {
         self.step.len()
     }
 
-    /// Steps from one window to the next: half a kernel.
+    /// Steps between windows: half a kernel.
     pub fn stride(&self) -> usize {
         self.steps().div_ceil(2)
     }
 }
 
-/// Σ weights · values.
+/// Weighted sum Σ weights · values.
 pub fn weigh(weights: &[f64], values: impl Iterator<Item = f64>) -> f64 {
     weights.iter().zip(values).map(|(w, x)| w * x).sum()
 }

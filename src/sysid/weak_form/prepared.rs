@@ -1,4 +1,4 @@
-//! A reconstructed flight made ready to be compared: on the models' clock, in the air, cut in windows.
+//! A reconstructed flight prepared for comparison: on the models' clock, in flight, divided into windows.
 
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
@@ -11,62 +11,62 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Integrator, Memory, STEP};
 use greylag_physics::State;
 
-/// Slower than this (m/s) an aircraft of any size is taken to stand, not to fly.
+/// Airspeed below which an aircraft of any size counts as not flying, m/s.
 const FLYING_FLOOR: f64 = 3.0;
 
-/// A flight that has no clock.
+/// Error of a flight whose sampling interval is not usable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"
 )]
 pub struct ClockError {
-    /// The flight.
+    /// Name of the flight.
     pub flight: String,
-    /// Its step, s.
+    /// Its sampling interval, s.
     pub step_s: f64,
 }
 
 /// A flight on the models' clock.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    /// Its name.
+    /// Name of the flight.
     pub name: String,
     /// Time between samples, s.
     pub dt: f64,
-    /// Steps of [`STEP`] between samples.
+    /// Number of model steps of [`STEP`] between samples.
     pub substeps: usize,
-    /// What body rates and deflections stand for between samples.
+    /// Meaning of body rates and deflections between samples.
     pub sampling: Sampling,
-    /// Stretches in the air without gaps.
+    /// Stretches in flight without gaps.
     pub segments: Vec<Vec<Instant>>,
-    /// Noise of roll, pitch, airspeed, p, q, r, α, β that the reconstruction has left in; zero where
-    /// unknown.
+    /// Remaining noise of roll, pitch, airspeed, p, q, r, α, β after reconstruction, in the units of the state; zero
+    /// where unknown.
     pub noise: [f64; 8],
-    /// Noise of the accelerometers, m/s², likewise.
+    /// Noise of the accelerometers, m/s²; zero where unknown.
     pub force_noise: [f64; 3],
-    /// What axes that are turned make of its α and β.
+    /// Change of its α and β with the misalignment of the axes.
     pub turning: Turning,
-    /// The kernel on its clock.
+    /// Kernel at its sampling interval.
     pub kernel: Kernel,
-    /// The windows, in time order.
+    /// Windows in time order.
     pub windows: Vec<Window>,
 }
 
 /// A window of the weak form.
 #[derive(Clone, Debug)]
 pub struct Window {
-    /// Which segment.
+    /// Index of the segment.
     pub segment: usize,
-    /// Its first sample in the segment.
+    /// Index of its first sample in the segment.
     pub start: usize,
-    /// Its middle on the log's clock, s.
+    /// Time of its middle on the log's clock, s.
     pub time_s: f64,
-    /// Where it lies, in the order of [`RegimeVariable::CONTINUOUS`] and their units.
+    /// Regime variables in the order and units of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
 }
 
 impl Prepared {
-    /// Puts `flight` on the models' clock and keeps what was flown faster than `slowest` (m/s).
+    /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
     ///
     /// # Errors
     /// It has no clock.
@@ -152,8 +152,8 @@ impl Prepared {
         Cow::Owned(acting)
     }
 
-    /// `model` with the integrator that this flight's samples call for: its own where the log holds what
-    /// a simulator holds, RK4 where it has samples at instants.
+    /// `model` with the integrator that matches this flight's sampling: its own if the log holds a simulator's held
+    /// rates, RK4 for samples at instants.
     pub fn stepping<'a>(&self, model: &'a GreyBox) -> Cow<'a, GreyBox> {
         match (self.sampling, model.integrator) {
             (Sampling::Instants, Integrator::Jsbsim) => {
@@ -165,8 +165,8 @@ impl Prepared {
         }
     }
 
-    /// The state of `model`, which must be [`Self::stepping`], one sample after `state`, the deflections
-    /// being those of sample `at` until the one after it, `next`.
+    /// State of `model`, which must be [`Self::stepping`], one sample after `state`; the deflections are those of
+    /// sample `at` until the next one, `next`.
     pub fn advance(
         &self,
         model: &GreyBox,
@@ -191,17 +191,17 @@ impl Prepared {
         &self.segments[window.segment][window.start..=window.start + self.kernel.steps()]
     }
 
-    /// Whether at least one window has specific force throughout.
+    /// Whether at least one window has specific force in all samples.
     pub fn has_force(&self) -> bool {
         self.windows.iter().any(|w| self.force_in(w))
     }
 
-    /// Whether a window has specific force throughout.
+    /// Whether a window has specific force in all samples.
     pub fn force_in(&self, window: &Window) -> bool {
         self.samples(window).iter().all(|i| i.specific_force.iter().all(|f| f.is_finite()))
     }
 
-    /// Number of samples.
+    /// Total number of samples.
     pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Vec::len).sum()
     }
@@ -216,8 +216,8 @@ fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
     Ok(((step_s / STEP).round() as usize).max(1))
 }
 
-/// The samples of a stretch `dt` (s) apart: as they are if they are so already, else linear between
-/// them, deflections held.
+/// Samples of a stretch at intervals of `dt` (s): unchanged if they have that interval, else linearly interpolated,
+/// deflections held.
 fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     if (step_s / dt - 1.0).abs() < 1e-6 {
         return instants.to_vec();
@@ -264,7 +264,7 @@ fn between(a: &Instant, b: &Instant, part: f64) -> Instant {
     }
 }
 
-/// The pieces that are flown, finite throughout.
+/// The parts in flight whose values are all finite.
 fn in_the_air(instants: &[Instant], slowest: f64) -> impl Iterator<Item = &[Instant]> {
     let flown = move |i: &Instant| {
         let z = i.controls;
@@ -290,7 +290,7 @@ fn windows(segments: &[Vec<Instant>], kernel: &Kernel, origin: f64) -> Vec<Windo
     windows
 }
 
-/// Where a window lies, each variable averaged with the kernel.
+/// Regime of a window, each variable averaged with the kernel.
 fn regime(
     samples: &[Instant],
     kernel: &Kernel,

@@ -15,21 +15,21 @@ use greylag_num::Real;
 use greylag_physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
 use greylag_physics::{AirData, Channel, State, Wrench};
 
-/// Windows in which the sensitivity to sensor noise is worked out, a flight.
+/// Number of windows of a flight in which the sensitivity to sensor noise is evaluated.
 const NOISE_WINDOWS: usize = 40;
-/// Windows whose columns one thread works out at a time.
+/// Number of windows whose columns one thread computes at a time.
 const CHUNK: usize = 64;
 
 /// One channel of one flight.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Which.
+    /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Measured, a value a window, in the channel's unit; NaN where the log has no specific force.
+    /// Measured values, one for each window, in the channel's unit; NaN where the log has no specific force.
     pub measured: Vec<f64>,
-    /// Predicted, likewise.
+    /// Predicted values, likewise.
     pub predicted: Vec<f64>,
-    /// Variance that the sensors' noise brings into measured − predicted.
+    /// Variance of measured − predicted due to sensor noise.
     pub noise_variance: f64,
 }
 
@@ -59,8 +59,9 @@ pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
     ChannelId::ALL.iter().enumerate().skip(forces).map(series).collect()
 }
 
-/// Measured − predicted of forces (N) and moments (N m) alone, a row a window, channels D, L, Y, l, m, n: what a fit by
-/// equation error takes, at a fraction of the price of [`channels`]. Forces are NaN where they are not measured.
+/// Measured − predicted of forces (N) and moments (N m) alone, a row for each window, channels D, L, Y, l, m, n: the
+/// residual of an equation-error fit, at a fraction of the cost of [`channels`]. Forces are NaN where they are not
+/// measured.
 pub fn force_and_moment_residuals(model: &GreyBox, flight: &Prepared) -> Vec<[f64; 6]> {
     let flight = &*flight.acting(model);
     let residual = |w: &Window| {
@@ -86,7 +87,7 @@ fn window(
     both
 }
 
-/// The first six of [`window`].
+/// The first six channels of [`window`].
 fn forces_and_moments(model: &GreyBox, flight: &Prepared, window: &Window) -> [[f64; 2]; 6] {
     let (kernel, samples) = (&flight.kernel, flight.samples(window));
     let mut both = [[f64::NAN; 2]; 6];
@@ -120,10 +121,10 @@ fn smooth(weights: &[f64], values: impl Iterator<Item = Vector<f64>>) -> Vector<
     sum
 }
 
-/// A step between two samples, as an integrator sees it.
+/// A step between two samples.
 struct Step<'a> {
     from: &'a Instant,
-    /// The end, for schemes that evaluate within the step: controls are still those of the start.
+    /// End of the step, for schemes that evaluate within it: controls are still those of the start.
     to: Option<&'a Instant>,
 }
 
@@ -149,7 +150,7 @@ impl Step<'_> {
     }
 }
 
-/// D less thrust, L, Y from the accelerometers, N, in the order of [`ChannelId::ALL`].
+/// Measured D less thrust, L, Y from the accelerometers, N, in the order of [`ChannelId::ALL`].
 fn measured_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     let air = model.air(&at.state, at.altitude);
     let force = at.specific_force.map(|f| f * model.body.mass);
@@ -162,7 +163,7 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     to_force_axes(rigid_body::body_force(&wrench, &air, model.axes), &air, model.axes)
 }
 
-/// D less thrust, L and Y, N, of a force in body axes: in the order of [`ChannelId::ALL`], not in that of
+/// D less thrust, L and Y, N, of a force in body axes: in the order of [`ChannelId::ALL`], not of
 /// [`rigid_body::aerodynamic_force`], which is D, Y, L.
 pub(crate) fn to_force_axes<R: Real>(
     force: Vector<R>,
@@ -186,7 +187,7 @@ fn measured_moment(
     std::array::from_fn(|k| momentum[k] + turning[k])
 }
 
-/// J ω.
+/// Angular momentum J ω, N m s.
 pub(crate) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vector<R> {
     [
         w[0].scale(body.jx) - w[2].scale(body.jxz),
@@ -195,7 +196,7 @@ pub(crate) fn inertia<R: Real>(body: &RigidBody, w: Vector<R>) -> Vector<R> {
     ]
 }
 
-/// ω × J ω.
+/// Gyroscopic moment ω × J ω, N m.
 pub(crate) fn gyroscopic<R: Real>(body: &RigidBody, state: &State<R>) -> Vector<R> {
     let w = [state.p, state.q, state.r];
     let h = inertia(body, w);
@@ -208,7 +209,7 @@ fn moment(model: &GreyBox, at: &Instant, controls: &Instant) -> Vector<f64> {
     [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c))
 }
 
-/// Rates of V, α, β that the model's integrator makes of each step, 1/s.
+/// Rates of V, α, β by the model's integrator over each step, 1/s.
 fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Vec<Vector<f64>> {
     let mut memory = Memory::default();
     let mut rate = |k: usize| {
@@ -219,8 +220,7 @@ fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Ve
     (0..segment.len()).map(&mut rate).collect()
 }
 
-/// What the sensors' noise, taken as white, brings into each channel's residual: variances in the
-/// order of [`ChannelId::ALL`].
+/// Variances of each channel's residual due to sensor noise, taken as white, in the order of [`ChannelId::ALL`].
 fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     let kernel = &flight.kernel;
     let squares = |w: &[f64]| w.iter().map(|x| x * x).sum::<f64>();
@@ -240,7 +240,7 @@ fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     variance
 }
 
-/// The part that enters through what the kernel weighs: accelerations, rates, airspeed, α, β.
+/// The part of that variance from quantities averaged by the kernel: accelerations, rates, airspeed, α, β.
 fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);
     let [fx, fy, fz] = flight.force_noise.map(|sd| (model.body.mass * sd).powi(2));
@@ -252,7 +252,7 @@ fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) 
     std::array::from_fn(|k| [force, moment, path][k / 3][k % 3])
 }
 
-/// The variance that the state's noise brings into one sample of the residual, by central differences.
+/// Variance of one sample of the residual due to the state's noise, by central differences.
 fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     let mut variance = [0.0; 9];
     for (k, sd) in noise.iter().enumerate().filter(|(_, sd)| **sd > 0.0) {
@@ -267,8 +267,8 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     variance
 }
 
-/// Predicted less what the state's noise moves of the measured side too: the forces turned by α and
-/// β, the gyroscopic moments.
+/// Predicted less the part of the measured side that depends on the state: forces rotated by α and β, gyroscopic
+/// moments.
 pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());
@@ -280,20 +280,20 @@ pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
 }
 
-/// The linear part of a model in weak form: what one unit of each coefficient contributes.
+/// Linear part of a model in weak form: contribution of one unit of each coefficient.
 #[derive(Clone, Debug)]
 pub struct Columns {
     /// Names of the coefficients, as in the model.
     pub names: Vec<String>,
-    /// `values[coefficient][channel][window]`, channels D, L, Y, l, m, n. Multiplied by the
-    /// coefficients and added up they are [`Series::predicted`].
+    /// Contributions `values[coefficient][channel][window]`, channels D, L, Y, l, m, n. Weighted by the coefficients,
+    /// their sum is [`Series::predicted`].
     pub values: Vec<[Vec<f64>; 6]>,
 }
 
-/// The columns of `model` over the windows of `flight`, to regress the measured channels on.
+/// Columns of `model` over the windows of `flight`, as regressors for the measured channels.
 ///
-/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not
-/// linear in them, or they act on the measured side.
+/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not linear in them,
+/// or they act on the measured side.
 pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
     let flight = &*flight.acting(model);
     let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();
@@ -309,7 +309,7 @@ pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
     Columns { names, values }
 }
 
-/// [`Columns::values`] of some windows.
+/// Values of [`Columns::values`] for some windows.
 fn columns_of(
     model: &GreyBox,
     flight: &Prepared,

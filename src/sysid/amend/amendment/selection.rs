@@ -1,4 +1,4 @@
-//! Which of the effects asked for the flights bear out: fit by fit, judged by held-out flights.
+//! Forward selection of the requested effects: each fit is judged by free runs over held-out flights.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -6,42 +6,43 @@ use super::{Added, Options, joined};
 use crate::amend::conventions::{Convention, Tried, closer};
 use crate::amend::error::AmendError;
 use crate::amend::flight::Flight;
-use crate::amend::judge::{self, Judge, Kept, SETTLED_OR_NOT, settled};
+use crate::amend::judge::{self, ACCEPTED_UNCONVERGED, Judge, Kept, settled};
 use crate::amend::output_error::{self, Fit, FitOptions};
 use crate::amend::parameters;
 use crate::amend::result::AddedEffect;
 use crate::compare::HorizonScore;
-use crate::progress::{self, Progress, say};
+use crate::progress::{self, Progress, report};
 use greylag_model::GreyBox;
 
-/// Times that all effects are asked for at most.
+/// Largest number of passes over the requested effects.
 const ROUNDS: usize = 3;
 
-/// A model with those of some effects that the flights bear out.
+/// A model with the effects accepted so far, and their fit.
 #[derive(Clone)]
 pub(super) struct Selection {
-    /// Tuned without any.
+    /// The fit of the model's own coefficients alone, with its held-out scores.
     pub(super) tuned: (Fit, Vec<HorizonScore>),
     pub(super) fit: Fit,
     pub(super) after: Vec<HorizonScore>,
     /// The effects that joined, in order.
     accepted: Vec<Added>,
-    /// What became of all.
+    /// The outcome for every requested effect.
     pub(super) effects: Vec<AddedEffect>,
 }
 
-/// What is asked for, and of which flights.
+/// The selection's inputs: what is requested, the flights to fit to, the judge.
 pub(super) struct Ask<'a> {
     pub(super) options: &'a Options,
     pub(super) train: &'a [Flight],
     pub(super) judge: &'a Judge<'a>,
     pub(super) progress: &'a Progress<'a>,
-    /// Fits begun, of which the first tunes the prior.
+    /// Number of fits begun; the first one tunes the prior.
     pub(super) begun: AtomicUsize,
 }
 
 impl Ask<'_> {
-    /// The effects that `model` bears out: those that a diagnosis found together, then the others.
+    /// Selects the effects that improve `model`: first those that a diagnosis found together, jointly, then the
+    /// others one by one.
     pub(super) fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
         let tuned = match &self.options.tuned {
             Some(known) => known.clone(),
@@ -64,13 +65,13 @@ impl Ask<'_> {
         self.rest(model, first)
     }
 
-    /// Asks for what `so_far`, a selection of effects of `model`, does not have, one after the other. One that was
-    /// refused while something else was missing is asked for again once that has joined.
+    /// Tries, one by one, the effects of `model` that the selection `so_far` lacks. An effect refused while another
+    /// was missing is tried again once that one has joined.
     fn rest(&self, model: &GreyBox, so_far: Selection) -> Result<Selection, AmendError> {
         let Options { effects, refused, .. } = self.options;
         let mut best = (so_far.fit, so_far.after);
         let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
-        // each with the number of effects beside which it was asked for, 0 for those that have joined
+        // each with the number of effects in the model when it was tried, 0 for those that have joined
         let verdict = |added: &Added| {
             let tried = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
             tried.map(|tried| (tried.clone(), 0))
@@ -99,9 +100,9 @@ impl Ask<'_> {
         Ok(Selection { tuned: so_far.tuned, fit: best.0, after: best.1, accepted, effects })
     }
 
-    /// Those of the effects that a diagnosis found together, fitted together, less those that the flights refuse
-    /// even so, if unseen flights are flown better with them: one of them alone may be lost beside a gross error
-    /// that another mends. `None` if there are not two.
+    /// Fits the effects that a diagnosis found together in one model, less those that the flights refuse even so, if
+    /// held-out flights are predicted better with them: the gain of one effect alone can be lost beside a gross error
+    /// that another one corrects. `None` if there are fewer than two.
     fn together(
         &self,
         model: &GreyBox,
@@ -120,7 +121,7 @@ impl Ask<'_> {
             return Ok(None);
         }
         let Some(mut kept) = fitted(&all)? else { return Ok(None) };
-        // what the model itself can say is not represented twice, which would widen all intervals
+        // an effect that the model's own coefficients can represent would widen all intervals
         let mut fewer = all.clone();
         fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
         if fewer.len() < all.len()
@@ -145,8 +146,8 @@ impl Ask<'_> {
         Ok(None)
     }
 
-    /// Tries the other conventions of `model`, whose selection is `best`, one after the other, and what was not
-    /// borne out again once another has been taken.
+    /// Tries the other conventions of `model`, whose selection is `best`, one by one; a convention that was refused
+    /// is tried again once another has been adopted.
     pub(super) fn with_conventions(
         &self,
         model: &GreyBox,
@@ -164,12 +165,13 @@ impl Ask<'_> {
                 let Some(other) = convention.other(&base) else { continue };
                 let (from, to) = (convention.of(&base), convention.of(&other));
                 let doing = format!("{}: {to} instead of {from}", model.name);
-                say(self.progress, &doing, self.done()[0])?;
+                report(self.progress, &doing, self.done()[0])?;
                 let tried = self.under(&other, &best)?;
                 let closer = tried.as_ref().map_or(f64::NAN, |t| closer(&best.fit, &t.fit));
                 let error = [best.error(), tried.as_ref().map_or(f64::NAN, Selection::error)];
                 let taken = tried.filter(|t| {
-                    let settled = t.fit.unsettled.is_none() || error[1] < SETTLED_OR_NOT * error[0];
+                    let settled =
+                        t.fit.unsettled.is_none() || error[1] < ACCEPTED_UNCONVERGED * error[0];
                     settled && convention.is_borne_out(closer, error)
                 });
                 let kept = taken.is_some();
@@ -183,8 +185,8 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
-    /// `other`, a model under another convention, with the effects that joined already; the rest are asked for again
-    /// only where that promises something.
+    /// The selection for `other`, the model under another convention, with the accepted effects; the remaining
+    /// effects are tried again only if that is promising.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
         let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
@@ -199,7 +201,7 @@ impl Ask<'_> {
         }
     }
 
-    /// Fits `model` with `effects`, which begin where `near` has them, if it does.
+    /// Fits `model` with `effects`, starting from their values in `near` where it has them.
     fn with_effects(
         &self,
         model: &GreyBox,
@@ -224,7 +226,7 @@ impl Ask<'_> {
         self.fit(&model, &options)
     }
 
-    /// A fit to the training flights, heard as a part of the whole.
+    /// Fits `model` to the training flights and reports progress as a share of the whole selection.
     fn fit(&self, model: &GreyBox, options: &FitOptions) -> Result<Fit, AmendError> {
         let progress = progress::part(self.progress, self.done());
         self.begun.fetch_add(1, Ordering::Relaxed);
@@ -233,8 +235,8 @@ impl Ask<'_> {
         output_error::fit(model, self.train, &options, &progress)
     }
 
-    /// Shares of the work that are done before and after the next fit. Some effects are asked for twice, so the
-    /// last share is never full.
+    /// Shares of the whole work done before and after the next fit. Some effects are tried twice, so the last share
+    /// stays below one.
     fn done(&self) -> [f64; 2] {
         let begun = self.begun.load(Ordering::Relaxed) as f64;
         let planned = 1.0 + self.options.effects.len() as f64;
@@ -243,7 +245,7 @@ impl Ask<'_> {
 }
 
 impl Selection {
-    /// The error of unseen flights by which it is judged; NaN if no run gets there.
+    /// Held-out free-run error at the horizon of judgement; NaN if no run reaches it.
     fn error(&self) -> f64 {
         judge::judged(&self.after).unwrap_or(f64::NAN)
     }

@@ -1,4 +1,4 @@
-//! What a fit that has ended says: estimates with their intervals, by flight, and what the reader must know.
+//! Results of a finished fit: estimates with their intervals, by flight too, and notes for the reader.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,18 +14,17 @@ use greylag_model::GreyBox;
 
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.96;
-/// A prior's width must shrink by this factor for a coefficient to count as learned.
+/// A coefficient counts as learned if its posterior width is below this share of the prior's.
 const LEARNED: f64 = 0.7;
-/// Coefficients whose errors go together more closely than this say the same.
+/// Error correlation beyond which two coefficients are confounded.
 const SAME: f64 = 0.9;
-/// Last change of a coefficient, in standard deviations, above which a fit has not settled.
+/// Last change of a coefficient, in standard deviations, above which a fit has not converged.
 const UNSETTLED: f64 = 0.5;
-/// Last change, in standard deviations, above which nothing can be said of any coefficient, if it was made.
+/// Last change, in standard deviations, above which no estimate of the fit is usable, if the step was taken.
 const LOST: f64 = 5.0;
 
 impl Search<'_> {
-    /// The fit as it stands, with intervals.
-    /// Its model is `given`, without trims of flights.
+    /// Completes the fit with intervals. Its model is `given` with the fitted coefficients, without trims of flights.
     pub(super) fn finish(self, given: &GreyBox) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
@@ -83,7 +82,7 @@ impl Search<'_> {
         let (size, constants) = (self.of_flight(), self.asked.constants());
         let count = self.flights.len();
         let place = |flight: usize, which: usize| self.free.len() + flight * size + which;
-        // less the mean of the flights, which is as well in the model's coefficient
+        // less the mean of the flights, which is confounded with the model's coefficient
         let beside_mean = |flight: usize, which: usize| {
             let value =
                 |k: usize| self.place.own[k].unknowns(&self.asked).nth(which).unwrap_or(0.0);
@@ -146,8 +145,8 @@ impl Search<'_> {
         self.free.iter().enumerate().map(one).collect()
     }
 
-    /// What each flight alone would say, to first order: a step from the common optimum with that
-    /// flight's equations and the prior.
+    /// Estimates of each flight alone, to first order: one step from the common optimum with that flight's equations
+    /// and the prior.
     fn by_flight(&self, system: &System) -> Vec<Vec<FlightEstimate>> {
         let count = self.free.len();
         let mut all = vec![Vec::new(); count];
@@ -180,9 +179,9 @@ impl Search<'_> {
         all
     }
 
-    /// By how much intervals must widen for the flights to agree as well as they say: the root mean
-    /// square of their own estimates less the common one, in standard deviations of the difference (Birge
-    /// ratio), at least 1. What is wrong in the same way throughout a flight, as a clock is, shows here.
+    /// Factor by which intervals widen for disagreement between flights (Birge ratio, at least 1): the root mean
+    /// square of the flights' own estimates less the common one, in standard deviations of the difference. It covers
+    /// errors that are constant within a flight, such as that of a clock.
     fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (k, f) in self.free.iter().enumerate() {
@@ -216,7 +215,7 @@ impl Search<'_> {
         std::array::from_fn(|k| (square(k) / count).sqrt())
     }
 
-    /// What had not settled, if anything.
+    /// The parameter that has not converged, in words, if there is one.
     fn unsettled(&self) -> Option<String> {
         let (change, parameter) = (self.change.0, &self.free[self.change.1].name);
         (change > UNSETTLED).then(|| {

@@ -1,4 +1,4 @@
-//! One damped Gauss–Newton step within bounds and strides, and how far it moves the coefficients.
+//! A damped Gauss–Newton step within bounds and largest steps, and its size in standard deviations.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use crate::amend::flight::SENSORS;
 use crate::amend::normal::{self, Normal, Place};
 use crate::amend::parameters::Free;
 
-/// The equations of all shots together.
+/// Normal equations of all shots together.
 pub(super) struct System {
     pub(super) shots: Vec<Normal>,
     pub(super) information: DMatrix<f64>,
@@ -18,7 +18,7 @@ pub(super) struct System {
 }
 
 impl Search<'_> {
-    /// Coefficients less their prior, then the unknowns of each flight.
+    /// Coefficients less their prior means, then the constants of each flight.
     pub(super) fn unknowns(&self, place: &Place) -> DVector<f64> {
         let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
         let mut all: Vec<f64> = coefficients.collect();
@@ -29,7 +29,7 @@ impl Search<'_> {
         DVector::from_vec(all)
     }
 
-    /// How many unknowns a flight has.
+    /// Number of constants of a flight.
     pub(super) fn of_flight(&self) -> usize {
         SENSORS + self.asked.constants().len()
     }
@@ -45,7 +45,7 @@ impl Search<'_> {
         DVector::from_vec(all.iter().map(|sd| sd.powi(-2)).collect())
     }
 
-    /// Where the unknowns of a shot's own equations stand among all.
+    /// Indices of the unknowns of a shot among all unknowns.
     pub(super) fn places(&self, flight: usize) -> Vec<usize> {
         let count = self.free.len();
         let size = self.of_flight();
@@ -75,7 +75,7 @@ impl Search<'_> {
         System { shots, information, gradient, prior }
     }
 
-    /// One damped step; whether it moved.
+    /// Takes one damped step; returns whether the point moved.
     pub(super) fn step(&mut self, system: &System, damping: &mut f64) -> Result<bool, AmendError> {
         let before = self.cost(&self.place);
         for _ in 0..8 {
@@ -93,7 +93,7 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// The step that stays within bounds and strides.
+    /// The damped step, restricted to bounds and largest steps.
     fn solve(&self, system: &System, damping: f64) -> Result<DVector<f64>, AmendError> {
         let singular = || AmendError::Singular { model: self.base.name.clone() };
         let mut held: Vec<Option<f64>> = vec![None; system.gradient.len()];
@@ -133,7 +133,7 @@ impl Search<'_> {
         Err(singular())
     }
 
-    /// How far a coefficient may move.
+    /// Largest decrease and increase of a coefficient.
     fn room(&self, k: usize, f: &Free) -> (f64, f64) {
         let here = self.place.theta[k];
         ((f.bounds.0 - here).max(-f.stride), (f.bounds.1 - here).min(f.stride))
@@ -160,7 +160,7 @@ impl Search<'_> {
         next
     }
 
-    /// The largest change of a coefficient in its standard deviations, and which.
+    /// Largest change of a coefficient in its standard deviations, with the coefficient's index.
     fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
         let Some(cholesky) = system.information.clone().cholesky() else {
             return (f64::INFINITY, 0);

@@ -1,21 +1,22 @@
-//! How much each state, each shot and each start counts in a search.
+//! Weights of states, shots and initial states in a search.
 
 use super::Search;
 use crate::amend::normal::Place;
 use crate::amend::shooting;
 use greylag_num::statistics::{correlation_length, quantile};
 
-/// Least standard deviations of residuals, in the units of the state: what the models' steps and the
-/// interpolation of deflections leave even without noise.
+/// Least standard deviations of residuals, in the units of the state: the error of the models' steps and of the
+/// interpolated deflections without noise.
 const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
-/// A shot whose mean square residual exceeds the typical one by this factor counts less.
+/// A shot is down-weighted if its mean square residual exceeds the typical one by this factor.
 const OUTLYING: f64 = 6.0;
 
 impl Search<'_> {
-    /// Sets the weights by the present residuals: the inverse variance of each state, all over one correlation length.
+    /// Sets the weights from the present residuals: the inverse variance of each state, all divided by one
+    /// correlation length.
     ///
-    /// With a length of its own for each state the weights have no fixed point worth having: a state that drifts hangs
-    /// together for longer, counts less for it, and drifts more, until the fit lets it go.
+    /// With a correlation length for each state the iteration of weights has no useful fixed point: a state that
+    /// drifts has a longer correlation, so a lower weight, so it drifts more, until the fit ignores it.
     pub(super) fn reweigh(&mut self) {
         let residuals = self.residuals();
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
@@ -40,8 +41,8 @@ impl Search<'_> {
         }
     }
 
-    /// Begins at `given`, the model's own coefficients, if its shots of `length_s` stay closer to the flights than those
-    /// of the start from equation error, which a kink of a table or a late sensor can lead astray.
+    /// Restarts at `given`, the model's own coefficients, if its shots of `length_s` follow the flights more closely
+    /// than those from the equation-error estimate, which a kink of a table or a delayed sensor can mislead.
     pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];
@@ -51,7 +52,7 @@ impl Search<'_> {
         }
     }
 
-    /// The sum over the shots of the root of their mean square residual: no shot that is lost rules it.
+    /// Sum over the shots of their root mean square residual, which no single diverged shot dominates.
     fn distance(&self, place: &Place) -> f64 {
         let square =
             |r: &[f64; 8]| (0..8).map(|k| self.weights.output[k] * r[k] * r[k]).sum::<f64>();
@@ -60,7 +61,7 @@ impl Search<'_> {
     }
 }
 
-/// The geometric mean of the states' correlation lengths, samples.
+/// Geometric mean of the states' correlation lengths, samples.
 fn common_length(residuals: &[Vec<[f64; 8]>]) -> f64 {
     let of_state = |k: usize| -> Vec<Vec<f64>> {
         residuals.iter().map(|r| r.iter().map(|x| x[k]).collect()).collect()

@@ -1,11 +1,11 @@
-//! The answer of a comparison: the first model, then each other beside it.
+//! The answer of a comparison: the first model, then each other model against it.
 
 use super::{ANSWER_S, Answer, Seen, Stage, Subject, Way};
 use crate::compare::forecast::ForecastResult;
 use crate::compare::result::ModelResult;
 use crate::weak_form::prepared::Prepared;
 
-/// The answer about `models` over `flights`; a model alone stands beside the best forecast without aerodynamics.
+/// The answer about `models` over `flights`; a single model is compared with the best forecast without aerodynamics.
 pub fn between(
     models: &[ModelResult],
     flights: &[Prepared],

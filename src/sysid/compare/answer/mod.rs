@@ -1,4 +1,5 @@
-//! The answer box: by how much the error falls, by what, what is left. Composed here for terminal, page, workbench and JSON.
+//! The answer box: by how much the error falls, by which effect, and what remains. Composed here for terminal, page,
+//! workbench and JSON.
 
 pub(super) mod between;
 mod numbers;
@@ -9,64 +10,65 @@ use serde::Serialize;
 use super::result::HorizonScore;
 pub use numbers::{Baseline, Decisive, InUse, Left, Numbers, Step, Way};
 
-/// Horizon of the answer, s; the longest one below it where no run reaches so far.
+/// Horizon of the answer, s; a shorter one where no run reaches it.
 pub const ANSWER_S: f64 = 5.0;
 
-/// The answer in sentences, with the numbers that stand in them.
+/// The answer in sentences, with the numbers in them.
 #[derive(Clone, Debug, Serialize)]
 pub struct Answer {
-    /// By how much the error falls, step by step, on which flights.
+    /// Fall of the error, step by step, with the flights it was measured on.
     pub error: String,
-    /// What the effect is, its decisive coefficient, and what it changes in use; empty where nothing was added.
+    /// Description of the effect, its decisive coefficient and the change of the predictions; empty if nothing was
+    /// added.
     pub effect: String,
-    /// What is left.
+    /// Largest remaining prediction error.
     pub left: String,
-    /// The command that comes next, ready to be copied; empty where it is not known.
+    /// The next command, ready to be copied; empty if none is known.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub next: String,
-    /// Every number of the sentences.
+    /// All numbers of the sentences.
     pub numbers: Numbers,
 }
 
-/// A model on the way from the one given to the last.
+/// A model in the sequence from the given to the last one.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
-    /// How it came from the model before.
+    /// Derivation from the model before it.
     pub way: Way,
-    /// Its name.
+    /// Name of the model.
     pub model: &'a str,
-    /// Its free-run errors.
+    /// Free-run errors of the model.
     pub scores: &'a [HorizonScore],
 }
 
-/// What the flights of the free runs are to the fit.
+/// Relation of the free runs' flights to the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// It is not known which flights a model was fitted to.
+    /// The flights that the model was fitted to are not known.
     Unknown,
-    /// The fit saw so many of them.
+    /// The model was fitted to this many of the flights.
     Of(usize),
-    /// They are the last third of a flight whose rest was fitted.
+    /// The flights are the last third of a flight whose rest was fitted.
     LastThird,
 }
 
-/// What an answer is composed of.
+/// Input of an answer.
 #[derive(Clone, Debug)]
 pub struct Subject<'a> {
-    /// The models, in the order in which they improve; the first is the one given.
+    /// Models in the order of improvement; the first is the given one.
     pub stages: Vec<Stage<'a>>,
-    /// The names of the flights.
+    /// Names of the flights.
     pub flights: Vec<String>,
-    /// What they are to the fit.
+    /// Relation of the flights to the fit.
     pub seen: Seen,
-    /// The effects that the last model has more than the first, each with its clearest coefficient.
+    /// Effects that the last model has and the first has not, each with its most significant coefficient.
     pub effects: Vec<Decisive>,
-    /// A forecast without aerodynamics, by name.
+    /// Name and errors of a forecast without aerodynamics.
     pub baseline: Option<(&'a str, &'a [HorizonScore])>,
 }
 
 impl Answer {
-    /// What can be said before anything is known.
+    /// The empty answer, before any result is known.
     pub fn nothing() -> Answer {
         Answer::of(&Subject {
             stages: Vec::new(),
@@ -89,17 +91,17 @@ impl Answer {
         }
     }
 
-    /// The answer with the command that comes next.
+    /// The answer with `next` as the next command.
     pub fn then(self, next: String) -> Answer {
         Answer { next, ..self }
     }
 
-    /// The answer with what is said of the effects instead, where nothing was asserted say.
-    pub fn saying(self, effect: String) -> Answer {
+    /// The answer with `effect` as its sentence on effects, for example that none was asserted.
+    pub fn with_effect(self, effect: String) -> Answer {
         Answer { effect, ..self }
     }
 
-    /// The lines of the box without the command: those that say something.
+    /// The non-empty sentences, without the command.
     pub fn lines(&self) -> impl Iterator<Item = &str> {
         [&self.error, &self.effect, &self.left]
             .into_iter()
@@ -107,7 +109,7 @@ impl Answer {
             .filter(|l| !l.is_empty())
     }
 
-    /// The answer in half a line: `error at 5 s 0.0873 → 0.00083 (−99 %)`.
+    /// The answer as a short phrase: `error at 5 s 0.0873 → 0.00083 (−99 %)`.
     pub fn summary(&self) -> String {
         words::summary(&self.numbers)
     }
@@ -118,7 +120,7 @@ mod tests {
     use super::*;
     use crate::compare::StateScore;
 
-    /// A score at 5 s whose airspeed (m/s) and sideslip (rad) are off by so much.
+    /// A score at 5 s with the given errors of airspeed (m/s) and sideslip (rad).
     fn score(rmse_scaled: f64, airspeed: f64, beta: f64) -> Vec<HorizonScore> {
         let state = |state, rmse: f64, scale: f64| StateScore {
             state,

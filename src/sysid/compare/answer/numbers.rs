@@ -5,114 +5,114 @@ use serde::Serialize;
 use super::{ANSWER_S, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
 
-/// How a model came from the one before.
+/// Derivation of a model from the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// It is the first one.
+    /// It is the given model, the first one.
     Given,
-    /// Its own coefficients were fitted.
+    /// The model's own coefficients were fitted.
     Tuned,
-    /// Effects were added, and all fitted again.
+    /// Effects were added, and all coefficients refitted.
     Effects,
-    /// It is another model.
+    /// It is a different model.
     Other,
 }
 
-/// A model on the way.
+/// A model in the sequence, with its error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
-    /// How it came from the one before.
+    /// Derivation from the model before it.
     pub way: Way,
-    /// Its name.
+    /// Name of the model.
     pub model: String,
     /// Free-run error at the horizon: NRMSE, the root mean square over the eight states, each over its scale x_c.
     pub error: f64,
-    /// Change from the step before, %; of another model from the first. `None` of the first.
+    /// Change against the step before, or for a different model against the first one, %. `None` for the first.
     pub change_percent: Option<f64>,
 }
 
-/// The clearest coefficient of an effect.
+/// The most significant coefficient of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Decisive {
-    /// The effect's id.
+    /// Identifier of the effect.
     pub id: String,
-    /// What it is, in words.
+    /// Description of the effect, in words.
     pub description: String,
-    /// The coefficient.
+    /// Name of the coefficient.
     pub coefficient: String,
-    /// Its value.
+    /// Estimate of the coefficient, in `unit`.
     pub value: f64,
-    /// Its 95 % interval.
+    /// 95 % interval of `value`.
     pub ci95: [f64; 2],
-    /// Its unit; may be empty.
+    /// Unit of `value`; may be empty.
     pub unit: String,
-    /// Ids that the flights cannot tell from the effect.
+    /// Ids of effects that the flights cannot distinguish from this one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<String>,
 }
 
 impl Decisive {
-    /// How clearly it differs from zero: its value over its interval's width.
+    /// Significance: the value divided by the width of its interval.
     pub fn clearness(value: f64, ci95: [f64; 2]) -> f64 {
         let clear = value.abs() / (ci95[1] - ci95[0]);
         if clear.is_finite() { clear } else { 0.0 }
     }
 }
 
-/// What the last step changes in use: the state whose prediction gains most for its scale.
+/// The state whose prediction improves most, relative to its scale, by the last step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InUse {
-    /// The state, with its unit, as in `State::NAMES`.
+    /// State with its unit, as in `State::NAMES`.
     pub state: &'static str,
-    /// Its root mean square error before the step, in that unit.
+    /// Root mean square error before the step, in that unit.
     pub before: f64,
-    /// After it.
+    /// Root mean square error after the step, in that unit.
     pub after: f64,
 }
 
-/// The state whose prediction is off most for its scale.
+/// The state with the largest remaining error relative to its scale.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Left {
-    /// The state, with its unit.
+    /// State with its unit, as in `State::NAMES`.
     pub state: &'static str,
-    /// Its root mean square error, in that unit.
+    /// Root mean square error, in that unit.
     pub rmse: f64,
 }
 
 /// A forecast without aerodynamics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Baseline {
-    /// What it does.
+    /// Name of the forecast.
     pub name: String,
-    /// Its error at the horizon.
+    /// NRMSE of the forecast at the horizon.
     pub error: f64,
 }
 
-/// Every number that stands in an answer.
+/// All numbers of an answer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Numbers {
     /// Horizon of the free runs, s; NaN (null) if none is reached.
     pub horizon_s: f64,
-    /// The flights.
+    /// Names of the flights.
     pub flights: Vec<String>,
-    /// How many of them a fit has seen; `None` (null) if that is not known.
+    /// Number of these flights that a fit has used; `None` (null) if that is not known.
     pub fitted_flights: Option<usize>,
-    /// Whether they are the last third of a flight whose rest was fitted.
+    /// Whether the flights are the last third of a flight whose rest was fitted.
     pub last_third: bool,
-    /// The models on the way.
+    /// The models, from the given to the last one.
     pub steps: Vec<Step>,
-    /// Change of the error from the first to the last, %; NaN (null) if there is one only.
+    /// Change of the error from the first to the last model, %; NaN (null) for a single model.
     pub change_percent: f64,
-    /// The best forecast without aerodynamics, where models stand beside some.
+    /// The best forecast without aerodynamics, where the models are compared with some.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<Baseline>,
-    /// What the last model has more than the first.
+    /// Effects that the last model has and the first has not.
     pub effects: Vec<Decisive>,
-    /// What that changes in use.
+    /// The state whose prediction they improve most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
-    /// What is left.
+    /// The state with the largest remaining error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<Left>,
 }
@@ -155,7 +155,7 @@ impl Numbers {
     }
 }
 
-/// The longest horizon up to [`ANSWER_S`] that runs of every model reach, else the shortest that they reach.
+/// The longest horizon up to [`ANSWER_S`] that runs of every model reach; without one, the shortest that they reach.
 fn horizon(stages: &[Stage]) -> Option<f64> {
     let first = stages.first()?;
     let reached = |s: &&HorizonScore| {
@@ -167,7 +167,7 @@ fn horizon(stages: &[Stage]) -> Option<f64> {
     below.or_else(|| all.into_iter().min_by(f64::total_cmp))
 }
 
-/// The score at a horizon that runs reach.
+/// The score at `horizon_s` if any run reaches it.
 fn score(scores: &[HorizonScore], horizon_s: f64) -> Option<&HorizonScore> {
     scores.iter().find(|s| s.horizon_s == horizon_s && s.runs > 0 && s.rmse_scaled.is_finite())
 }

@@ -2,7 +2,7 @@
 
 use super::numbers::{Decisive, InUse, Left, Numbers, Step, Way};
 
-/// By how much the error falls.
+/// Sentence on the fall of the error.
 pub fn error(n: &Numbers) -> String {
     let Some((first, rest)) = n.steps.split_first() else {
         return "No free run is long enough for an error to be given.".into();
@@ -57,7 +57,7 @@ pub fn error(n: &Numbers) -> String {
     text + "."
 }
 
-/// What the effects are, each with its decisive coefficient, and what they change in use.
+/// Sentence on the effects, each with its decisive coefficient, and the change of the predictions.
 pub fn effect(n: &Numbers) -> String {
     let mut said: Vec<String> = n.effects.iter().map(one).collect();
     let subject = match (n.steps.len(), n.effects.len()) {
@@ -100,7 +100,7 @@ fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     )
 }
 
-/// What is left.
+/// Sentence on the largest remaining error.
 pub fn left(n: &Numbers) -> String {
     n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
         let (name, unit, factor) = people(state);
@@ -112,7 +112,7 @@ pub fn left(n: &Numbers) -> String {
     })
 }
 
-/// The answer in half a line.
+/// The answer as a short phrase.
 pub fn summary(n: &Numbers) -> String {
     let at = format!("error at {} s", number(n.horizon_s));
     match &n.steps[..] {
@@ -129,7 +129,7 @@ pub fn summary(n: &Numbers) -> String {
     }
 }
 
-/// "On 2 flights not fitted".
+/// The flights in words: "On 2 flights not fitted".
 fn on(n: &Numbers) -> String {
     let all = n.flights.len();
     let flights = if all == 1 { "1 flight".into() } else { format!("{all} flights") };
@@ -142,7 +142,7 @@ fn on(n: &Numbers) -> String {
     }
 }
 
-/// Which way an error goes.
+/// Direction of a change of the error.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Verb {
     Falls,
@@ -191,7 +191,7 @@ fn by(n: &Numbers, step: &Step) -> String {
     }
 }
 
-/// A change in percent with its sign; a digit more where only that tells it from all or nothing.
+/// A change in percent with its sign; one more digit where rounding would give 0 or 100 %.
 fn percent(p: f64) -> String {
     let sign = if p > 0.0 { "+" } else { "−" };
     match p.abs() {
@@ -231,7 +231,7 @@ fn lower(text: &str) -> String {
     }
 }
 
-/// A state's name and unit as people say them, and the factor from its SI unit.
+/// Colloquial name and unit of a state, and the factor from its SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let degrees = 1f64.to_degrees();
     match state {

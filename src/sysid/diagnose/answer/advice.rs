@@ -1,14 +1,14 @@
-//! What to fly next.
+//! Advice on the next flight.
 
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
 use crate::diagnose::answer::sentences::figures;
 use crate::diagnose::search::stepwise::Found;
 use greylag_physics::catalogue::describe;
 
-/// Pieces of advice on effects that these data could not have shown.
+/// Largest number of hints on effects that these data could not have shown.
 const UNSEEN: usize = 2;
 
-/// The advice, the most useful first.
+/// Advice on the next flight, the most useful first.
 pub fn advice(
     found: &Found,
     verdict: Verdict,

@@ -5,16 +5,16 @@ use crate::diagnose::answer::result::Curve;
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::search::round::Round;
 
-/// Bins of equal count, by which the variable is chosen.
+/// Number of bins of equal count, by which the variable is chosen.
 const PLACES: usize = 12;
-/// Bins of equal width, in which the curve is drawn: those of equal count stop where few windows lie.
+/// Number of bins of equal width, in which the curve is drawn; bins of equal count end where windows are sparse.
 const WIDTHS: usize = 24;
-/// Variables that tell when or where, not how, the aircraft flew.
+/// Variables that describe the circumstances rather than the flight state, and are not plotted.
 const NOT_SHOWN: [RegimeVariable; 3] =
     [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
 
-/// The curve of `contribution` (flight by flight) in the first of `channels`. `relative`: its standard
-/// deviation relative to itself; `left`: whether the round's residual still holds it.
+/// The curve of `contribution` (flight by flight) in the first of `channels`. `relative` is its standard deviation
+/// relative to itself; `left` states whether the round's residual still contains it.
 pub fn curve(
     round: &Round,
     contribution: &[Column],
@@ -41,9 +41,9 @@ pub fn curve(
     over_the_best(id, made, scatter, &regimes, relative)
 }
 
-/// The curve of an effect in a channel over the regime variable that shows it best: at each window what it makes
-/// (`made`), measured less the model without it (`scatter`), both in the channel's unit, and where the window lies.
-/// `relative` is the standard deviation of what it makes relative to itself.
+/// The curve of an effect in a channel over the regime variable that shows it best, from values at each window: its
+/// contribution (`made`), measured less the model without it (`scatter`), both in the channel's unit, and the
+/// window's regime. `relative` is the standard deviation of the contribution relative to itself.
 pub fn over_the_best(
     id: ChannelId,
     made: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Columns that cannot be effects: candidates reversed in time, candidates with their phases shuffled.
+//! Decoys, columns that cannot be effects: candidates reversed in time, candidates with randomized phases.
 
 use std::f64::consts::TAU;
 
@@ -13,11 +13,12 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::Found;
 use greylag_num::stream::{Stream, stream};
 
-/// Random stream of the phases.
+/// Random stream for the phases.
 const DECOYS: u64 = 84;
-/// Candidates that are made into decoys.
+/// Largest number of candidates turned into decoys.
 const MOST: usize = 6;
-/// Windows beyond which a series is shuffled in pieces, which spares the time of a long transform.
+/// Longest series, in windows, that is transformed at once; longer ones are randomized in pieces, to bound the cost
+/// of the transform.
 const PIECE: usize = 256;
 
 /// The decoys of the best linear candidates of the last round with their evidence.
@@ -78,7 +79,7 @@ fn evidence(round: &Round, names: &[(String, Trial)], lists: &[Vec<Column>]) -> 
     names.iter().enumerate().filter_map(of).collect()
 }
 
-/// A series with the spectrum of `x` and phases by chance.
+/// A series with the spectrum of `x` and random phases.
 fn shuffle(x: &[f64], random: &mut Stream) -> Vec<f64> {
     x.chunks(PIECE).flat_map(|piece| shuffle_piece(piece, random)).collect()
 }

@@ -1,8 +1,8 @@
 //! The smallest amount of an effect that the flights would have shown.
 //!
-//! An effect that is linear in its constants needs their standard deviations only. One on the deflections
-//! is not: near zero a lag is a late clock, and a dead zone nothing at all. It is tried at increasing
-//! amounts on the flights' own deflections, everything that is fitted along projected out each time.
+//! For an effect that is linear in its constants, their standard deviations suffice. An effect on the deflections is
+//! not linear near zero: a lag is confounded with a clock error there, and a dead zone has no effect. It is evaluated
+//! at increasing amounts on the flights' own deflections, with all nuisances projected out each time.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +14,20 @@ use crate::diagnose::regression::projected::Projected;
 use crate::diagnose::regression::rank::{Draw, Trial, deviations};
 use crate::diagnose::search::round::Round;
 
-/// Most amounts that are tried.
+/// Largest number of amounts evaluated.
 const TRIED: usize = 8;
 /// Largest factor between one amount and the next.
 const STRIDE: f64 = 8.0;
-/// Power of the amount with which an effect's evidence is taken to grow until two amounts have been tried.
+/// Assumed exponent of the evidence over the amount, until two amounts have been evaluated.
 const POWER: f64 = 2.0;
-/// Least and largest power that two amounts may give.
+/// Least and largest exponent accepted from two amounts.
 const POWERS: [f64; 2] = [0.5, 4.0];
-/// An amount whose evidence is within this share of the one sought is close enough.
+/// The search ends at an amount whose evidence is within this relative distance of the one sought.
 const CLOSE: f64 = 0.1;
 
 /// For each candidate of `round`, the smallest amount of its first free coefficient whose evidence would have
-/// exceeded `threshold`, five times in six; those are left out that have none, as shapes of which there is no
-/// small amount, and effects that would not show at any possible amount.
+/// exceeded `threshold` with a probability of five in six. Candidates without such an amount are left out: shapes
+/// that have no small amount, and effects that would not show at any possible amount.
 pub fn detectable(round: &Round, threshold: f64) -> BTreeMap<&'static str, f64> {
     let straight = round.trials.iter().filter(|t| t.points[0].contribution.is_none());
     let mut all: BTreeMap<&'static str, f64> =
@@ -43,13 +43,13 @@ fn linear(round: &Round, trial: &Trial, threshold: f64) -> Option<f64> {
     amount.is_finite().then_some(amount)
 }
 
-/// How well a direction shows against noise.
+/// Detectability of a direction against noise.
 struct Shown {
-    /// Standard deviation of its amount by the noise alone.
+    /// Standard deviation of its amount due to the noise alone.
     alone: f64,
-    /// How much more the blocks scatter, at least 1.
+    /// Ratio of the blocks' scatter to the noise's, at least 1.
     scatter: f64,
-    /// What a free constant costs, ln n each.
+    /// Penalty of the free constants, ln n each.
     penalty: f64,
 }
 
@@ -61,8 +61,8 @@ impl Shown {
         Some(Shown { alone, scatter: (robust / alone).max(1.0), penalty })
     }
 
-    /// The amount in standard deviations at which gain and Wald statistic both exceed `threshold` even if noise
-    /// takes one deviation.
+    /// The amount, in standard deviations, at which gain and Wald statistic both exceed `threshold` even if noise
+    /// lowers it by one standard deviation.
     fn needed(&self, threshold: f64) -> f64 {
         let threshold = threshold.max(0.0);
         let by_gain = (threshold + self.penalty).sqrt();
@@ -70,18 +70,18 @@ impl Shown {
     }
 }
 
-/// An effect on the deflections whose smallest visible amount is sought.
+/// Search for the smallest detectable amount of an effect on the deflections.
 struct Sought<'a> {
     entry: &'a Entry,
     trial: &'a Trial,
-    /// Least and largest size possible.
+    /// Least and largest possible size.
     bounds: [f64; 2],
     size: f64,
-    /// The largest size that does not show, with its evidence as a share of what is needed.
+    /// The largest size that is not detectable, with its evidence as a share of the required one.
     hidden: Option<[f64; 2]>,
-    /// The smallest that does.
+    /// The smallest size that is detectable, likewise.
     seen: Option<[f64; 2]>,
-    /// The one tried last.
+    /// The size evaluated last, likewise.
     last: Option<[f64; 2]>,
     found: Option<f64>,
 }
@@ -106,14 +106,14 @@ impl<'a> Sought<'a> {
         Some(sought)
     }
 
-    /// Size of an amount and amount of a size: a lower limit is more of an effect.
+    /// Converts a size to an amount and back: a lower limit is a larger effect.
     fn turned(&self, x: f64) -> f64 {
         let starts = self.entry.about.entry.map_or(&[][..], |e| e.starts);
         let falls = starts.first().map(|s| s[0]) > starts.last().map(|s| s[0]);
         if falls { x.recip() } else { x }
     }
 
-    /// Notes that the size tried reached `ratio` of what is needed, and chooses the next one.
+    /// Records that the size evaluated reached `ratio` of the required evidence, and chooses the next one.
     fn tried(&mut self, ratio: f64) {
         if (ratio - 1.0).abs() < CLOSE {
             self.found = Some(self.size);
@@ -141,7 +141,7 @@ impl<'a> Sought<'a> {
         self.size = next.clamp(self.bounds[0], self.bounds[1]);
     }
 
-    /// The amount sought, as well as it is known.
+    /// The best estimate of the amount sought.
     fn amount(&self) -> Option<f64> {
         let size = self.found.or(self.seen.map(|[size, _]| size))?;
         Some(self.turned(size))
@@ -169,7 +169,7 @@ fn operators(round: &Round, threshold: f64) -> Vec<(&'static str, f64)> {
     sought.iter().filter_map(|s| Some((s.trial.id, s.amount()?))).collect()
 }
 
-/// What each of `sought` shows at its size, as a share of what is needed.
+/// Evidence of each of `sought` at its size, as a share of the required one.
 fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>> {
     let na = round.known.len();
     let last = na + sought.len();
@@ -203,7 +203,7 @@ mod tests {
     use super::*;
     use greylag_physics::inputs::Kind;
 
-    /// Seeks the amount of the effect `id` whose evidence, a power of its size, is as much as needed at `amount`.
+    /// Searches for the amount of the effect `id`, if its evidence is a power of its size and sufficient at `amount`.
     fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {
         let entry = Entry { about: Kind::from_id(id)?.describe(), operator: true };
         let id = entry.about.id;

@@ -1,22 +1,23 @@
-//! Figures of a flight that cannot be: where there is one, no sentence about forces is worth anything.
+//! Checks for physically impossible figures of a flight; with one of them, no statement about forces is valid.
 
 use crate::diagnose::answer::result::Tuned;
 use crate::diagnose::answer::sentences::with_interval;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_num::statistics::mean;
 
-/// Airspeed scales (measured by true) that a working pitot has: a static port in a bad place gives 10 to 15 %.
+/// Range of airspeed scales (measured over true) of a working pitot tube; a badly placed static port causes 10 to 15
+/// %.
 const SCALES: [f64; 2] = [0.8, 1.25];
-/// Mean vertical wind that no air has for the length of a flight, m/s: thermals sink and rise.
+/// Largest mean vertical wind over a flight, m/s: thermals have up- and downdraughts that average out.
 const VERTICAL_MPS: f64 = 3.0;
-/// Standard deviations of what was known before beyond which a constant is not believed.
+/// Largest distance of a constant from its prior mean, in prior standard deviations, that is plausible.
 const BELIEVED: f64 = 6.0;
-/// Standard deviations beyond which a coefficient surely has its sign.
+/// Standard deviations beyond which a coefficient's sign is certain.
 const SURELY: f64 = 4.0;
-/// Part of its prior under which the slope of lift is no wing's.
+/// Share of its prior below which a lift slope is implausible for a wing.
 const NO_WING: f64 = 0.2;
 
-/// What cannot be, a sentence each, with what to look at.
+/// The impossible figures, a sentence each, with what to check.
 pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
     let of_flight = |flight: &&Reconstruction| {
         let speeds: Vec<f64> = flight
@@ -27,17 +28,17 @@ pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
         let airspeed = mean(&speeds);
         let wind = wind(flight, airspeed);
         let all = flight.nuisances.iter().filter_map(move |n| Some((n, why(n)?)));
-        let all = all.map(|(n, why)| said(&flight.name, n, why)).chain(wind);
+        let all = all.map(|(n, why)| sentence(&flight.name, n, why)).chain(wind);
         all.collect::<Vec<_>>()
     };
     flights.iter().flat_map(of_flight).chain(tuned.iter().filter_map(coefficient)).collect()
 }
 
-fn said(flight: &str, n: &Nuisance, why: &str) -> String {
+fn sentence(flight: &str, n: &Nuisance, why: &str) -> String {
     format!("{flight}: {} is found at {}: {why}.", n.name, with_interval(n.value, n.sd, n.unit))
 }
 
-/// Why a constant cannot be what it is found at, with what to look at.
+/// Why the estimate of a constant is impossible, with what to check.
 fn why(n: &Nuisance) -> Option<&'static str> {
     let name = n.name.as_str();
     let beyond =
@@ -61,7 +62,7 @@ fn why(n: &Nuisance) -> Option<&'static str> {
     }
 }
 
-/// A mean wind faster than the aircraft flies.
+/// A mean wind faster than the aircraft flies, as a sentence.
 fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     let of = |name: &str| {
         flight.nuisances.iter().find(|n| n.name == name).filter(|n| n.moved().abs() > 0.0)
@@ -78,7 +79,7 @@ fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     })
 }
 
-/// A coefficient that no aircraft that flies has.
+/// A coefficient that no aircraft in flight can have, as a sentence.
 fn coefficient(t: &Tuned) -> Option<String> {
     let own = t.name.rsplit('.').next()?;
     let damps = ["Cmq", "Clp", "Cnr"].contains(&own);

@@ -1,10 +1,10 @@
-//! Sensor errors and wind, as the reconstruction decided them before any aerodynamics.
+//! Sensor errors and wind, estimated by the reconstruction without any aerodynamics.
 
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// A constant's prefix, its id in the catalogue, its nominal value, and how far from it the constant changes nothing that
-/// anybody would notice: what the filters' own errors leave, or a trim.
+/// Kinds of constants: name prefix, id in the catalogue, nominal value, and the deviation that is negligible because
+/// it is within the filters' own errors or a trim.
 const KINDS: [(&str, &str, f64, f64); 15] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
@@ -22,11 +22,11 @@ const KINDS: [(&str, &str, f64, f64); 15] = [
     ("skew_actuators", "actuators_late", 0.0, 0.015),
     ("skew_", "clock_skew", 0.0, 0.005),
 ];
-/// Standard deviations beyond which a constant is clearly not zero.
+/// Standard deviations beyond which a constant differs from its nominal value.
 const CLEARLY: f64 = 4.0;
 
-/// What each flight's sensors and wind were. Late actuators may as well be the aircraft's, which the
-/// search for effects decides, so they are not asserted.
+/// Sensor errors and wind of each flight. Late actuators may equally be a property of the aircraft, which the search
+/// for effects decides, so they are never asserted here.
 pub fn measurement(flights: &[&Reconstruction]) -> Vec<Measurement> {
     let of = |flight: &&Reconstruction| {
         let name = flight.name.clone();

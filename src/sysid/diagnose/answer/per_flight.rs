@@ -1,4 +1,4 @@
-//! What each flight has of its own, as fitted beside the aerodynamics: its trims, how its measured axes stand.
+//! Constants of each flight, fitted beside the aerodynamics: its trims, and the misalignment of its measured axes.
 
 use std::collections::HashSet;
 
@@ -7,19 +7,19 @@ use crate::diagnose::answer::sentences::{INTERVAL, figures};
 use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
 
-/// Standard deviations beyond which a constant is clearly not zero.
+/// Standard deviations beyond which a constant differs from zero.
 const CLEARLY: f64 = 4.0;
-/// Prior standard deviations beyond which a constant is not believed: something that acts like it is missing.
+/// Prior standard deviations beyond which a constant is implausible: it probably compensates for a missing effect.
 const BELIEVED: f64 = 3.0;
-/// Angle under which axes are mounted as well as can be, rad.
+/// Misalignment within the accuracy of mounting, rad.
 const MOUNTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
-/// Least standard deviation of an angle, rad: in simulated flights whose axes are the body's it came out 0.05° off, beside
-/// a flight whose axes stand askew up to 0.34°.
+/// Least standard deviation of a misalignment angle, rad: in simulated flights with aligned axes the estimates were
+/// 0.05° off, beside a flight with misaligned axes up to 0.34°.
 const LEAST: f64 = 0.15 * std::f64::consts::PI / 180.0;
-/// Share of its usual standard deviation under which a trim does not matter.
+/// A trim below this share of its usual standard deviation is negligible.
 const MATTERS: f64 = 0.2;
 
-/// The angles of each flight's axes in `round`; empty if they were not asked for.
+/// Misalignment angles of each flight in `round`; empty unless they were estimated.
 pub fn angles(round: &Round) -> Vec<Measurement> {
     let angles = round.per_flight.angles();
     let all = fitted(round);
@@ -42,7 +42,7 @@ pub fn angles(round: &Round) -> Vec<Measurement> {
         .collect()
 }
 
-/// The trims of each flight in `round`; empty if they were not asked for.
+/// Trims of each flight in `round`; empty unless they were estimated.
 pub fn trims(round: &Round) -> Vec<FlightTrim> {
     let angles = round.per_flight.angles();
     let all = fitted(round);
@@ -65,10 +65,10 @@ pub fn trims(round: &Round) -> Vec<FlightTrim> {
         .collect()
 }
 
-/// A constant of a flight as fitted.
+/// Estimate of a constant of a flight.
 struct Fitted {
     flight: String,
-    /// Its place among the flight's constants.
+    /// Index among the flight's constants.
     which: usize,
     constant: Constant,
     value: f64,
@@ -77,16 +77,16 @@ struct Fitted {
 }
 
 impl Fitted {
-    /// Whether it is farther from zero than is believed.
-    fn strains(&self) -> bool {
+    /// Whether its distance from zero is implausible.
+    fn is_implausible(&self) -> bool {
         self.value.abs() > BELIEVED * self.constant.width
     }
 }
 
-/// Flights of which nothing is asserted: where one constant takes up what something else causes, its neighbours, which
-/// correlate with it, are not believed either.
+/// Flights for which nothing is asserted: where one constant compensates for another cause, the constants correlated
+/// with it are not reliable either.
 fn astray(fitted: &[Fitted]) -> HashSet<String> {
-    fitted.iter().filter(|f| f.strains()).map(|f| f.flight.clone()).collect()
+    fitted.iter().filter(|f| f.is_implausible()).map(|f| f.flight.clone()).collect()
 }
 
 fn fitted(round: &Round) -> Vec<Fitted> {
@@ -100,7 +100,7 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
         let share = 1.0 / flights as f64;
-        // the mean of all flights is as well in the model's coefficient, so that what tells them apart is known better
+        // the mean of all flights is confounded with the model's coefficient, so differences are known better
         let weights: Vec<f64> =
             (0..flights).map(|k| f64::from(u8::from(k == flight)) - share).collect();
         let pairs = places.iter().zip(&weights);
@@ -122,8 +122,8 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         .collect()
 }
 
-/// By how much what a flight leaves exceeds its noise, at least 1: where something is missing, nothing is known as well as
-/// noise alone would have it.
+/// Ratio of the flight's residual to its noise, at least 1: with a missing effect, estimates are less certain than
+/// noise alone suggests.
 fn misfit(round: &Round, flight: usize) -> f64 {
     let of = round.projected.by_channel.iter().zip(&round.cells.flight_of_block);
     let own = of.filter(|(_, of)| **of == flight).flat_map(|(channels, _)| channels);
@@ -131,7 +131,7 @@ fn misfit(round: &Round, flight: usize) -> f64 {
     (square / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// Axes that clearly stand askew, a sentence for each flight.
+/// Significantly misaligned axes, a sentence for each flight.
 pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     let turned = measurement.iter().filter(|m| m.id == askew::ID && m.asserted).map(|m| {
         let about = m.name.trim_start_matches("askew_");
@@ -147,7 +147,7 @@ pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     by_flight(turned).into_iter().map(one).collect()
 }
 
-/// Trims that clearly differ, a sentence for each flight.
+/// Significantly different trims, a sentence for each flight.
 pub fn trim_sentences(trims: &[FlightTrim]) -> Vec<String> {
     let trims = trims.iter().filter(|t| t.asserted).filter_map(|t| {
         let [by, sd] = t.beside_mean?;
@@ -165,7 +165,7 @@ pub fn trim_sentences(trims: &[FlightTrim]) -> Vec<String> {
     by_flight(trims).into_iter().map(one).collect()
 }
 
-/// Neighbours of one flight joined.
+/// Consecutive entries of the same flight, joined into one sentence.
 fn by_flight<'a>(all: impl Iterator<Item = (&'a str, String)>) -> Vec<(&'a str, String)> {
     let mut joined: Vec<(&str, String)> = Vec::new();
     for (flight, words) in all {
@@ -177,9 +177,9 @@ fn by_flight<'a>(all: impl Iterator<Item = (&'a str, String)>) -> Vec<(&'a str, 
     joined
 }
 
-/// Constants that strain their prior, in words.
+/// Notes on constants far outside their prior, in words.
 pub fn notes(round: &Round) -> Vec<String> {
-    let far = fitted(round).into_iter().filter(Fitted::strains);
+    let far = fitted(round).into_iter().filter(Fitted::is_implausible);
     far.map(|f| {
         format!(
             "{} of {} lies {:+.1} prior standard deviations from zero: the prior is too narrow, or something that acts \

@@ -1,4 +1,4 @@
-//! Every candidate as it is listed: asserted ones first, then by evidence.
+//! The list of candidates: asserted ones first, then by evidence.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +15,12 @@ use crate::diagnose::search::stepwise::{Found, Selected};
 use greylag_physics::catalogue::describe;
 use greylag_physics::effects::Description;
 
-/// Runners-up with a curve.
+/// Number of runners-up that get a curve.
 const RUNNERS_UP: usize = 2;
-/// Half of a 95 % interval in standard deviations.
+/// Half width of a 95 % interval in standard deviations.
 const INTERVAL: f64 = 1.96;
 
-/// All candidates.
+/// The results of all candidates, in the order of the list.
 pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     let (asserted, refused): (Vec<&Selected>, Vec<&Selected>) =
         found.selected.iter().partition(|s| s.refused.is_empty());
@@ -58,8 +58,8 @@ pub fn candidates(found: &Found, options: &Options) -> Vec<Candidate> {
     list
 }
 
-/// Ids of asserted effects each of whose constants may be zero (95 %) once all effects have settled: what another effect took
-/// over. Shape constants are no amounts.
+/// Ids of asserted effects whose constants may all be zero (95 %) in the joint fit of all effects, because another
+/// effect accounts for the same residual. Shape constants do not count.
 pub fn void(found: &Found, options: &Options) -> Vec<String> {
     let lean = Options { detail: Detail::Lean, ..options.clone() };
     let asserted = found.selected.iter().filter(|s| s.refused.is_empty());
@@ -72,7 +72,7 @@ pub fn void(found: &Found, options: &Options) -> Vec<String> {
     candidates.filter(may_be_zero).map(|c| c.id).collect()
 }
 
-/// The smallest amounts that would have shown, of those that have joined the model before they did.
+/// Smallest detectable amounts; for effects that joined the model, those from before they joined.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
     if let Some(last) = &found.last {
@@ -81,7 +81,7 @@ fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     least
 }
 
-/// The largest standard deviation relative to its value, of a fitted contribution.
+/// Largest standard deviation relative to its value, of a fitted contribution.
 fn relative(score: &Score) -> f64 {
     score.wald.max(1e-9).sqrt().recip()
 }
@@ -92,7 +92,7 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
         let [value, sd, sums] =
             fitted(found, s.id, c.name).unwrap_or([s.score.values[k], 0.0, 0.0]);
-        // the blocks' scatter stands in the deviation of the round that selected it
+        // the standard deviation of the round that selected it includes the blocks' scatter
         parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums))
     });
     let parameters = parameters.collect();
@@ -130,7 +130,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     })
 }
 
-/// Value of a coefficient that has joined the model, its standard deviation by the noise and that by the sums over samples.
+/// Value of a coefficient that has joined the model, its standard deviation from the noise, and that from the sums
+/// over samples.
 fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
     let round = found.round();
     let full = format!("{id}.{name}");
@@ -152,7 +153,7 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
     let parameters = (0..about.coefficients.len())
         .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
         .collect();
-    // what is no more than chance says nothing flight by flight either
+    // estimates by flight mean nothing for evidence within chance
     let by_flight = match score.evidence > found.threshold {
         true => flights(round, &checks::by_flight(round, trial, score)),
         false => Vec::new(),

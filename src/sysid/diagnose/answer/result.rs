@@ -1,10 +1,10 @@
-//! What a diagnosis says, as it goes into JSON (`greylag.diagnosis/1`).
+//! The result of a diagnosis, serialized to JSON (`greylag.diagnosis/1`).
 
 use serde::Serialize;
 
 use crate::per_flight::PerFlight;
 
-/// The answer in one word.
+/// Overall verdict on the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -12,267 +12,278 @@ pub enum Verdict {
     Effect,
     /// The tuned model explains the data; nothing more is needed.
     Adequate,
-    /// Something is missing, and none of the catalogue's effects is it.
+    /// Something is missing, but no effect of the catalogue explains it.
     Unexplained,
-    /// These flights cannot say: a figure of theirs cannot be, or what their sensors may still have wrong accounts for
-    /// all that is left.
+    /// The flights allow no verdict: one of their figures is impossible, or remaining sensor errors may account for
+    /// the whole residual.
     Unknown,
 }
 
-/// A diagnosis.
+/// The result of a diagnosis of one model over one or several flights.
+///
+/// It is plain data: [`diagnose`](crate::diagnose::diagnose) computes it whole and nothing changes it later. Read
+/// `verdict` first, then `doubtful`: if that is not empty, figures of the flights are physically impossible,
+/// `verdict` is [`Verdict::Unknown`] and no effect is asserted. Then read `effects`, whose `asserted` entries stand
+/// first in the order of selection. `sentences` state the same results in words, the most important first. The
+/// optional parts are filled as the options requested them: `trims` and the axes' angles in `measurement` if
+/// constants of each flight were estimated, `decoys` and the candidates' curves with
+/// [`Detail::Full`](crate::diagnose::Detail::Full).
+///
+/// Units are SI and stand beside the values; channels D, L, Y are forces (N), l, m, n moments (N m). A number that does
+/// not exist is NaN, which JSON writes as `null`. Flights are named by their file. For equal inputs, options and version
+/// the result is equal, since `settings.seed` determines all random draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
-    /// `greylag.diagnosis/1`.
+    /// Schema of the document, `greylag.diagnosis/1`.
     pub schema: &'static str,
     /// Version of the program.
     pub version: &'static str,
     /// Name of the model.
     pub model: String,
-    /// The answer in one word.
+    /// Overall verdict on the model.
     pub verdict: Verdict,
     /// The answer in plain sentences, the most important first.
     pub sentences: Vec<String>,
-    /// Figures that cannot be, in words: where there is one, nothing is said about forces and moments.
+    /// Physically impossible figures, in words; if there are any, forces and moments are not judged.
     pub doubtful: Vec<String>,
     /// Every candidate, asserted ones first in the order of their selection, then by evidence.
     pub effects: Vec<Candidate>,
-    /// What the tuned model with the asserted effects leaves unexplained, by channel.
+    /// Unexplained share of each channel under the tuned model with the asserted effects.
     pub channels: Vec<ChannelLeft>,
-    /// Sensor errors and wind of each flight, decided before any aerodynamics; axes that stand askew
-    /// (`axes_askew`), decided beside them, where they were asked for.
+    /// Sensor errors and wind of each flight, estimated without any aerodynamics; misalignment of the axes
+    /// (`axes_askew`), estimated with the aerodynamics, where it was requested.
     pub measurement: Vec<Measurement>,
-    /// The trims of each flight, where they were asked for.
+    /// Trims of each flight, where they were estimated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trims: Vec<FlightTrim>,
-    /// The prior's coefficients as tuned, with the asserted effects in the model.
+    /// The model's own coefficients as tuned with the asserted effects in the model.
     pub tuned: Vec<Tuned>,
-    /// What to fly next, the most useful first.
+    /// Advice on the next flight, the most useful first.
     pub advice: Vec<Advice>,
-    /// The nulls, which lack no effect, that set the thresholds.
+    /// Null flights, which lack no effect, that determine the thresholds.
     pub nulls: Nulls,
-    /// Columns that cannot be effects, tried to see what chance reaches.
+    /// Decoys, columns that cannot be effects, as a check on the level of chance.
     pub decoys: Vec<Decoy>,
-    /// Share of the residual's variance beyond noise that a flexible model, trained on the other
-    /// flights, could still remove after the asserted effects; NaN (null) if it could not be tried.
+    /// Share of the residual's variance beyond noise that a flexible model, trained on the other flights, could still
+    /// remove after the asserted effects; NaN (null) if it was not computed.
     pub learnable_remainder: f64,
-    /// What the reader must know besides.
+    /// Further notes for the reader.
     pub notes: Vec<String>,
-    /// What the diagnosis was asked for.
+    /// Settings of the diagnosis.
     pub settings: Settings,
 }
 
-/// A candidate effect.
+/// A candidate effect with its evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Candidate {
-    /// Its id in the catalogue.
+    /// Identifier in the catalogue.
     pub id: String,
-    /// What it is, in one sentence.
+    /// Description of the effect, in one sentence.
     pub description: &'static str,
-    /// Whether the data say that it is missing.
+    /// Whether the diagnosis asserts that the model lacks it.
     pub asserted: bool,
-    /// What the data say of it, in one word.
+    /// Classification of the evidence.
     pub status: Status,
-    /// The smaller of its penalised gain and its block-robust Wald statistic, in the step in which
-    /// it was selected, or in the last one.
+    /// The smaller of its penalised gain and its block-robust Wald statistic, in the round that selected it, or in
+    /// the last one.
     pub evidence: f64,
-    /// What chance reaches in the nulls.
+    /// Evidence that chance reaches in the null flights.
     pub threshold: f64,
-    /// Its parameters as fitted together with the prior.
+    /// Its parameters, fitted together with the model's own coefficients.
     pub parameters: Vec<Parameter>,
-    /// Channels (D, L, Y, l, m, n) in which it takes part of the residual, the largest first.
+    /// Channels (D, L, Y, l, m, n) whose residual it reduces, the largest reduction first.
     pub channels: Vec<String>,
-    /// Ids that these data cannot tell from it.
+    /// Ids of effects that these data cannot distinguish from it.
     pub indistinguishable_from: Vec<String>,
-    /// Share by which it lowers the error of segments that the fit did not see; NaN (null) if not
-    /// tried.
+    /// Relative reduction of the error on segments that the fit did not use; NaN (null) if not computed.
     pub heldout_error_reduction: f64,
-    /// Share of block bootstraps in which it is selected first; NaN (null) if not tried.
+    /// Share of block bootstraps in which it is selected first; NaN (null) if not computed.
     pub selected_in_bootstraps: f64,
-    /// Per flight, the first parameter fitted on that flight alone with its standard deviation.
+    /// Estimate of the first parameter from each flight alone.
     pub by_flight: Vec<FlightEstimate>,
-    /// Smallest amount of the first parameter that these data would have shown.
+    /// Smallest amount of the first parameter that these data would have shown, in its unit.
     pub minimum_detectable: Option<f64>,
-    /// Why it is not asserted although its evidence exceeds the threshold.
+    /// Reasons not to assert it although its evidence exceeds the threshold.
     pub refused: Vec<String>,
     /// Its contribution over the regime variable that shows it best.
     pub curve: Option<Curve>,
 }
 
-/// What the data say of a candidate.
+/// Classification of a candidate's evidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// It is missing.
+    /// The model lacks this effect.
     Missing,
-    /// It, or one of those that these flights cannot tell from it, is missing.
+    /// The model lacks this effect or one that these flights cannot distinguish from it.
     Indistinguishable,
-    /// It is significant and too small to matter in these flights.
+    /// The effect is significant but too small to matter in these flights.
     Small,
-    /// Its evidence is more than chance, and something speaks against it.
+    /// The evidence exceeds the threshold, but a further check failed.
     Refused,
-    /// These flights do not show it: they would have shown its smallest detectable amount.
+    /// The flights do not show it, although they would have shown its smallest detectable amount.
     NotShown,
 }
 
-/// A fitted parameter.
+/// A fitted parameter of a candidate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Parameter {
-    /// Its name in model files.
+    /// Name in model files.
     pub name: String,
-    /// Its value.
+    /// Estimate, in `unit`.
     pub value: f64,
-    /// Its 95 % interval.
+    /// 95 % interval of `value`.
     pub ci95: [f64; 2],
-    /// What it is, with its unit.
+    /// Unit of `value`, with the parameter's meaning.
     pub unit: String,
 }
 
-/// One flight's say on a parameter.
+/// One flight's estimate of a parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightEstimate {
-    /// The flight.
+    /// Name of the flight.
     pub flight: String,
-    /// The value.
+    /// Estimate from this flight alone.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of `value`.
     pub sd: f64,
 }
 
 /// An effect's contribution over a regime variable, with the scatter that it explains.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
-    /// Channel, D, L, Y, l, m or n.
+    /// Name of the channel: D, L, Y, l, m or n.
     pub channel: String,
     /// Name of the regime variable with its unit.
     pub variable: String,
     /// Unit of the channel.
     pub unit: String,
-    /// The variable at each window.
+    /// Value of the variable at each window.
     pub x: Vec<f64>,
     /// Measured less the tuned model without the effect, at each window.
     pub residual: Vec<f64>,
-    /// Places on the axis where the curve is given.
+    /// Values of the variable at which the contribution is given.
     pub at: Vec<f64>,
-    /// Mean contribution there, lower and upper end of its 95 % interval.
+    /// Mean contribution there, with lower and upper end of its 95 % interval.
     pub contribution: Vec<[f64; 3]>,
 }
 
-/// What is left of one channel.
+/// Unexplained residual of one channel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelLeft {
-    /// D, L, Y, l, m or n.
+    /// Name of the channel: D, L, Y, l, m or n.
     pub channel: String,
-    /// Unexplained share of what is not sensor noise under the tuned model.
+    /// Unexplained share of the variance beyond sensor noise under the tuned model.
     pub tuned_unexplained_fraction: f64,
-    /// The same with the asserted effects.
+    /// The same share with the asserted effects.
     pub unexplained_fraction: f64,
     /// The worst regime in one sentence, where there is one.
     pub worst_regime: Option<String>,
-    /// The product of states that what is left goes with most, where more is left than chance leaves.
+    /// The product of states that correlates most with the remaining residual, if that exceeds chance.
     pub left_with: Option<String>,
     /// Whether these flights cannot judge the model as given in this channel.
     pub abstained: bool,
-    /// Why not.
+    /// Reason for abstaining, if `abstained`.
     pub why_abstained: Option<String>,
 }
 
-/// A sensor's error or the wind in one flight.
+/// A sensor error or a component of the wind in one flight.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measurement {
-    /// The flight.
+    /// Name of the flight.
     pub flight: String,
-    /// Id in the catalogue: `alpha_bias`, `airspeed_scale`, `steady_wind` and so on.
+    /// Identifier in the catalogue: `alpha_bias`, `airspeed_scale`, `steady_wind` and so on.
     pub id: String,
     /// Name of the constant.
     pub name: String,
-    /// Its value.
+    /// Estimate, in `unit`.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of `value`.
     pub sd: f64,
-    /// Its unit.
+    /// Unit of `value`.
     pub unit: String,
-    /// Whether it is clearly not zero.
+    /// Whether it differs significantly from its nominal value.
     pub asserted: bool,
 }
 
-/// A trim of one flight, beside what all flights have in common.
+/// A trim of one flight, relative to what all flights have in common.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightTrim {
-    /// The flight.
+    /// Name of the flight.
     pub flight: String,
-    /// Its name: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's thrust.
+    /// Name of the trim: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's thrust.
     pub name: String,
-    /// Its standard deviation as a prior, about zero.
+    /// Prior standard deviation, about zero.
     pub prior_sd: f64,
-    /// Its value, dimensionless, to be added to the model's coefficient.
+    /// Estimate, dimensionless, to be added to the model's coefficient.
     pub value: f64,
-    /// Its standard deviation, what is not sure of the model's coefficient included.
+    /// Standard deviation of `value`, the uncertainty of the model's own coefficient included.
     pub sd: f64,
-    /// The same less the mean of all flights, with its standard deviation; `None` of a single flight.
+    /// Estimate less the mean of all flights, and its standard deviation; `None` for a single flight.
     pub beside_mean: Option<[f64; 2]>,
-    /// Whether it is clearly not the mean, and by no more than is believed.
+    /// Whether it differs significantly from the mean by a plausible amount.
     pub asserted: bool,
 }
 
-/// A tuned coefficient.
+/// A tuned coefficient of the model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tuned {
-    /// `effect.coefficient`.
+    /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
     /// Value in the model file.
     pub prior: f64,
-    /// Its standard deviation as a prior.
+    /// Prior standard deviation.
     pub prior_sd: f64,
     /// Value after tuning.
     pub value: f64,
-    /// Its standard deviation.
+    /// Posterior standard deviation of `value`.
     pub sd: f64,
 }
 
-/// What to fly, and why.
+/// A manoeuvre to fly next, with its reason.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
     /// The manoeuvre, in words.
     pub manoeuvre: String,
-    /// What it would tell.
+    /// Question that the manoeuvre would answer.
     pub why: String,
-    /// The pair of ids for `greylag design --between`, where it separates two.
+    /// Pair of ids for `greylag design --between`, if the manoeuvre separates two effects.
     pub between: Option<[String; 2]>,
 }
 
-/// Nulls: the flights under the tuned model, with the noise of the richest fit, its sign drawn anew block by
-/// block, and the prior wrong by chance within its widths.
+/// Null flights, which determine the thresholds: the flights under the tuned model with the noise of the richest fit,
+/// its sign drawn at random block by block, and with prior errors drawn within the prior's widths.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
-    /// How many.
+    /// Number of null flights.
     pub count: usize,
-    /// The best candidate's evidence in each, ascending.
+    /// Largest evidence over the candidates in each, ascending.
     pub best: Vec<f64>,
-    /// The chance that was allowed in setting the thresholds.
+    /// Significance level of the thresholds.
     pub level: f64,
 }
 
 /// A column that cannot be an effect.
 #[derive(Clone, Debug, Serialize)]
 pub struct Decoy {
-    /// How it was made, for example `drag_alpha2 reversed in time`.
+    /// Construction of the decoy, for example `drag_alpha2 reversed in time`.
     pub name: String,
-    /// Its evidence.
+    /// Evidence that it reaches.
     pub evidence: f64,
 }
 
-/// What a diagnosis was asked for.
+/// Settings of a diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
-    /// Seed of nulls, bootstraps and decoys.
+    /// Seed of null flights, bootstraps and decoys.
     pub seed: u64,
-    /// Nulls drawn.
+    /// Number of null flights.
     pub nulls: usize,
-    /// Block bootstraps.
+    /// Number of block bootstraps.
     pub bootstraps: usize,
-    /// Ids left out of the catalogue.
+    /// Ids excluded from the catalogue.
     pub without: Vec<String>,
-    /// What each flight had of its own.
+    /// Constants estimated for each flight.
     #[serde(flatten)]
     pub per_flight: PerFlight,
 }

@@ -1,9 +1,10 @@
-//! Measured axes that stand askew as a rival of missing effects: what explains the flights better stands.
+//! Misaligned measured axes as a rival explanation of the residual.
 //!
-//! A board that is pitched by 3° makes of every roll a yaw, as a product of inertia does, and of lift a part of drag. No
-//! kinematics shows it, for all that the board measures is turned alike. So it is judged where the aerodynamics are: once
-//! effects were found, the flights are explained anew with the angles of their axes free, under the same noise, and both
-//! explanations are compared by what they leave and by how many constants they need (Bayesian information criterion).
+//! A board pitched by 3° turns part of every roll into yaw, as a product of inertia does, and part of lift into drag.
+//! Kinematics cannot show it, since everything that the board measures is rotated alike, so it is tested with the
+//! aerodynamics: once effects were found, the search is repeated with the misalignment angles free, under the same
+//! noise, and both explanations are compared by their residuals and numbers of constants (Bayesian information
+//! criterion).
 
 use crate::diagnose::answer::result::Verdict;
 use crate::diagnose::answer::run::verdict;
@@ -14,16 +15,16 @@ use crate::diagnose::search::round::{Beside, Problem, Round};
 use crate::diagnose::search::settling::{SETTLING, settled};
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::per_flight::{PerFlight, askew};
-use crate::progress::{Progress, part, say};
+use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 
-/// Standard deviation of each angle before the flights are seen, °: a board mounted by eye.
+/// Prior standard deviation of each misalignment angle, °: a board mounted by eye.
 const MOUNTED_DEG: f64 = 3.0;
-/// Least share of what the best effect takes that the angles must take to be worth a search.
+/// The angles must remove at least this share of what the best effect removes for the second search to be made.
 const WORTH: f64 = 0.3;
 
-/// The better explanation of the flights of `problem`: `found`, or one with turned axes. Where both are as good, the
-/// effects of `found` can then not be told from turned axes, and say so.
+/// The better explanation of the flights of `problem`: `found`, or one with misaligned axes. If both are equally
+/// good, the effects of `found` are marked as indistinguishable from misaligned axes.
 ///
 /// # Errors
 /// As [`search`].
@@ -35,7 +36,7 @@ pub fn against_axes(
     mut found: Found,
 ) -> Result<Found, DiagnoseError> {
     let Some(tilted) = worth(&problem, &found) else { return Ok(found) };
-    say(progress, "explaining the flights by axes that stand askew", 0.9)?;
+    report(progress, "explaining the flights by axes that stand askew", 0.9)?;
     let other = search(&tilted, model, options, &part(progress, [0.9, 0.95]))?;
     let cost = |problem: &Problem, of: &Found| cost(problem, &found, of);
     let (Some(effects), Some(axes)) = (cost(&problem, &found), cost(&tilted, &other)) else {
@@ -52,7 +53,7 @@ pub fn against_axes(
     Ok(found)
 }
 
-/// The problem with the angles free, if something is missing and they take a fair part of it.
+/// The problem with the angles free, if an effect is missing and the angles remove a fair part of the residual.
 fn worth(problem: &Problem, found: &Found) -> Option<Problem> {
     if problem.per_flight.askew_deg.is_some() || verdict(found) == Verdict::Adequate {
         return None;
@@ -68,13 +69,13 @@ fn worth(problem: &Problem, found: &Found) -> Option<Problem> {
     (taken > WORTH * best && taken > found.threshold).then_some(tilted)
 }
 
-/// The squared whitened error that `round` leaves.
+/// Sum of squares of the whitened residual of `round`.
 fn left(round: &Round) -> f64 {
     let last = round.projected.width();
     round.projected.total[(last, last)]
 }
 
-/// What `of` leaves under the noise of `first`, with what its constants cost.
+/// Sum of squares that `of` leaves under the noise of `first`, plus the penalty of its constants.
 fn cost(problem: &Problem, first: &Found, of: &Found) -> Option<f64> {
     let model = of.round().tuned();
     let given = of.first.model.coefficients().len();

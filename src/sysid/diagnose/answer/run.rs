@@ -1,4 +1,4 @@
-//! The diagnosis itself: flights in, answer out.
+//! The diagnosis, from flights to the result.
 
 use crate::compare::{self, ChannelId};
 use crate::diagnose::answer::advice;
@@ -9,7 +9,7 @@ use crate::diagnose::answer::per_flight;
 use crate::diagnose::answer::ranking;
 use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
 use crate::diagnose::answer::rival::against_axes;
-use crate::diagnose::answer::sentences::{self, Said, WhyUnknown};
+use crate::diagnose::answer::sentences::{self, Content, WhyUnknown};
 use crate::diagnose::answer::shares;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::options::{Detail, Options};
@@ -20,29 +20,29 @@ use crate::diagnose::search::excitation;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::progress::{Progress, say};
+use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
-/// Least share of the error beyond noise that must be learnable before something is said to be missing:
-/// what the reconstruction leaves is no effect.
+/// Least share of the error beyond noise that must be learnable before the verdict is that something is missing;
+/// errors of the reconstruction leave less.
 const WORTH_SAYING: f64 = 0.1;
-/// The same where an effect of the catalogue was refused for its shape or its flights.
+/// The same share where an effect of the catalogue was refused for its shape or its flights.
 const REFUSED: f64 = 0.01;
-/// What is refused beside a figure that cannot be.
+/// Reason to refuse effects beside a physically impossible figure.
 const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
-/// What is refused of an effect whose amount another one took over.
+/// Reason to refuse an effect whose contribution another one accounts for.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
-/// Says which effects of the catalogue `model` lacks according to `flights`, which must have been
-/// reconstructed with their deflections as recorded; `progress` hears what is being done.
+/// Determines which effects of the catalogue `model` lacks according to `flights`, which must have been reconstructed
+/// with their deflections as recorded; reports to `progress`, which may cancel.
 ///
 /// # Errors
-/// There is too little flight or nothing in it moves, an id to be left out is unknown, or a flight has
-/// no clock, or `progress` ended it.
+/// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or `progress`
+/// cancelled.
 pub fn diagnose(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -55,7 +55,7 @@ pub fn diagnose(
     notes.extend(excitation::check(&problem.flights)?);
     let found = search(&problem, model, options, progress)?;
     let mut found = against_axes(problem, model, options, progress, found)?;
-    say(progress, "what is left", 0.95)?;
+    report(progress, "what is left", 0.95)?;
     let rudder = rudder::unmodelled(flights, model);
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
@@ -72,7 +72,7 @@ pub fn diagnose(
         Detail::Full => decoys::decoys(&found, options.seed),
         Detail::Lean => Vec::new(),
     };
-    let said = sentences::sentences(&Said {
+    let findings = sentences::sentences(&Content {
         found: &found,
         verdict,
         why_unknown,
@@ -87,7 +87,7 @@ pub fn diagnose(
         version: env!("CARGO_PKG_VERSION"),
         model: model.name.clone(),
         verdict,
-        sentences: rudder.map(rudder::warning).into_iter().chain(said).collect(),
+        sentences: rudder.map(rudder::warning).into_iter().chain(findings).collect(),
         doubtful,
         advice: advice::advice(&found, verdict, &effects, &channels),
         effects,
@@ -113,7 +113,7 @@ fn settings(options: &Options) -> Settings {
     }
 }
 
-/// What speaks against effects beside the search's own checks.
+/// Objections to effects beyond the search's own checks.
 struct Judged {
     abstained: [Option<String>; 6],
     /// Whether `compare` finds no sure error of the model as given in any channel.
@@ -122,7 +122,8 @@ struct Judged {
     doubtful: Vec<String>,
 }
 
-/// Refuses effects where the flights cannot judge, whose amount may be zero, or beside figures that cannot be.
+/// Refuses effects in channels that the flights cannot judge, effects whose amount may be zero, and all effects
+/// beside impossible figures.
 fn judge(
     found: &mut Found,
     model: &GreyBox,
@@ -182,7 +183,7 @@ fn compared(
     (abstained, !all.is_empty() && all.iter().all(|a| !a.sure_error))
 }
 
-/// Whether every id is one of the catalogue.
+/// Checks that every id is one of the catalogue.
 pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     match ids.iter().find(|id| physics::catalogue::describe(id).is_none()) {
         None => Ok(()),
@@ -190,10 +191,10 @@ pub fn known(ids: &[String]) -> Result<(), DiagnoseError> {
     }
 }
 
-/// The problem, the flights it is made of, what the reader must know.
+/// The problem, the flights it is made from, and notes for the reader.
 pub type Intake<'a> = (Problem, Vec<&'a Reconstruction>, Vec<String>);
 
-/// The flights on the model's clock, with what was left out.
+/// Resamples the flights to the model's clock; flights that cannot be used are noted.
 pub fn problem<'a>(
     model: &GreyBox,
     flights: &'a [Reconstruction],
@@ -228,7 +229,7 @@ pub fn problem<'a>(
     Ok((problem, used, notes))
 }
 
-/// The verdict on what the search found: an effect, something unexplained, or an adequate model.
+/// The verdict on the search's result: an effect, something unexplained, or an adequate model.
 pub fn verdict(found: &Found) -> Verdict {
     let significant =
         found.remainder.total > found.remainder.total_threshold && found.learnable() > WORTH_SAYING;
@@ -244,7 +245,7 @@ pub fn verdict(found: &Found) -> Verdict {
     }
 }
 
-/// Ids of the candidates that a model lacks and that can be searched for.
+/// Ids of the candidate effects that a model lacks and that can be searched for.
 pub fn searched(model: &GreyBox, without: &[String]) -> Vec<&'static str> {
     catalogue::candidates(model, &[], without).iter().map(|e| e.about.id).collect()
 }

@@ -1,4 +1,4 @@
-//! The answer in plain sentences.
+//! The diagnosis in plain sentences.
 
 use crate::diagnose::answer::result::{
     Candidate, ChannelLeft, FlightTrim, Measurement, Parameter, Status, Verdict,
@@ -10,34 +10,34 @@ use crate::per_flight::askew;
 use greylag_model::GreyBox;
 use greylag_physics::catalogue::describe;
 
-/// Prior standard deviations beyond which a tuned coefficient is worth a note.
+/// Distance from the prior mean, in prior standard deviations, beyond which a tuned coefficient gets a note.
 const FAR: f64 = 3.0;
-/// Least share that is said: less is printed as nothing.
+/// Least share that is reported; a smaller one is printed as zero.
 const SHOWN: f64 = 0.005;
-/// Half of a 95 % interval in standard deviations.
+/// Half width of a 95 % interval in standard deviations.
 pub const INTERVAL: f64 = 1.96;
-/// Share of the error on segments not fitted from which a refused effect is called the closest shape.
+/// Share of the error on held-out segments from which a refused effect is named as the closest shape.
 const CLOSEST: f64 = 0.5;
-/// What is asked for where axes stand askew.
+/// Advice for misaligned axes.
 const AXES: &str = "amend with --axes-askew 3, or mount the board anew";
 
-/// What the sentences are made of.
-pub struct Said<'a> {
-    /// How the search ended.
+/// Input of the sentences.
+pub struct Content<'a> {
+    /// Result of the search.
     pub found: &'a Found,
-    /// The answer in one word.
+    /// Overall verdict on the model.
     pub verdict: Verdict,
     /// Why it is [`Verdict::Unknown`], unless figures that cannot be are the reason.
     pub why_unknown: Option<WhyUnknown>,
-    /// Figures that cannot be.
+    /// Physically impossible figures, in words.
     pub doubtful: &'a [String],
-    /// Every candidate.
+    /// All candidates, in the order of the list.
     pub effects: &'a [Candidate],
-    /// What is left of each channel.
+    /// Unexplained residual of each channel.
     pub channels: &'a [ChannelLeft],
-    /// Errors of the sensors.
+    /// Sensor errors and wind of each flight.
     pub measurement: &'a [Measurement],
-    /// The flights' own trims.
+    /// Trims of each flight.
     pub trims: &'a [FlightTrim],
 }
 
@@ -52,19 +52,20 @@ pub enum WhyUnknown {
     NotOfTheStates,
 }
 
-/// The sentences, the most important first: what cannot be, the instruments where they explain the flights, the aircraft.
-pub fn sentences(said: &Said) -> Vec<String> {
-    let Said { verdict, doubtful, effects, channels, measurement, .. } = *said;
+/// The sentences, the most important first: impossible figures, instruments where they explain the flights, the
+/// aircraft.
+pub fn sentences(content: &Content) -> Vec<String> {
+    let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
     let askew = per_flight::askew_sentences(measurement);
     if !askew.is_empty() {
         all.extend(askew.into_iter().map(|s| format!("{s} To keep it out of the model, {AXES}.")));
     }
     all.extend(effects.iter().filter(|c| c.asserted).map(asserted));
-    all.extend(answer(said));
+    all.extend(answer(content));
     all.extend(effects.iter().filter(|c| c.status == Status::Small).map(small));
     if verdict != Verdict::Unknown {
-        all.extend(beyond(said));
+        all.extend(beyond(content));
     }
     let refused = |c: &&Candidate| c.status == Status::Refused && c.evidence > c.threshold;
     all.extend(effects.iter().filter(refused).filter(|c| !c.refused.is_empty()).map(|c| {
@@ -85,13 +86,13 @@ pub fn sentences(said: &Said) -> Vec<String> {
     }
     all.extend(abstained(channels));
     all.extend(sensors(measurement));
-    all.extend(per_flight::trim_sentences(said.trims));
+    all.extend(per_flight::trim_sentences(content.trims));
     all
 }
 
-/// The sentence of the verdict; none where effects are asserted, which speak for themselves.
-fn answer(said: &Said) -> Option<String> {
-    let Said { found, verdict, doubtful, effects, .. } = *said;
+/// The sentence of the verdict; none if effects are asserted, since their own sentences follow.
+fn answer(content: &Content) -> Option<String> {
+    let Content { found, verdict, doubtful, effects, .. } = *content;
     match verdict {
         Verdict::Effect => None,
         Verdict::Adequate => Some(format!(
@@ -100,7 +101,7 @@ fn answer(said: &Said) -> Option<String> {
             best_of(effects)
         )),
         Verdict::Unexplained => Some(unexplained(found, effects)),
-        Verdict::Unknown if doubtful.is_empty() => Some(undecided(said)),
+        Verdict::Unknown if doubtful.is_empty() => Some(undecided(content)),
         Verdict::Unknown => Some(
             "So nothing is said about forces and moments: put that right first, or leave this flight out.".into(),
         ),
@@ -108,8 +109,8 @@ fn answer(said: &Said) -> Option<String> {
 }
 
 /// Why nothing is said to be missing although more than noise is left.
-fn undecided(said: &Said) -> String {
-    match said.why_unknown {
+fn undecided(content: &Content) -> String {
+    match content.why_unknown {
         Some(WhyUnknown::GivenModelFaultless) => "The model as given has no sure error in any channel of these flights, \
              so nothing is said to be missing. What the tuned model leaves beyond noise comes from the record: filtered, \
              slow or late sensors; log faster and unfiltered to see more."
@@ -118,7 +119,7 @@ fn undecided(said: &Said) -> String {
             "These flights cannot say whether the model lacks anything: the tuned model leaves more than noise{}, so most \
              of it is not a function of the states. Filtered, slow or late sensors are likelier than a missing force or \
              moment; log faster and unfiltered.",
-            removable(said.found)
+            removable(content.found)
         ),
         _ => "These flights cannot say whether the model lacks anything: in every channel the remaining errors of the \
              sensors may account for all that is left; log what is noted below, or fly with better sensors."
@@ -126,7 +127,7 @@ fn undecided(said: &Said) -> String {
     }
 }
 
-/// Something is missing: with the closest effect of the catalogue where one explains most of it.
+/// Sentence that an effect is missing, with the closest effect of the catalogue if one explains most of the error.
 fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     let close = |c: &&Candidate| c.status == Status::Refused && c.heldout_error_reduction > CLOSEST;
     match effects.iter().find(close) {
@@ -147,9 +148,9 @@ fn unexplained(found: &Found, effects: &[Candidate]) -> String {
     }
 }
 
-/// What is left beside what was found.
-fn beyond(said: &Said) -> Vec<String> {
-    let Said { found, verdict, channels, .. } = *said;
+/// Sentences on the residual beyond the effects found.
+fn beyond(content: &Content) -> Vec<String> {
+    let Content { found, verdict, channels, .. } = *content;
     let left = channels.iter().filter(|c| !c.abstained).filter_map(|c| {
         let term = c.left_with.as_ref()?;
         Some(format!("More than noise is left in {}: it goes with {term} above all.", c.channel))
@@ -181,7 +182,7 @@ fn abstained(channels: &[ChannelLeft]) -> Vec<String> {
     by_reason.into_iter().map(one).collect()
 }
 
-/// The sensors' errors that are clearly not zero, a sentence a flight.
+/// Significant sensor errors, a sentence for each flight.
 fn sensors(measurement: &[Measurement]) -> Vec<String> {
     let before = measurement.iter().filter(|m| m.asserted && m.id != askew::ID);
     let mut flights: Vec<(&str, Vec<String>)> = Vec::new();
@@ -206,7 +207,7 @@ pub fn with_interval(value: f64, sd: f64, unit: &str) -> String {
     format!("{} ± {} {unit}", figures(value), figures(INTERVAL * sd)).trim_end().to_owned()
 }
 
-/// The parameters with their 95 % intervals.
+/// The parameters with their 95 % intervals, in words.
 fn values(c: &Candidate) -> String {
     let of = |p: &Parameter| {
         let sd = (p.ci95[1] - p.ci95[0]) / (2.0 * INTERVAL);
@@ -219,7 +220,7 @@ fn values(c: &Candidate) -> String {
     c.parameters.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
-/// An effect that is significant and small.
+/// Sentence on an effect that is significant but small.
 fn small(c: &Candidate) -> String {
     format!(
         "Seen, and small in these flights: {} ({}): {} (95 %); evidence {:.0} against {:.0} by chance. {}.",
@@ -257,7 +258,7 @@ fn asserted(c: &Candidate) -> String {
     text
 }
 
-/// What a flexible model could remove, if it is more than chance.
+/// What a flexible model could remove, in words, if it exceeds chance.
 fn removable(found: &Found) -> String {
     let more = found.remainder.total > found.remainder.total_threshold;
     match more && found.learnable() >= SHOWN {
@@ -279,7 +280,7 @@ fn best_of(effects: &[Candidate]) -> String {
     })
 }
 
-/// Three significant figures.
+/// `x` to three significant figures.
 pub fn figures(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -288,7 +289,7 @@ pub fn figures(x: f64) -> String {
     format!("{x:.places$}")
 }
 
-/// Notes on coefficients that the data pull far from their prior, and on what was not searched.
+/// Notes on coefficients far from their prior, and on effects that were not searched.
 pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
     let mut notes = Vec::new();
     for t in shares::tuned(found, model) {

@@ -1,4 +1,4 @@
-//! What is left of each channel, with the prior as tuned.
+//! Unexplained residual of each channel, with the model's own coefficients as tuned.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::{ChannelLeft, Tuned};
@@ -8,13 +8,13 @@ use crate::diagnose::search::stepwise::Found;
 use greylag_model::GreyBox;
 use greylag_num::statistics::mean;
 
-/// Bins over a regime variable.
+/// Number of bins over a regime variable.
 const BINS: usize = 5;
-/// Standard deviations of its mean beyond which a bin is worth a sentence.
+/// A bin is reported if its mean exceeds this many standard deviations.
 const WORTH: f64 = 4.0;
 const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 
-/// Every channel that the flights allow.
+/// Unexplained residual of every channel that the flights allow.
 pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLeft> {
     let (before, after) = (found.unexplained, found.left());
     let residual = found.round().tuned_residual();
@@ -30,7 +30,7 @@ pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLe
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
 }
 
-/// The regime in which the mean residual of a channel stands out most, in words.
+/// The regime in which a channel's mean residual is most significant, in words.
 fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     let mut points: Vec<([f64; RegimeVariable::CONTINUOUS.len()], f64)> = Vec::new();
     for (flight, left) in round.flights.iter().zip(residual) {
@@ -73,7 +73,7 @@ fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     best.map(|(_, words)| words)
 }
 
-/// The prior's coefficients as tuned in the last round.
+/// The model's own coefficients as tuned in the last round.
 pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
     let round = found.round();
     let p = &round.projected;

@@ -1,4 +1,4 @@
-//! Free forms, where the library found nothing or leaves more than it should.
+//! Free forms, for residuals that the library's formula does not explain or explains only in part.
 
 use super::forward::{Ask, Climbed, ORDER, candidates};
 use super::free::search::{Fitted, Searched, searched};
@@ -8,20 +8,20 @@ use crate::diagnose::DiagnoseError;
 use crate::diagnose::proposal::draft::{self, Term};
 use crate::diagnose::search::remainder::remainder;
 use crate::diagnose::search::round::Round;
-use crate::progress::{Progress, part, say};
+use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// Share of what a formula took that a flexible model must still remove for the formula to be in doubt.
+/// A formula is doubtful if a flexible model can still remove this share of what the formula removed.
 const MATERIAL: f64 = 0.02;
-/// Share of what the best form takes by which a simpler one may be behind: what an exact formula leaves of strong
-/// effects, by the errors of reconstructed paths, is of that order.
+/// A simpler form may remove less than the best one by this share: even an exact formula of a strong effect leaves a
+/// residual of that order, from errors of the reconstructed path.
 const BEHIND: f64 = 0.01;
-/// Fall of the squared error that a larger formula must take more than a smaller one.
+/// A larger formula must lower the squared error by this much more than a smaller one.
 const WORTH: f64 = 10.0;
 
-/// Why free forms are tried, and in which channels; `None` if the library's formula leaves nothing that a flexible model
-/// could remove.
+/// Why and in which channels free forms are tried; `None` if the library's formula leaves nothing that a flexible
+/// model could remove.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {
@@ -56,11 +56,11 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Tries free forms in `channels` of what `tuned` leaves, the library's best beside them. `None` if the flights do not
-/// hold the model.
+/// Searches free forms in `channels` of the residual of `tuned`, together with the library's best ones. `None` if the
+/// model cannot be evaluated over the flights.
 ///
 /// # Errors
-/// If `progress` ends it.
+/// `progress` cancelled.
 pub(super) fn beyond(
     ask: &Ask,
     library: &Climbed,
@@ -77,7 +77,7 @@ pub(super) fn beyond(
             all.push((*channel, found));
         }
     }
-    say(progress, "judging the best free forms beside the library's", 0.8)?;
+    report(progress, "judging the best free forms beside the library's", 0.8)?;
     let mut forms: Vec<Form> =
         library.terms.iter().map(|t| t.form).chain(library.class.clone()).collect();
     for finalist in all.iter().flat_map(|(_, s)| &s.finalists) {
@@ -94,7 +94,7 @@ pub(super) fn beyond(
         ..*ask
     };
     let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
-    // a form also frees the coefficients that stood in for it, which are counted in its fall
+    // a form also frees the coefficients that compensated for its absence, which are counted in its fall
     let falls = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| f.fall));
     let whole = falls.fold(library.excess, f64::max);
     let rung = |f: &Fitted, threshold: f64| Rung {
@@ -112,7 +112,7 @@ pub(super) fn beyond(
     Ok(Some((FreeForms { why, tried, front, chosen }, climbed)))
 }
 
-/// The form of the library that is written as `form` is, or `form` itself.
+/// The library's form with the same text as `form`, or `form` itself.
 fn as_of_library(form: Form) -> Form {
     let text = form.shape.text(None);
     let of = library::forms(form.channel, &|_, _| 0.0);
@@ -120,8 +120,8 @@ fn as_of_library(form: Form) -> Form {
     of.into_iter().find(same).unwrap_or(form)
 }
 
-/// Whether the formula with free forms takes the place of the library's: it takes more, or no less and is simpler, or is
-/// the same with other constants, which the library reads off the flights and does not fit.
+/// Whether the formula with free forms replaces the library's: it removes more, or it removes as much and is simpler,
+/// or it is the same with other constants, which the library takes from quantiles of the flights and does not fit.
 pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     let taken = |c: &Climbed| c.removed() * library.excess;
     let more = taken(free) - taken(library);

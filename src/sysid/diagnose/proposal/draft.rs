@@ -1,29 +1,29 @@
-//! The effect file of a formula that was found.
+//! The effect file of a proposed formula.
 
 use super::grades;
 use super::library::{Form, Shape};
 use greylag_physics::formula::file::channel_name;
 
-/// A term with its coefficient.
+/// A term of a formula with its coefficient.
 #[derive(Clone, Copy, Debug)]
 pub struct Term {
-    /// Its form.
+    /// Form of the term.
     pub form: Form,
-    /// Its coefficient.
+    /// Estimated coefficient, in the form's unit.
     pub value: f64,
     /// The coefficient's standard deviation.
     pub sd: f64,
 }
 
-/// Bounds of a coefficient: this many times what was found, to both sides.
+/// Bounds of a coefficient: ± this many times its estimate.
 const ROOM: f64 = 10.0;
 
-/// Four significant figures.
+/// `x` to four significant figures.
 fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// The id of a proposal.
+/// Identifier of the proposed effect.
 pub fn id(terms: &[Term]) -> String {
     let channel = terms.first().map_or("", |t| channel_name(t.form.channel));
     let mut names: Vec<&str> = Vec::new();
@@ -45,14 +45,14 @@ pub fn formula(terms: &[Term]) -> String {
     terms.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// The names of the constants of a term, the one in place `k`.
+/// Names of the constants of the term with index `k`.
 fn names(k: usize, term: &Term) -> Vec<String> {
     let count = term.form.shape.constants().len();
     let letter = |i: usize| if count > 1 { ["a", "b", "c", "d"][i.min(3)] } else { "" };
     (0..count).map(|i| format!("w{}{}", k + 1, letter(i))).collect()
 }
 
-/// The effect file of `terms`, thresholds free; `from` says of which flights.
+/// The effect file of `terms` with free thresholds; `from` states which flights it was found in.
 pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
     let quoted = |text: &str| toml::Value::from(text).to_string();
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! The forward selection of terms: the best shape joins while it is more than chance and worth it.
+//! Forward selection of terms: the best form joins while it is significant and reduces the error enough.
 
 use super::draft::{self, Term};
 use super::grades;
@@ -17,22 +17,21 @@ use greylag_num::statistics::quantile;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// Terms of a formula.
+/// Largest number of terms of a formula.
 const MOST: usize = 3;
-/// Least part of what the first term takes that a further one must take.
+/// A further term must remove at least this share of what the first term removes.
 const WORTH: f64 = 0.05;
-/// Passes of tuning after a term has joined.
+/// Tuning passes after a term has joined.
 const SETTLING: usize = 2;
-/// Share of a channel's variance beyond noise from which a search in it is worth its time: what the diagnosis
-/// takes for adequate.
+/// Unexplained share of the variance beyond noise from which a channel is searched; the diagnosis's adequate level.
 const FAILING: f64 = 5e-4;
-/// The same beside the worst channel: what a lesser one lacks is searched for once that is mended.
+/// The same relative to the worst channel: a smaller deficit is searched for after the worst one has been corrected.
 const BESIDE: f64 = 0.05;
-/// Standard deviations by which tuning all terms together may move a coefficient: beyond, the terms say the same.
+/// Standard deviations by which joint tuning may change a coefficient; a larger change shows confounded terms.
 const MOVED: f64 = 5.0;
-/// Channels that are searched.
+/// Largest number of channels that are searched.
 const CHANNELS: usize = 3;
-/// Channels of forces and moments in the order of the regression.
+/// Force and moment channels in the order of the regression.
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
@@ -51,7 +50,7 @@ pub(super) fn failing(found: &Found) -> Vec<Channel> {
     all.into_iter().map(|c| ORDER[c]).collect()
 }
 
-/// The forms to be tried, each as a candidate.
+/// The forms of the library in `channels`, each as a candidate.
 pub(super) fn forms(problem: &Problem, channels: &[Channel]) -> Vec<(Form, Entry)> {
     let threshold = |v: Variable, q: f64| rounded(magnitude(problem, v, q));
     candidates(channels.iter().flat_map(|c| library::forms(*c, &threshold)))
@@ -66,7 +65,7 @@ pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)
     forms.filter_map(entry).collect()
 }
 
-/// Two significant figures, so that thresholds can be read.
+/// `x` to two significant figures, so that thresholds are readable.
 fn rounded(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
@@ -91,22 +90,22 @@ fn magnitude(problem: &Problem, variable: Variable, share: f64) -> f64 {
     quantile(&values, share)
 }
 
-/// What is searched, and in what.
+/// Inputs and limits of a forward search.
 pub(super) struct Ask<'a> {
     pub problem: &'a Problem,
     pub options: &'a Options,
     pub forms: &'a [(Form, Entry)],
     /// Channels whose error counts, in the order of the regression.
     pub channels: [bool; 6],
-    /// Evidence that the first term needs whatever chance reaches among `forms`: where these were picked from more.
+    /// Least evidence of the first term, whatever chance reaches among `forms`, in case these are preselected.
     pub least: f64,
-    /// Share of what the best form takes by which a simpler one may be behind.
+    /// Share of what the best form removes by which a simpler one may remove less.
     pub behind: f64,
 }
 
-/// What a search says beside its terms.
+/// Explanatory text of a search's result.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Said {
+pub(super) struct Outcome {
     pub front: Vec<Rung>,
     pub alike: Vec<Alternative>,
     pub grades: Option<Grades>,
@@ -114,40 +113,40 @@ pub(super) struct Said {
     pub nulls: Vec<f64>,
 }
 
-/// Where a search arrives.
+/// State and result of a forward search.
 pub(super) struct Climbed {
-    pub said: Said,
-    /// The first term as it was found; `None` if none was.
+    pub outcome: Outcome,
+    /// The first term as found; `None` if there is none.
     pub first: Option<Term>,
-    /// All of them as tuning leaves them.
+    /// All terms with their tuned coefficients.
     pub terms: Vec<Term>,
-    /// The forms that the flights cannot tell from the first one.
+    /// Forms that the flights cannot distinguish from the first term.
     pub class: Vec<Form>,
-    /// The model with the terms.
+    /// The model with the terms added.
     pub model: GreyBox,
-    /// The squared error beyond noise of the model given.
+    /// Squared error beyond noise of the model as given.
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
-    /// Whether a further term was more than chance and took a part of the error, and yet did not join: those there are
-    /// stand for something else.
+    /// Whether a further term was significant and removed enough of the error but was not added: the present terms
+    /// then compensate for another form.
     pub significant_left_out: bool,
     first_fall: f64,
 }
 
 impl Climbed {
-    /// Share of the error beyond noise that the terms remove.
+    /// Share of the squared error beyond noise that the terms remove.
     pub(super) fn removed(&self) -> f64 {
-        self.said.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
+        self.outcome.front.iter().find(|r| r.chosen).map_or(0.0, |r| r.removed)
     }
 
-    /// Nodes of the formula.
+    /// Number of nodes of the formula.
     pub(super) fn complexity(&self) -> usize {
         self.terms.iter().map(|t| 1 + t.form.shape.complexity()).sum()
     }
 }
 
-/// A round with its winner.
+/// A round with its best form.
 struct Stage<'a> {
     round: &'a Round,
     scores: &'a [(usize, Score)],
@@ -156,13 +155,13 @@ struct Stage<'a> {
 }
 
 impl Ask<'_> {
-    /// One term after the other joins `model` while it is more than chance and worth it. `None` if the flights do
-    /// not hold the model.
+    /// Adds terms to `model` one by one while each is significant and removes enough. `None` if the model cannot be
+    /// evaluated over the flights.
     pub(super) fn climb(&self, model: GreyBox) -> Option<Climbed> {
         let given = model.clone();
         let excess = self.excess(&model)?.max(1.0);
         let mut c = Climbed {
-            said: Said::default(),
+            outcome: Outcome::default(),
             first: None,
             terms: Vec::new(),
             class: Vec::new(),
@@ -180,7 +179,7 @@ impl Ask<'_> {
                 ranked(self.problem, round, self.options);
             let on = self.winner(&round, &scores).is_some_and(|place| {
                 if c.terms.is_empty() {
-                    c.said.nulls = nulls;
+                    c.outcome.nulls = nulls;
                 }
                 let stage = Stage { round: &round, scores: &scores, place, threshold };
                 self.joins(&mut c, &given, &stage) == Some(true)
@@ -190,10 +189,10 @@ impl Ask<'_> {
                 break;
             }
         }
-        if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.said.front.get_mut(k)) {
+        if let Some(rung) = c.terms.len().checked_sub(1).and_then(|k| c.outcome.front.get_mut(k)) {
             rung.chosen = true;
         }
-        if let Some(grades) = c.said.grades.as_mut().filter(|_| c.significant_left_out) {
+        if let Some(grades) = c.outcome.grades.as_mut().filter(|_| c.significant_left_out) {
             *grades = Grades { variables: false, trend: false, form: false, ..*grades };
         }
         c.first = c.terms.first().copied();
@@ -201,27 +200,27 @@ impl Ask<'_> {
         Some(c)
     }
 
-    /// Notes the winner of a round in the front and, if it passes, in the terms and the model; whether it joined.
-    /// `None` if the flights do not hold the model with it.
+    /// Records the best form of a round in the front and, if it passes, adds it to the terms and the model; returns
+    /// whether it was added. `None` if the model with it cannot be evaluated over the flights.
     fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
         let &Stage { round, scores, place, threshold } = stage;
         let (trial, score) = &scores[place];
         let form = self.form(round.trials[*trial].id)?.fitted(&score.values);
         let first = c.terms.is_empty();
         let threshold = if first { threshold.max(self.least) } else { threshold };
-        let before = c.said.front.last().map_or(0.0, |r| r.removed);
+        let before = c.outcome.front.last().map_or(0.0, |r| r.removed);
         let worth = score.fall > WORTH * c.first_fall;
         c.terms.push(Term { form, value: score.values[0], sd: score.deviations[0] });
-        c.said.front.push(Rung {
+        c.outcome.front.push(Rung {
             formula: draft::formula(&c.terms),
             complexity: c.complexity(),
-            // a term also frees the coefficients that stood in for it, which are counted in its fall
+            // a term also frees the coefficients that compensated for its absence, which are counted in its fall
             removed: (before + score.fall / c.excess).min(1.0),
             evidence: score.evidence,
             threshold,
             chosen: false,
         });
-        // until it stands beside the others
+        // set back when the term joins
         let much = score.fall > WORTH * c.excess;
         c.significant_left_out = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
@@ -242,7 +241,7 @@ impl Ask<'_> {
             c.terms.pop();
             return Some(false);
         }
-        if let Some(rung) = c.said.front.last_mut() {
+        if let Some(rung) = c.outcome.front.last_mut() {
             rung.removed = removed;
         }
         c.model = tuned;
@@ -250,30 +249,30 @@ impl Ask<'_> {
         Some(true)
     }
 
-    /// What is sure of the first term.
+    /// Determines which properties of the first term are certain.
     fn grade(&self, c: &mut Climbed, stage: &Stage, form: &Form) {
         let &Stage { round, scores, place, .. } = stage;
         let (trial, score) = &scores[place];
         let alike = self.alike(round, scores, place);
-        c.said.refused.extend(contradicted(round, *trial, score));
+        c.outcome.refused.extend(contradicted(round, *trial, score));
         let steady = self.selected(round, scores, place) >= SELECTED;
         c.class = alike.iter().map(|a| a.0).collect();
         let mut grades = grades::grades(form, &c.class);
         grades.form &= steady && !self.surpassed(stage);
-        c.said.grades = Some(grades);
+        c.outcome.grades = Some(grades);
         let alternative = |(form, evidence): &(Form, f64)| Alternative {
             formula: draft::formula(&[Term { form: *form, value: 0.0, sd: 0.0 }]),
             evidence: *evidence,
         };
-        c.said.alike = alike.iter().map(alternative).collect();
+        c.outcome.alike = alike.iter().map(alternative).collect();
     }
 
-    /// What `model` leaves beyond noise.
+    /// Squared error beyond noise of `model`.
     fn excess(&self, model: &GreyBox) -> Option<f64> {
         Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
 
-    /// The model of `round` with a trial in it, all coefficients tuned together; `Some(None)` if it cannot join.
+    /// The model of `round` with a trial added, all coefficients tuned together; `Some(None)` if it cannot join.
     fn tuned(&self, round: &Round, trial: usize, score: &Score) -> Option<Option<GreyBox>> {
         let mut model = round.with(score);
         if model.join_most(round.trials[trial].id, &score.values).is_err() {
@@ -285,7 +284,7 @@ impl Ask<'_> {
         Some(Some(model))
     }
 
-    /// Share of the block bootstraps in which the form in `place` or a look-alike is the best.
+    /// Share of the block bootstraps in which the form at index `place`, or one indistinguishable from it, is best.
     fn selected(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> f64 {
         let alike = checks::class(round, scores, place);
         let members: Vec<usize> =
@@ -297,11 +296,11 @@ impl Ask<'_> {
         }
     }
 
-    /// The simplest of those that are as good as the best one.
+    /// The simplest form among those as good as the best one.
     fn winner(&self, round: &Round, scores: &[(usize, Score)]) -> Option<usize> {
         let fits = |k: &usize| {
             let (trial, score) = &scores[*k];
-            !round.at_bound(*trial, score) && !checks::relieves(round, score)
+            !round.at_bound(*trial, score) && !checks::absorbs_prior_error(round, score)
         };
         let best = (0..scores.len()).find(fits)?;
         let size =
@@ -309,7 +308,7 @@ impl Ask<'_> {
         let own = &scores[best].1;
         let pool: Vec<usize> = match self.behind > 0.0 {
             true => (0..scores.len())
-                .filter(|k| checks::likeness(round, own, &scores[*k].1).abs() > checks::ALIKE)
+                .filter(|k| checks::correlation(round, own, &scores[*k].1).abs() > checks::ALIKE)
                 .collect(),
             false => checks::class(round, scores, best),
         };
@@ -324,8 +323,8 @@ impl Ask<'_> {
         simpler.min_by_key(|k| (size(*k), *k)).or(Some(best))
     }
 
-    /// The forms that these flights cannot tell from the one in `place`, with their evidence: of those that were
-    /// picked from more, no larger ones, of which there is always one.
+    /// Forms that these flights cannot distinguish from the one at index `place`, with their evidence. If the forms
+    /// were preselected from more, larger ones are excluded, since one always exists.
     fn alike(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> Vec<(Form, f64)> {
         let own = self.form(round.trials[scores[place].0].id).map_or(0, |f| f.shape.complexity());
         checks::class(round, scores, place)
@@ -333,15 +332,15 @@ impl Ask<'_> {
             .filter_map(|k| {
                 let (trial, score) = &scores[k];
                 let form = self.form(round.trials[*trial].id)?.fitted(&score.values);
-                let same = checks::likeness(round, &scores[place].1, score).abs() > 1.0 - SAME;
+                let same = checks::correlation(round, &scores[place].1, score).abs() > 1.0 - SAME;
                 let larger = self.behind > 0.0 && form.shape.complexity() > own;
                 (!same && !larger).then_some((form, score.evidence))
             })
             .collect()
     }
 
-    /// Whether a form much like the winner takes more than it by more than its size is worth: the simpler one is as good in
-    /// practice, and its form is not the truth.
+    /// Whether a form similar to the winner removes significantly more for its size: the simpler form is as good in
+    /// practice but is not the true one.
     fn surpassed(&self, stage: &Stage) -> bool {
         let &Stage { round, scores, place, .. } = stage;
         let size = |k: usize| {
@@ -354,7 +353,7 @@ impl Ask<'_> {
                 let slack = LIKELY + NODE * (size(k) - size(place)).max(0.0);
                 let other = &scores[k].1;
                 other.fall > own.fall + slack
-                    && checks::likeness(round, own, other).abs() > checks::ALIKE
+                    && checks::correlation(round, own, other).abs() > checks::ALIKE
             })
     }
 
@@ -362,7 +361,7 @@ impl Ask<'_> {
         self.forms.iter().find(|(_, e)| e.about.id == id).map(|(form, _)| *form)
     }
 
-    /// The terms with their coefficients as all of them together were tuned.
+    /// The terms with their coefficients as jointly tuned in `model`.
     fn joint(&self, model: &GreyBox, mut terms: Vec<Term>) -> Vec<Term> {
         for term in &mut terms {
             let prefix = format!("{}.", term.form.id());
@@ -375,14 +374,14 @@ impl Ask<'_> {
     }
 }
 
-/// Why a form is not proposed whose amount differs from flight to flight, as for an effect of the catalogue.
+/// Objection to a form whose amount differs between flights, as for an effect of the catalogue.
 fn contradicted(round: &Round, trial: usize, score: &Score) -> Option<String> {
     let by_flight = checks::by_flight(round, &round.trials[trial], score);
     checks::contradict(score.values[0], &by_flight)
         .then(|| "the flights contradict one another about its amount".into())
 }
 
-/// Whether tuning has moved the coefficient of `term` in `model` further than its own uncertainty allows.
+/// Whether tuning changed the coefficient of `term` in `model` by more than its uncertainty allows.
 fn moved(term: &Term, model: &GreyBox) -> bool {
     let name = format!("{}.k", term.form.id());
     let now = model.coefficients().iter().find(|c| c.name == name);
@@ -392,9 +391,9 @@ fn moved(term: &Term, model: &GreyBox) -> bool {
     })
 }
 
-/// Fall of the squared error by which a simpler form may be behind: its likelihood is then e⁻² of the other's.
+/// A simpler form may remove this much less of the squared error; its likelihood ratio is then e⁻².
 const LIKELY: f64 = 4.0;
-/// The same for each node that it has less: with a node more there are about e times as many forms.
+/// Additional allowance for each node that it has less: with each node there are about e times as many forms.
 const NODE: f64 = 2.0;
-/// Forms whose contributions are as alike as this are one, written in two ways.
+/// Correlation tolerance at which contributions are the same form, written in two ways.
 const SAME: f64 = 1e-9;

@@ -1,4 +1,5 @@
-//! What may be said of a form beside those that the flights cannot tell from it, in words.
+//! Properties that a form shares with those that the flights cannot distinguish from it, and their description in
+//! words.
 
 use super::free::{self, trend::plain};
 use super::library::{Form, Shape};
@@ -6,7 +7,7 @@ use super::result::Grades;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// How a form runs with each of its variables.
+/// Trend of a form with each of its variables.
 fn trend(form: &Form) -> Option<String> {
     // in the steady state a lag is no more
     let shape = match form.shape {
@@ -16,7 +17,7 @@ fn trend(form: &Form) -> Option<String> {
     free::trend::trend(&shape.text(None))
 }
 
-/// What `best` and all of `alike`, which these flights cannot tell from it, have in common.
+/// The properties that `best` and all of `alike`, which these flights cannot distinguish from it, have in common.
 pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     let same = |of: &dyn Fn(&Form) -> bool| alike.iter().all(of);
     let variables = sorted(best);
@@ -28,14 +29,14 @@ pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     }
 }
 
-/// The variables of the shape.
+/// The variables of the shape, sorted by name.
 fn sorted(form: &Form) -> Vec<&'static str> {
     let mut all: Vec<&str> = form.shape.variables().into_iter().map(plain).collect();
     all.sort_unstable();
     all
 }
 
-/// The amount of a channel.
+/// The physical quantity of a channel, in words.
 pub fn amount(channel: Channel) -> &'static str {
     match channel {
         Channel::Drag => "drag",
@@ -59,7 +60,7 @@ fn long(v: Variable) -> &'static str {
     }
 }
 
-/// How the channel of `form` depends on its variables, for a coefficient of that `value`.
+/// Dependence of the form's channel on its variables, in words, for a coefficient of that `value`.
 pub fn words(form: &Form, value: f64) -> String {
     let runs = if value < 0.0 { "falls" } else { "grows" };
     let how = match form.shape {

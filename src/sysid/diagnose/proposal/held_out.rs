@@ -1,4 +1,4 @@
-//! The test of a formula on flights that were not searched.
+//! Test of a formula on held-out flights.
 
 use super::draft::Term;
 use super::forward::ORDER;
@@ -13,8 +13,8 @@ use crate::diagnose::search::stepwise::HELD_OUT;
 use greylag_model::GreyBox;
 use greylag_physics::formula::Written;
 
-/// The share of the error of `before` beyond noise in `channels` that `after` does not have. Both are measured by the noise
-/// that `after` leaves: each by its own would count a better model's smaller noise against it.
+/// Share of the error beyond noise in `channels` that `after` removes from that of `before`. Both use the noise level
+/// of `after`, since a better model would otherwise be penalised for its smaller noise.
 pub(super) fn removed(
     problem: &Problem,
     before: &GreyBox,
@@ -28,7 +28,7 @@ pub(super) fn removed(
     Some(1.0 - left / all.max(1.0))
 }
 
-/// What `terms`, their coefficients as they are, take of what `model` leaves in flights that were not searched.
+/// Reduction by `terms`, with their coefficients fixed, of the residual of `model` on held-out flights.
 pub(super) fn tested(
     problem: &Problem,
     model: &GreyBox,
@@ -67,7 +67,7 @@ pub(super) fn tested(
     Some(HeldOut { flights, removed, fall: measured, threshold })
 }
 
-/// Why flights that were not searched do not bear a formula out.
+/// Objection to the formula from the held-out flights, if any.
 pub(super) fn objection(tested: &HeldOut) -> Option<String> {
     if tested.fall <= tested.threshold {
         return Some(format!(

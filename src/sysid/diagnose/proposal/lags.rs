@@ -1,7 +1,7 @@
-//! Controls through a first-order lag, where the library's formula has them at once or leaves something.
+//! Controls through a first-order lag, where the library's formula uses them directly or leaves a residual.
 //!
-//! The shapes of the library know the present alone. A moment behind an engine or a flap that takes time looks to them like
-//! the control itself, and what is left goes with its rate, which no shape holds.
+//! The shapes of the library depend on the present alone. A moment that follows an engine or a flap with a delay
+//! looks like the control itself to them, and the residual follows the control's rate, which no shape contains.
 
 use super::forward::{Ask, Climbed, candidates};
 use super::library::{self, CONTROLS, Form};
@@ -9,8 +9,8 @@ use greylag_model::GreyBox;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// The lags that are worth their time beside the library's formula: those of its own controls, and of all controls in the
-/// channels `doubted`, where it leaves something.
+/// The lags worth trying beside the library's formula: those of its own controls, and of all controls in the channels
+/// `doubted`, where it leaves a residual.
 pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     let mut all: Vec<Form> = Vec::new();
     for term in &library.terms {
@@ -27,8 +27,8 @@ pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     kept
 }
 
-/// The search once more with `lags` beside what the library's search found and could not tell from it. `None` if the
-/// flights do not hold the model.
+/// Repeats the search with `lags` beside the library's result and the forms indistinguishable from it. `None` if the
+/// model cannot be evaluated over the flights.
 pub(super) fn climb(
     ask: &Ask,
     library: &Climbed,

@@ -1,4 +1,4 @@
-//! The shapes that are tried: each one variable or two in a known factor of a channel.
+//! Library of shapes: functions of one or two variables, times a known factor of a channel.
 
 use super::free::Free;
 use greylag_physics::Channel;
@@ -6,7 +6,7 @@ use greylag_physics::formula::dimension::Dimension;
 use greylag_physics::formula::file::channel_name;
 use greylag_physics::formula::{Variable, Written, register};
 
-/// Variables of shapes that grow with dynamic pressure: all are numbers without a unit.
+/// Variables of shapes that scale with dynamic pressure; all are dimensionless.
 pub(super) const OF_AIR: [Variable; 9] = [
     Variable::Alpha,
     Variable::Beta,
@@ -18,7 +18,7 @@ pub(super) const OF_AIR: [Variable; 9] = [
     Variable::Rudder,
     Variable::Throttle,
 ];
-/// Variables of shapes that do not: thrust, gyroscopic and inertial moments.
+/// Variables of shapes that do not scale with it: thrust, gyroscopic and inertial moments.
 pub(super) const BESIDE_AIR: [Variable; 7] = [
     Variable::Throttle,
     Variable::Airspeed,
@@ -31,56 +31,56 @@ pub(super) const BESIDE_AIR: [Variable; 7] = [
 /// Variables that may have a dead band or a threshold.
 const BANDED: [Variable; 5] =
     [Variable::Alpha, Variable::Beta, Variable::Aileron, Variable::Elevator, Variable::Throttle];
-/// Variables that a lag can have.
+/// Controls that may act through a lag.
 pub(super) const CONTROLS: [Variable; 4] =
     [Variable::Aileron, Variable::Elevator, Variable::Rudder, Variable::Throttle];
-/// Where the search for the time constant of a lag starts, s; it also starts at a quarter of it and at 1.75 of it.
+/// Starting time constant of a lag, s; the search also starts at a quarter and at 1.75 times of it.
 const LAG_S: f64 = 0.2;
 /// Longest time constant of a lag, s.
 const LONGEST_LAG_S: f64 = 3.0;
-/// Where the search for its amount starts: so little that the first step is one of the amount alone.
+/// Starting coefficient of a lag, so small that the first step changes the coefficient alone.
 const AMOUNT: f64 = 1e-6;
-/// Where thresholds lie, as quantiles of the magnitude of what was flown.
+/// Thresholds, as quantiles of the variable's magnitude in the flights.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 
-/// How an amount depends on its variables.
+/// Dependence of an amount on its variables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// v
+    /// The variable v itself.
     Linear(Variable),
-    /// |v|
+    /// Magnitude of the variable, |v|.
     Magnitude(Variable),
-    /// v²
+    /// Square of the variable, v².
     Square(Variable),
-    /// v |v|
+    /// Signed square of the variable, v |v|.
     SignedSquare(Variable),
-    /// v w
+    /// Product of two variables, v w.
     Product(Variable, Variable),
-    /// v |w|
+    /// Product of one variable and another's magnitude, v |w|.
     ByMagnitude(Variable, Variable),
-    /// What v exceeds a threshold by.
+    /// Excess of v over a threshold, zero below it.
     Above(Variable, f64),
-    /// What v exceeds a dead band by, with its sign.
+    /// Excess of v over a dead band, with its sign.
     Beyond(Variable, f64),
-    /// v, a control, through a first-order lag of so many seconds. As a candidate its time constant is free.
+    /// The control v through a first-order lag of that many seconds; as a candidate, the time constant is free.
     Lagged(Variable, f64),
-    /// Any expression.
+    /// An expression of the free forms.
     Free(&'static Free),
 }
 
-/// A shape in a factor of a channel.
+/// A shape with the channel it acts in and its factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Form {
-    /// Where it acts.
+    /// Channel in which it acts.
     pub channel: Channel,
-    /// Whether it grows with dynamic pressure.
+    /// Whether it scales with dynamic pressure.
     pub of_air: bool,
-    /// How it depends on its variables.
+    /// Dependence on its variables.
     pub shape: Shape,
 }
 
 impl Shape {
-    /// Its variables.
+    /// Variables of the shape.
     pub fn variables(&self) -> Vec<Variable> {
         match *self {
             Shape::Product(v, w) | Shape::ByMagnitude(v, w) => vec![v, w],
@@ -116,7 +116,7 @@ impl Shape {
         }
     }
 
-    /// Its constants beside the coefficient.
+    /// Constants of the shape beside the coefficient.
     pub fn constants(&self) -> Vec<f64> {
         match self {
             Shape::Above(_, c) | Shape::Beyond(_, c) | Shape::Lagged(_, c) => vec![*c],
@@ -125,7 +125,7 @@ impl Shape {
         }
     }
 
-    /// Terms of its formula: variables, numbers and operations.
+    /// Size of the formula: number of variables, numbers and operations.
     pub fn complexity(&self) -> usize {
         match self {
             Shape::Linear(_) => 1,
@@ -139,7 +139,7 @@ impl Shape {
 }
 
 impl Form {
-    /// What its shape is multiplied by.
+    /// Factor of the shape, as text.
     pub fn factor(&self) -> &'static str {
         let moment = matches!(self.channel, Channel::Roll | Channel::Yaw);
         match (self.of_air, moment, self.channel) {
@@ -150,7 +150,7 @@ impl Form {
         }
     }
 
-    /// The unit of its coefficient.
+    /// Unit of the coefficient.
     pub fn unit(&self) -> String {
         let force = match self.channel {
             Channel::Roll | Channel::Pitch | Channel::Yaw => "N m",
@@ -175,7 +175,7 @@ impl Form {
         format!("{force}{}{}", units.concat(), if squared { units.concat() } else { String::new() })
     }
 
-    /// Its id among the candidates.
+    /// Identifier among the candidates.
     pub fn id(&self) -> String {
         let text = match self.shape {
             // too long for an id
@@ -193,7 +193,7 @@ impl Form {
         )
     }
 
-    /// The form with the constants that a search left free as it found them: `values` are the coefficient, then these.
+    /// The form with the constants that a search estimated: `values` are the coefficient, then these.
     pub fn fitted(self, values: &[f64]) -> Form {
         match (self.shape, values) {
             (Shape::Lagged(v, _), [_, tau, ..]) => {
@@ -205,10 +205,10 @@ impl Form {
         }
     }
 
-    /// The effect of this form alone, its threshold fixed; of a lag, the time constant is free.
+    /// The effect of this form alone with a fixed threshold; a lag's time constant is free.
     ///
     /// # Errors
-    /// If its file could not be read, which none of the library is.
+    /// Its file cannot be read, which does not happen for the library's forms.
     pub fn effect(&self) -> Result<&'static Written, String> {
         match self.shape {
             Shape::Lagged(v, _) => self.through_lag(v, LAG_S, &self.id()),
@@ -216,7 +216,7 @@ impl Form {
         }
     }
 
-    /// The effect of a control through a lag; the search starts at `tau`, and a width to either side.
+    /// The effect of a control through a lag; the search starts at `tau`, and one width to either side.
     fn through_lag(&self, v: Variable, tau: f64, id: &str) -> Result<&'static Written, String> {
         register::read(&format!(
             "schema = 1\nid = \"{id}\"\ndescription = \"A control through a lag.\"\nsource = \"greylag propose\"\n\
@@ -232,10 +232,10 @@ impl Form {
         ))
     }
 
-    /// The effect of this form alone, all its constants as they are.
+    /// The effect of this form alone with all its constants fixed.
     ///
     /// # Errors
-    /// As of [`Form::effect`].
+    /// As [`Form::effect`].
     pub fn fixed(&self) -> Result<&'static Written, String> {
         if let Shape::Lagged(v, tau) = self.shape {
             let own = format!("{}_{tau}", self.id()).replace('.', "_");
@@ -255,7 +255,7 @@ impl Form {
     }
 }
 
-/// The controls `of` in `channel`, each through a lag.
+/// Forms in `channel` of the controls `of`, each through a lag.
 pub fn lags(channel: Channel, of: &[Variable]) -> Vec<Form> {
     let form = |of_air, v| Form { channel, of_air, shape: Shape::Lagged(v, LAG_S) };
     let with_air = of.iter().filter(|v| CONTROLS.contains(v)).map(|v| form(true, *v));
@@ -263,7 +263,7 @@ pub fn lags(channel: Channel, of: &[Variable]) -> Vec<Form> {
     with_air.chain(thrust).collect()
 }
 
-/// A number that goes with `text` (FNV-1a).
+/// Hash of `text` (FNV-1a).
 fn number_of(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

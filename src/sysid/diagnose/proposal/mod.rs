@@ -1,4 +1,4 @@
-//! A formula for what no effect of the catalogue holds: shapes searched, tested on other flights, put into words.
+//! Proposal of a formula for an effect outside the catalogue: searched, tested on other flights, described in words.
 
 mod beyond;
 mod draft;

@@ -1,4 +1,4 @@
-//! The search for a formula: one term after the other on some flights, the whole tested on others.
+//! Search for a formula: term by term on some flights, tested as a whole on others.
 
 use super::beyond::{better, beyond, doubt};
 use super::draft::{self, Term};
@@ -15,22 +15,22 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::diagnose::{DiagnoseError, Options, Verdict};
 use crate::flight_path::reconstruction::Reconstruction;
-use crate::progress::{Progress, part, say};
+use crate::progress::{Progress, part, report};
 use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::Channel;
 
-/// Shares of the work after the diagnosis, before the lags, of the free forms, and before the test.
+/// Shares of the work: after the diagnosis, before the lags, before the free forms, before the test.
 const SEARCHED: f64 = 0.3;
 const LAGS: f64 = 0.5;
 const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
-/// Proposes a formula for what `model` lacks according to `flights`, if a diagnosis leaves it unexplained, and tests
-/// it on `held_out`; `progress` hears what is being done.
+/// Proposes a formula for the effect that `model` lacks according to `flights`, if a diagnosis leaves it unexplained,
+/// and tests it on `held_out`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-/// As of [`diagnose`](crate::diagnose::diagnose).
+/// As [`diagnose`](crate::diagnose::diagnose).
 pub fn propose(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -52,8 +52,8 @@ pub fn propose(
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
-    let said = rudder.map(rudder::warning).into_iter().collect();
-    let mut proposal = empty(model, verdict(&found), options, said, notes);
+    let warnings = rudder.map(rudder::warning).into_iter().collect();
+    let mut proposal = empty(model, verdict(&found), options, warnings, notes);
     if let Some(why) = settled(&found, proposal.verdict) {
         proposal.sentences.push(why);
         return Ok(proposal);
@@ -62,7 +62,7 @@ pub fn propose(
     let channels = searched(&found, rudder.is_some());
     let forms = forms(&problem, &channels);
     proposal.tried = forms.len();
-    say(progress, &format!("trying {} shapes", forms.len()), SEARCHED)?;
+    report(progress, &format!("trying {} shapes", forms.len()), SEARCHED)?;
     let ask = Ask {
         problem: &problem,
         options,
@@ -73,17 +73,18 @@ pub fn propose(
     };
     let library = ask.climb(tuned.clone()).ok_or_else(unusable)?;
     let climbed = beyond_library(&ask, library, &tuned, &mut proposal, progress)?;
-    let Climbed { said, first, terms, .. } = climbed;
-    (proposal.front, proposal.alike, proposal.grades) = (said.front, said.alike, said.grades);
-    (proposal.refused, proposal.nulls) = (said.refused, said.nulls);
+    let Climbed { outcome, first, terms, .. } = climbed;
+    (proposal.front, proposal.alike, proposal.grades) =
+        (outcome.front, outcome.alike, outcome.grades);
+    (proposal.refused, proposal.nulls) = (outcome.refused, outcome.nulls);
     let Some(first) = first else {
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
-    // further terms say that the first one's form is not the whole
+    // further terms show that the first one's form is not the whole
     let whole = terms.len() == 1 && !outdone(&proposal);
     proposal.grades.iter_mut().for_each(|grades| grades.form &= whole);
-    say(progress, "testing the formula on flights that the search has not seen", TESTED)?;
+    report(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();
     let tested = tested(&test, &tuned, &terms, options, names).ok_or_else(unusable)?;
     let from = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -91,7 +92,7 @@ pub fn propose(
     Ok(proposal)
 }
 
-/// The channels in which a formula is searched for; none of those that a rudder moves if the model lacks one.
+/// Channels in which a formula is searched for; without those that a rudder drives if the model has no rudder.
 fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
     let mut channels = failing(found);
@@ -99,16 +100,16 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     channels
 }
 
-/// Whether a free form fits better than the formula of the library that was taken, as it is simpler and hardly behind
-/// in the error removed: its form is then not sure. Their evidences are of two rounds of tuning, so this only withholds a
-/// grade.
+/// Whether a free form fits better than the adopted formula of the library although that is simpler and removes
+/// hardly less error: the form is then uncertain. The evidences are from two rounds of tuning, so this only withholds
+/// a grade.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);
     free.is_some_and(|free| best(&free.front) > best(&proposal.front))
 }
 
-/// A proposal before anything was searched.
+/// A proposal before any search.
 fn empty(
     model: &GreyBox,
     verdict: Verdict,
@@ -141,7 +142,8 @@ fn empty(
     }
 }
 
-/// Says what was found, and writes the effect file if nothing speaks against it; `from` names the flights searched.
+/// Completes the proposal with its sentences, and with the effect file if there is no objection; `from` names the
+/// flights searched.
 fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldOut, from: &str) {
     proposal.refused.extend(objection(&tested));
     proposal.sentences.extend(sentences(proposal, first, terms, &tested));
@@ -153,7 +155,7 @@ fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldO
     proposal.held_out = Some(tested);
 }
 
-/// The library's formula, or one with controls through a lag or with free forms if that is better.
+/// The library's formula, or one with lagged controls or free forms if that is better.
 fn beyond_library(
     ask: &Ask,
     library: Climbed,
@@ -166,7 +168,7 @@ fn beyond_library(
     let channels = doubted.as_ref().map_or(&[][..], |(_, channels)| channels);
     let forms = lags::forms(&library, channels);
     if !forms.is_empty() {
-        say(progress, "trying controls through a lag", LAGS)?;
+        report(progress, "trying controls through a lag", LAGS)?;
         proposal.tried += forms.len();
         let lagged = lags::climb(ask, &library, forms, tuned);
         if let Some(lagged) = lagged.filter(|lagged| better(lagged, &library)) {
@@ -175,7 +177,7 @@ fn beyond_library(
         }
     }
     let Some(doubt) = doubted.filter(|_| ask.options.free_forms) else { return Ok(library) };
-    say(progress, "trying free forms", FREE[0])?;
+    report(progress, "trying free forms", FREE[0])?;
     let Some((mut record, free)) = beyond(ask, &library, tuned, doubt, &part(progress, FREE))?
     else {
         return Ok(library);
@@ -187,7 +189,7 @@ fn beyond_library(
     Ok(if taken { free } else { library })
 }
 
-/// Why there is nothing to propose, where the catalogue or chance explains what is left.
+/// Why there is nothing to propose, if the catalogue or chance explains the residual.
 fn settled(found: &Found, verdict: Verdict) -> Option<String> {
     match verdict {
         Verdict::Unexplained => None,

@@ -1,120 +1,120 @@
-//! What a search for a formula says, as it goes into JSON (`greylag.proposal/1`).
+//! The result of a search for a formula, serialized to JSON (`greylag.proposal/1`).
 
 use serde::Serialize;
 
 use crate::diagnose::Verdict;
 
-/// What is sure of the form that was found.
+/// Properties of the formula's first term that are certain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Grades {
-    /// The channel in which it acts.
+    /// Whether the channel in which it acts is certain.
     pub channel: bool,
-    /// The variables on which it depends.
+    /// Whether the variables on which it depends are certain.
     pub variables: bool,
-    /// Whether it is odd, even or only grows with them.
+    /// Whether its trend with them (odd, even, monotonic) is certain.
     pub trend: bool,
-    /// The form, up to its constants.
+    /// Whether the form is certain, up to its constants.
     pub form: bool,
 }
 
-/// A form that the flights cannot tell from the one found.
+/// A form that the flights cannot distinguish from the one found.
 #[derive(Clone, Debug, Serialize)]
 pub struct Alternative {
-    /// Its formula.
+    /// Formula, as text.
     pub formula: String,
-    /// Its evidence.
+    /// Evidence of the form.
     pub evidence: f64,
 }
 
-/// A step of the search: the formula with one term more.
+/// A step of the search: the formula with one more term.
 #[derive(Clone, Debug, Serialize)]
 pub struct Rung {
-    /// Its formula.
+    /// Formula, as text.
     pub formula: String,
-    /// Terms, numbers and operations in it.
+    /// Number of terms, numbers and operations in it.
     pub complexity: usize,
-    /// Share of the error beyond noise in the failing channels that it removes.
+    /// Share of the error beyond noise in the searched channels that it removes.
     pub removed: f64,
     /// Evidence of its last term.
     pub evidence: f64,
-    /// What chance reaches: of the search over all forms, on flights that lack nothing.
+    /// Evidence that chance reaches in the same search over null flights.
     pub threshold: f64,
-    /// Whether it is the one proposed.
+    /// Whether this formula is the chosen one.
     pub chosen: bool,
 }
 
-/// What the chosen form does on flights that the search has not seen, its amounts as they were found.
+/// Test of the chosen formula on held-out flights, with its coefficients as found.
 #[derive(Clone, Debug, Serialize)]
 pub struct HeldOut {
     /// Names of the flights.
     pub flights: Vec<String>,
     /// Share of the error beyond noise in its channels that it removes.
     pub removed: f64,
-    /// The fall of the squared error over the noise's.
+    /// Reduction of the squared error over the noise's variance.
     pub fall: f64,
-    /// What chance reaches.
+    /// Reduction that chance reaches.
     pub threshold: f64,
 }
 
-/// What the search of free forms gave, which follows where the library's shapes are not all.
+/// Result of the search over free forms, made if the library's shapes do not suffice.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeForms {
-    /// Why it was made.
+    /// Reason for the search.
     pub why: String,
-    /// Forms that were tried, over all channels.
+    /// Number of forms evaluated, over all channels.
     pub tried: usize,
-    /// The best form of each size that takes more than all smaller ones, channel by channel, its constants fitted.
+    /// The best form of each size that removes more than all smaller ones, by channel, with fitted constants.
     pub front: Vec<Rung>,
-    /// Whether one of them is in the formula that was found.
+    /// Whether one of them is part of the formula found.
     pub chosen: bool,
 }
 
-/// What a search was asked for.
+/// Settings of a search for a formula.
 #[derive(Clone, Debug, Serialize)]
 pub struct Settings {
-    /// Seed of everything that is drawn.
+    /// Seed of all random draws.
     pub seed: u64,
-    /// Bootstrap draws under the null hypothesis that set the thresholds.
+    /// Number of bootstrap draws under the null hypothesis, which determine the thresholds.
     pub nulls: usize,
-    /// Ids that were left out of the catalogue.
+    /// Ids excluded from the catalogue.
     pub without: Vec<String>,
     /// Whether free forms may be tried.
     pub free_forms: bool,
 }
 
-/// What was found.
+/// The result of a search for a formula.
 #[derive(Clone, Debug, Serialize)]
 pub struct Proposal {
-    /// `greylag.proposal/1`.
+    /// Schema of the document, `greylag.proposal/1`.
     pub schema: &'static str,
     /// Version of the program.
     pub version: &'static str,
     /// Name of the model.
     pub model: String,
-    /// The verdict of the diagnosis before.
+    /// Verdict of the preceding diagnosis.
     pub verdict: Verdict,
     /// The answer in plain sentences.
     pub sentences: Vec<String>,
-    /// The formulas of the search, each with one term more than the one before.
+    /// Formulas of the search, each with one more term than the one before.
     pub front: Vec<Rung>,
     /// The search of free forms, if one was made.
     pub free: Option<FreeForms>,
-    /// Forms of the first term that these flights cannot tell from it.
+    /// Forms that these flights cannot distinguish from the first term.
     pub alike: Vec<Alternative>,
-    /// What is sure of the first term.
+    /// Properties of the first term that are certain.
     pub grades: Option<Grades>,
-    /// The test on other flights.
+    /// Test on held-out flights.
     pub held_out: Option<HeldOut>,
-    /// Shapes of the library that were tried.
+    /// Number of the library's shapes evaluated.
     pub tried: usize,
-    /// Why the formula that was found is not proposed; empty if it is.
+    /// Reasons not to propose the formula found; empty if it is proposed.
     pub refused: Vec<String>,
-    /// What the search was asked for.
+    /// Settings of the search.
     pub settings: Settings,
-    /// Best evidence in flights that lack nothing, over all forms.
+    /// Best evidence over all forms in each null flight.
     pub nulls: Vec<f64>,
     /// The effect file, if one is proposed.
     pub effect: Option<String>,
-    /// What the reader must know besides.
+    /// Further notes for the reader.
     pub notes: Vec<String>,
 }

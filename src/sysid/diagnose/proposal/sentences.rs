@@ -1,4 +1,4 @@
-//! What was found, in sentences.
+//! The proposal in sentences.
 
 use super::draft::Term;
 use super::free::grammar::MOST_NODES;
@@ -8,13 +8,13 @@ use super::result::{HeldOut, Proposal};
 use crate::diagnose::answer::sentences::figures;
 use greylag_physics::formula::Variable;
 
-/// `text` as a sentence.
+/// `text` with a capital first letter.
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect()) + "."
 }
 
-/// What was found, in sentences.
+/// The proposal in sentences.
 pub(super) fn sentences(
     proposal: &Proposal,
     first: &Term,

@@ -1,4 +1,4 @@
-//! What a search for a formula works on, as a table for other programs.
+//! The residual that a search for a formula uses, as a table for other programs.
 
 use std::fmt::Write;
 
@@ -11,13 +11,13 @@ use crate::flight_path::reconstruction::Reconstruction;
 use greylag_model::GreyBox;
 use greylag_physics::formula::file::channel_name;
 
-/// The residual of `model`, tuned to `flights` and their sensors' errors taken out, as CSV: a row a window of the weak
-/// form (0.37 s, half overlapping), with the flight, the mean of each variable over the window (SI units), dynamic
-/// pressure times wing area (`qbar_S`, N), and `left_` and a channel: what is left there (N or N m; empty where it is
-/// not measured).
+/// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV: one row for each window of the
+/// weak form (0.37 s, half overlapping), with the flight, the mean of each variable over the window (SI units),
+/// dynamic pressure times wing area (`qbar_S`, N), and `left_` with the channel's name, the residual there (N or N m;
+/// empty where it is not measured).
 ///
 /// # Errors
-/// As of [`diagnose`](crate::diagnose::diagnose).
+/// As [`diagnose`](crate::diagnose::diagnose).
 pub fn signals(
     model: &GreyBox,
     flights: &[Reconstruction],

@@ -1,4 +1,4 @@
-//! The candidates: every effect of the catalogue that a model lacks, with its columns.
+//! The candidates: every effect of the catalogue that a model lacks, with its regressor columns.
 
 use rayon::prelude::*;
 
@@ -13,32 +13,32 @@ use greylag_physics::formula::register;
 use greylag_physics::inputs;
 use greylag_physics::size::Size;
 
-/// Share of a shape constant by which its derivative is taken.
+/// Finite-difference step of a shape constant, as a share of its value.
 const MOVED: f64 = 0.02;
-/// Largest change of a shape constant that its linearisation is trusted with, as a share.
+/// Largest change of a shape constant within which its linearisation is used, as a share of its value.
 pub const REACH: f64 = 0.35;
 
-/// Factor between places below the least start.
+/// Factor between the points below the least start.
 const SMALLER: f64 = 2.5;
 
 /// An effect that may be missing.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// What is known of it.
+    /// Description of the effect.
     pub about: Description,
-    /// Whether it acts on the deflections.
+    /// Whether it is an input effect, acting on the deflections.
     pub operator: bool,
 }
 
 impl Entry {
-    /// Whether it is of a file, whose amounts nobody knows beforehand.
+    /// Whether it comes from a file, so that no prior on its amounts exists.
     fn written(&self) -> bool {
         Kind::from_id(self.about.id).is_some_and(|kind| kind.written().is_some())
     }
 }
 
-/// The effects of the catalogue, and those of files called `with`, that `model` lacks and that can be searched for,
-/// but for those of `without`.
+/// The effects of the catalogue and those of files with ids in `with` that `model` lacks and that can be searched
+/// for, without those of `without`.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = on_air().map(|about| of(about, false));
@@ -61,16 +61,16 @@ pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<E
         .collect()
 }
 
-/// Columns of candidates over all flights: for each flight, a list of one length.
+/// Columns of candidates over all flights; each flight's list has the same length.
 pub struct Columns {
-    /// The candidates, columns numbered from 0.
+    /// The candidates, which refer to columns by index.
     pub trials: Vec<Trial>,
-    /// Flight by flight.
+    /// Columns of each flight.
     pub columns: Vec<Vec<Column>>,
 }
 
-/// The columns of `entries` for `flights` under `model`; `refined` gives further places at which the
-/// nonlinear ones are linearised.
+/// Columns of `entries` for `flights` under `model`; `refined` gives additional points at which the nonlinear ones
+/// are linearised.
 pub fn columns(
     model: &GreyBox,
     flights: &[Ready],
@@ -113,7 +113,7 @@ fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
 }
 
-/// Places below the least start of an effect on the deflections, where good sensors may still see it.
+/// Points below the least start of an input effect, which accurate sensors may still detect.
 fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
         return Vec::new();
@@ -131,7 +131,8 @@ pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// `model` with all of `entries` that can join it, at zero or what lies nearest to it, and these with their values.
+/// `model` with all of `entries` that can join it, at zero or the bound nearest to it, and these entries with their
+/// values.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();
@@ -149,7 +150,7 @@ pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec
     (everything, joined)
 }
 
-/// Coefficients that a search leaves free: all but gains that are one in every start.
+/// Indices of the coefficients that a search estimates: all but gains that are one in every start.
 pub fn free(entry: &Entry) -> Vec<usize> {
     let linear = entry.about.coefficients.len() - entry.about.shape;
     (0..entry.about.coefficients.len())
@@ -160,7 +161,7 @@ pub fn free(entry: &Entry) -> Vec<usize> {
 }
 
 impl Columns {
-    /// One model with all of `entries` at zero gives the columns of all in one pass.
+    /// Adds the linear candidates: one model with all of `entries` at zero gives their columns in one pass.
     fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
         let (everything, joined) = with_all(model, entries);
         let wanted = model.coefficients().len()..everything.coefficients().len();
@@ -217,13 +218,13 @@ impl Columns {
         });
     }
 
-    /// Whether a column has anything but zeros.
+    /// Whether a column has a nonzero entry.
     fn acts(&self, column: usize) -> bool {
         let moved = |x: &f64| *x != 0.0;
         self.columns.iter().any(|list| list[column].iter().flatten().any(moved))
     }
 
-    /// Notes where a trial acts, and keeps it if it acts at all.
+    /// Records the channels in which a trial acts, and keeps the trial if there is one.
     fn finish(&mut self, mut trial: Trial, flights: &[Ready]) {
         let own: Vec<usize> = trial
             .points
@@ -247,8 +248,8 @@ impl Columns {
     }
 }
 
-/// A nonlinear candidate at `values`: its contribution, then the derivatives by its free coefficients,
-/// flight by flight; `None` if the values are not possible.
+/// Columns of a nonlinear candidate at `values`: its contribution, then its derivatives with respect to its free
+/// coefficients, by flight; `None` if the values are not possible.
 fn curved_columns(
     model: &GreyBox,
     flights: &[Ready],

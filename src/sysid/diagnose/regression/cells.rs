@@ -1,4 +1,4 @@
-//! Flights cut into cells: one channel of one flight, its finite windows in runs and blocks.
+//! Division of flights into cells: one channel of one flight, its finite windows in runs and blocks.
 
 use nalgebra::DMatrix;
 
@@ -7,38 +7,38 @@ use crate::diagnose::regression::gather::Column;
 use crate::diagnose::regression::local::CHANNELS;
 use crate::diagnose::regression::whiten::Whitener;
 
-/// Length of a block of windows that are taken to hang together, s.
+/// Length of a block of windows whose errors are taken as correlated, s.
 pub const BLOCK_S: f64 = 4.0;
 
-/// The columns of one flight with their places in the list of all.
+/// Columns of one flight with their indices among all columns.
 pub type Placed = Vec<(usize, Column)>;
 
 /// One channel of one flight.
 #[derive(Clone, Debug)]
 pub struct Cell {
-    /// Which flight.
+    /// Index of the flight.
     pub flight: usize,
-    /// Which channel.
+    /// Index of the channel.
     pub channel: usize,
-    /// Windows that count, in order.
+    /// Indices of the finite windows, ascending.
     pub windows: Vec<usize>,
-    /// Ends of the runs of neighbouring windows, as places in `windows`.
+    /// Ends of the runs of neighbouring windows, as indices into `windows`.
     pub runs: Vec<usize>,
-    /// Block of each of them, numbered over all flights.
+    /// Block number of each window, unique over all flights.
     pub blocks: Vec<usize>,
 }
 
 /// The cells of all flights, with the flight of every block.
 #[derive(Clone, Debug)]
 pub struct Cells {
-    /// Flight by flight, channel by channel; cells without windows are left out.
+    /// Cells by flight and channel; cells without windows are left out.
     pub list: Vec<Cell>,
     /// The flight of each block.
     pub flight_of_block: Vec<usize>,
 }
 
 impl Cells {
-    /// Cuts `flights`.
+    /// Divides `flights` into cells.
     pub fn new(flights: &[Ready]) -> Cells {
         let mut cells = Cells { list: Vec::new(), flight_of_block: Vec::new() };
         for (flight, ready) in flights.iter().enumerate() {
@@ -53,7 +53,7 @@ impl Cells {
         cells
     }
 
-    /// The block of each window of `ready`; a rest shorter than half a block joins the one before.
+    /// Block number of each window of `ready`; a rest shorter than half a block joins the previous one.
     fn number(&mut self, flight: usize, ready: &Ready) -> Vec<usize> {
         let windows = &ready.acting.windows;
         let mut block_of = Vec::with_capacity(windows.len());
@@ -71,7 +71,7 @@ impl Cells {
         block_of
     }
 
-    /// Number of blocks.
+    /// Number of blocks over all flights.
     pub fn blocks(&self) -> usize {
         self.flight_of_block.len()
     }
@@ -93,7 +93,7 @@ fn cell(flight: usize, channel: usize, ready: &Ready, block_of: &[usize]) -> Cel
 }
 
 impl Cell {
-    /// The runs of `values`, a value a window of the flight.
+    /// The runs of `values`, one for each window of the flight.
     pub fn split(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let mut start = 0;
         let cut = |&end: &usize| {
@@ -104,12 +104,12 @@ impl Cell {
         self.runs.iter().map(cut).collect()
     }
 
-    /// `values` whitened, a value a row.
+    /// `values` whitened, one for each row.
     pub fn whitened(&self, values: &[f64], whitener: &Whitener) -> Vec<f64> {
         self.split(values).iter().flat_map(|run| whitener.apply(run)).collect()
     }
 
-    /// The whitened columns of `placed` that act in the channel, with their places.
+    /// The whitened columns of `placed` that act in the channel, with their indices.
     pub fn matrix(&self, placed: &Placed, whitener: &Whitener) -> (Vec<usize>, DMatrix<f64>) {
         let mut places = Vec::new();
         let mut data = Vec::new();
@@ -122,7 +122,7 @@ impl Cell {
         (places.clone(), DMatrix::from_vec(self.windows.len(), places.len(), data))
     }
 
-    /// The rows of each block: block, first row, one past the last.
+    /// Rows of each block: block number, first row, one past the last.
     pub fn rows_of_blocks(&self) -> Vec<(usize, usize, usize)> {
         let mut rows: Vec<(usize, usize, usize)> = Vec::new();
         for (row, block) in self.blocks.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What one unit of each unknown adds to the residual of a flight, window by window.
+//! Regressor columns: change of a flight's residual for one unit of each unknown, window by window.
 
 use std::ops::Range;
 
@@ -12,31 +12,31 @@ use greylag_model::GreyBox;
 use greylag_physics::rigid_body::{self, RigidBody, Vector};
 use greylag_physics::{Channel, Wrench};
 
-/// Columns of sensor errors: gyros p, q, r, α, β, share of the airspeed, accelerometers x, y, z, then
-/// lateness of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of the
-/// recorded actuators (s), and how much the record of the actuators is a mean over time (half the variance
-/// of that time, squared samples).
+/// Number of sensor-error columns: gyros p, q, r (rad/s), α, β (rad), airspeed (relative), accelerometers x, y, z
+/// (m/s²), then delays (s) of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of
+/// the recorded actuators, and the actuators' blur (half the variance, in squared samples, of the time over which a
+/// record is averaged).
 pub const SENSORS: usize = 16;
 
-/// A flight under a model.
+/// A flight evaluated under a model.
 #[derive(Clone, Debug)]
 pub struct Ready {
     /// The flight as measured.
     pub measured: Prepared,
-    /// The same with the deflections that act under the model.
+    /// The same flight with the deflections that act under the model.
     pub acting: Prepared,
-    /// Measured less predicted.
+    /// Residual, measured less predicted.
     pub residual: Column,
-    /// What one unit of each sensor error adds to it.
+    /// Change of the residual for one unit of each sensor error.
     pub sensors: Vec<Column>,
-    /// Derivatives of the prediction by aileron, elevator and throttle, segment by sample.
+    /// Derivatives of the prediction with respect to aileron, elevator and throttle, by segment and sample.
     controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
-    /// The model that says how the aircraft accelerates, if it is another one.
+    /// Model that predicts the aircraft's accelerations, if it is a different one.
     accelerating: Option<GreyBox>,
 }
 
 impl Ready {
-    /// `flight` under `model`.
+    /// Evaluates `flight` under `model`.
     pub fn new(model: &GreyBox, flight: &Prepared) -> Ready {
         let acting = flight.acting(model).into_owned();
         let locals: Vec<Vec<local::Local>> = acting
@@ -82,7 +82,7 @@ impl Ready {
                 let slope = &here.slope[CONTROLS + i];
                 (0..CHANNELS).for_each(|c| add(1 + INPUTS + 9, c, bend * slope[c]));
             }
-            // J ω̇ + ω × J ω = M(t − T), as explicit Euler steps of 2 T have it: T Σ ∂(ω × J ω − M)/∂x ẋ
+            // J ω̇ + ω × J ω = M(t − T), for explicit Euler steps of 2 T: T Σ ∂(ω × J ω − M)/∂x ẋ
             if acting.sampling == Sampling::Instants {
                 let rates = differences(&acting, place.segment, place.index, inputs);
                 for (slope, rate) in here.slope.iter().zip(rates) {
@@ -109,13 +109,13 @@ impl Ready {
         Ready { measured: flight.clone(), acting, residual, sensors, controls, accelerating }
     }
 
-    /// With accelerations of another model in the columns of mass and inertia.
+    /// Uses accelerations predicted by another model in the columns of mass and inertia.
     pub fn accelerating_as(self, model: Option<&GreyBox>) -> Ready {
         Ready { accelerating: model.cloned(), ..self }
     }
 
-    /// What one unit of each of the coefficients `wanted` of `model`, a model that has the effects of
-    /// the flight's, predicts; shape constants and those of input effects have empty columns.
+    /// Predictions of one unit of each of the coefficients `wanted` of `model`, which must contain the effects of the
+    /// flight's model; shape constants and those of input effects have empty columns.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
         // a formula with a lag needs the past of the deflections, which the flight's own model may not remember
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
@@ -154,8 +154,8 @@ impl Ready {
         columns
     }
 
-    /// What a step of `step` to `body` adds to the residual, by one unit. The accelerations are a
-    /// model's: measured ones share the residual's noise.
+    /// Change of the residual for a unit of a parameter that changes the rigid body to `body` at `step`. The
+    /// accelerations are predicted ones, since measured ones share the residual's noise.
     fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
         let old = &model.body;
         let model = self.accelerating.as_ref().unwrap_or(model);
@@ -179,8 +179,8 @@ impl Ready {
         columns.pop().unwrap_or_default()
     }
 
-    /// What `model`, the flight's with one more effect on the inputs or another constant of one,
-    /// predicts beyond the flight's, to first order in deflections and throttle.
+    /// Difference between the predictions of `model` and of the flight's model, from which it differs in an input
+    /// effect, to first order in deflections and throttle.
     pub fn operator(&self, model: &GreyBox) -> Column {
         let other = self.measured.acting(model);
         let mut columns = gather(&self.acting, model.integrator, 1, |place, add| {
@@ -214,12 +214,12 @@ fn join(a: &mut Vec<f64>, b: Vec<f64>) {
     }
 }
 
-/// Whether mass or inertia of `model` depend on its coefficient `index`.
+/// Whether mass or inertia of `model` depends on its coefficient `index`.
 pub fn of_body(model: &GreyBox, index: usize) -> bool {
     changed_body(model, index).is_some()
 }
 
-/// The body that `model` has with the coefficient `index` moved, and by how much, if it changes it.
+/// The rigid body of `model` with the coefficient `index` perturbed, and the perturbation, if it changes the body.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;
     let mut moved = model.clone();
@@ -228,7 +228,7 @@ fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     (moved.body != model.body).then_some((moved.body, MOVED))
 }
 
-/// Adds the moment of the measured angular acceleration.
+/// Adds the moment of the measured angular acceleration to the residual.
 fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     let spins = rates(flight, |i| [i.state.p, i.state.q, i.state.r]);
     let moments: Vec<Vector<f64>> = spins.iter().map(|w| inertia(&model.body, *w)).collect();
@@ -237,7 +237,7 @@ fn add_spin(model: &GreyBox, flight: &Prepared, residual: &mut Column) {
     }
 }
 
-/// Aileron, elevator, throttle, rudder.
+/// Aileron, elevator, throttle and rudder, in this order.
 fn steered(i: &Instant) -> [f64; 4] {
     let z = &i.controls;
     [z.aileron, z.elevator, z.throttle, z.rudder]
@@ -249,7 +249,7 @@ fn inputs(i: &Instant) -> [f64; INPUTS] {
     [s.p, s.q, s.r, s.alpha, s.beta, s.airspeed, aileron, elevator, throttle, rudder]
 }
 
-/// Second differences of aileron, elevator, throttle and rudder.
+/// Second differences of aileron, elevator, throttle and rudder, in this order.
 pub fn bends(flight: &Prepared, segment: usize, index: usize) -> [f64; 4] {
     let instants = &flight.segments[segment];
     let (before, after) = (index.saturating_sub(1), (index + 1).min(instants.len() - 1));

@@ -12,29 +12,29 @@ use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, Integrator};
 use greylag_num::stream::{Stream, stream};
 
-/// Random stream of the features.
+/// Random stream for the features.
 const FEATURES: u64 = 81;
-/// Cosines.
+/// Number of cosines.
 const COSINES: usize = 40;
-/// What they are of: α, β, V, p, q, r, deflections and throttle now, deflections a while ago, the rate of α.
+/// Number of their variables: α, β, V, p, q, r, deflections and throttle now, earlier deflections, the rate of α.
 const VARIABLES: usize = 12;
-/// How many they are: the variables themselves and the cosines.
+/// Number of features: the variables themselves and the cosines.
 pub const COUNT: usize = VARIABLES + COSINES;
-/// Standard deviation of the cosines' frequencies, per standard deviation of a variable: features that
-/// bend about once over what was flown.
+/// Standard deviation of the cosines' frequencies per standard deviation of a variable, so that a feature varies by
+/// about one half-period over the flights.
 const BEND: f64 = 0.5;
-/// Time over which the rate of α is taken, s: shorter, it would be noise.
+/// Time over which the rate of α is differenced, s; a shorter one would amplify noise.
 const SPAN_S: f64 = 0.06;
-/// How long ago the past deflections were, s.
+/// Delay of the earlier deflections, s.
 const AGO_S: f64 = 0.08;
 
-/// A cosine's frequency along each variable and its phase.
+/// Frequency of a cosine along each variable, and its phase.
 struct Cosine {
     frequency: [f64; VARIABLES],
     phase: f64,
 }
 
-/// The features of every flight; the same in all channels, each times the dynamic pressure.
+/// Features of every flight, multiplied by dynamic pressure; the same in all channels.
 pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
     let spread = spread(flights, variables);
     let mut random = stream(seed, &[FEATURES]);
@@ -93,7 +93,7 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     ]
 }
 
-/// Mean and standard deviation over all flights of each of the variables that `of` takes from a flight, a
+/// Mean and standard deviation over all flights of each variable; `of` extracts the variables from a flight, a
 /// segment and an index.
 pub fn spread<const N: usize>(
     flights: &[Ready],
@@ -118,7 +118,7 @@ pub fn spread<const N: usize>(
     })
 }
 
-/// `raw` less its mean, in standard deviations.
+/// `raw` standardised: less its mean, in standard deviations.
 pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
     std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
 }

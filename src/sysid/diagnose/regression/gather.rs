@@ -1,4 +1,4 @@
-//! Averages with the kernel over every window of a flight, each sample evaluated once.
+//! Kernel averages over every window of a flight, with each sample evaluated once.
 
 use rayon::prelude::*;
 
@@ -9,30 +9,29 @@ use greylag_logs::Sampling;
 use greylag_model::Integrator;
 use greylag_physics::Controls;
 
-/// A value a window in each of the channels D, L, Y, l, m, n; an empty list stands for zeros.
+/// Values for each window in each of the channels D, L, Y, l, m, n; an empty list means zeros.
 pub type Column = [Vec<f64>; CHANNELS];
 
-/// Windows that one task takes, which spares evaluating samples of overlapping windows twice.
+/// Number of windows that one task processes, to avoid evaluating samples of overlapping windows twice.
 const GROUP: usize = 16;
-/// Windows that may hold one sample.
+/// Largest number of windows that contain one sample.
 const OVERLAP: usize = 4;
 
-/// A sample to be evaluated.
+/// A sample to evaluate.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
-    /// Its segment.
+    /// Index of its segment.
     pub segment: usize,
-    /// Its place in the segment.
+    /// Index within the segment.
     pub index: usize,
-    /// The sample whose state counts.
+    /// Sample that gives the state.
     pub at: &'a Instant,
-    /// The controls that count.
+    /// Controls to evaluate it with.
     pub controls: &'a Controls,
 }
 
-/// Averages what `evaluate` reports, as `add(column, channel, amount)`, over each window: forces on
-/// the samples, moments on the steps as the integrator has them, on the samples too where these are taken
-/// at instants.
+/// Averages the amounts that `evaluate` reports, as `add(column, channel, amount)`, over each window: forces over the
+/// samples; moments over integration steps, or over the samples if they are taken at instants.
 pub fn gather(
     flight: &Prepared,
     integrator: Integrator,
@@ -63,7 +62,7 @@ pub fn gather(
     out
 }
 
-/// Runs of at most [`GROUP`] windows of one segment: first and one past the last.
+/// Runs of at most [`GROUP`] windows of one segment: first, and one past the last.
 fn groups(flight: &Prepared) -> Vec<(usize, usize)> {
     let mut groups: Vec<(usize, usize)> = Vec::new();
     for (w, window) in flight.windows.iter().enumerate() {
@@ -131,7 +130,7 @@ fn group(
     sums
 }
 
-/// `of` for every window from the kernel's slope: the smoothed rates of a signal.
+/// Rates of `of` for every window by the kernel's derivative (smoothed differentiation).
 pub fn rates<const N: usize>(
     flight: &Prepared,
     of: impl Fn(&Instant) -> [f64; N],

@@ -1,4 +1,4 @@
-//! The residual at one sample, with its derivatives by what may be in error there.
+//! Residual at one sample, with its derivatives with respect to measured quantities.
 
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::windows::{gyroscopic, to_force_axes};
@@ -7,24 +7,24 @@ use greylag_num::{Dual, Real};
 use greylag_physics::rigid_body;
 use greylag_physics::{Channel, Controls, State};
 
-/// Channels: D, L, Y (N), l, m, n (N m).
+/// Number of channels: D, L, Y (N), l, m, n (N m).
 pub const CHANNELS: usize = 6;
-/// Places of the derivatives: p, q, r, α, β, V, then aileron, elevator, throttle, rudder.
+/// Number of inputs: p, q, r, α, β, V, then aileron, elevator, throttle, rudder.
 pub const INPUTS: usize = 10;
-/// Place of the first rate.
+/// Index of the first rate among the inputs.
 pub const RATES: usize = 0;
-/// Place of the angle of attack; sideslip and airspeed follow.
+/// Index of the angle of attack; sideslip and airspeed follow.
 pub const ALPHA: usize = 3;
-/// Place of the aileron; elevator, throttle and rudder follow.
+/// Index of the aileron; elevator, throttle and rudder follow.
 pub const CONTROLS: usize = 6;
 
-/// Measured less predicted at one sample, without the moments of the angular acceleration, which the
-/// kernel takes from the rates.
+/// Measured less predicted at one sample, without the angular acceleration's moment, which the kernel computes from
+/// the rates.
 #[derive(Clone, Copy, Debug)]
 pub struct Local {
     /// The residual; forces NaN where the log has no specific force.
     pub value: [f64; CHANNELS],
-    /// Its derivatives by the inputs in their order.
+    /// Derivatives of the residual with respect to the inputs, in their order.
     pub slope: [[f64; CHANNELS]; INPUTS],
 }
 

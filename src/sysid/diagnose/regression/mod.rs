@@ -1,4 +1,4 @@
-//! The regression that ranks candidates: columns, whitening, elimination of nuisances (Frisch–Waugh–Lovell).
+//! The regression behind the ranking: columns, whitening, elimination of nuisance parameters (Frisch–Waugh–Lovell).
 
 pub(super) mod catalogue;
 pub(super) mod cells;

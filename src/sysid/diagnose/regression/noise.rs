@@ -1,4 +1,4 @@
-//! What is left in each channel under the richest plausible model: its colour, its level, its blocks.
+//! Noise of each channel, from the residual of the richest plausible model: its spectrum, its level, its blocks.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -8,24 +8,22 @@ use crate::diagnose::regression::whiten::Whitener;
 
 /// Order of the autoregressive whitening.
 const ORDER: usize = 8;
-/// Ridge of the rich fit, as a share of a column's own square.
+/// Ridge parameter of the rich fit, as a share of a column's own square.
 const RIDGE: f64 = 1e-4;
-/// Passes of colour and fit.
+/// Number of alternations between whitening and fit.
 const PASSES: usize = 2;
 
-/// The noise of every channel.
+/// Noise of every channel.
 #[derive(Clone)]
 pub struct Noise {
     /// Whitener of each channel.
     pub whiteners: [Whitener; CHANNELS],
-    /// The whitened residual of the rich fit, a list a cell, each block made as large again as the fit
-    /// made it smaller.
+    /// Whitened residual of the rich fit, one list for each cell, each block corrected for the reduction by the fit.
     pub residuals: Vec<Vec<f64>>,
 }
 
 impl Noise {
-    /// From what `rich` columns leave of the residuals, whose place is `last`; columns and residuals
-    /// flight by flight.
+    /// Estimates the noise from the residual in index `last` after a fit of the `rich` columns, by flight.
     pub fn estimate(cells: &Cells, rich: &[Placed], last: usize) -> Noise {
         let mut residuals = vec![Vec::new(); cells.list.len()];
         let whiteners = std::array::from_fn(|channel| {
@@ -39,7 +37,7 @@ impl Noise {
     }
 }
 
-/// A channel's whitened rows: columns of the rich fit, then the residual.
+/// Whitened rows of a channel: columns of the rich fit, then the residual.
 struct Rows {
     x: DMatrix<f64>,
     y: DVector<f64>,
@@ -119,8 +117,8 @@ impl Fit {
         Some(Fit { scale, inverse, solution })
     }
 
-    /// The residual of `rows`, each block b turned by (I − H_bb)^(−1/2), so that its variance is as if it
-    /// had not been fitted (Bell and McCaffrey 2002, "CR2").
+    /// The residual of `rows`, each block b multiplied by (I − H_bb)^(−1/2), so that its variance is that before the
+    /// fit (Bell and McCaffrey 2002, "CR2").
     fn unshrunk(&self, cell: &Cell, rows: &Rows) -> Vec<f64> {
         let left = &rows.y - &rows.x * &self.solution;
         let mut out = vec![0.0; left.len()];
@@ -136,7 +134,7 @@ impl Fit {
                 .unwrap_or_else(|| DMatrix::zeros(scaled.nrows(), scaled.ncols()));
             let hat = half.tr_mul(&half);
             let turn = (DMatrix::identity(to - from, to - from) - hat).symmetric_eigen();
-            // a block that the fit can follow altogether tells nothing of the noise
+            // a block that the fit can follow altogether carries no information on the noise
             let root = turn.eigenvalues.map(|e| e.max(0.04).sqrt().recip());
             let part = turn.eigenvectors.tr_mul(&left.rows(from, to - from));
             let part = &turn.eigenvectors * part.component_mul(&root);
@@ -146,7 +144,7 @@ impl Fit {
     }
 }
 
-/// The residual before whitening, in runs.
+/// The residual before whitening, by runs.
 fn raw_residual(cell: &Cell, rich: &[Placed], last: usize, fit: &Fit) -> Vec<Vec<f64>> {
     let mut left = vec![0.0; cell.windows.iter().max().map_or(0, |w| w + 1)];
     for (place, column) in &rich[cell.flight] {

@@ -1,4 +1,4 @@
-//! What one unit of each constant that a flight has of its own adds to its residual.
+//! Regressor columns of each flight's own constants.
 
 use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::gather::{Column, gather, rates};
@@ -9,7 +9,7 @@ use crate::weak_form::windows::{inertia, to_force_axes};
 use greylag_model::GreyBox;
 use greylag_physics::rigid_body::Vector;
 
-/// The columns of `flight` under `model`, in the order of [`PerFlight::constants`].
+/// Columns of `flight` under `model`, in the order of [`PerFlight::constants`].
 pub fn columns(asked: &PerFlight, model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let mut columns = Vec::new();
     if asked.askew_deg.is_some() {
@@ -21,7 +21,7 @@ pub fn columns(asked: &PerFlight, model: &GreyBox, flight: &Ready) -> Vec<Column
     columns
 }
 
-/// Of the trims, which are linear in the wrench.
+/// Columns of the trims, which are linear in the wrench.
 fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let count = model.coefficients().len();
     match trims::joined(model) {
@@ -30,8 +30,8 @@ fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     }
 }
 
-/// Of the angles by which the axes of gyros, accelerometers and path are turned: all that was measured in them moves,
-/// the angular acceleration included.
+/// Columns of the misalignment angles of gyros, accelerometers and path: all quantities measured in those axes
+/// rotate, the angular acceleration included.
 fn of_axes(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let angles = askew::NAMES.len();
     let mut columns = gather(&flight.acting, model.integrator, angles, |place, add| {

@@ -1,4 +1,4 @@
-//! Candidate columns with the tuned prior and the sensors' errors projected out, block by block.
+//! Candidate columns with the model's own coefficients and the sensor errors projected out, block by block.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -7,14 +7,14 @@ use crate::diagnose::regression::cells::{Cells, Placed};
 use crate::diagnose::regression::noise::Noise;
 use crate::diagnose::regression::whiten::Whitener;
 
-/// A known unknown: a coefficient of the prior, or a sensor's error.
+/// A nuisance parameter: a coefficient of the model, or a sensor error.
 #[derive(Clone, Debug)]
 pub struct Known {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// Its standard deviation as a prior; infinite for an asserted effect's.
+    /// Prior standard deviation; infinite for those of an asserted effect.
     pub width: f64,
-    /// What the prior says less the value at which the model was linearised.
+    /// Prior mean less the value at which the model was linearised.
     pub offset: f64,
 }
 
@@ -24,34 +24,35 @@ impl Known {
     }
 }
 
-/// Gram matrices of all candidate columns, and of the residual as the last one.
+/// Gram matrices of all candidate columns, the residual being the last one.
 pub struct Projected {
-    /// Of each block.
+    /// Gram matrix of each block.
     pub blocks: Vec<DMatrix<f64>>,
-    /// Of the pseudo-observations at the prior.
+    /// Gram matrix of the prior's pseudo-observations.
     pub prior: DMatrix<f64>,
-    /// Their sum.
+    /// Sum of all these matrices.
     pub total: DMatrix<f64>,
-    /// What the noise of each block alone gives with the candidate columns.
+    /// Products of the candidate columns with the noise of each block.
     pub noise: Vec<DVector<f64>>,
-    /// A square root of `prior` for the candidates: draws of the prior's error are this times unit ones.
+    /// Square root of `prior` for the candidates: multiplied by a unit normal vector, it gives a draw of the prior's
+    /// error.
     pub prior_root: DMatrix<f64>,
-    /// Values of the known unknowns fitted without any candidate, beyond where they are linearised.
+    /// Nuisance parameters fitted without any candidate, relative to the point of linearisation.
     pub tuned: DVector<f64>,
-    /// What a unit of each candidate column takes from the known unknowns' values.
+    /// Change of the nuisance parameters for a unit of each candidate column.
     pub taken: DMatrix<f64>,
-    /// Covariance of the known unknowns without any candidate.
+    /// Covariance of the nuisance parameters without any candidate.
     pub covariance: DMatrix<f64>,
-    /// Squared residual with its number of rows, block by channel.
+    /// Squared residual and number of rows, by block and channel.
     pub by_channel: Vec<[(f64, usize); 6]>,
     /// Projected rows of each cell.
     pub rows: Vec<DMatrix<f64>>,
 }
 
 impl Projected {
-    /// `placed`: flight by flight, the columns of the known unknowns (places 0..), of the candidates
-    /// behind them, and of the residual in the last place `last`; `shared`: what their product with the
-    /// residual is by shared noise alone, by place, zero beyond its end.
+    /// Projects the columns of `placed`: by flight, those of the nuisance parameters (from index 0), then the
+    /// candidates, and the residual at index `last`. `shared` is the part of their product with the residual due to
+    /// shared noise, by index, zero beyond its end.
     pub fn new(
         cells: &Cells,
         placed: &[Placed],
@@ -72,7 +73,7 @@ impl Projected {
             ay[(k, ny - 1)] -= shared_of(k);
             aa[(k, k)] += known.weight();
             ay[(k, ny - 1)] += known.weight() * known.offset;
-            // what neither data nor prior tells stays where it is
+            // a direction without information from data or prior stays where it is
             if aa[(k, k)] <= 0.0 {
                 aa[(k, k)] = 1.0;
             }
@@ -113,7 +114,7 @@ impl Projected {
         })
     }
 
-    /// Number of rows, channel by channel.
+    /// Number of rows of each channel.
     pub fn rows_by_channel(&self) -> [f64; 6] {
         std::array::from_fn(|c| self.by_channel.iter().map(|of| of[c].1 as f64).sum())
     }
@@ -123,8 +124,8 @@ impl Projected {
         self.total.ncols() - 1
     }
 
-    /// The Gram matrix that other columns in the places of these would have: of the candidates, less what they
-    /// take from the known unknowns; `whiteners` by channel.
+    /// Gram matrix of other columns at the candidates' indices, less their part along the nuisance parameters;
+    /// `whiteners` by channel.
     pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
         let (na, ny) = (self.taken.nrows(), self.taken.ncols());
         let mut gram = DMatrix::zeros(ny, ny);
@@ -136,13 +137,13 @@ impl Projected {
         gram
     }
 
-    /// The Gram matrices of the data as they are.
+    /// Gram matrices of the data as measured.
     pub fn grams(&self) -> Grams<'_> {
         let blocks = self.blocks.iter().collect();
         Grams { blocks, prior: &self.prior, total: self.total.clone() }
     }
 
-    /// The Gram matrices of `blocks`, some of which may be missing and some there several times.
+    /// Gram matrices of a resample: `blocks` may omit some and repeat others.
     pub fn resampled(&self, blocks: impl Iterator<Item = usize>) -> Grams<'_> {
         let blocks: Vec<&DMatrix<f64>> = blocks.map(|b| &self.blocks[b]).collect();
         let mut total = self.prior.clone();
@@ -151,17 +152,17 @@ impl Projected {
     }
 }
 
-/// Gram matrices of candidate columns and residual over a choice of blocks.
+/// Gram matrices of candidate columns and residual over a selection of blocks.
 pub struct Grams<'a> {
-    /// Of each block.
+    /// Gram matrix of each selected block.
     pub blocks: Vec<&'a DMatrix<f64>>,
-    /// Of the pseudo-observations at the prior.
+    /// Gram matrix of the prior's pseudo-observations.
     pub prior: &'a DMatrix<f64>,
-    /// Their sum.
+    /// Sum of all these matrices.
     pub total: DMatrix<f64>,
 }
 
-/// The inverse of a symmetric matrix whose rows may be of very different size.
+/// Inverse of a symmetric matrix whose rows may differ widely in size.
 pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = matrix.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt().recip());
     let n = matrix.nrows();
@@ -173,7 +174,7 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Rows whose squares are what the prior of the known unknowns weighs, the residual in the last column.
+/// Rows whose squares are the prior's weight of the nuisance parameters; the residual is the last column.
 fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     let mut root = -taken.clone();
     let last = root.ncols() - 1;
@@ -184,7 +185,7 @@ fn root_of_prior(known: &[Known], taken: &DMatrix<f64>) -> DMatrix<f64> {
     root
 }
 
-/// Products of the whitened columns of the `na` known unknowns with one another, and with the `ny` columns
+/// Products of the whitened columns of the `na` nuisance parameters with one another, and with the `ny` columns
 /// behind them.
 fn products_of_known(
     whitened: &[(Vec<usize>, DMatrix<f64>)],
@@ -209,7 +210,7 @@ fn products_of_known(
     (aa, ay)
 }
 
-/// Rows of the candidates and the residual less what the known unknowns take.
+/// Rows of the candidates and the residual less their part along the nuisance parameters.
 fn project(
     places: &[usize],
     z: &DMatrix<f64>,

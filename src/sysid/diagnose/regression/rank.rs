@@ -1,46 +1,46 @@
-//! The evidence for each candidate: penalised gain, block-robust Wald statistic, the smaller of both.
+//! Evidence for each candidate: the smaller of the penalised gain and the block-robust Wald statistic.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnose::regression::projected::{Grams, scaled_inverse};
 
-/// Where a candidate is linearised.
+/// A point at which a candidate is linearised.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// Values of all its coefficients.
     pub values: Vec<f64>,
-    /// Candidate column of its contribution there; `None` for one that is linear, at zero.
+    /// Candidate column of its contribution there; `None` for a linear candidate, whose point is zero.
     pub contribution: Option<usize>,
-    /// Its free coefficients: place in `values`, candidate column of the derivative, lowest and highest
-    /// value up to which the linearisation is trusted.
+    /// Free coefficients: index in `values`, candidate column of the derivative, lowest and highest value within
+    /// which the linearisation is used.
     pub free: Vec<(usize, usize, [f64; 2])>,
 }
 
-/// A candidate effect as columns.
+/// A candidate effect in terms of columns.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// Its id.
+    /// Identifier of the effect.
     pub id: &'static str,
-    /// Where it is linearised; one place for linear ones.
+    /// Points of linearisation; a single one for linear candidates.
     pub points: Vec<Point>,
-    /// Independent rows in the channels in which it acts.
+    /// Number of independent rows in the channels in which it acts.
     pub support: f64,
     /// Channels in which it acts.
     pub channels: [bool; 6],
 }
 
-/// What a candidate reaches.
+/// Score of a candidate.
 #[derive(Clone, Debug)]
 pub struct Score {
-    /// The smaller of `fall` less d ln n and `wald`.
+    /// Evidence, the smaller of `fall` less d ln n and `wald`.
     pub evidence: f64,
-    /// Block-robust Wald statistic.
+    /// Block-robust Wald statistic of the free coefficients.
     pub wald: f64,
-    /// What candidates are ordered by: the evidence where it is not positive, else the geometric mean of
-    /// penalised gain and Wald statistic. Far above chance, the smaller of the two alone would order by how
-    /// evenly an effect is spread over the blocks.
+    /// Ranking criterion: the evidence if it is not positive, else the geometric mean of penalised gain and Wald
+    /// statistic. Far above chance, the smaller of the two would rank by how evenly an effect is spread over the
+    /// blocks.
     pub order: f64,
-    /// Fall of the squared whitened error.
+    /// Reduction of the squared whitened error.
     pub fall: f64,
     /// Values of all coefficients.
     pub values: Vec<f64>,
@@ -48,20 +48,20 @@ pub struct Score {
     pub deviations: Vec<f64>,
     /// Weights of the candidate columns in the fitted contribution.
     pub weights: Vec<(usize, f64)>,
-    /// Which point it started from.
+    /// Index of the point that it started from.
     pub point: usize,
 }
 
-/// Products of the candidate columns with a residual, as a whole and block by block.
+/// Products of the candidate columns with a residual, in total and by block.
 pub struct Draw {
-    /// Over all blocks and the prior.
+    /// Product over all blocks and the prior.
     pub total: DVector<f64>,
-    /// Of each block.
+    /// Product over each block.
     pub blocks: Vec<DVector<f64>>,
 }
 
 impl Draw {
-    /// Of the data.
+    /// Products with the measured residual.
     pub fn measured(p: &Grams) -> Draw {
         let last = p.total.ncols() - 1;
         let of = |m: &DMatrix<f64>| m.view((0, last), (last, 1)).column(0).into_owned();
@@ -70,7 +70,7 @@ impl Draw {
 }
 
 impl Trial {
-    /// The best of its points under `draw`.
+    /// The best score over the trial's points under `draw`.
     pub fn score(&self, p: &Grams, draw: &Draw) -> Option<Score> {
         let scores = (0..self.points.len()).filter_map(|k| self.score_at(p, draw, k));
         scores.max_by(|a, b| a.fall.total_cmp(&b.fall))
@@ -118,8 +118,8 @@ impl Trial {
         })
     }
 
-    /// `step` kept where the linearisation is trusted, one coefficient after the other, and whether any
-    /// had to be held back.
+    /// `step` limited to where the linearisation is used, one coefficient after the other, and whether any
+    /// coefficient was limited.
     fn within(
         &self,
         point: &Point,
@@ -160,13 +160,13 @@ impl Trial {
     }
 }
 
-/// x'b and x'Sx for the contribution x that `weights` make.
+/// Products x'b and x'Sx for the contribution x that `weights` define.
 fn along(weights: &[(usize, f64)], gram: &DMatrix<f64>, product: &DVector<f64>) -> (f64, f64) {
     let linear = weights.iter().map(|(c, w)| w * product[*c]).sum();
     (linear, quadratic(weights, weights, gram))
 }
 
-/// u'Sv.
+/// Bilinear form u'Sv.
 pub fn quadratic(u: &[(usize, f64)], v: &[(usize, f64)], gram: &DMatrix<f64>) -> f64 {
     u.iter().map(|(i, a)| v.iter().map(|(j, b)| a * b * gram[(*i, *j)]).sum::<f64>()).sum()
 }
@@ -179,7 +179,7 @@ fn pick(vector: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
     DVector::from_iterator(columns.len(), columns.iter().map(|c| vector[*c]))
 }
 
-/// θ' V⁻¹ θ with the blocks' own scatter in V, and the standard deviations.
+/// Wald statistic θ' V⁻¹ θ with the blocks' scatter in V, and the standard deviations.
 fn joint_wald(
     p: &Grams,
     draw: &Draw,
@@ -205,7 +205,7 @@ fn joint_wald(
     (wald, deviations)
 }
 
-/// The same for the amount of a fixed contribution.
+/// The same for the amplitude of a fixed contribution.
 fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, square: f64) -> f64 {
     if square <= 0.0 {
         return 0.0;
@@ -221,8 +221,8 @@ fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, squar
     if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
 }
 
-/// Standard deviations of the first of `columns` fitted together: by the noise alone, and by the scatter
-/// of the blocks of `null`.
+/// Standard deviations of the first of `columns` fitted together: from the noise alone, and from the scatter of the
+/// blocks of `null`.
 pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
     let inverse = scaled_inverse(&select(&p.total, columns))?;
     let zero = DVector::zeros(columns.len());

@@ -1,4 +1,4 @@
-//! What the sensors may still have wrong after the reconstruction.
+//! Priors of the sensor errors that remain after the reconstruction.
 
 use crate::diagnose::regression::columns::SENSORS;
 use crate::flight_path::reconstruction::Reconstruction;
@@ -24,34 +24,34 @@ pub const NAMES: [&str; SENSORS] = [
     "blur_actuators",
 ];
 
-/// Name of the actuators' lateness.
+/// Name of the actuators' delay.
 pub const LATE: &str = "skew_actuators";
-/// Its place in [`NAMES`].
+/// Index of the actuators' delay in [`NAMES`].
 pub const LATE_PLACE: usize = SENSORS - 2;
-/// Place of the actuators' blur.
+/// Index of the actuators' blur.
 pub const BLUR_PLACE: usize = SENSORS - 1;
 
-/// Least standard deviations: rad/s, rad, a share, m/s², s; a filter that knows only its own errors states
-/// less than it has.
+/// Least standard deviations (rad/s, rad, relative, m/s², s), since a filter's covariance covers only the errors it
+/// models.
 const FLOOR: [f64; SENSORS - 3] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
-/// Prior width of the time, s, by which angular accelerations follow the moments: a simulator that steps by
-/// explicit Euler at 400 Hz has 1.25 ms, a gyro's low-pass filter of 100 Hz 1.6 ms.
+/// Prior width of the delay of angular accelerations behind the moments, s: a simulator with explicit Euler steps at
+/// 400 Hz has 1.25 ms, a gyro's low-pass filter of 100 Hz 1.6 ms.
 const MOMENTS_LATE: f64 = 1.5e-3;
-/// The same where the log holds a simulator's own steps, which are compared as such.
+/// The same if the log holds a simulator's own steps, which are compared as such.
 const MOMENTS_ON_TIME: f64 = 1e-6;
-/// Prior width of the actuators' clock, samples: ±1.5 samples are its 95 % interval.
+/// Prior width of the actuators' delay, samples: its 95 % interval is ±1.5 samples.
 const SKEW_SAMPLES: f64 = 0.77;
-/// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a part of a
-/// sample is anything between the value then and the mean of both samples beside it, which has 1/8.
+/// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a fraction of a
+/// sample lies between the present value and the mean of both neighbouring samples, whose blur is 1/8.
 pub const BLURRED: [f64; 2] = [1.0 / 16.0, 1.0 / 24.0];
 
-/// What each is taken for before anything is fitted.
+/// Prior mean of each sensor error.
 pub fn mean(which: usize) -> f64 {
     if which == BLUR_PLACE { BLURRED[0] } else { 0.0 }
 }
 
-/// Prior widths of the sensor errors of a flight whose samples are `dt` (s) apart.
+/// Prior widths of the sensor errors of a flight with a sampling interval of `dt` (s).
 pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
     let stated = |name: &str| {
         // the vanes share a clock

@@ -1,8 +1,8 @@
-//! Noise that columns share with the residual, and how much it feigns.
+//! Noise shared by columns and residual, and the spurious evidence it causes.
 //!
-//! Gyro noise and the path's error stand in the residual as well as in the columns, whose products are
-//! then not zero on average. They are estimated by disturbing the flights once more with noise of the same
-//! kind: what that adds to column and residual has the same average product.
+//! Gyro noise and the path's error enter the residual as well as the columns, so their products are not zero on
+//! average. The bias is estimated by disturbing the flights again with noise of the same kind: the products of the
+//! resulting changes of column and residual have the same mean.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -13,16 +13,16 @@ use crate::flight_path::reconstruction::Reconstruction;
 use crate::weak_form::prepared::Prepared;
 use greylag_num::stream::stream;
 
-/// Random stream of the disturbance.
+/// Random stream for the disturbance.
 const DISTURBANCE: u64 = 85;
 
-/// What the path's V, α and β are made of: the noise of their sensors, and how much of the past a sample
-/// keeps in the smoother.
+/// Error of the path's V, α and β: noise of their sensors, and the share of the past that the smoother keeps in a
+/// sample.
 pub type PathError = [[f64; 2]; 3];
 
-/// The steady smoother of a flight whose samples are `dt` (s) apart, which weighs the measured value
-/// against the integrated rates: with variances R of the measurement and q of a step of the integration, it
-/// remembers √(R/q) samples to either side.
+/// The steady-state smoother of a flight with a sampling interval of `dt` (s), which weighs the measured value
+/// against the integrated rates: with variances R of the measurement and q of an integration step, its memory is
+/// √(R/q) samples to either side.
 pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let [fx, fy, fz] = flight.force_noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|x| if x.is_finite() { x } else { 0.0 });
@@ -39,8 +39,8 @@ pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
 }
 
-/// `flight` with noise of its inertial sensors, its vanes and its airspeed once more, as they go through the
-/// smoother of its path; `which` are the flight's number and that of the draw.
+/// `flight` disturbed again with noise of its inertial sensors, vanes and airspeed, filtered as by the smoother of
+/// its path; `which` holds the index of the flight and that of the draw.
 pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 2]) -> Prepared {
     let mut random = stream(seed, &[DISTURBANCE, which[0] as u64, which[1] as u64]);
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
@@ -81,8 +81,8 @@ pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 
     out
 }
 
-/// First-order low-pass filters forward and backward, each of which keeps `kept` of the past; they start
-/// from the mean of the first samples that they remember.
+/// First-order low-pass filters forward and backward, which keep `kept` of the past; they start from the mean of the
+/// first samples within their memory.
 fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     let pass = |x: &mut dyn Iterator<Item = f64>, start: f64| {
         let mut y = start;
@@ -101,8 +101,8 @@ fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     back
 }
 
-/// Products of what a disturbance adds to the columns before `last` with what it adds to the residual in
-/// the place `last`, flight by flight; columns in the same place in `before` and `after` are the same one.
+/// Products of a disturbance's changes of the columns before `last` with its change of the residual at index `last`,
+/// by flight; the same index in `before` and `after` means the same column.
 pub fn products(
     cells: &Cells,
     before: &[Placed],
@@ -128,7 +128,7 @@ pub fn products(
     sums
 }
 
-/// `after` less `before`, place by place; channels that one of them lacks stay empty.
+/// `after` less `before`, index by index; channels missing in one of them stay empty.
 fn differences(before: &Placed, after: &Placed) -> Placed {
     let of = |(place, new): &(usize, Column)| {
         let (_, old) = before.iter().find(|(p, _)| p == place)?;

@@ -1,14 +1,14 @@
 //! Autoregressive whitening of a channel.
 
-/// Share of the variance that is taken for white, so that no frequency counts as free of noise.
+/// Share of the variance treated as white, so that no frequency counts as free of noise.
 const FLOOR: f64 = 1e-3;
 
-/// Predictors of a value from those before it, for as many as there are, up to an order.
+/// Linear predictors of a value from those before it: of each order up to the largest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Whitener {
-    /// `predictors[k]`: weights of the k values before, the nearest first.
+    /// Weights of the k previous values in `predictors[k]`, the nearest first.
     predictors: Vec<Vec<f64>>,
-    /// Standard deviation of what each leaves.
+    /// Standard deviation of each predictor's residual.
     deviations: Vec<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Whitener {
         fitted
     }
 
-    /// `run` less what its past predicts, in units of the standard deviation.
+    /// Prediction residual of `run`, in standard deviations.
     pub fn apply(&self, run: &[f64]) -> Vec<f64> {
         let order = self.predictors.len() - 1;
         (0..run.len())
@@ -58,7 +58,7 @@ impl Whitener {
     }
 }
 
-/// Mean of x(k) x(k + lag), over the count of all values, which keeps the sequence positive definite.
+/// Mean of x(k) x(k + lag) over the count of all values, which keeps the sequence positive definite.
 fn autocovariance(runs: &[Vec<f64>], lag: usize) -> f64 {
     let count: usize = runs.iter().map(Vec::len).sum();
     let of = |run: &Vec<f64>| run.iter().zip(run.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();

@@ -1,7 +1,6 @@
-//! What an effect must pass besides its evidence: held-out segments, bootstraps, the flights' agreement.
+//! Checks of an effect beyond its evidence: held-out segments, bootstraps, agreement of the flights.
 //!
-//! Here they are computed; the thresholds that they are held against are in `stepwise/examine.rs` and
-//! `stepwise/judge.rs`.
+//! They are computed here; their thresholds are in `stepwise/examine.rs` and `stepwise/judge.rs`.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -15,31 +14,31 @@ use crate::diagnose::regression::rank::{Draw, Point, Score, Trial, quadratic};
 use crate::diagnose::search::round::Round;
 use greylag_num::stream::stream;
 
-/// Folds of the held-out segments.
+/// Number of folds of the held-out segments.
 const FOLDS: usize = 5;
-/// Random stream of the bootstraps.
+/// Random stream for the bootstraps.
 const BOOTSTRAPS: u64 = 82;
-/// Contributions that correlate more than this cannot be distinguished.
+/// Correlation beyond which contributions cannot be distinguished.
 pub const ALIKE: f64 = 0.9;
-/// Nor those whose evidence is this close.
+/// Difference of evidence below which effects cannot be distinguished.
 pub const CLOSE: f64 = 10.0;
-/// Squared error per row by which the level of the noise may be off: with nothing missing, −0.03 to 0.07.
+/// Uncertainty of the noise level, as squared error per row: with nothing missing it was −0.03 to 0.07.
 const UNSURE: f64 = 0.1;
-/// Standard deviations of the noise's square beyond which what an effect leaves is no chance.
+/// Standard deviations of the noise's square beyond which a remaining residual is significant.
 const DOUBT: f64 = 4.0;
-/// Least share of a flight's information on an amount that its excitation gives, and not the noise of its columns.
+/// Least share of a flight's information on an amount that must come from its excitation rather than from noise in
+/// its columns.
 const LEAST_SIGNAL: f64 = 0.5;
-/// Strain, in prior standard deviations, of the model's own coefficients: a candidate that takes more of it may be
-/// these coefficients by another name.
-const STRAIN: f64 = 5.0;
-/// Least share of what such a candidate takes in all that is this strain.
-const RELIEF: f64 = 0.9;
-/// Candidates that a bootstrap lets compete.
+/// Reduction, in prior standard deviations, of the prior's misfit beyond which a candidate may merely replace an
+/// adjustment of existing coefficients.
+const PRIOR_MISFIT: f64 = 5.0;
+/// Least share of such a candidate's reduction that must be prior misfit for it to count as such.
+const PRIOR_SHARE: f64 = 0.9;
+/// Number of candidates that compete in a bootstrap.
 const COMPETING: usize = 8;
 
-/// Share of the squared error beyond noise that `score` takes from segments that its amounts were not
-/// fitted on; segments of a block's length, every fifth one held out in turn, in the channels in which
-/// the candidate acts.
+/// Share of the squared error beyond noise that `score` removes from segments that its amounts were not fitted to;
+/// segments have a block's length, every fifth one is held out in turn, in the channels in which the candidate acts.
 pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     let p = &round.projected;
     let last = p.width();
@@ -71,7 +70,7 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
-/// What a model leaves beyond noise.
+/// Squared error of a model beyond noise.
 #[derive(Clone, Debug)]
 pub struct Beyond {
     excess: [f64; 6],
@@ -79,8 +78,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// Of the model of `round`, which has no candidates: a fit with the columns of all of them follows the
-    /// noise that stands in these, and leaves down to half of it in the moments.
+    /// The error of the model of `round`, which must have no candidates: a fit with all candidates' columns follows
+    /// their noise and leaves as little as half of it in the moments.
     pub fn of(round: &Round) -> Beyond {
         let only = |c: usize| std::array::from_fn(|k| k == c);
         Beyond {
@@ -89,8 +88,7 @@ impl Beyond {
         }
     }
 
-    /// The share that is left in `channels` beside `fall`, which an effect took from them, if that is more than
-    /// chance leaves.
+    /// Share remaining in `channels` beside `fall`, which an effect removed from them, if it exceeds chance.
     pub fn share(&self, channels: &[usize], fall: f64) -> Option<f64> {
         let own = |of: &[f64; 6]| channels.iter().map(|c| of[*c]).sum::<f64>();
         let (left, rows) = (own(&self.excess), own(&self.rows));
@@ -109,13 +107,13 @@ pub fn excess(round: &Round, channels: &[bool; 6]) -> f64 {
     blocks.map(of).sum::<f64>() - rows(round, channels)
 }
 
-/// Rows in `channels`.
+/// Number of rows in `channels`.
 fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
     let all = round.projected.rows_by_channel();
     (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
 }
 
-/// What may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
+/// Directions that may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
 fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     match trial.points[score.point].contribution {
         None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
@@ -123,24 +121,25 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     }
 }
 
-/// Whether `score` is the model's own figure by another name: what it takes is the strain of coefficients that
-/// the data has pulled far from their prior, and hardly any of the error, which they take as well.
-pub fn relieves(round: &Round, score: &Score) -> bool {
+/// Whether the candidate mostly replaces an adjustment of existing coefficients: its reduction is the prior misfit of
+/// coefficients that the data moved far from their prior, and hardly any error of the flights, which those
+/// coefficients remove as well.
+pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     let prior = &round.projected.prior;
     let last = round.projected.width();
     let linear: f64 = score.weights.iter().map(|(c, w)| w * prior[(*c, last)]).sum();
-    let relief = 2.0 * linear - quadratic(&score.weights, &score.weights, prior);
-    relief > STRAIN.powi(2) && relief > RELIEF * score.fall
+    let reduction = 2.0 * linear - quadratic(&score.weights, &score.weights, prior);
+    reduction > PRIOR_MISFIT.powi(2) && reduction > PRIOR_SHARE * score.fall
 }
 
-/// How much the contributions of two scores are alike: the correlation of what they add to the residual.
-pub fn likeness(round: &Round, a: &Score, b: &Score) -> f64 {
+/// Correlation of the contributions of two scores to the residual.
+pub fn correlation(round: &Round, a: &Score, b: &Score) -> f64 {
     let total = &round.projected.total;
     let of = |u: &Score, v: &Score| quadratic(&u.weights, &v.weights, total);
     of(a, b) / (of(a, a) * of(b, b)).sqrt()
 }
 
-/// Places in `scores` of those that these data cannot tell from the first one.
+/// Indices in `scores` of the effects that these data cannot distinguish from the one at `of`, itself included.
 pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> {
     let (_, own) = &scores[of];
     (0..scores.len())
@@ -149,13 +148,13 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
             let (trial, other) = &scores[*k];
             other.evidence > own.evidence - CLOSE
                 && !round.at_bound(*trial, other)
-                && likeness(round, own, other).abs() > ALIKE
+                && correlation(round, own, other).abs() > ALIKE
         })
         .collect()
 }
 
-/// Share of `count` block bootstraps in which one of the trials of `class` comes first among those of `open`,
-/// the best ones first; blocks are drawn flight by flight.
+/// Share of `count` block bootstraps in which one of the trials of `class` ranks first among those of `open`, which
+/// are sorted from the best; blocks are drawn flight by flight.
 pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
     let seed = round.seed;
     let by_flight: Vec<Vec<usize>> = (0..round.flights.len())
@@ -188,10 +187,10 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// The first free coefficient as each flight has it, with its standard deviation; NaN where a flight does not
-/// tell. Sensors are each flight's own and fitted anew; the other coefficients are the aircraft's, and known
-/// as well as all flights together know them. A flight that hardly rolls cannot find them again: its balance
-/// of small moments holds as well with all of them too small, and noise in the columns has it so.
+/// The first free coefficient estimated from each flight alone, with its standard deviation; NaN where a flight
+/// carries no information. Sensor errors are fitted anew for each flight; the other coefficients keep the estimates
+/// and uncertainties from all flights together. A flight with little excitation could not re-estimate them: noise in
+/// its regressors biases the coefficients toward zero (errors in variables).
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
     (0..round.flights.len())
         .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
@@ -210,9 +209,9 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let point = &trial.points[score.point];
     let columns: Vec<usize> = point.free.iter().map(|f| f.1).chain(point.contribution).collect();
     let (na, last) = (round.known.len(), round.known.len() + columns.len());
-    let feigned = &round.shared[flight];
-    let mut shared: Vec<f64> = feigned[..na].to_vec();
-    shared.extend(columns.iter().map(|c| feigned.get(na + c).copied().unwrap_or(0.0)));
+    let spurious = &round.shared[flight];
+    let mut shared: Vec<f64> = spurious[..na].to_vec();
+    shared.extend(columns.iter().map(|c| spurious.get(na + c).copied().unwrap_or(0.0)));
     let placed = alone(&round.placed, flight, na, &columns);
     let mut with_residual = placed.clone();
     let residual = round.placed[flight].iter().find(|(p, _)| *p == round.last)?;
@@ -232,7 +231,7 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     if contribution.is_some() {
         return Some([value, sd]);
     }
-    // of what moves the columns, the sensors' noise tells nothing: it only seems to be excitation
+    // of what moves the columns, the sensors' noise carries no information: it only looks like excitation
     let disturbed = alone(&round.disturbed, flight, na, &columns);
     let added = less(&disturbed, &placed);
     let feint = p.others(&cells, &added, &noise.whiteners);
@@ -245,7 +244,7 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     (share > LEAST_SIGNAL).then(|| [amounts[0], sd / share])
 }
 
-/// By how much what is left in `channels` once a candidate has taken `fall` exceeds the noise, at least 1.
+/// Ratio of the residual in `channels` after a reduction of `fall` to the noise, at least 1.
 fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     let own = |of: &[(f64, usize); 6]| (0..6).filter(|c| channels[*c]).map(|c| of[c]).collect();
     let all: Vec<Vec<(f64, usize)>> = p.by_channel.iter().map(own).collect();
@@ -254,7 +253,7 @@ fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// The known unknowns with the model's coefficients as all flights have them together with `score`'s effect.
+/// Nuisance parameters with the model's coefficients as estimated from all flights together with `score`'s effect.
 fn together(round: &Round, score: &Score) -> Vec<Known> {
     let p = &round.projected;
     let mut all = round.known.clone();
@@ -268,8 +267,7 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     all
 }
 
-/// The known columns of one flight and the candidate columns `columns`, numbered anew; the other flights have
-/// none.
+/// Nuisance columns of one flight and the candidate columns `columns`, renumbered; the other flights have none.
 fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
     let own = &placed[flight];
     let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
@@ -282,7 +280,7 @@ fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<
     all
 }
 
-/// The columns of `a` less those of `b` in the same places.
+/// Columns of `a` less those of `b` at the same indices.
 fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     let of = |(a, b): (&Placed, &Placed)| {
         let both = a.iter().filter_map(|(p, x)| Some((*p, x, &b.iter().find(|(q, _)| q == p)?.1)));
@@ -291,8 +289,8 @@ fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     a.iter().zip(b).map(of).collect()
 }
 
-/// Whether flights contradict the common `value`: the other sign beyond doubt, or another amount beyond
-/// doubt and by half.
+/// Whether flights contradict the common `value`: significantly the other sign, or a significantly different amount
+/// by at least half of it.
 pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
     flights.iter().any(|[own, sd]| {
         let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;

@@ -1,8 +1,8 @@
-//! How late the actuators are recorded, as forces and moments together tell it.
+//! Delay of the recorded actuators, estimated from forces and moments together.
 //!
-//! A surface that acts late is like a surface recorded early, but the throttle hangs on the same clock: what
-//! it does to the forces tells the two apart, and free runs, in which the thrust is only an acceleration, do
-//! not.
+//! A surface with a delay looks like a surface recorded early, but the throttle is recorded on the same clock: its
+//! effect on the forces distinguishes the two. Free runs, in which thrust is only an acceleration, do not distinguish
+//! them.
 
 use crate::diagnose::regression::columns::SENSORS;
 use crate::diagnose::regression::sensors;
@@ -14,12 +14,12 @@ use crate::per_flight::PerFlight;
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// Times that everything is fitted again around the last values.
+/// Number of fits, each relinearised at the last estimate.
 const PASSES: usize = 4;
-/// Seed of what is random about the noise that columns share.
+/// Seed of the random draws of shared noise.
 const SEED: u64 = 1;
 
-/// What the reconstruction leaves in doubt of a flight.
+/// Uncertainty of a flight after its reconstruction.
 #[derive(Clone, Copy, Debug)]
 pub struct Doubt {
     sensors: [f64; SENSORS],
@@ -27,22 +27,23 @@ pub struct Doubt {
 }
 
 impl Doubt {
-    /// Of `flight`, put on a clock whose samples are `dt` (s) apart.
+    /// Sensor doubts of `flight` at a sampling interval of `dt` (s).
     pub fn of(flight: &Reconstruction, dt: f64) -> Doubt {
         Doubt { sensors: sensors::widths(flight, dt), path: shared::path_error(flight, dt) }
     }
 }
 
-/// A model as forces and moments have it, with the clocks that go with it.
+/// A model fitted to forces and moments, with the actuators' delays estimated along.
 pub struct Clocks {
-    /// The model with its coefficients fitted.
+    /// The model with its fitted coefficients.
     pub model: GreyBox,
-    /// How late each flight's actuators are recorded, s, with standard deviation.
+    /// Delay of each flight's recorded actuators, s, and its standard deviation.
     pub late: Vec<[f64; 2]>,
 }
 
-/// Fits `model`, each flight with what it has of its own by `per_flight`, whose first `given` coefficients have their prior widths and whose others have none, together
-/// with the clocks of `flights`; `None` if they do not hold the model at all.
+/// Fits `model` to `flights` together with their actuator delays and the constants of each flight that `per_flight`
+/// selects. The first `given` coefficients have their prior widths, the others have no prior. `None` if the model
+/// cannot be evaluated over the flights.
 pub fn clocks(
     model: &GreyBox,
     given: usize,

@@ -1,18 +1,19 @@
-//! What the sums over samples leave in a fit, by the same fit on every other sample.
+//! Discretisation error of a fit, estimated by the same fit on every other sample.
 //!
-//! An interval knows of noise. Between two samples of 20 or 40 ms a surface and a roll rate move on, and what a sum over
-//! samples makes of that is no noise: it is the same in every flight and does not average out.
+//! An interval covers noise only. Between two samples of 20 or 40 ms surfaces and rates move on, and the resulting
+//! error of a sum over samples is not noise: it is the same in every flight and does not average out.
 
 use crate::diagnose::search::round::{Problem, Round};
 use crate::diagnose::search::settling::SETTLING;
 use greylag_logs::Sampling;
 
-/// Part of the change from half the samples to all of them that is left with all, taken as a standard deviation. Sums whose error grows
-/// with the square of the time between samples leave a third.
+/// Share of the change between half and all samples that remains with all samples, used as a standard deviation. A
+/// third holds for sums whose error grows with the square of the sampling interval.
 const LEFT: f64 = 1.0 / 3.0;
 
-/// Standard deviation that the sums leave in each coefficient of the model of `round`, in the order of the model's list and in their
-/// units. Zero where nothing is known of it: without a fit on half the samples, and in a simulator's own steps, whose sums are exact.
+/// Standard deviation of each coefficient of the model of `round` due to the discretisation, in the order of the
+/// model's list and in their units. Zero where it is not known, that is without a fit on half the samples, and for a
+/// simulator's own steps, whose sums are exact.
 pub fn left_by_sums(problem: &Problem, round: &Round) -> Vec<f64> {
     let fine = round.tuned();
     let none = vec![0.0; fine.coefficients().len()];
@@ -96,7 +97,7 @@ mod tests {
         }
     }
 
-    /// Error of the fitted roll damping, what the noise and what the sums leave in it.
+    /// Error of the fitted roll damping, and its standard deviations due to noise and to discretisation.
     fn roll_damping(every: usize, sampling: Sampling) -> [f64; 3] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         let mut model = GreyBox::load(&path).unwrap();

@@ -1,14 +1,14 @@
-//! Whether the flights move what a diagnosis needs moved.
+//! Check that the flights contain the excitation that a diagnosis needs.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::prepared::Prepared;
 use greylag_logs::rudder::MOVES_RAD;
 
-/// Least flight time, s.
+/// Least duration of flight, s.
 const LEAST_S: f64 = 10.0;
 
-/// What must move, by how much at least (standard deviation), its unit, and what to fly for it.
+/// A requirement: variable, its least standard deviation, unit, and the manoeuvre that excites it.
 type Need = (&'static str, fn(&Instant) -> f64, f64, f64, &'static str, &'static str);
 
 const NEEDS: [Need; 4] = [
@@ -18,10 +18,10 @@ const NEEDS: [Need; 4] = [
     ("the angle of attack", |i| i.state.alpha, 0.4, 57.3, "°", "pull-ups and a slow flight"),
 ];
 
-/// Notes on what hardly moves.
+/// Notes on variables with little excitation.
 ///
 /// # Errors
-/// If there is too little flight, or aileron, elevator and angle of attack all hardly move.
+/// There is too little flight, or aileron, elevator and angle of attack all hardly move.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
     if seconds < LEAST_S {
@@ -44,7 +44,8 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .collect())
 }
 
-/// How little something moves; what never moves is another channel's fault, not the pilot's.
+/// The variation of a variable in words; a variable that never moves indicates a missing channel rather than the
+/// manoeuvre.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
         true => format!(
@@ -59,7 +60,7 @@ pub fn moves_rudder(flights: &[Prepared]) -> bool {
     deviation(flights, |i| i.controls.rudder) > MOVES_RAD
 }
 
-/// Standard deviation within flights.
+/// Standard deviation within the flights, all taken together.
 fn deviation(flights: &[Prepared], of: fn(&Instant) -> f64) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for flight in flights {

@@ -1,4 +1,4 @@
-//! What chance reaches: the best candidate's evidence in flights without a missing effect.
+//! Level of chance: the best candidate's evidence in flights without a missing effect.
 
 use nalgebra::DVector;
 use rand::RngExt;
@@ -9,11 +9,11 @@ use crate::diagnose::regression::projected::Projected;
 use crate::diagnose::regression::rank::{Draw, Trial};
 use greylag_num::stream::stream;
 
-/// Random streams of nulls.
+/// Random stream for the null flights.
 const NULLS: u64 = 80;
 
-/// The draw number `k` of a null flight: the noise of each block as it was, its sign by chance, and the
-/// prior wrong by chance within its widths. The channels of a block keep their common sign.
+/// Null flight `k`: the noise of each block with a random sign, and prior errors drawn within the prior's widths. The
+/// channels of a block share one sign.
 pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
     let mut random = stream(seed, &[NULLS, k as u64]);
     let mut total = DVector::zeros(p.width());
@@ -47,8 +47,8 @@ pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64
     best
 }
 
-/// The quantile 1 − `level` of values of which `sample` is one, by a Gumbel law with the sample's mean
-/// and deviation: that of the largest of many.
+/// The quantile 1 − `level` of the distribution of `sample`, as a Gumbel law with the sample's mean and standard
+/// deviation, which approximates the maximum of many.
 pub fn threshold(sample: &[f64], level: f64) -> f64 {
     let finite: Vec<f64> = sample.iter().copied().filter(|x| x.is_finite()).collect();
     let count = finite.len() as f64;

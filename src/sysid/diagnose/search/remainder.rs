@@ -1,4 +1,4 @@
-//! What a flexible model without physics could still remove, cross-validated by flight.
+//! Error that a flexible model without physics could still remove, cross-validated by flight.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::RngExt;
@@ -9,27 +9,27 @@ use crate::diagnose::search::nulls::threshold;
 use crate::diagnose::search::round::Round;
 use greylag_num::stream::stream;
 
-/// Ridges that are tried, as shares of a feature's mean square.
+/// Ridge parameters tried, as shares of a feature's mean square.
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
-/// Random stream of the null draws.
+/// Random stream for the null draws.
 const NULLS: u64 = 83;
-/// Fewest flights that are folds of their own; fewer are cut in this many pieces.
+/// Least number of folds; with fewer flights, they are divided into this many parts.
 const FOLDS: usize = 3;
 
-/// What is still to be had, channel by channel.
+/// Removable error, channel by channel.
 #[derive(Clone, Debug)]
 pub struct Remainder {
-    /// Fall of the squared whitened error on flights that the flexible model was not fitted on.
+    /// Reduction of the squared whitened error on flights that the flexible model was not fitted to.
     pub removable: [f64; 6],
-    /// What chance reaches.
+    /// Reduction that chance reaches, by channel.
     pub threshold: [f64; 6],
-    /// The same over all channels.
+    /// Reduction over all channels.
     pub total: f64,
-    /// What chance reaches over all channels.
+    /// Reduction that chance reaches over all channels.
     pub total_threshold: f64,
 }
 
-/// One channel: features of each fold, targets, ridge solvers.
+/// One channel: features of each fold, targets, ridge solutions.
 struct Channel {
     folds: Vec<Fold>,
 }
@@ -39,11 +39,12 @@ struct Fold {
     target: DVector<f64>,
     noise: DVector<f64>,
     blocks: Vec<usize>,
-    /// Solvers fitted on the other folds, a ridge each.
+    /// Factorisations fitted on the other folds, one for each ridge parameter.
     others: Vec<Cholesky<f64, Dyn>>,
 }
 
-/// What a flexible model could remove of what `round` leaves; the thresholds from `count` draws of noise.
+/// Error that a flexible model could remove from the residual of `round`; the thresholds come from `count` draws of
+/// noise.
 pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
     let channels: Vec<Option<Channel>> =
         (0..6).into_par_iter().map(|c| channel(round, c)).collect();
@@ -111,8 +112,8 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
 /// Features, noise and residual of one cell.
 type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
 
-/// Whitened features of unit size, noise and residual of each cell, with what the known unknowns can follow
-/// of them taken out: by plain least squares, else a flexible model would find again what shared noise feigns.
+/// Whitened features of unit size, noise and residual of each cell, with the nuisance parameters projected out: by
+/// plain least squares, since otherwise a flexible model would pick up the bias from shared noise.
 fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
     let na = round.known.len();
     let mut all = Vec::new();
@@ -164,8 +165,8 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> 
 }
 
 impl Channel {
-    /// The best ridge's fall of the squared error of folds left out, not below zero; of the data, or of
-    /// noise whose blocks have `signs`.
+    /// Reduction of the squared error of held-out folds by the best ridge parameter, at least zero; for the data, or
+    /// for noise whose blocks have `signs`.
     fn gain(&self, signs: Option<&[f64]>) -> f64 {
         let targets: Vec<DVector<f64>> = self
             .folds

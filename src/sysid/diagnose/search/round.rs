@@ -1,4 +1,4 @@
-//! One round of the search: a model linearised over all flights, with every candidate's columns.
+//! A round of the search: a model linearised over all flights, with every candidate's columns.
 
 mod known;
 mod shared_noise;
@@ -19,88 +19,88 @@ use greylag_model::GreyBox;
 use known::{curved, known};
 use shared_noise::{Setting, shared, sum};
 
-/// Times a nonlinear candidate is linearised anew where it fits best.
+/// Largest number of times a nonlinear candidate is linearised again at its best fit.
 const REFINEMENTS: usize = 3;
-/// Times that the clocks' second order is taken anew.
+/// Iterations of the second-order correction of the clocks.
 const CURVATURES: usize = 2;
-/// A nonlinear candidate is linearised anew if it takes more than this share of the squared error that the best takes.
+/// A nonlinear candidate is linearised again if its reduction exceeds this share of the largest one.
 const WORTH: f64 = 0.2;
-/// It is linearised anew, too, if its evidence is within this of the best one's.
+/// It is also linearised again if its evidence is within this of the largest one.
 const CLOSE: f64 = 40.0;
-/// A candidate whose amount is more than so many times the one that it was linearised with started from nothing.
+/// A candidate was linearised near zero if its amount is more than this many times the one at the linearisation.
 const NOTHING: f64 = 1e3;
 
-/// What all rounds share.
+/// Data that all rounds share.
 #[derive(Clone)]
 pub struct Problem {
-    /// The flights.
+    /// The flights on the model's clock.
     pub flights: Vec<Prepared>,
-    /// Prior value and width of each coefficient of the model given.
+    /// Prior mean and width of each coefficient of the model as given.
     pub prior: Vec<(f64, f64)>,
     /// Errors of the reconstructed paths.
     pub path: Vec<shared::PathError>,
-    /// Prior widths of the sensors' errors, flight by flight.
+    /// Prior widths of the sensor errors, by flight.
     pub sensors: Vec<[f64; SENSORS]>,
-    /// What each flight has of its own beside them.
+    /// Constants estimated for each flight beside them.
     pub per_flight: PerFlight,
-    /// Seed of everything random.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
-/// What a round takes from elsewhere.
+/// Results of other rounds that a round may use.
 #[derive(Clone, Copy, Default)]
 pub struct Beside<'a> {
-    /// The noise, if it is not estimated anew.
+    /// The noise; estimated from this round if `None`.
     pub noise: Option<&'a Noise>,
-    /// The model by whose accelerations mass and inertia act, if its own are too far off.
+    /// Model that predicts the accelerations in the columns of mass and inertia, if the round's own is too far off.
     pub accelerating: Option<&'a GreyBox>,
 }
 
-/// A model linearised.
+/// A model linearised over the flights.
 pub struct Round {
-    /// The model.
+    /// The linearised model.
     pub model: GreyBox,
-    /// The flights under it.
+    /// The flights under this model.
     pub flights: Vec<Ready>,
-    /// Their cells.
+    /// Cells of the flights.
     pub cells: Cells,
-    /// Coefficients, what each flight has of its own, and sensor errors fitted along.
+    /// Nuisance parameters: coefficients, each flight's own constants, and sensor errors.
     pub known: Vec<Known>,
-    /// Place of each known coefficient in the model's list.
+    /// Index of each free coefficient in the model's list.
     pub coefficients: Vec<usize>,
-    /// What each flight has of its own, which stands behind the coefficients, flight by flight.
+    /// Each flight's own constants, which follow the coefficients, by flight.
     pub per_flight: PerFlight,
-    /// The candidates.
+    /// The candidates with their columns.
     pub trials: Vec<Trial>,
-    /// Everything projected.
+    /// Columns with the nuisance parameters projected out.
     pub projected: Projected,
-    /// Columns flight by flight: known, candidates, residual, features.
+    /// Columns by flight: nuisance parameters, candidates, residual, features.
     pub placed: Vec<Placed>,
-    /// Place of the residual in them.
+    /// Index of the residual in them.
     pub last: usize,
-    /// The noise.
+    /// Noise of the channels.
     pub noise: Noise,
-    /// Coefficients of the model given; those behind have joined.
+    /// Number of coefficients of the model as given; later ones belong to effects that have joined.
     pub given: usize,
-    /// Seed of everything random.
+    /// Seed of all random draws.
     pub seed: u64,
-    /// The candidates as they are described.
+    /// Descriptions of the candidates.
     pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
-    /// What noise that columns share with the residual feigns, by place, flight by flight.
+    /// Spurious products from shared noise, by index, by flight.
     pub shared: Vec<Vec<f64>>,
-    /// The known columns and the linear candidates' of the flights with their noise once more, in the same
-    /// places.
+    /// Columns of the nuisance parameters and the linear candidates for the flights disturbed again, at the same
+    /// indices.
     pub disturbed: Vec<Placed>,
 }
 
 impl Round {
-    /// `model` with `entries` as candidates; `None` if the flights do not hold it at all.
+    /// Linearises `model` with `entries` as candidates; `None` if it cannot be evaluated over the flights.
     pub fn new(problem: &Problem, model: GreyBox, entries: &[Entry]) -> Option<Round> {
         Round::beside(problem, model, entries, Beside::default())
     }
 
-    /// The same with what another round or model knows.
+    /// The same with results of another round or model.
     pub fn beside(
         problem: &Problem,
         model: GreyBox,
@@ -158,8 +158,8 @@ impl Round {
         })
     }
 
-    /// The scores of all candidates, best evidence first; nonlinear ones near the top are linearised
-    /// again where they fit best.
+    /// Scores of all candidates, best evidence first; nonlinear ones near the top are linearised again at their best
+    /// fit.
     pub fn rank(&mut self) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
@@ -186,8 +186,8 @@ impl Round {
         scores
     }
 
-    /// Where a candidate is linearised next: at its best values; where it started from next to nothing, with the shape
-    /// constants that it had, whose derivatives there said nothing.
+    /// Next point of linearisation of a candidate: its best values. If it was linearised near zero, its shape
+    /// constants are kept, since their derivatives vanish there.
     fn next_place(&self, trial: &Trial, score: &Score) -> Vec<f64> {
         let start = &trial.points[score.point].values;
         let mut next = score.values.clone();
@@ -200,7 +200,7 @@ impl Round {
         next
     }
 
-    /// Adds places at which candidates are linearised; `false` if that cannot be done.
+    /// Adds points of linearisation; `false` if that is not possible.
     fn refine(&mut self, wanted: Vec<(&'static str, Vec<f64>)>) -> bool {
         self.refined.extend(wanted);
         let made = catalogue::columns(&self.model, &self.flights, &self.entries, &self.refined);
@@ -222,7 +222,7 @@ impl Round {
         true
     }
 
-    /// What noise that columns share with the residual feigns over all flights, by place.
+    /// Spurious products from shared noise over all flights, by index.
     pub fn shared(&self) -> Vec<f64> {
         sum(&self.shared)
     }
@@ -241,7 +241,7 @@ impl Round {
         scores
     }
 
-    /// Whether a free coefficient of the trial ended at its physical bound.
+    /// Whether a free coefficient of the trial is at its physical bound.
     pub fn at_bound(&self, trial: usize, score: &Score) -> bool {
         let trial = &self.trials[trial];
         let Some(entry) = self.entries.iter().find(|e| e.about.id == trial.id) else {
@@ -255,8 +255,7 @@ impl Round {
         })
     }
 
-    /// Wald statistic of all free constants of an effect that has joined against zero; `None` for one whose
-    /// constants are not amounts.
+    /// Wald statistic of all free constants of a joined effect against zero; `None` if its constants are not amounts.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");
         let operator = greylag_physics::inputs::Kind::from_id(id).is_some();
@@ -277,12 +276,12 @@ impl Round {
     }
 }
 
-/// The list's columns up to `place`.
+/// The columns of the list below index `place`.
 fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
 }
 
-/// Puts candidates and residual behind the known columns; the residual's place.
+/// Appends candidates and residual to the nuisance parameters' columns; returns the residual's index.
 fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready]) -> usize {
     let last = count + made.columns.first().map_or(0, Vec::len);
     for ((list, own), flight) in placed.iter_mut().zip(&made.columns).zip(flights) {
@@ -292,7 +291,7 @@ fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready])
     last
 }
 
-/// The columns of the rich fit: all but the derivatives of nonlinear candidates.
+/// Columns of the rich fit: all but the derivatives of nonlinear candidates.
 fn rich(placed: &[Placed], count: usize, trials: &[Trial]) -> Vec<Placed> {
     let curved = trials.iter().flat_map(|t| &t.points).filter(|p| p.contribution.is_some());
     let left_out: Vec<usize> = curved.flat_map(|p| p.free.iter().map(|f| count + f.1)).collect();

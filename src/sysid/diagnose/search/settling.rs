@@ -1,4 +1,4 @@
-//! Candidates ranked, and a model settled after one of them has joined.
+//! Ranking of the candidates, and tuning of a model after one of them has joined.
 
 use crate::diagnose::options::Options;
 use crate::diagnose::regression::rank::Score;
@@ -6,25 +6,26 @@ use crate::diagnose::search::nulls;
 use crate::diagnose::search::round::{Beside, Problem, Round};
 use greylag_model::GreyBox;
 
-/// Passes of tuning after an effect has joined, which is where nonlinear ones settle.
+/// Tuning passes after an effect has joined, in which nonlinear effects converge.
 pub const SETTLING: usize = 3;
-/// A change of mass or inertia that settles farther from where it was found than this share of it was found by
-/// the accelerations of a model that is too far off.
+/// If a mass or inertia change moves by more than this share while it is tuned, it was estimated with accelerations
+/// of a model that is too far off.
 const ASTRAY: f64 = 0.1;
 
-/// A round with its scores.
+/// A round with its candidates' scores.
 pub struct Ranked {
-    /// The round.
+    /// The ranked round.
     pub round: Round,
     /// The candidates, best evidence first.
     pub scores: Vec<(usize, Score)>,
-    /// Best evidence in null flights.
+    /// Best evidence in each null flight.
     pub nulls: Vec<f64>,
-    /// Evidence that is asked of a candidate.
+    /// Evidence that a candidate must exceed.
     pub threshold: f64,
 }
 
-/// Ranks the candidates of `round`, those of mass and inertia by better accelerations if its own are too far off.
+/// Ranks the candidates of `round`; those of mass and inertia with better accelerations if the model's own are too
+/// far off.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -39,9 +40,9 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     }
 }
 
-/// The round with the accelerations of its model once the best change of mass or inertia has joined and settled;
-/// `None` if none is called for. Where the inertia is grossly wrong the model's accelerations are, and so are the
-/// columns that are made of them: each flight has its own amount then, and all too little.
+/// The round with the accelerations of its model after the best change of mass or inertia has been added and tuned;
+/// `None` if that is not needed. With a grossly wrong inertia the model's accelerations are wrong, and so are the
+/// columns made from them: the estimates then differ between flights and are all too small.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {
@@ -56,7 +57,7 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let first = trial.points[score.point].free[0].0;
     let entry = round.entries.iter().find(|e| e.about.id == trial.id)?;
     let name = format!("{}.{}", trial.id, entry.about.coefficients[first].name);
-    // the first pass tells whether others are worth their time
+    // the first pass shows whether further passes are worthwhile
     let (model, _) = settled(problem, round, model, 1)?;
     let value = model.coefficients().iter().find(|c| c.name == name)?.value;
     if (value - score.values[first]).abs() <= ASTRAY * value.abs() {
@@ -67,7 +68,7 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     Round::beside(problem, round.model.clone(), &round.entries, beside)
 }
 
-/// `model` settled under the noise of `round`, and the squared error that it left before the last of `passes`.
+/// `model` tuned under the noise of `round`, with its squared error before the last of `passes`.
 pub fn settled(
     problem: &Problem,
     round: &Round,

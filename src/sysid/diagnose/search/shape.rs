@@ -1,9 +1,9 @@
-//! What products of what was flown still explain beside an effect, so that its formula has another shape than
-//! what is missing.
+//! Residual shape: products of states and deflections that still explain the residual beside an effect, which shows
+//! that the effect's formula differs from the true one.
 //!
-//! The flexible model of [`remainder`](super::remainder) must show on other flights what it learned, and sees
-//! only what is large. Here the question is one of a few terms, those that aerodynamic tables are made of, and a fit on
-//! the same flights is held against the noise of these.
+//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects large errors
+//! only. Here a few terms, as in aerodynamic tables, are fitted to the same flights and compared with their reduction
+//! of noise.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,52 +21,52 @@ use greylag_num::statistics::mean;
 
 /// States and deflections whose products are the terms.
 const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];
-/// Squares and products of each with each.
+/// Number of squares and pairwise products.
 const PRODUCTS: usize = NAMES.len() * (NAMES.len() + 1) / 2;
-/// Second derivatives of the surfaces, which is where a lag differs from a delay.
+/// Second derivatives of the deflections, in which a lag differs from a delay.
 const BENT: [&str; 2] = ["δa″", "δe″"];
-/// Terms of a channel.
+/// Number of terms of a channel.
 const TERMS: usize = PRODUCTS + BENT.len();
-/// Keeps terms apart that the flights hardly tell apart: a share of a term's square.
+/// Ridge parameter that keeps nearly collinear terms solvable, as a share of a term's square.
 const RIDGE: f64 = 1e-4;
-/// Standard deviations beyond which what the terms take is no chance.
+/// Standard deviations beyond which the terms' reduction is significant.
 const DOUBT: f64 = 4.0;
-/// Squared error per row that the terms may take of what sensors and path have left unsaid.
+/// Squared error per row that the terms may remove because of remaining errors of sensors and path.
 const UNSURE: f64 = 0.1;
-/// Squared error per row above which the terms by themselves say that something is missing: without anything missing,
-/// they take 0.13 at most.
+/// Squared error per row above which the terms alone indicate a missing effect; without one, they remove 0.13 at
+/// most.
 const ALARM: f64 = 0.15;
-/// Squared whitened error that second derivatives take of right models: up to 25.
+/// Squared whitened error that second derivatives may remove; with right models up to 25.
 const BENDING: f64 = 30.0;
 
-/// What the terms take of the squared whitened error, channel by channel.
+/// Reduction of the squared whitened error by the terms, by channel.
 #[derive(Clone, Debug)]
 pub struct Shape {
     channels: Vec<Taken>,
 }
 
-/// The same of one channel.
+/// Reduction in one channel.
 #[derive(Clone, Debug)]
 struct Taken {
-    /// Beyond what they take of noise.
+    /// Reduction beyond that of noise.
     left: f64,
-    /// Standard deviation of what they take of noise.
+    /// Standard deviation of the reduction of noise.
     doubt: f64,
     rows: f64,
-    /// The term that takes most by itself.
+    /// Index of the term that reduces the error most by itself.
     most: usize,
-    /// What the second derivatives take by themselves.
+    /// Reduction by the second derivatives alone.
     bent: f64,
 }
 
 impl Shape {
-    /// The term that what is left in `channel` goes with most, if so much is left that something is missing.
+    /// The term that correlates most with the residual of `channel`, if the residual indicates a missing effect.
     pub fn term(&self, channel: usize) -> Option<String> {
         self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
     }
 
-    /// The share that the terms take in `channels` beside `fall`, which effects took from them, if that is
-    /// more than chance, with the term that takes most.
+    /// Share that the terms remove in `channels` beside `fall`, the reduction by effects, if it is significant, with
+    /// the term that removes most.
     pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
         let left = self.left_in(channels, UNSURE)?;
         let own = channels.iter().map(|c| &self.channels[*c]);
@@ -74,8 +74,8 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// The share that second derivatives of the surfaces take, in whatever channel, beside `fall`, which an
-    /// effect took; zero if they take no more than they do of right models.
+    /// Share over all channels that second derivatives of the deflections remove beside `fall`, the reduction
+    /// by an effect; zero if it is not more than with right models.
     pub fn bends_beside(&self, fall: f64) -> f64 {
         let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
         bent / (bent + fall).max(f64::MIN_POSITIVE)
@@ -92,8 +92,8 @@ impl Shape {
     }
 }
 
-/// What the terms take of what `round`, a model without candidates, leaves; noise from `count` draws.
-/// `None` if they cannot be fitted.
+/// Reduction by the terms of the residual of `round`, a model without candidates, compared with `count` draws of
+/// noise. `None` if the terms cannot be fitted.
 pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     let na = round.known.len();
     let last = na + CHANNELS * TERMS;
@@ -121,8 +121,8 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     Some(Shape { channels: (0..CHANNELS).map(of).collect::<Option<_>>()? })
 }
 
-/// What terms with the Gram matrix `gram` take of a residual with which their products are `measured`, beside
-/// what they take of `draws` of noise.
+/// Reduction by terms with the Gram matrix `gram` and the products `measured` with a residual, compared with that of
+/// `draws` of noise.
 fn taken(
     gram: &DMatrix<f64>,
     measured: &DVector<f64>,
@@ -149,7 +149,7 @@ fn taken(
     })
 }
 
-/// The terms of `flight`, those of one channel after those of the other, each times the dynamic pressure.
+/// Terms of `flight`, channel by channel, each multiplied by dynamic pressure.
 fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> Vec<Column> {
     let sides = gather(&flight.acting, Integrator::Jsbsim, TERMS, |place, add| {
         let z = standard(variables(&flight.acting, place.segment, place.index), spread);
@@ -176,7 +176,7 @@ fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> V
     (0..CHANNELS).flat_map(of).collect()
 }
 
-/// Of what each product is.
+/// Index pairs of the products.
 fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..NAMES.len()).flat_map(|i| (i..NAMES.len()).map(move |j| (i, j)))
 }

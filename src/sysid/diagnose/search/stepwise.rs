@@ -1,4 +1,4 @@
-//! Forward selection: the effect with the best evidence joins the model, and again, until none passes.
+//! Forward selection: adds the effect with the best evidence to the model, until no candidate passes.
 
 mod examine;
 mod found;
@@ -21,27 +21,28 @@ use crate::diagnose::search::settling::{Ranked, SETTLING, ranked};
 use crate::diagnose::search::shape::shape;
 use crate::diagnose::search::unexplained::unexplained;
 use crate::diagnose::search::{checks, excitation};
-use crate::progress::{Cancelled, FirstLook, Progress, Stage, said, say};
+use crate::progress::{Cancelled, FirstLook, Progress, Stage, not_cancelled, report};
 use examine::examine;
 use greylag_model::{GreyBox, RUDDER};
 use run_off::run_off;
 
-/// Share of the search that is done once all candidates have been ranked.
+/// Share of the work done once all candidates have been ranked.
 const RANKED: f64 = 0.3;
-/// Most effects that are asserted together.
+/// Largest number of asserted effects.
 const MOST: usize = 6;
-/// Most passes of tuning after an effect has joined. A product of two coefficients, as of a saturation and the
-/// effectiveness that saturates, takes more of them than [`SETTLING`]: each is tuned with the other held.
+/// Largest number of tuning passes after an effect has joined. A product of two coefficients, such as a saturation
+/// and the effectiveness that saturates, needs more of them than [`SETTLING`], since each is tuned with the other
+/// held.
 const MOST_SETTLING: usize = 12;
-/// Largest change of a coefficient, in its standard deviations, of a model that is settled.
-const SETTLED: f64 = 0.2;
-/// Most candidates that are refused beside what has joined before the search ends.
+/// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
+const STEP_TOLERANCE: f64 = 0.2;
+/// Largest number of candidates refused beside the joined effects before the search ends.
 const MOST_ASIDE: usize = 4;
 
-/// Searches for what `model` lacks.
+/// Searches for the effects that `model` lacks.
 ///
 /// # Errors
-/// The flights do not hold the model at all, or `progress` ended the search.
+/// The model cannot be evaluated over the flights, or `progress` cancelled.
 pub fn search(
     problem: &Problem,
     model: &GreyBox,
@@ -52,19 +53,19 @@ pub fn search(
         let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
         Round::new(problem, model.clone(), entries).ok_or_else(unusable)
     };
-    say(progress, "tuning the model's own coefficients", 0.0)?;
+    report(progress, "tuning the model's own coefficients", 0.0)?;
     let tuned = round(model.clone(), &[])?.tuned();
     let mut entries = catalogue::candidates(model, &options.with, &options.without);
     if !excitation::moves_rudder(&problem.flights) {
         entries.retain(|e| e.about.id != RUDDER);
     }
-    say(progress, &format!("ranking {} candidate effects", entries.len()), 0.05)?;
+    report(progress, &format!("ranking {} candidate effects", entries.len()), 0.05)?;
     let shape = shape(&round(tuned.clone(), &[])?, options.nulls);
     let Ranked { round: first, scores, nulls, threshold } =
         ranked(problem, round(tuned, &entries)?, options);
     let ranking = first_look(&first, &scores, threshold);
     let doing = "checking the best candidate";
-    said(progress(Stage { doing, fraction: RANKED, ranking: &ranking }))?;
+    not_cancelled(progress(Stage { doing, fraction: RANKED, ranking: &ranking }))?;
     let first_remainder = remainder(&first, options.nulls, options.level);
     let mut found = Found {
         unexplained: unexplained(&first, &first.tuned_residual()),
@@ -92,7 +93,7 @@ pub fn search(
     Ok(found)
 }
 
-/// Lets the best candidates join one after the other, until none passes; returns those that were refused beside them.
+/// Adds the best candidates one by one until none passes; returns those that were refused.
 fn select(
     problem: &Problem,
     model: &GreyBox,
@@ -106,7 +107,7 @@ fn select(
         found.beaten.clear();
         found.level.clear();
         run_off(problem, found);
-        say(progress, "checking the best candidate", found.fraction())?;
+        report(progress, "checking the best candidate", found.fraction())?;
         let Some(winner) = examine(found, options) else { break };
         let passed = winner.refused.is_empty() || winner.trace.is_some();
         let outcome = match (&winner.trace, passed) {
@@ -114,8 +115,8 @@ fn select(
             (None, true) => "joins",
             (None, false) => "is refused",
         };
-        say(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
-        // several things may be missing: what is refused beside one of them does not hide the next
+        report(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
+        // several things may be missing: a refused candidate does not prevent the next one
         if !passed && found.last.is_some() && aside.len() < MOST_ASIDE {
             found.scores.remove(0);
             aside.push(winner);
@@ -130,7 +131,7 @@ fn select(
     Ok(aside)
 }
 
-/// The candidates as the first ranking has them.
+/// The candidates in the first ranking, for progress reports.
 fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<FirstLook> {
     let of = |(trial, score): &(usize, Score)| FirstLook {
         id: round.trials[*trial].id,
@@ -140,7 +141,7 @@ fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<F
     scores.iter().map(of).collect()
 }
 
-/// `current` without the effect `id`, which `given` does not have either.
+/// `current` without the effect `id`, which `given` does not contain either.
 fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
     let mut model = given.clone();
     let joined: Vec<&'static str> =
@@ -151,11 +152,11 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
         of.map(|c| c.value).collect()
     };
     for effect in joined {
-        // what it had is possible again
+        // its values were valid before, so joining cannot fail
         let _ = model.join(effect, &own(effect));
     }
     for c in current.coefficients().iter().filter(|c| {
-        // what it replaced is there again
+        // coefficients that the removed effect had replaced keep the given model's values
         current.replaced(&c.name) != Some(id)
     }) {
         model.set_coefficient(&c.name, c.value);
@@ -164,9 +165,9 @@ fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
 }
 
 impl Found {
-    /// Joins the effect selected last to the model and ranks what is left.
-    /// An earlier one that is nothing beside it goes. `false` if it cannot join, or the model with it cannot be
-    /// linearised: the search ends.
+    /// Adds the effect selected last to the model and ranks the remaining candidates. An earlier effect that becomes
+    /// insignificant is removed. `false` if the effect cannot join or the model with it cannot be linearised; the
+    /// search then ends.
     fn join(
         &mut self,
         problem: &Problem,
@@ -188,7 +189,11 @@ impl Found {
         self.beyond = Some(checks::Beyond::of(&settled));
         self.shape = shape(&settled, options.nulls);
         let open: Vec<Entry> = entries.iter().filter(|e| !model.has(e.about.id)).copied().collect();
-        say(progress, &format!("ranking {} candidate effects again", open.len()), self.fraction())?;
+        report(
+            progress,
+            &format!("ranking {} candidate effects again", open.len()),
+            self.fraction(),
+        )?;
         let Some(round) = Round::new(problem, model, &open) else { return Ok(false) };
         let Ranked { round, scores, threshold, .. } = ranked(problem, round, options);
         (self.scores, self.threshold) = (scores, threshold);
@@ -197,8 +202,8 @@ impl Found {
         Ok(true)
     }
 
-    /// `model`, with the effect selected last, once its coefficients move no more; an earlier effect that is nothing beside it
-    /// goes, and ends that. `None` if the model cannot be linearised.
+    /// `model`, with the effect selected last, tuned to convergence; an earlier effect that becomes insignificant is
+    /// removed and ends the tuning. `None` if the model cannot be linearised.
     fn settle(
         &mut self,
         problem: &Problem,
@@ -209,9 +214,9 @@ impl Found {
     ) -> Result<Option<Round>, Cancelled> {
         let newest = self.selected.last().map(|s| s.id);
         for pass in 0..MOST_SETTLING {
-            say(progress, doing, self.fraction())?;
+            report(progress, doing, self.fraction())?;
             let Some(round) = Round::new(problem, model.clone(), &[]) else { return Ok(None) };
-            if pass >= SETTLING && round.stride() < SETTLED {
+            if pass >= SETTLING && round.stride() < STEP_TOLERANCE {
                 return Ok(Some(round));
             }
             model = round.tuned();
@@ -227,7 +232,7 @@ impl Found {
         Ok(Round::new(problem, model, &[]))
     }
 
-    /// Share of the search that is done; how many effects will be selected is not known.
+    /// Estimated share of the work done; the number of effects to be selected is not known in advance.
     fn fraction(&self) -> f64 {
         let left = 0.5_f64.powi(self.selected.len() as i32);
         RANKED + (0.9 - RANKED) * (1.0 - left)

@@ -1,4 +1,4 @@
-//! How much of each channel is left unexplained.
+//! Unexplained share of each channel.
 
 use crate::compare::ChannelId;
 use crate::diagnose::regression::gather::Column;
@@ -13,7 +13,7 @@ struct Measured {
     noise: f64,
 }
 
-/// Every channel as the flights of `first` measure it; `None` where they do not.
+/// Measured variances of every channel in the flights of `first`; `None` where it is not measured.
 fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     let series: Vec<Vec<Series>> =
         first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();
@@ -37,8 +37,8 @@ fn mean_square(residual: &[Column], channel: usize) -> f64 {
     mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
 }
 
-/// Share of each channel's variance beyond noise that `residual`, a column a flight, leaves unexplained under
-/// the model of `first`; NaN where the flights do not measure the channel.
+/// Share of each channel's variance beyond noise that remains in `residual`, a column for each flight, under the
+/// model of `first`; NaN where the flights do not measure the channel.
 pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {
@@ -49,8 +49,8 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     })
 }
 
-/// Share of each channel's variance beyond noise by which `after` leaves less unexplained than `before`; negative where it
-/// leaves more, 0 where the flights do not measure the channel.
+/// Share of each channel's variance beyond noise that `after` explains more than `before`; negative if it explains
+/// less, 0 where the flights do not measure the channel.
 pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {

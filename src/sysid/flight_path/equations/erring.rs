@@ -1,4 +1,4 @@
-//! How the reconstructed path errs: draws of the noise of every sensor, and shifts by other residuals.
+//! Errors of the reconstructed path: draws of the noise of every sensor, and changes for other residuals.
 
 use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,18 +14,18 @@ use crate::flight_path::path::{CHANNELS, Path};
 use greylag_logs::Sampling;
 use greylag_num::stream::Stream;
 
-/// A path with an error like that of the one found.
+/// A path disturbed by an error like that of the estimate.
 #[derive(Clone, Debug)]
 pub struct Erring {
-    /// The path of each track.
+    /// Path of each track.
     pub paths: Vec<Path>,
-    /// The noise of the gyros of each track, rad/s.
+    /// Noise of the gyros of each track, rad/s.
     pub gyro: Vec<Vec<[f64; 3]>>,
 }
 
 impl Problem<'_> {
-    /// What the constants of [`calm`](Self::calm) would be moved by if the sensors of the air had the
-    /// residuals `others`, by stretch, then instant.
+    /// Change of the constants of [`calm`](Self::calm) if the air-data sensors had the residuals `others`, by
+    /// stretch, then instant.
     pub fn moved_by(
         &self,
         found: &Found,
@@ -46,7 +46,7 @@ impl Problem<'_> {
         }))
     }
 
-    /// How the path errs that was found, in one draw of the noise of every sensor, the constants held.
+    /// Error of the estimated path in one draw of the noise of every sensor, with the constants held.
     pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
         let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
         for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
@@ -60,7 +60,7 @@ impl Problem<'_> {
         Some(erring)
     }
 
-    /// Moves `path` by its error in one draw; returns the gyros' noise in it, rad/s.
+    /// Adds one draw of its error to `path`; returns the gyros' noise in it, rad/s.
     fn err<const N: usize>(
         &self,
         track: &Track,

@@ -1,11 +1,11 @@
-//! The channels of a log, each with the way it is interpolated.
+//! Channels of a log, each with its kind of interpolation.
 
 use super::{Periods, Present};
 use crate::flight_path::ReconstructError;
 use crate::flight_path::channel::{Channel, Interpolation};
 use greylag_logs::{Flight, FlowAngles, Sample};
 
-/// The channels of a log.
+/// All channels of a log.
 pub(super) struct Channels {
     pub(super) rates: [Channel; 3],
     pub(super) force: [Channel; 3],
@@ -69,7 +69,7 @@ impl Channels {
         }
     }
 
-    /// Says which needed channel is missing, or shows one and the same value all the time.
+    /// Checks the required channels; the error names one that is missing or constant.
     pub(super) fn check(&self, flight: &str) -> Result<(), ReconstructError> {
         let missing =
             |channel, column| ReconstructError::Missing { flight: flight.into(), channel, column };

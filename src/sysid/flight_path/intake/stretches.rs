@@ -1,4 +1,4 @@
-//! The stretches of a log that were flown without a gap, and the time between their samples.
+//! Stretches of a log in flight without a gap, and the time between their samples.
 
 use super::Present;
 use crate::flight_path::{Options, ReconstructError};
@@ -7,9 +7,9 @@ use greylag_num::statistics::quantile;
 
 /// A pause is a gap if it exceeds this many median periods of the rows, and `Options::gap_s`.
 const GAP_PERIODS: f64 = 2.5;
-/// Longest median period of the rows that counts in that, s: at less than 5 Hz nothing is known between the rows.
+/// Longest median period used for that, s: below 5 Hz the motion between rows is unknown.
 const SLOWEST_PERIOD: f64 = 0.2;
-/// Time around a row over which its airspeed is averaged to tell flight from ground, s.
+/// Time around a row over which the airspeed is averaged to decide whether the aircraft flies, s.
 const AIRBORNE_WINDOW: f64 = 1.0;
 
 /// The times of the rows of each stretch in flight without a gap.
@@ -47,7 +47,7 @@ pub(super) fn gap(flight: &Flight, options: &Options) -> f64 {
     1.000_001 * options.gap_s.max(GAP_PERIODS * period.min(SLOWEST_PERIOD))
 }
 
-/// Tells flight from ground by the mean airspeed around a time.
+/// Detects flight by the mean airspeed around a time.
 fn airborne(flight: &Flight, options: &Options) -> Result<impl Fn(f64) -> bool, ReconstructError> {
     let rows = flight.samples.iter().map(|s| (s.time_s, s.airspeed_mps));
     let (times, speeds): (Vec<f64>, Vec<f64>) =

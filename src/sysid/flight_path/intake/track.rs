@@ -1,4 +1,4 @@
-//! One stretch on a uniform clock: measurements where there are any, commands held, deflections always.
+//! A stretch on a uniform clock: measurements where available, commands held, deflections always.
 
 use super::channels::Channels;
 use super::{Present, Track};
@@ -8,7 +8,7 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::atmosphere::{Atmosphere, Density};
 use greylag_physics::{Command, Controls};
 
-/// Time over which a climb is taken from the altitude, s.
+/// Time over which the climb rate is differenced from the altitude, s.
 const CLIMB_WINDOW: f64 = 1.0;
 
 pub(super) fn track(
@@ -65,8 +65,8 @@ pub(super) fn track(
     track
 }
 
-/// Takes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that the errors of
-/// the altitude enter once each.
+/// Computes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that each altitude error enters
+/// once.
 fn climb(track: &mut Track, step: f64) {
     let half = (CLIMB_WINDOW / step / 2.0).round().max(1.0) as usize;
     let mut k = half;
@@ -77,8 +77,8 @@ fn climb(track: &mut Track, step: f64) {
     }
 }
 
-/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and hands it out once every
-/// [`CLIMB_WINDOW`]: where nothing else shows the heading, the path could turn as it likes.
+/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and returns it once every
+/// [`CLIMB_WINDOW`], because without any measured heading that of the path would be undetermined.
 fn heading(track: &mut Track, step: f64) {
     let every = (CLIMB_WINDOW / step).round().max(1.0) as usize;
     let (mut yaw, mut last) = (0.0, [0.0; 2]);
@@ -93,7 +93,7 @@ fn heading(track: &mut Track, step: f64) {
     }
 }
 
-/// The command in force at `t`; where only some are logged, the others are NaN.
+/// The command in force at `t`; components that are not logged are NaN.
 fn command(channels: &Channels, t: f64) -> Option<Command> {
     let [aileron, elevator, throttle, rudder] =
         std::array::from_fn(|i| channels.commands[i].held(t));
@@ -102,7 +102,7 @@ fn command(channels: &Channels, t: f64) -> Option<Command> {
     command.is_finite().then_some(command)
 }
 
-/// The deflections at `times`: as logged, else from the commands through the actuators.
+/// Deflections at `times`: as logged, else from the commands through the actuator model.
 pub(super) fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Controls> {
     let f = &options.actuators;
     let sent = |t: f64| {

@@ -1,10 +1,10 @@
-//! Expressions over all samples at once.
+//! Evaluation of expressions over all samples at once.
 
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::{Expression, Function, Node};
 
-/// The values of `of` at `count` places, where `variable` has those of a variable; not a number where it has a part
-/// that depends on more than the place.
+/// Values of `of` at `count` samples, `variable` giving those of each variable; NaN where a part of the expression
+/// depends on more than the present sample.
 pub fn evaluate<'a>(
     of: &Expression,
     constants: &[f64],

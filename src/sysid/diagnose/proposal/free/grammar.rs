@@ -1,82 +1,82 @@
-//! Expressions of at most nine nodes, from what a variable may do by itself to products of three.
+//! Expressions of at most nine nodes: functions of one variable, and products of up to three of them.
 
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::dimension::Dimension;
 use greylag_physics::formula::expression::{Expression, Function, Node};
 use greylag_physics::formula::units;
 
-/// Most nodes of an expression: variables, numbers, functions and operators.
+/// Largest number of nodes of an expression: variables, numbers, functions and operators.
 pub const MOST_NODES: usize = 9;
 
-/// An expression; its shape constants are parameters, all of them numbers without a unit.
+/// An expression whose shape constants are parameters, all dimensionless.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
-    /// The expression.
+    /// The expression, with its parameters by index.
     pub expression: Expression,
     /// The values of its parameters.
     pub constants: Vec<f64>,
 }
 
-/// A variable with what it reaches in the flights.
+/// A variable with its range in the flights.
 #[derive(Clone, Copy, Debug)]
 pub struct Reach {
-    /// The variable.
+    /// The variable itself.
     pub variable: Variable,
     /// The quantiles 0.5, 0.75 and 0.95 of its magnitude.
     pub levels: [f64; 3],
 }
 
 impl Reach {
-    /// Whether it has one sign in all flights.
+    /// Whether it has the same sign in all flights.
     fn positive(&self) -> bool {
         positive(self.variable)
     }
 }
 
-/// Whether `variable` has one sign in all flights.
+/// Whether `variable` is positive in all flights.
 pub fn positive(variable: Variable) -> bool {
     matches!(variable, Variable::Throttle | Variable::Airspeed)
 }
 
-/// What products are made of: what one variable does by itself, or a sum of two in a function.
+/// A factor of products: a function of one variable, or a function of a sum of two.
 #[derive(Clone, Debug)]
 pub struct Atom {
     /// The expression and its constants.
     pub free: Free,
-    /// Whether a product is divided by it.
+    /// Whether products are divided by it.
     pub below: bool,
     kind: Kind,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// Without a constant.
+    /// It has no constant.
     Plain,
-    /// With a constant at the middle of the levels that are tried.
+    /// Its constant is the middle one of the levels tried.
     Middle,
-    /// With one at the others.
+    /// Its constant is one of the other levels.
     Outer,
-    /// Of a sum, which is in no product.
+    /// It is a function of a sum and enters no product.
     Sum,
 }
 
 /// A product of atoms.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// Places of the atoms.
+    /// Indices of the atoms.
     pub parts: Vec<usize>,
-    /// Nodes of the expression.
+    /// Number of nodes of the expression.
     pub size: usize,
-    /// Shape constants.
+    /// Number of shape constants.
     pub constants: usize,
 }
 
-/// What is tried.
+/// All expressions that are tried.
 #[derive(Clone, Debug)]
 pub struct Grammar {
-    /// What products are made of.
+    /// Factors of products.
     pub atoms: Vec<Atom>,
-    /// The products, each of whose units balance.
+    /// Products with consistent units.
     pub candidates: Vec<Candidate>,
 }
 
@@ -96,13 +96,13 @@ fn call<const N: usize>(function: Function, arguments: [Expression; N]) -> Expre
     Expression::call(function, arguments.into())
 }
 
-/// v/c, c the first constant.
+/// The ratio v/c, where c is the first constant.
 fn scaled(v: Expression) -> Expression {
     call(Function::Divide, [v, constant(0)])
 }
 
 impl Grammar {
-    /// The forms of `variables`; what does not move in the flights is left out.
+    /// Builds the expressions of `variables`; variables that do not vary in the flights are left out.
     pub fn new(variables: &[Reach]) -> Grammar {
         let moving: Vec<Reach> = variables.iter().filter(|r| r.levels[2] > 0.0).copied().collect();
         let mut grammar = Grammar { atoms: Vec::new(), candidates: Vec::new() };
@@ -133,7 +133,7 @@ impl Grammar {
         }
     }
 
-    /// Functions of one variable with a constant.
+    /// Adds functions of one variable with a constant.
     fn add_bent(&mut self, reach: &Reach) {
         let v = || of(reach.variable);
         let c = || constant(0);
@@ -169,7 +169,7 @@ impl Grammar {
         }
     }
 
-    /// Functions of v + c·w.
+    /// Adds functions of v + c·w.
     fn add_sums(&mut self, v: &Reach, w: &Reach) {
         let ratio = v.levels[1] / w.levels[1].max(f64::MIN_POSITIVE);
         if !ratio.is_finite() {
@@ -216,7 +216,7 @@ impl Grammar {
         }
     }
 
-    /// Takes the product of `parts` in, if it is of as many variables, small enough, and its units balance.
+    /// Adds the product of `parts` if each variable occurs once, it is small enough, and its units are consistent.
     fn keep(&mut self, parts: Vec<usize>) {
         let atoms: Vec<&Atom> = parts.iter().map(|p| &self.atoms[*p]).collect();
         let of_one: Vec<Variable> =
@@ -239,7 +239,7 @@ impl Grammar {
     }
 }
 
-/// The product of `atoms`, divided by those that stand below.
+/// The product of `atoms`, divided by those marked as denominators.
 fn product(atoms: &[&Atom]) -> Free {
     let (mut above, mut below) = (Expression::number(1.0), Expression::number(1.0));
     let mut constants = Vec::new();
@@ -257,7 +257,7 @@ fn product(atoms: &[&Atom]) -> Free {
     Free { expression, constants }
 }
 
-/// Moves the parameters of `of` up by `by`.
+/// Increases the parameter indices of `of` by `by`.
 fn renumber(of: &mut Expression, by: usize) {
     match &mut of.node {
         Node::Parameter(k) => *k += by,
@@ -268,13 +268,13 @@ fn renumber(of: &mut Expression, by: usize) {
 }
 
 impl Free {
-    /// Its dimension; `None` if its units do not balance with constants that have none.
+    /// Dimension of the expression; `None` if its units are inconsistent with dimensionless constants.
     pub fn dimension(&self) -> Option<Dimension> {
         let plain = vec![Dimension::NONE; self.constants.len()];
         units::dimension(&self.expression, &plain).ok().flatten()
     }
 
-    /// The formula as a factor of a product, its constants as they are or by `names`.
+    /// The formula as a factor of a product, with the constants' values or `names`.
     pub fn text(&self, names: Option<&[String]>) -> String {
         let numbers: Vec<String> = self.constants.iter().map(|c| format!("{c}")).collect();
         let names: Vec<&str> = names.unwrap_or(&numbers).iter().map(String::as_str).collect();

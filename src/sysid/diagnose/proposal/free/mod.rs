@@ -1,8 +1,8 @@
-//! The search of free forms, where no shape of the library is what is missing.
+//! Search over free forms, for residuals that no shape of the library explains.
 //!
-//! All expressions of a [`grammar`] of at most nine nodes are tried on the whitened residual of a channel
-//! ([`screen`]), the best ones' constants are fitted ([`refine`]), and what the same search finds in flights that
-//! lack nothing sets what is asked of them ([`search`]).
+//! All expressions of a [`grammar`] of at most nine nodes are evaluated on the whitened residual of a channel
+//! ([`screen`]), the constants of the best ones are fitted ([`refine`]), and the same search over null flights, which
+//! lack nothing, determines the thresholds ([`search`]).
 
 mod evaluate;
 pub mod grammar;

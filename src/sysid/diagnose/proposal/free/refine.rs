@@ -1,4 +1,4 @@
-//! The constants of a form where they fit best, its coefficient eliminated (variable projection).
+//! Fit of a form's constants with its coefficient eliminated (variable projection).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,36 +7,36 @@ use super::samples::Samples;
 use super::screen::Screen;
 use crate::diagnose::regression::projected::scaled_inverse;
 
-/// Gauss–Newton steps.
+/// Largest number of Gauss–Newton steps.
 const STEPS: usize = 6;
-/// Times that a step is halved before it is given up.
+/// Largest number of times a step is halved.
 const HALVINGS: usize = 4;
-/// Share of a constant by which its derivative is taken.
+/// Finite-difference step of a constant, as a share of its value.
 const MOVED: f64 = 0.01;
-/// Largest change of a constant in one step, as a share.
+/// Largest change of a constant in one step, as a share of its value.
 const REACH: f64 = 0.5;
-/// A fall that grows by less than this share has settled.
-const SETTLED: f64 = 1e-4;
+/// Convergence tolerance: least relative increase of the reduction in a step.
+const RELATIVE_TOLERANCE: f64 = 1e-4;
 
-/// A channel with the factor of the form.
+/// A channel with the form's factor.
 pub struct Place<'a> {
-    /// The channel.
+    /// Whitened data of the channel.
     pub screen: &'a Screen<'a>,
-    /// The samples.
+    /// Variables at every sample.
     pub samples: &'a Samples,
-    /// What the form is multiplied by, a value a sample.
+    /// Factor of the form at every sample.
     pub factor: &'a [f64],
 }
 
 impl Place<'_> {
-    /// The whitened column of `free`, projected.
+    /// Whitened and projected column of `free`.
     pub fn column(&self, free: &Free, constants: &[f64]) -> DVector<f64> {
         let mut values = self.samples.of(&free.expression, constants);
         values.iter_mut().zip(self.factor).for_each(|(x, f)| *x *= f);
         self.screen.projected(&DVector::from_vec(self.screen.column(values)))
     }
 
-    /// `free` with its constants where they take most of `target`, and what it takes.
+    /// Fits the constants of `free` to remove most of `target`; returns the form and the reduction.
     pub fn refined(&self, free: &Free, target: &DVector<f64>) -> (Free, f64) {
         let mut best = free.constants.clone();
         let mut column = self.column(free, &best);
@@ -58,15 +58,15 @@ impl Place<'_> {
                     break;
                 }
             }
-            if fall - before <= SETTLED * before {
+            if fall - before <= RELATIVE_TOLERANCE * before {
                 break;
             }
         }
         (Free { expression: free.expression.clone(), constants: best }, fall)
     }
 
-    /// The step of the constants by Kaufman's approximation: derivatives of the contribution with what the column
-    /// itself takes projected out.
+    /// Step of the constants by Kaufman's approximation: derivatives of the contribution with the part along the
+    /// column itself projected out.
     fn step(
         &self,
         free: &Free,
@@ -97,7 +97,7 @@ impl Place<'_> {
     }
 }
 
-/// What a projected column takes of `target`'s square.
+/// Reduction of the square of `target` by a projected column.
 fn taken(column: &DVector<f64>, target: &DVector<f64>) -> f64 {
     let fall = column.dot(target).powi(2) / column.norm_squared();
     if fall.is_finite() { fall } else { 0.0 }

@@ -1,4 +1,4 @@
-//! What the variables are at every sample of the flights, and how a window averages them.
+//! Values of the variables at every sample of the flights, and their averages over windows.
 
 use crate::diagnose::proposal::free::evaluate::evaluate;
 use crate::diagnose::search::round::Round;
@@ -10,7 +10,7 @@ use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::Expression;
 use greylag_physics::{Channel, Controls};
 
-/// Variables that free forms may hold.
+/// Variables that free forms may contain.
 pub const VARIABLES: [Variable; 13] = [
     Variable::Alpha,
     Variable::Beta,
@@ -27,12 +27,12 @@ pub const VARIABLES: [Variable; 13] = [
     Variable::Airspeed,
 ];
 
-/// The samples of all flights one after the other.
+/// Samples of all flights, concatenated.
 pub struct Samples {
     values: Vec<(Variable, Vec<f64>)>,
     /// Dynamic pressure times wing area, N.
     pressure: Vec<f64>,
-    /// The samples once; behind them, where a step counts both its ends, its ends.
+    /// Number of samples; for channels that average over integration steps, the steps' end values follow the samples.
     count: usize,
     /// First sample of each segment of each flight.
     first: Vec<Vec<usize>>,
@@ -40,7 +40,7 @@ pub struct Samples {
     lengths: [f64; 2],
 }
 
-/// A window: its first sample and the weights from there on.
+/// A window: its first sample, and the weights from there on.
 pub struct Average<'a> {
     first: usize,
     weights: &'a [f64],
@@ -68,7 +68,7 @@ fn value(variable: Variable, model: &GreyBox, at: &Instant, z: &Controls) -> f64
 }
 
 impl Samples {
-    /// Of the flights of `round`, for `channel`.
+    /// Samples of the flights of `round` for `channel`.
     pub fn new(round: &Round, channel: Channel) -> Samples {
         let model = &round.model;
         type Places<'a> = Vec<(&'a Instant, &'a Controls)>;
@@ -102,17 +102,17 @@ impl Samples {
         }
     }
 
-    /// The values of a variable.
+    /// Values of a variable, if it can be computed.
     pub fn variable(&self, variable: Variable) -> Option<&[f64]> {
         self.values.iter().find(|(v, _)| *v == variable).map(|(_, x)| &x[..])
     }
 
-    /// The values of an expression.
+    /// Values of an expression.
     pub fn of(&self, expression: &Expression, constants: &[f64]) -> Vec<f64> {
         evaluate(expression, constants, self.pressure.len(), &|v| self.variable(v))
     }
 
-    /// What a coefficient in `channel` is multiplied by: dynamic pressure, wing area and a length, or one.
+    /// Factor of a coefficient in `channel`: dynamic pressure times wing area, times a length for moments, or one.
     pub fn factor(&self, channel: Channel, of_air: bool) -> Vec<f64> {
         let length = match channel {
             Channel::Roll | Channel::Yaw => self.lengths[0],
@@ -125,7 +125,7 @@ impl Samples {
         }
     }
 
-    /// A value a sample, where a step counts both its ends their mean.
+    /// One value for each sample: for channels that average over integration steps, the mean of both ends.
     pub fn merged(&self, mut values: Vec<f64>) -> Vec<f64> {
         if values.len() > self.count {
             let (start, end) = values.split_at_mut(self.count);
@@ -135,7 +135,7 @@ impl Samples {
         values
     }
 
-    /// The windows of one cell of `round`, in its order.
+    /// The windows of one cell of `round`, in order.
     pub fn windows<'a>(&self, round: &'a Round, cell: usize) -> Vec<Average<'a>> {
         let cell = &round.cells.list[cell];
         let flight = &round.flights[cell.flight].acting;
@@ -151,8 +151,8 @@ impl Samples {
         cell.windows.iter().map(of).collect()
     }
 
-    /// The means of all variables over each window of flight number `flight` of `round`, then that of dynamic pressure
-    /// times wing area.
+    /// Means of all variables, then of dynamic pressure times wing area, over each window of flight `flight` of
+    /// `round`.
     pub fn means(&self, round: &Round, flight: usize) -> Vec<Vec<f64>> {
         let own = &round.flights[flight].acting;
         let of = |window: &Window| {
@@ -170,7 +170,7 @@ fn moment(channel: Channel) -> bool {
 }
 
 impl Average<'_> {
-    /// The average of `values`, a value a sample.
+    /// The window's average of `values`, one for each sample.
     pub fn of(&self, values: &[f64]) -> f64 {
         let own = &values[self.first..];
         self.weights.iter().zip(own).map(|(w, x)| w * x).sum()

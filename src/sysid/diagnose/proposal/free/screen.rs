@@ -1,8 +1,8 @@
-//! All forms on the whitened residual of one channel, and on that of flights that lack nothing.
+//! Evaluation of all forms on the whitened residual of one channel, and on that of null flights.
 //!
-//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)) with
-//! what the model's own coefficients take projected out, but for the noise that columns share with the residual,
-//! which the round corrects when the best forms come to it.
+//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)) with the
+//! model's own coefficients projected out, except for noise shared between columns and residual, which the round
+//! corrects for the best forms.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -17,64 +17,64 @@ use greylag_physics::Channel;
 
 use super::samples::{Average, Samples};
 
-/// Random stream of the null flights.
+/// Random stream for the null flights.
 const NULLS: u64 = 84;
 
-/// One channel of all flights, ready for whatever column is tried.
+/// One channel of all flights, prepared to evaluate any column.
 pub struct Screen<'a> {
     round: &'a Round,
     samples: &'a Samples,
-    /// The cells of the channel.
+    /// Indices of the channel's cells.
     cells: Vec<usize>,
     windows: Vec<Vec<Average<'a>>>,
-    /// Whitened columns of the known unknowns.
+    /// Whitened columns of the nuisance parameters.
     known: DMatrix<f64>,
-    /// Square roots of their weights as a prior.
+    /// Square roots of their prior weights.
     roots: DVector<f64>,
-    /// Covariance of the known unknowns times `known`'.
+    /// Covariance of the nuisance parameters times `known`ᵀ.
     taken: DMatrix<f64>,
-    /// What the tuned model leaves, and the noise.
+    /// Residual of the tuned model, and the noise.
     residual: DVector<f64>,
     noise: DVector<f64>,
-    /// First row and one past the last of each block, with the block's number.
+    /// First and one-past-last row of each block, with the block's number.
     blocks: Vec<(usize, usize, usize)>,
     block_count: usize,
-    /// Independent rows.
+    /// Number of independent rows.
     support: f64,
 }
 
-/// What is kept of a column.
+/// Statistics of a projected column.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// Its square once projected.
+    /// Square of the projected column.
     square: f64,
-    /// Its product with the residual.
+    /// Product of the projected column with the residual.
     linear: f64,
-    /// The square of what it takes from the prior.
+    /// Part of the square in the prior's rows.
     prior: f64,
-    /// Products with residual, noise and itself, block by block.
+    /// Products with residual, noise and itself, by block.
     blocks: Vec<[f64; 3]>,
-    /// What it takes from each known unknown, in widths of the prior.
-    strain: Vec<f64>,
+    /// Change of each nuisance parameter for a unit of the column, in prior widths.
+    prior_shift: Vec<f64>,
 }
 
-/// What a form reaches.
+/// Score of a form.
 #[derive(Clone, Copy, Debug)]
 pub struct Reached {
-    /// Fall of the squared whitened error.
+    /// Reduction of the squared whitened error.
     pub fall: f64,
-    /// The smaller of the fall less (1 + its constants) ln n and the block-robust Wald statistic.
+    /// The smaller of the reduction less (1 + number of constants) ln n and the block-robust Wald statistic.
     pub evidence: f64,
 }
 
-/// A flight that lacks nothing: the sign of each block's noise and the prior's error in its widths.
+/// A null flight: the sign of each block's noise, and the prior's error in prior widths.
 pub struct Null {
     signs: Vec<f64>,
     prior: DVector<f64>,
 }
 
 impl<'a> Screen<'a> {
-    /// `channel` of `round`; `None` if no flight measures it.
+    /// Prepares `channel` of `round`; `None` if no flight measures it.
     pub fn new(round: &'a Round, samples: &'a Samples, channel: Channel) -> Option<Screen<'a>> {
         let place = ORDER.iter().position(|c| *c == channel)?;
         let all = &round.cells.list;
@@ -122,7 +122,7 @@ impl<'a> Screen<'a> {
         })
     }
 
-    /// The whitened column of `values`, a value a sample.
+    /// The whitened column of `values`, one for each sample.
     pub fn column(&self, values: Vec<f64>) -> Vec<f64> {
         let values = self.samples.merged(values);
         let mut rows = Vec::with_capacity(self.residual.len());
@@ -139,13 +139,13 @@ impl<'a> Screen<'a> {
         rows
     }
 
-    /// What is kept of `columns`, one after the other.
+    /// The statistics of each of `columns`.
     pub fn keep(&self, columns: &DMatrix<f64>) -> Vec<Kept> {
         let taken = &self.taken * columns;
         let left = columns - &self.known * &taken;
         let one = |k: usize| {
             let (x, own) = (columns.column(k), left.column(k));
-            let strain: Vec<f64> =
+            let prior_shift: Vec<f64> =
                 taken.column(k).iter().zip(self.roots.iter()).map(|(t, w)| t * w).collect();
             let mut blocks = vec![[0.0; 3]; self.block_count];
             for &(from, to, b) in &self.blocks {
@@ -157,21 +157,21 @@ impl<'a> Screen<'a> {
             Kept {
                 square: x.dot(&own),
                 linear: x.dot(&self.residual),
-                prior: strain.iter().map(|t| t * t).sum(),
+                prior: prior_shift.iter().map(|t| t * t).sum(),
                 blocks,
-                strain,
+                prior_shift,
             }
         };
         (0..columns.ncols()).map(one).collect()
     }
 
-    /// `column` less what the known unknowns take of it, the prior's rows behind.
+    /// `column` less its part along the nuisance parameters, followed by the prior's rows.
     pub fn projected(&self, column: &DVector<f64>) -> DVector<f64> {
         let taken = &self.taken * column;
         stacked(column - &self.known * &taken, -self.roots.component_mul(&taken))
     }
 
-    /// What the tuned model leaves, and of the prior.
+    /// Residual of the tuned model, followed by that of the prior.
     pub fn residual(&self) -> DVector<f64> {
         let tuned = self.round.known.iter().zip(self.round.projected.tuned.iter());
         let off = DVector::from_iterator(self.roots.len(), tuned.map(|(k, t)| k.offset - t));
@@ -187,7 +187,7 @@ impl<'a> Screen<'a> {
         Null { signs, prior }
     }
 
-    /// What the tuned model leaves of that null flight, and of the prior.
+    /// Residual of the tuned model in that null flight, followed by that of the prior.
     pub fn residual_of(&self, null: &Null) -> DVector<f64> {
         let mut noise = self.noise.clone();
         for &(from, to, b) in &self.blocks {
@@ -199,17 +199,17 @@ impl<'a> Screen<'a> {
         stacked(noise - &self.known * taken, prior)
     }
 
-    /// What a form with so many constants reaches in the flights.
+    /// Score in the flights of a form with that many constants.
     pub fn measured(&self, kept: &Kept, constants: usize) -> Reached {
         let product = |b: usize| kept.blocks[b][0];
         self.reached(kept, kept.linear, product, constants)
     }
 
-    /// The same in a null flight.
+    /// Score in a null flight, likewise.
     pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
         let product = |b: usize| null.signs[b] * kept.blocks[b][1];
         let noise: f64 = (0..self.block_count).map(product).sum();
-        let prior: f64 = kept.strain.iter().zip(null.prior.iter()).map(|(t, g)| t * g).sum();
+        let prior: f64 = kept.prior_shift.iter().zip(null.prior.iter()).map(|(t, g)| t * g).sum();
         self.reached(kept, noise - prior, product, constants)
     }
 
@@ -236,7 +236,7 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// What the fall must exceed for a coefficient and `constants`.
+    /// Penalty for a coefficient and `constants`, which the reduction must exceed.
     pub fn price(&self, constants: usize) -> f64 {
         (1 + constants) as f64 * self.support.max(2.0).ln()
     }

@@ -1,4 +1,4 @@
-//! The search of free forms: all of a grammar, the best ones fitted, a front of size against fit.
+//! Search over free forms: evaluates a whole grammar, fits the best forms, and builds a front of size against fit.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -12,50 +12,50 @@ use crate::diagnose::proposal::draft::{self, Term};
 use crate::diagnose::proposal::library::{BESIDE_AIR, Form, OF_AIR, Shape};
 use crate::diagnose::search::nulls::threshold;
 use crate::diagnose::search::round::Round;
-use crate::progress::{Cancelled, Progress, say};
+use crate::progress::{Cancelled, Progress, report};
 use greylag_num::statistics::quantile;
 use greylag_physics::Channel;
 use greylag_physics::formula::{Variable, file};
 
-/// Forms that are tried at once.
+/// Number of forms evaluated at once.
 const BATCH: usize = 64;
-/// Batches between two words on the progress.
-const HEARD: usize = 32;
-/// The best forms of each size whose constants are fitted.
+/// Batches between two progress reports.
+const REPORT_EVERY: usize = 32;
+/// Number of forms of each size whose constants are fitted.
 const FITTED: usize = 8;
-/// Forms of a channel that go on to the round.
+/// Number of forms of a channel that enter the round.
 const FINALISTS: usize = 20;
-/// Significant figures of a constant.
+/// Significant figures of a fitted constant.
 const FIGURES: usize = 2;
 
-/// A form that was fitted.
+/// A form with fitted constants.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// The form.
+    /// The form, with its channel and factor.
     pub form: Form,
-    /// Nodes of its expression.
+    /// Number of nodes of its expression.
     pub size: usize,
-    /// Fall of the squared whitened error.
+    /// Reduction of the squared whitened error.
     pub fall: f64,
-    /// The fall less what its constants and the number of forms of its size make of nothing.
+    /// The reduction less what its constants and the number of forms of its size achieve by chance.
     pub worth: f64,
-    /// Its evidence.
+    /// Evidence of the form.
     pub evidence: f64,
 }
 
-/// What a search of one channel gives.
+/// Result of the search in one channel.
 pub struct Searched {
-    /// Forms that were tried.
+    /// Number of forms evaluated.
     pub tried: usize,
-    /// What the same search reaches in flights that lack nothing.
+    /// Evidence that the same search reaches in null flights.
     pub threshold: f64,
-    /// The best of each size that is better than all smaller ones.
+    /// The best form of each size, if it is better than all smaller ones.
     pub front: Vec<Fitted>,
-    /// Those that go on, the best first.
+    /// Forms that enter the round, the best first.
     pub finalists: Vec<Fitted>,
 }
 
-/// The forms with and without dynamic pressure.
+/// The forms that scale with dynamic pressure, or those that do not.
 struct Side {
     of_air: bool,
     grammar: Grammar,
@@ -63,10 +63,10 @@ struct Side {
     kept: Vec<Kept>,
 }
 
-/// Searches the free forms in `channel` of what the model of `round` leaves; `None` if no flight measures it.
+/// Searches the free forms in `channel` of the residual of `round`; `None` if no flight measures it.
 ///
 /// # Errors
-/// If `progress` ends it.
+/// `progress` cancelled.
 pub fn searched(
     round: &Round,
     channel: Channel,
@@ -88,17 +88,17 @@ pub fn searched(
     let mut done = 0;
     for side in &mut sides {
         side.keep(&screen, &samples, |count| {
-            say(progress, "trying free forms", 0.7 * (done + count) as f64 / tried as f64)
+            report(progress, "trying free forms", 0.7 * (done + count) as f64 / tried as f64)
         })?;
         done += side.kept.len();
     }
-    say(progress, "fitting the constants of the best free forms", 0.7)?;
+    report(progress, "fitting the constants of the best free forms", 0.7)?;
     let counts: Vec<usize> = (0..=MOST_NODES)
         .map(|n| sides.iter().flat_map(|s| &s.grammar.candidates).filter(|c| c.size == n).count())
         .collect();
     let search = Search { channel, screen: &screen, samples: &samples, counts };
     let fitted = search.fitted(&sides);
-    say(progress, "the same search in flights that lack nothing", 0.85)?;
+    report(progress, "the same search in flights that lack nothing", 0.85)?;
     let nulls = search.nulls(&sides, options);
     Ok(Some(Searched {
         tried,
@@ -108,7 +108,7 @@ pub fn searched(
     }))
 }
 
-/// The variables with what they reach in the flights.
+/// The variables with their ranges in the flights.
 fn reaches(samples: &Samples, variables: &[Variable]) -> Vec<Reach> {
     let of = |variable: &Variable| {
         let all = samples.variable(*variable)?;
@@ -126,12 +126,12 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Side {
-    /// Tries all forms; `heard` is told how many are done.
+    /// Evaluates all forms; `on_progress` receives the number done.
     fn keep(
         &mut self,
         screen: &Screen,
         samples: &Samples,
-        heard: impl Fn(usize) -> Result<(), Cancelled>,
+        on_progress: impl Fn(usize) -> Result<(), Cancelled>,
     ) -> Result<(), Cancelled> {
         let atoms: Vec<Vec<f64>> = self
             .grammar
@@ -158,8 +158,8 @@ impl Side {
             screen.keep(&DMatrix::from_vec(rows, candidates.len(), columns))
         };
         let mut kept = Vec::with_capacity(self.grammar.candidates.len());
-        for many in self.grammar.candidates.chunks(BATCH * HEARD) {
-            heard(kept.len())?;
+        for many in self.grammar.candidates.chunks(BATCH * REPORT_EVERY) {
+            on_progress(kept.len())?;
             let done: Vec<Vec<Kept>> = many.par_chunks(BATCH).map(batch).collect();
             kept.extend(done.into_iter().flatten());
         }
@@ -176,18 +176,18 @@ struct Search<'a> {
     channel: Channel,
     screen: &'a Screen<'a>,
     samples: &'a Samples,
-    /// Forms of each size.
+    /// Number of forms of each size.
     counts: Vec<usize>,
 }
 
 impl Search<'_> {
-    /// What a form of `size` with `constants` must take to be worth more than none: its coefficients, and the choice
-    /// among all of its size.
+    /// Penalty of a form of `size` with `constants`: for its coefficients, and for the choice among all forms of its
+    /// size.
     fn price(&self, size: usize, constants: usize) -> f64 {
         self.screen.price(constants) + 2.0 * (self.counts[size].max(1) as f64).ln()
     }
 
-    /// The best forms of each size in the flights, their constants fitted.
+    /// The best forms of each size in the flights, with fitted constants.
     fn fitted(&self, sides: &[Side]) -> Vec<Fitted> {
         let mut best: Vec<(usize, usize, f64)> = Vec::new();
         for size in 1..=MOST_NODES {
@@ -216,7 +216,7 @@ impl Search<'_> {
         fitted
     }
 
-    /// `free` with what it reaches; `None` if no effect file can hold it.
+    /// `free` with its score; `None` if an effect file cannot hold it.
     fn judged(&self, side: &Side, free: Free) -> Option<Fitted> {
         let mut values = self.samples.of(&free.expression, &free.constants);
         values.iter_mut().zip(&side.factor).for_each(|(x, f)| *x *= f);
@@ -232,7 +232,7 @@ impl Search<'_> {
         Some(Fitted { form, size, fall: reached.fall, worth, evidence: reached.evidence })
     }
 
-    /// The best evidence of the search in each null flight, the constants of the best form fitted as in the flights.
+    /// Best evidence of the search in each null flight; the constants of the best form are fitted as in the flights.
     fn nulls(&self, sides: &[Side], options: &Options) -> Vec<f64> {
         let of = |k: usize| {
             let null = self.screen.null(options.seed, k);
@@ -261,7 +261,7 @@ impl Search<'_> {
     }
 }
 
-/// The best of each size that takes more than all smaller ones.
+/// The best of each size that reduces the error more than all smaller ones.
 fn front(fitted: &[Fitted]) -> Vec<Fitted> {
     let mut front: Vec<Fitted> = Vec::new();
     for size in 1..=MOST_NODES + 1 {
@@ -275,7 +275,7 @@ fn front(fitted: &[Fitted]) -> Vec<Fitted> {
     front
 }
 
-/// The front, and the worthiest others.
+/// The front, and the best of the other forms.
 fn finalists(fitted: Vec<Fitted>) -> Vec<Fitted> {
     let front = front(&fitted);
     let mut all: Vec<Fitted> = front.clone();

@@ -1,4 +1,4 @@
-//! How a shape runs with each of its variables, found by trying.
+//! Trend of a shape with each of its variables, determined by sampling.
 
 use super::evaluate::evaluate;
 use super::grammar::positive;
@@ -6,17 +6,17 @@ use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::Expression;
 use greylag_physics::formula::parser;
 
-/// Places along a variable at which a shape is tried, as shares of what the variable reaches.
+/// Values of a variable at which a shape is sampled, as shares of its range.
 const ALONG: [f64; 8] = [0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0];
-/// Values of the other variables meanwhile, as shares of what they reach.
+/// Values of the other variables meanwhile, as shares of their ranges.
 const BESIDE: [f64; 3] = [0.9, 0.37, 0.71];
-/// Share of a variable's range that flights reach.
+/// Share of a variable's possible range that flights typically cover.
 const FLOWN: f64 = 0.3;
-/// Differences below this share of the largest value are rounding.
+/// Differences below this share of the largest value count as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// How `shape` runs with each of its variables, in words that are equal if the trends are; `None` if it is no
-/// formula. A rate is the same variable whether it is divided by the airspeed or not.
+/// The trend of `shape` with each of its variables, in words that are equal if the trends are; `None` if it is no
+/// formula. A rate counts as the same variable whether or not it is divided by the airspeed.
 pub fn trend(shape: &str) -> Option<String> {
     let expression = parser::parse(shape, &[]).ok()?;
     let variables = expression.variables();
@@ -26,7 +26,7 @@ pub fn trend(shape: &str) -> Option<String> {
     Some(all.join(" "))
 }
 
-/// The name of a variable: a rate is the same one whether it is divided by the airspeed or not.
+/// Name of a variable; a rate has the same name whether or not it is divided by the airspeed.
 pub fn plain(v: Variable) -> &'static str {
     match v {
         Variable::RollRateHat => "p",
@@ -36,12 +36,12 @@ pub fn plain(v: Variable) -> &'static str {
     }
 }
 
-/// What the variable reaches in flights, less than what it may ever reach.
+/// Typical range of the variable in flight, less than its possible range.
 fn reach(v: Variable) -> f64 {
     if positive(v) { v.range()[1] } else { FLOWN * v.range()[1] }
 }
 
-/// The trend along one variable, the others held.
+/// The trend along one variable, the others held constant.
 fn along(expression: &Expression, variables: &[Variable], v: Variable) -> String {
     let values = |sign: f64| {
         let columns: Vec<(Variable, Vec<f64>)> = variables
@@ -78,7 +78,7 @@ fn along(expression: &Expression, variables: &[Variable], v: Variable) -> String
     format!("{turns}{parity} {}", plain(v))
 }
 
-/// Whether `values` never turn.
+/// Whether `values` are monotonic.
 fn runs(values: &[f64], size: f64) -> bool {
     let steps = || values.windows(2).map(|w| w[1] - w[0]);
     let least = ROUNDING * size;

@@ -1,4 +1,4 @@
-//! What is unknown in every round: the free coefficients and the errors of the sensors, with their columns.
+//! Nuisance parameters of every round: the free coefficients and the sensor errors, with their columns.
 
 use super::Problem;
 use crate::diagnose::regression::catalogue::{self, Entry};
@@ -11,8 +11,8 @@ use greylag_model::GreyBox;
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
-/// The known unknowns and their columns: free coefficients, whose columns `linear_columns` has where the model is linear in
-/// them, then what each flight has of its own, then the sensors of each flight.
+/// The nuisance parameters and their columns: free coefficients (from `linear_columns` where the model is linear in
+/// them), then each flight's own constants, then each flight's sensor errors.
 pub(super) fn known(
     problem: &Problem,
     model: &GreyBox,
@@ -63,9 +63,9 @@ pub(super) fn known(
     (known, coefficients, placed)
 }
 
-/// Expects of every flight's blur what its clock adds to it: a record of u that is late by λ samples is
-/// u − λu' + ½λ²u'', and the clock's column holds the first order alone. Without the second, a delay of a
-/// sample that the clock takes for its own leaves a curvature that only a lag explains.
+/// Sets the prior mean of every flight's blur to the second-order effect of its delay: a record of u that is late by
+/// λ samples is u − λu' + ½λ²u'', and the delay's column contains the first order alone. Without the second order, a
+/// delay of a sample leaves a curvature that would be attributed to a lag.
 pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Projected) {
     let first = known.len().saturating_sub(problem.flights.len() * SENSORS);
     for (k, flight) in problem.flights.iter().enumerate() {
@@ -79,7 +79,7 @@ pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Project
     }
 }
 
-/// Whether a search leaves the coefficient free: gains of nominally one are held.
+/// Whether a search estimates the coefficient; gains of nominally one are held.
 fn searched(model: &GreyBox, index: usize) -> bool {
     let name = &model.coefficients()[index].name;
     let Some((id, own)) = name.split_once('.') else { return true };
@@ -89,7 +89,7 @@ fn searched(model: &GreyBox, index: usize) -> bool {
     starts == 0 || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
 }
 
-/// The derivative of the prediction by a coefficient that the model is not linear in.
+/// Derivative of the prediction with respect to a coefficient that the model is not linear in.
 fn tangent(model: &GreyBox, flight: &Ready, index: usize) -> Column {
     let named = &model.coefficients()[index];
     let by = (0.02 * named.value.abs()).max(1e-4);

@@ -1,4 +1,4 @@
-//! What noise that columns and residual share feigns, by drawing it again.
+//! Spurious products from noise shared by columns and residual, estimated by drawing the noise again.
 
 use crate::diagnose::regression::shared;
 use rayon::prelude::*;
@@ -11,11 +11,11 @@ use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::noise::Noise;
 use greylag_model::GreyBox;
 
-/// Draws of the noise that columns and residual share, over which its product is averaged. With one, an
-/// inertia that is not there had an evidence of 3, 11 or 19 by the seed.
+/// Draws over which the product of shared noise is averaged. With a single draw, an inertia error that was not there
+/// reached an evidence of 3, 11 or 19 depending on the seed.
 const DRAWS: usize = 8;
 
-/// What a round is made of.
+/// Inputs of a round.
 pub(super) struct Setting<'a> {
     pub(super) problem: &'a Problem,
     pub(super) model: &'a GreyBox,
@@ -23,13 +23,13 @@ pub(super) struct Setting<'a> {
     pub(super) accelerating: Option<&'a GreyBox>,
 }
 
-/// The sum of lists of one length.
+/// Elementwise sum of lists of equal length.
 pub(super) fn sum(lists: &[Vec<f64>]) -> Vec<f64> {
     let count = lists.first().map_or(0, Vec::len);
     (0..count).map(|k| lists.iter().map(|list| list[k]).sum()).collect()
 }
 
-/// The flights with the noise number `draw` once more.
+/// The flights disturbed again with noise of draw number `draw`.
 pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
     let flights = of.problem.flights.par_iter().zip(&of.problem.path).enumerate();
     flights
@@ -40,9 +40,9 @@ pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
         .collect()
 }
 
-/// What noise that columns share with the residual feigns, flight by flight: by place, of the known unknowns
-/// and the linear candidates, which stand in front; the mean of `DRAWS` where there are candidates to judge,
-/// one draw where a model only settles. With it, those columns with the noise of the first draw.
+/// Spurious products from shared noise, by flight and index, of the nuisance parameters and the linear candidates,
+/// which come first: the mean of `DRAWS` draws if there are candidates to judge, one draw if a model is only settled.
+/// Also returns those columns with the noise of the first draw.
 pub(super) fn shared(
     of: &Setting,
     cells: &Cells,
@@ -65,7 +65,7 @@ pub(super) fn shared(
         let (known, _, mut after) = known(of.problem, of.model, &flights, columns);
         let made = Columns { trials: Vec::new(), columns: candidates };
         let end = place(&mut after, known.len(), &made, &flights);
-        // the residual stands where it stands before
+        // the residual keeps the index that it has in `before`
         for list in &mut after {
             list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
         }

@@ -1,4 +1,4 @@
-//! The models and the columns that a round fits.
+//! Models and columns that a round's fit yields.
 
 use super::Round;
 use crate::diagnose::regression::catalogue::{self};
@@ -9,7 +9,7 @@ use crate::diagnose::regression::rank::Score;
 use greylag_model::GreyBox;
 
 impl Round {
-    /// The model with its coefficients where they go once `score`'s effect has joined.
+    /// The model with its coefficients as estimated together with `score`'s effect.
     pub fn with(&self, score: &Score) -> GreyBox {
         let p = &self.projected;
         let mut model = self.model.clone();
@@ -22,14 +22,14 @@ impl Round {
         model
     }
 
-    /// The largest change that tuning makes to a coefficient, in its standard deviations.
+    /// Largest change of a coefficient by tuning, in its standard deviations.
     pub fn stride(&self) -> f64 {
         let p = &self.projected;
         let of = |k: usize| p.tuned[k].abs() / p.covariance[(k, k)].sqrt();
         (0..self.coefficients.len()).map(of).filter(|x| x.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Measured less the tuned model, sensors' errors taken out, flight by flight.
+    /// Residual of the tuned model, sensor errors removed, by flight.
     pub fn tuned_residual(&self) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -48,7 +48,7 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// What `score` adds to the residual, flight by flight.
+    /// Contribution of `score` to the residual, by flight.
     pub fn contribution(&self, score: &Score) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -65,8 +65,7 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// What of the tuned model's residual is left once `score`'s effect has joined and the known columns have
-    /// gone where they go with it, flight by flight.
+    /// Residual with `score`'s effect and the nuisance parameters as estimated together with it, by flight.
     pub fn residual_with(&self, score: &Score) -> Vec<Column> {
         let added = self.contribution(score);
         let given = |place: usize| -> f64 {
@@ -85,7 +84,7 @@ impl Round {
         self.tuned_residual().into_iter().zip(added).zip(&self.placed).map(of).collect()
     }
 
-    /// What `score` takes of the squared whitened error, channel by channel.
+    /// Reduction of the squared whitened error by `score`, by channel.
     pub fn taken_by(&self, score: &Score) -> [f64; 6] {
         let mut taken = [0.0; 6];
         let last = self.projected.width();
@@ -98,7 +97,7 @@ impl Round {
         taken
     }
 
-    /// Channels in which `score` takes at least a tenth of what it takes in the best, the best first.
+    /// Channels in which `score` reduces the error by at least a tenth of its largest reduction, the largest first.
     pub fn channels_of(&self, score: &Score) -> Vec<usize> {
         let taken = self.taken_by(score);
         let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
@@ -108,8 +107,8 @@ impl Round {
         channels
     }
 
-    /// The model with its coefficients where the data and their prior put them, asserted effects' within
-    /// their bounds.
+    /// The model with its coefficients as estimated from data and prior; those of asserted effects limited to their
+    /// bounds.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
         let linear = model.linear();
@@ -151,7 +150,7 @@ impl Round {
     }
 }
 
-/// The physical bounds of a coefficient.
+/// Physical bounds of a coefficient.
 fn bounds(model: &GreyBox, index: usize) -> Option<(f64, f64)> {
     let (id, own) = model.coefficients()[index].name.split_once('.')?;
     let about = model.effects().find(|about| about.id == id)?;

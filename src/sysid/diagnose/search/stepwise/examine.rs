@@ -1,4 +1,4 @@
-//! The checks of the best candidate.
+//! Checks of the best candidate.
 
 use super::found::{Found, Selected};
 use crate::diagnose::options::Options;
@@ -7,22 +7,21 @@ use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Round;
 use crate::diagnose::search::unexplained::explained;
 
-/// Least fall of the error on held-out segments.
+/// Least relative reduction of the error on held-out segments.
 pub const HELD_OUT: f64 = 0.1;
-/// Least share of bootstraps in which the effect, or one of its class, is the best.
+/// Least share of bootstraps in which the effect, or one indistinguishable from it, is best.
 pub const SELECTED: f64 = 0.8;
-/// Precision of the formula of an effect that is not linear in its constants: whatever takes a smaller part of
-/// what such an effect took before may be no more than its error.
+/// Precision of the formula of a nonlinear effect: a later effect with a smaller share of its reduction may only
+/// correct the formula's error.
 const PRECISION: f64 = 2e-3;
-/// Least share of a channel's variance that an effect must explain to be material. A delay of 10 ms explains
-/// 2e-4 of it.
+/// Least share of a channel's variance that a material effect explains. A delay of 10 ms explains 2e-4 of it.
 const MATERIAL: f64 = 1e-4;
-/// Least share of a channel's error beyond noise that an effect must take to be material beside others.
+/// Least share of a channel's error beyond noise that a material effect removes beside others.
 const MATERIAL_BESIDE: f64 = 0.02;
-/// A candidate whose contribution is this much like another's can take its place.
+/// Correlation of contributions from which one candidate can replace another.
 const RIVAL: f64 = 0.3;
 
-/// The best candidate, if its evidence exceeds the threshold, with all its checks.
+/// The best candidate with all its checks, if its evidence exceeds the threshold.
 pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     let round = found.round();
     let (place, score) = found.scores.first()?;
@@ -38,29 +37,29 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     let members: Vec<usize> =
         std::iter::once(*place).chain(class.iter().map(|k| found.scores[*k].0)).collect();
     let heldout = checks::heldout_reduction(round, trial, score);
-    let relieves = checks::relieves(round, score);
-    let slight = (heldout < HELD_OUT || heldout.is_nan()) && !relieves;
+    let absorbs_prior_error = checks::absorbs_prior_error(round, score);
+    let slight = (heldout < HELD_OUT || heldout.is_nan()) && !absorbs_prior_error;
     if slight {
         refused.push(under("it takes", heldout, "of the error on held-out segments", HELD_OUT));
     }
     // what explains something else would be selected besides, not in its place
     let rival = |(t, other): &&(usize, Score)| {
-        !found.beaten.contains(t) && checks::likeness(round, score, other).abs() > RIVAL
+        !found.beaten.contains(t) && checks::correlation(round, score, other).abs() > RIVAL
     };
     let open: Vec<usize> = found.scores.iter().filter(rival).map(|(t, _)| *t).collect();
     let selected = checks::selected(round, &open, &members, options.bootstraps);
     if selected < SELECTED && options.bootstraps > 0 {
         refused.push(under("it is the best in", selected, "of the block bootstraps", SELECTED));
     }
-    // what relieves the prior takes its strain, which no formula's error is
-    refused.extend(hidden(found, score).filter(|_| !relieves));
+    // a candidate that absorbs prior misfit does not correct the error of a formula
+    refused.extend(hidden(found, score).filter(|_| !absorbs_prior_error));
     let by_flight = checks::by_flight(round, trial, score);
     let first = trial.points[score.point].free[0].0;
     if checks::contradict(score.values[first], &by_flight) {
         refused.push("the flights contradict one another about its amount".into());
     }
     let contribution = round.contribution(score);
-    let trace = match refused.is_empty() && !relieves {
+    let trace = match refused.is_empty() && !absorbs_prior_error {
         true => immaterial(found, round, score),
         false => None,
     };
@@ -78,27 +77,27 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
         refused,
         slight,
         trace,
-        relieves,
+        absorbs_prior_error,
         curved: trial.points[score.point].contribution.is_some(),
         contribution,
     })
 }
 
-/// Places in the ranking of the candidates that the data cannot tell from the best one.
+/// Indices in the ranking of the candidates that the data cannot distinguish from the best one.
 fn class(found: &Found) -> Vec<usize> {
     let mut class = checks::class(found.round(), &found.scores, 0);
     class.retain(|k| !found.beaten.contains(&found.scores[*k].0));
-    // settled, they are as good: how they did where the model was linearised without them says no more
+    // settled, they are as good: their scores at the model linearised without them add no information
     let level = (1..found.scores.len()).filter(|k| found.level.contains(&found.scores[*k].0));
     let level: Vec<usize> = level.filter(|k| !class.contains(k)).collect();
     class.extend(level);
     class
 }
 
-/// Says so if a significant effect does not matter: in no channel does it explain [`MATERIAL`] of the variance
-/// and [`MATERIAL_BESIDE`] of what the tuned model left beyond noise. What counts is by how much less is left with it in
-/// the model and the known coefficients where they go then: evidence also holds what the prior and the noise of the
-/// columns are credited with, which no channel shows.
+/// A remark if a significant effect is immaterial: in no channel does it explain [`MATERIAL`] of the variance and
+/// [`MATERIAL_BESIDE`] of the tuned model's residual beyond noise. The measure is the reduction with the effect and
+/// all coefficients re-estimated, because the evidence also includes reductions of the prior's misfit and of column
+/// noise, which no channel shows.
 fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     let taken = round.taken_by(score);
     let explained = explained(&found.first, &round.tuned_residual(), &round.residual_with(score));
@@ -124,12 +123,12 @@ fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     })
 }
 
-/// A refusal by a share that is less than it has to be.
+/// Text of a refusal because of a share below its limit.
 fn under(verb: &str, share: f64, of: &str, least: f64) -> String {
     format!("{verb} {:.0} % {of}, under {:.0} %", 100.0 * share, 100.0 * least)
 }
 
-/// Says so if `score` may be an error of the formula of an effect that has been selected before.
+/// A remark if `score` may only correct the formula of an effect selected before.
 fn hidden(found: &Found, score: &Score) -> Option<String> {
     let earlier = found.selected.iter().find(|s| s.curved && hides(s, score))?;
     Some(format!(
@@ -139,7 +138,7 @@ fn hidden(found: &Found, score: &Score) -> Option<String> {
     ))
 }
 
-/// Whether `score` may be an error of what has been selected before.
+/// Whether `score` may only correct the formula of the effect `earlier`.
 fn hides(earlier: &Selected, score: &Score) -> bool {
     score.fall < PRECISION * earlier.score.fall
 }

@@ -1,26 +1,27 @@
-//! Refusals of selected effects by what is left beside them.
+//! Refusals of selected effects because of the remaining residual.
 
 use super::found::{Found, Selected};
 use crate::compare::ChannelId;
 use greylag_physics::inputs::{Acts, Kind};
 
-/// Part of what is to be removed from its channels that an effect may leave there.
+/// Share of the removable error that an effect may leave in its channels.
 const LEFT: f64 = 0.3;
-/// The same of what products of the states take beside it: right ones leave less than 0.02, but for
-/// `unsteady_lift`, whose formula is not what the simulator has.
+/// The same share for products of the states; with right effects it is below 0.02, except for `unsteady_lift`, whose
+/// formula differs from the simulator's.
 const SHAPELESS: f64 = 0.1;
-/// The same of what second derivatives of the surfaces take beside an effect on the inputs.
+/// The same share for second derivatives of the deflections beside an input effect.
 const BENT: f64 = 0.02;
 
 impl Found {
-    /// Refuses effects that leave in their own channels much of what there is to remove: of what they take
-    /// themselves and what a flexible model could remove besides, or of what is more than noise.
+    /// Refuses effects that leave much of the removable error in their own channels, that is of their own reduction
+    /// plus what a flexible model could remove, or of the error beyond noise.
     pub(super) fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
-        let real = |s: &&Selected| s.refused.is_empty() && !s.relieves;
+        let real = |s: &&Selected| s.refused.is_empty() && !s.absorbs_prior_error;
         let taken: Vec<(&'static str, [f64; 6])> =
             self.selected.iter().filter(real).map(|s| (s.id, s.taken)).collect();
-        let assertable = self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.relieves);
+        let assertable =
+            self.selected.iter_mut().filter(|s| s.refused.is_empty() && !s.absorbs_prior_error);
         for effect in assertable {
             let own = |of: &[f64; 6]| effect.channels.iter().map(|c| of[*c]).sum::<f64>();
             let significant =
@@ -42,7 +43,7 @@ impl Found {
                 ));
             }
             let Some(shape) = &self.shape else { continue };
-            // several effects of a channel leave what they leave together
+            // the residual of a channel with several effects is common to them
             let others = taken.iter().filter(|(id, _)| *id != effect.id);
             let others: f64 =
                 others.map(|(_, of)| effect.channels.iter().map(|c| of[*c]).sum::<f64>()).sum();
@@ -78,7 +79,7 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses every effect all of whose channels are `abstained` from, for the reason that stands there.
+    /// Refuses every effect all of whose channels are `abstained` from, for the reason given there.
     pub fn refuse_where_abstained(&mut self, abstained: &[Option<String>; 6]) {
         for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
             let whys: Option<Vec<&String>> =
@@ -94,14 +95,14 @@ impl Found {
         self.selected.iter_mut().for_each(|effect| effect.refused.push(reason.to_owned()));
     }
 
-    /// Refuses the asserted effects called `ids`, for `reason`.
+    /// Refuses the asserted effects with the ids `ids`, for `reason`.
     pub fn refuse(&mut self, ids: &[String], reason: &str) {
         for effect in self.selected.iter_mut().filter(|s| ids.iter().any(|id| id == s.id)) {
             effect.refused.push(reason.to_owned());
         }
     }
 
-    /// Refuses what was found beside an effect that is refused: it is no more sure than that.
+    /// Refuses effects found beside a refused one, since they depend on it.
     fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
         let Some(first) = self.selected.iter().position(refused) else { return };

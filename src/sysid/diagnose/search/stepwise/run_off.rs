@@ -1,20 +1,20 @@
-//! The run-off of close contenders, each joined to the model and settled.
+//! Run-off between close contenders, each added to the model and tuned.
 
 use super::found::Found;
 use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::settling::{SETTLING, settled};
 
-/// Share of the best candidate's order (see `Score::order`) above which another contends with it.
+/// A candidate is a contender if its order (see `Score::order`) exceeds this share of the best one's.
 const CONTENDING: f64 = 0.2;
-/// Least likeness (correlation) of its contribution to the best one's.
-const CONTENDING_LIKENESS: f64 = 0.6;
-/// Most contenders, the best one among them.
+/// Least correlation of its contribution with the best one's.
+const CONTENDING_CORRELATION: f64 = 0.6;
+/// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
-/// Puts the best of several close contenders first, each joined to the model and settled under one noise, and
-/// tells those that lose clearly from those that are as good: a linearisation at the model without them does
-/// not tell them apart.
+/// Ranks the best of several close contenders first, after each has been added to the model and tuned under the same
+/// noise, and separates those that are clearly worse from those that are equally good: the linearisation at the model
+/// without them cannot distinguish them.
 pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
@@ -26,7 +26,7 @@ pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
             let (trial, score) = &found.scores[*k];
             score.order > CONTENDING * best.order
                 && !round.at_bound(*trial, score)
-                && checks::likeness(round, best, score).abs() > CONTENDING_LIKENESS
+                && checks::correlation(round, best, score).abs() > CONTENDING_CORRELATION
         })
         .take(CONTENDERS)
         .collect();
