@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# A campaign on a real Slurm of one node and on HyperQueue: jobs are killed by scancel and by SIGKILL, and the results are
-# those of a local run to the bit.
+# A campaign on a real Slurm of one node, on HyperQueue and under GNU parallel: two cells or more are killed on each, by
+# scancel and by SIGKILL, and the results are those of a local run to the bit.
 #
-#   tests/campaign_schedulers.sh GREYLAG FILE.toml [slurm|hyperqueue]...
+#   tests/campaign_schedulers.sh GREYLAG FILE.toml [slurm|hyperqueue|parallel]...
 #
 # Needs root for munged (Debian: slurm-wlm, munge), and for HyperQueue `hq` or a Python ($PYTHON) with the package hyperqueue.
-# Exit status 77: a scheduler that was asked for is not installed.
+# GNU parallel: Debian's package parallel. Exit status 77: a scheduler that was asked for is not installed.
 set -euo pipefail
 greylag=$(realpath "$1") file=$(realpath "$2")
 here=$(dirname "$(realpath "$0")")
@@ -120,6 +120,19 @@ on_hyperqueue() {
     for _ in $(seq 200); do [ -n "$(cells hyperqueue)" ] && break; sleep 0.1; done
     sleep 0.7
     kill -KILL $(cells hyperqueue) 2> /dev/null && echo "hyperqueue: killed" || true
+  done
+  wait "$submit"
+}
+
+# GNU parallel's joblog has exit value 0 for a job that a signal killed, so the script looks at each cell's own status.
+on_parallel() {
+  need parallel
+  "$greylag" campaign run "$file" --out "$work/parallel" --launcher parallel --submit > "$work/parallel.txt" 2>&1 &
+  submit=$!
+  for _ in 1 2; do
+    for _ in $(seq 200); do [ -n "$(cells parallel)" ] && break; sleep 0.1; done
+    sleep 0.7
+    kill -KILL $(cells parallel) 2> /dev/null && echo "parallel: killed" || true
   done
   wait "$submit"
 }

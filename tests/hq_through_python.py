@@ -24,7 +24,8 @@ def main():
     first, last = map(int, asked.array.split("-"))
     env = dict(pair.split("=", 1) for pair in asked.env)
     with tempfile.TemporaryDirectory() as folder, LocalCluster(folder, WorkerConfig(cores=2)) as cluster:
-        job = Job(name=asked.name)
+        # by default a job of this interface ends, and cancels its other tasks, when a second task fails
+        job = Job(name=asked.name, max_fails=None)
         for task in range(first, last + 1):
             # HyperQueue counts the tasks of such a job from 0, whatever the environment says
             words = [word.replace("$HQ_TASK_ID", str(task)) for word in command]

@@ -84,7 +84,7 @@ use tracing_subscriber::EnvFilter;
 use crate::sysid::progress::Cancelled;
 use interruption::{Ended, Interruption};
 
-/// What `-V` says: version, commit where the build was given one (`GREYLAG_COMMIT`), features.
+/// The version that `-V` prints: the package's, the commit that the program was built from, its features.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let features = [
         ("demo", cfg!(feature = "demo")),
