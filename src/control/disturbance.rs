@@ -16,7 +16,7 @@ pub(crate) const NONE: State =
 /// Time constant of the estimate where nothing else is asked for, s: faster follows the noise, slower the manoeuvre.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
 /// Part of the motion that predictions may miss for the model to be planned with, where nothing else is asked for. In still air,
-/// on `params/x8/learned` they never miss so much, on `prior-as-printed` almost always (`docs/validation/learned-models.md`).
+/// on `params/x8/learned` they never miss so much, on `prior-as-printed` almost always (`results/notes/2026-11-27-learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
 /// Time over which predictions are compared with what happened, s: a few responses of the short period.
 const MEMORY_S: f64 = 0.5;

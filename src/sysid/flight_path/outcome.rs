@@ -34,7 +34,7 @@ const DISAGREEING: f64 = 4.0;
 
 /// How well a flight controller's pitch and heading are known for a whole flight, rad: the board is levelled by hand, the compass calibrated, and an
 /// estimator that takes a bias of its accelerometers for a pitch corrects the accelerations by the same, so that the log agrees with itself. PX4 in
-/// SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading (docs/validation/real-firmware.md); a calibration by hand is taken to be no better.
+/// SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading (results/notes/2026-11-27-flight-path-reconstruction.md); a calibration by hand is taken to be no better.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
