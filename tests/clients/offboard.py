@@ -134,8 +134,12 @@ class Offboard:
         return self.until(answers, f"acknowledgement of command {number}", 0.5).result
 
     def arm(self):
-        """Arms."""
+        """Arms; a controller that has just started may reject that for the time being."""
+        deadline = time.monotonic() + 5
         result = self.command(ARM, 1)
+        while result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED and time.monotonic() < deadline:
+            time.sleep(0.2)
+            result = self.command(ARM, 1)
         check(result == mavlink.MAV_RESULT_ACCEPTED, f"arming: result {result}")
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         self.until(lambda m: self.beats(m) and m.base_mode & armed, "heartbeat that is armed")

@@ -23,8 +23,8 @@ pub use crate::weak_form::channels::{ChannelId, RegimeVariable};
 pub use answer::Answer;
 pub use error::CompareError;
 pub use result::{
-    Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace, GrowthPoint,
-    HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime, RegimeBins,
-    Settings, StateScore,
+    Abstention, Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace,
+    GrowthPoint, HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime,
+    RegimeBins, Settings, StateScore,
 };
 pub use run::{Options, abstentions, compare, scores};

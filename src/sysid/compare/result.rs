@@ -193,6 +193,17 @@ pub struct ChannelResult {
     pub map: Map,
 }
 
+/// What a comparison can judge of a model in one channel.
+#[derive(Clone, Copy, Debug)]
+pub struct Abstention {
+    /// The channel.
+    pub channel: ChannelId,
+    /// Why the flights cannot judge the model here; `None` where they can.
+    pub why: Option<&'static str>,
+    /// Whether a regime with enough samples differs from the model beyond doubt.
+    pub sure_error: bool,
+}
+
 /// Mean residual over one regime variable.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegimeBins {

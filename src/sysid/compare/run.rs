@@ -13,8 +13,8 @@ use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
 use super::result::{
-    ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace, RegimeBins,
-    Settings,
+    Abstention, ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace,
+    RegimeBins, Settings,
 };
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
@@ -220,11 +220,16 @@ pub fn abstentions(
     model: &GreyBox,
     flights: &[Reconstruction],
     seed: u64,
-) -> Result<Vec<(ChannelId, Option<&'static str>)>, CompareError> {
+) -> Result<Vec<Abstention>, CompareError> {
     let (used, prepared, _) = usable(flights, model.airframe.envelope.flying_from_mps())?;
     let (series, shifts) = seen(model, &prepared, &used);
     let seen = Seen { flights: &prepared, series: &series, shifts: &shifts };
-    Ok(all_channels(model, &seen, seed).into_iter().map(|c| (c.channel, c.abstained)).collect())
+    let own = |c: ChannelResult| Abstention {
+        channel: c.channel,
+        why: c.abstained,
+        sure_error: c.regime.is_some(),
+    };
+    Ok(all_channels(model, &seen, seed).into_iter().map(own).collect())
 }
 
 type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);

@@ -9,7 +9,7 @@ use crate::diagnose::answer::per_flight;
 use crate::diagnose::answer::ranking;
 use crate::diagnose::answer::result::{ChannelLeft, Diagnosis, Nulls, Settings, Tuned, Verdict};
 use crate::diagnose::answer::rival::against_axes;
-use crate::diagnose::answer::sentences::{self, Said};
+use crate::diagnose::answer::sentences::{self, Said, WhyUnknown};
 use crate::diagnose::answer::shares;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::options::{Detail, Options};
@@ -60,13 +60,13 @@ pub fn diagnose(
     if let Some(motion) = rudder {
         found.refuse_in(&rudder::CHANNELS, RUDDER, &rudder::reason(motion));
     }
-    let Judged { abstained, tuned, doubtful } = judge(&mut found, model, &used, options);
+    let Judged { abstained, faultless, tuned, doubtful } = judge(&mut found, model, &used, options);
     let effects = ranking::candidates(&found, options);
     let channels = shares::channels(&found, &abstained);
     let mut measurement = measurement::measurement(&used);
     measurement.extend(per_flight::angles(found.round()));
     let trims = per_flight::trims(found.round());
-    let verdict = spoken(&found, &doubtful, &channels);
+    let (verdict, why_unknown) = spoken(&found, &doubtful, &channels, faultless);
     notes.extend(sentences::notes(&found, model, options));
     let decoys = match options.detail {
         Detail::Full => decoys::decoys(&found, options.seed),
@@ -75,6 +75,7 @@ pub fn diagnose(
     let said = sentences::sentences(&Said {
         found: &found,
         verdict,
+        why_unknown,
         doubtful: &doubtful,
         effects: &effects,
         channels: &channels,
@@ -115,6 +116,8 @@ fn settings(options: &Options) -> Settings {
 /// What speaks against effects beside the search's own checks.
 struct Judged {
     abstained: [Option<String>; 6],
+    /// Whether `compare` finds no sure error of the model as given in any channel.
+    faultless: bool,
     tuned: Vec<Tuned>,
     doubtful: Vec<String>,
 }
@@ -126,7 +129,7 @@ fn judge(
     flights: &[&Reconstruction],
     options: &Options,
 ) -> Judged {
-    let abstained = abstained(model, flights, options.seed);
+    let (abstained, faultless) = compared(model, flights, options.seed);
     found.refuse_where_abstained(&abstained);
     let void = ranking::void(found, options);
     found.refuse(&void, MAY_BE_ZERO);
@@ -135,26 +138,48 @@ fn judge(
     if !doubtful.is_empty() {
         found.refuse_all(CANNOT_BE);
     }
-    Judged { abstained, tuned, doubtful }
+    Judged { abstained, faultless, tuned, doubtful }
 }
 
-/// The verdict as it is spoken: nothing is said beside what cannot be, or where no channel can be judged.
-fn spoken(found: &Found, doubtful: &[String], channels: &[ChannelLeft]) -> Verdict {
+/// The verdict, and where it is [`Verdict::Unknown`] for want of evidence, the reason.
+///
+/// Nothing is said to be missing beside figures that cannot be, where no channel can be judged, where the model as given
+/// has no sure error, or where a flexible model of the states removes little of what is left: that is then not a function
+/// of the states, as errors of timing and of filtered sensors are not.
+fn spoken(
+    found: &Found,
+    doubtful: &[String],
+    channels: &[ChannelLeft],
+    faultless: bool,
+) -> (Verdict, Option<WhyUnknown>) {
+    let remainder = &found.remainder;
+    let little = remainder.total > remainder.total_threshold && found.learnable() < WORTH_SAYING;
+    let unknown = |why| (Verdict::Unknown, Some(why));
     match verdict(found) {
-        _ if !doubtful.is_empty() => Verdict::Unknown,
-        Verdict::Unexplained if channels.iter().all(|c| c.abstained) => Verdict::Unknown,
-        verdict => verdict,
+        _ if !doubtful.is_empty() => (Verdict::Unknown, None),
+        Verdict::Unexplained if channels.iter().all(|c| c.abstained) => {
+            unknown(WhyUnknown::SensorsMayAccount)
+        }
+        Verdict::Unexplained if faultless => unknown(WhyUnknown::GivenModelFaultless),
+        Verdict::Unexplained if little => unknown(WhyUnknown::NotOfTheStates),
+        verdict => (verdict, None),
     }
 }
 
-/// Why these flights cannot judge `model` as given in a channel, as `compare` has it.
-fn abstained(model: &GreyBox, flights: &[&Reconstruction], seed: u64) -> [Option<String>; 6] {
+/// Why these flights cannot judge `model` as given in a channel, and whether they show no sure error of it in any, as
+/// `compare` has it.
+fn compared(
+    model: &GreyBox,
+    flights: &[&Reconstruction],
+    seed: u64,
+) -> ([Option<String>; 6], bool) {
     let flights: Vec<Reconstruction> = flights.iter().map(|f| (*f).clone()).collect();
     let all = compare::abstentions(model, &flights, seed).unwrap_or_default();
-    std::array::from_fn(|k| {
-        let own = all.iter().find(|(id, _)| *id == ChannelId::ALL[k]);
-        own.and_then(|(_, why)| *why).map(str::to_owned)
-    })
+    let abstained = std::array::from_fn(|k| {
+        let own = all.iter().find(|a| a.channel == ChannelId::ALL[k]);
+        own.and_then(|a| a.why).map(str::to_owned)
+    });
+    (abstained, !all.is_empty() && all.iter().all(|a| !a.sure_error))
 }
 
 /// Whether every id is one of the catalogue.

@@ -27,6 +27,8 @@ pub struct Said<'a> {
     pub found: &'a Found,
     /// The answer in one word.
     pub verdict: Verdict,
+    /// Why it is [`Verdict::Unknown`], unless figures that cannot be are the reason.
+    pub why_unknown: Option<WhyUnknown>,
     /// Figures that cannot be.
     pub doubtful: &'a [String],
     /// Every candidate.
@@ -37,6 +39,17 @@ pub struct Said<'a> {
     pub measurement: &'a [Measurement],
     /// The flights' own trims.
     pub trims: &'a [FlightTrim],
+}
+
+/// Why a diagnosis has no verdict although its figures are possible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WhyUnknown {
+    /// The remaining errors of the sensors may account for what is left in every channel.
+    SensorsMayAccount,
+    /// The model as given has no sure error in any channel.
+    GivenModelFaultless,
+    /// A flexible model of the states removes little of what is left.
+    NotOfTheStates,
 }
 
 /// The sentences, the most important first: what cannot be, the instruments where they explain the flights, the aircraft.
@@ -87,14 +100,29 @@ fn answer(said: &Said) -> Option<String> {
             best_of(effects)
         )),
         Verdict::Unexplained => Some(unexplained(found, effects)),
-        Verdict::Unknown if doubtful.is_empty() => Some(
-            "These flights cannot say whether the model lacks anything: in every channel the remaining errors of the \
-             sensors may account for all that is left; log what is noted below, or fly with better sensors."
-                .into(),
-        ),
+        Verdict::Unknown if doubtful.is_empty() => Some(undecided(said)),
         Verdict::Unknown => Some(
             "So nothing is said about forces and moments: put that right first, or leave this flight out.".into(),
         ),
+    }
+}
+
+/// Why nothing is said to be missing although more than noise is left.
+fn undecided(said: &Said) -> String {
+    match said.why_unknown {
+        Some(WhyUnknown::GivenModelFaultless) => "The model as given has no sure error in any channel of these flights, \
+             so nothing is said to be missing. What the tuned model leaves beyond noise comes from the record: filtered, \
+             slow or late sensors; log faster and unfiltered to see more."
+            .into(),
+        Some(WhyUnknown::NotOfTheStates) => format!(
+            "These flights cannot say whether the model lacks anything: the tuned model leaves more than noise{}, so most \
+             of it is not a function of the states. Filtered, slow or late sensors are likelier than a missing force or \
+             moment; log faster and unfiltered.",
+            removable(said.found)
+        ),
+        _ => "These flights cannot say whether the model lacks anything: in every channel the remaining errors of the \
+             sensors may account for all that is left; log what is noted below, or fly with better sensors."
+            .into(),
     }
 }
 
