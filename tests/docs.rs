@@ -14,11 +14,15 @@ use greylag::manoeuvres::Schedule;
 use greylag::physics::Airframe;
 
 use docs_support::commands::{Invocation, invocations};
-use docs_support::markdown::{self, Page, anchors, links, pages, root};
+use docs_support::markdown::{self, Page, anchors, links, pages, records, root};
 use docs_support::{cli, effects, sitl};
 
 /// The README is read in ten minutes.
 const README_LINES: usize = 150;
+/// A validation page is a claim, a table, a command and limits.
+const VALIDATION_WORDS: usize = 600;
+/// Words of all pages below `docs` that are not generated.
+const DOCS_WORDS: usize = 55_000;
 /// Words of one conversation, which tell a reader of the repository nothing.
 const PRIVATE: [&str; 4] = ["the issue", "(asked:", "/work/", "asked was"];
 const AGAIN: &str = "write it anew: GREYLAG_WRITE_DOCS=1 cargo test --ignore-rust-version \
@@ -31,7 +35,7 @@ fn fail_with(problems: Vec<String>) {
 #[test]
 fn every_relative_link_and_anchor_resolves() {
     let mut problems = Vec::new();
-    for page in pages() {
+    for page in pages().into_iter().chain(records()) {
         let folder = page.path.parent().unwrap();
         for link in links(&page.text) {
             let (file, anchor) = link.split_once('#').unwrap_or((&link, ""));
@@ -169,6 +173,31 @@ fn the_readme_is_short_and_names_the_two_commands_to_begin_with() {
     for command in ["cargo demo", "cargo verify"] {
         assert!(readme.contains(command), "README.md does not name `{command}`");
     }
+}
+
+#[test]
+fn what_is_written_by_hand_is_short() {
+    let docs = root().join("docs");
+    let generated = [root().join(cli::PAGE), root().join(effects::PAGE)];
+    let mut problems = Vec::new();
+    let mut total = 0;
+    for page in pages() {
+        if !page.path.starts_with(&docs) || generated.contains(&page.path) {
+            continue;
+        }
+        let words = page.text.split_whitespace().count();
+        total += words;
+        if page.path.starts_with(docs.join("validation")) && words > VALIDATION_WORDS {
+            problems.push(format!(
+                "{page} has {words} words; {VALIDATION_WORDS} is the most: what was found on the \
+                 way belongs into results/notes"
+            ));
+        }
+    }
+    if total > DOCS_WORDS {
+        problems.push(format!("docs has {total} words; {DOCS_WORDS} is the most"));
+    }
+    fail_with(problems);
 }
 
 #[test]

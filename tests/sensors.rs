@@ -134,7 +134,7 @@ fn in_still_air_velocity_and_attitude_stand_for_airspeed_vanes_and_accelerometer
     let alpha = rms(&found, &flown, |i, t| i.state.alpha - t.alpha_rad).to_degrees();
     assert!(alpha < 0.1, "{alpha}");
     // forward: a difference over 20 ms of velocities with 5 mm/s of noise errs by 0.35 m/s² at a sample.
-    // Across, the path errs by more: docs/notes/limits.md
+    // Across, the path errs by more: docs/limits.md
     let force: [f64; 3] = std::array::from_fn(|k| {
         rms(&found, &flown, |i, t| i.specific_force[k] - t.specific_force_mps2[k])
     });

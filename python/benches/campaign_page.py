@@ -1,7 +1,7 @@
 """Puts what `greylag campaign report` says into a page of the documentation, between the marks that the page has for it.
 
     python python/benches/campaign_page.py --greylag target/release/greylag --campaign params/campaigns/medium.toml \\
-        --results results/campaign-medium.jsonl docs/validation/campaign-medium.md
+        --results results/campaign-medium.jsonl results/campaign-medium.md
 
 The page has `<!-- claims -->` … `<!-- end -->` and `<!-- tables -->` … `<!-- end -->`; what stands outside of these is left alone.
 """

@@ -15,7 +15,7 @@ pub(crate) const NONE: State =
 /// Default time constant of the estimate, s: a shorter one follows the noise, a longer one lags behind manoeuvres.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
 /// Default limit of the relative prediction error for the model to be planned with. In still air `params/x8/learned`
-/// stays below it and `prior-as-printed` almost always exceeds it (`docs/validation/learned-models.md`).
+/// stays below it and `prior-as-printed` almost always exceeds it (`results/notes/2026-11-27-learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
 /// Averaging time of the comparison of predictions with measurements, s: a few periods of the short-period mode.
 const MEMORY_S: f64 = 0.5;

@@ -42,6 +42,17 @@ pub fn pages() -> Vec<Page> {
     for folder in ["docs", "sitl", "params", "src", "tests", "examples"] {
         below(&root().join(folder), &mut paths);
     }
+    read_all(paths)
+}
+
+/// Pages of the dated notebook and of campaigns' tables. Their commands are those of their day, so only their links must hold.
+pub fn records() -> Vec<Page> {
+    let mut paths = Vec::new();
+    below(&root().join("results"), &mut paths);
+    read_all(paths)
+}
+
+fn read_all(mut paths: Vec<PathBuf>) -> Vec<Page> {
     paths.sort();
     paths.into_iter().map(|path| Page { text: fs::read_to_string(&path).unwrap(), path }).collect()
 }

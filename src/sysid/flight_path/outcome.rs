@@ -34,7 +34,7 @@ const DISAGREEING: f64 = 4.0;
 /// Uncertainty of a flight controller's pitch and heading over a whole flight, rad: the board is levelled by hand,
 /// the compass calibrated, and an estimator that attributes an accelerometer bias to pitch corrects the accelerations
 /// accordingly, so that the log is consistent. PX4 in SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading
-/// (docs/validation/real-firmware.md); a calibration by hand is assumed to be no better.
+/// (results/notes/2026-11-27-flight-path-reconstruction.md); a calibration by hand is assumed to be no better.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
