@@ -72,6 +72,11 @@ fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
         .clamped()
 }
 
+/// All at neutral, the throttle closed.
+pub(super) fn released() -> Inputs {
+    Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 }
+}
+
 /// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.
 pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
     let read = |channel: usize, name: &str| parameters.get(&format!("RC{channel}_{name}"));
