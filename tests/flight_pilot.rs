@@ -213,7 +213,7 @@ fn arming_is_refused_at_an_absurd_airspeed_or_attitude() {
 fn an_attitude_beyond_the_limits_is_flown_as_the_nearest_within_and_said_once() {
     let mut flight = Flight::offboard();
     flight.fly(5);
-    assert_eq!(flight.texts(), "");
+    assert!(!flight.texts().contains("limits"));
     let mut ask = |roll_deg: f64, pitch_deg: f64, ticks: usize| {
         let (roll, pitch) = (roll_deg.to_radians(), pitch_deg.to_radians());
         let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
@@ -240,6 +240,7 @@ fn an_attitude_beyond_the_limits_is_flown_as_the_nearest_within_and_said_once() 
 #[test]
 fn an_airspeed_that_is_late_is_not_called_wrong_and_a_short_gap_is_not_said() {
     let mut flight = Flight::armed();
+    flight.texts();
     let mut late = |ticks: usize| {
         for _ in 0..ticks {
             flight.now = flight.now.plus(TICK);

@@ -558,7 +558,7 @@ impl FlightController {
             now_us: self.now_us,
             mode: self.mode,
             radio: self.has_radio(),
-            sticks_s: self.sticks.age_s(self.now_us),
+            sticks_s: self.sticks.overridden_s(self.now_us),
             station_s: self.station_us.map(age),
         }
     }
