@@ -9,8 +9,9 @@ use greylag::link::autopilot::Verdict;
 use greylag::link::vehicle::Authority;
 use greylag_sitl::air::{Air, Turbulence};
 use greylag_sitl::plant::Truth;
-use greylag_sitl::shim::controller::Mode;
+use greylag_sitl::shim::controller::{FlightController, Mode};
 use greylag_sitl::shim::{Distortion, Noise, Personality};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType};
 
 use Authority::{Attitude, Surfaces};
 use Personality::{Ardupilot, Px4};
@@ -248,14 +249,105 @@ fn a_dead_companion_leaves_ardupilot_on_a_radios_sticks_until_its_failsafe_acts(
         assert_eq!(bench.said("a radio is bound"), no_radio == 0.0, "{:?}", bench.texts());
         // The companion is dead: nothing goes up any more.
         bench.cut = true;
-        bench.run(1.0);
+        bench.run(0.8);
         assert_eq!(bench.controller.mode(), Mode::Manual);
         let throttle = bench.controller.inputs().throttle;
         assert_eq!(throttle == 0.0, no_radio == 0.0, "{throttle}");
-        // The throttle's failsafe acts 1.2 s after the last stick, the ground station's 2 s after the last heartbeat.
-        bench.run(if no_radio == 1.0 { 1.0 } else { 2.0 });
+        // The receiver's failsafe neutralises the sticks at 1.0 s and acts at 1.2 s, the ground station's 2 s after the last heartbeat.
+        bench.run(0.3);
+        assert_eq!(bench.controller.mode(), Mode::Manual);
+        assert_eq!(bench.controller.inputs().throttle, 0.0);
+        bench.run(if no_radio == 1.0 { 0.9 } else { 2.0 });
         let mode = bench.controller.mode();
         assert!(left.contains(&mode), "{mode:?}");
+        bench.run(2.5);
+        assert_eq!(bench.controller.mode(), Mode::Return);
+    }
+}
+
+#[test]
+fn a_dead_companion_leaves_guided_where_a_radio_lets_the_ground_stations_failsafe_act() {
+    // Without a radio ArduPlane has been in its long failsafe since the ground, and looks at no other.
+    for (no_radio, action, ends) in
+        [(0.0, 1.0, Mode::Return), (0.0, 0.0, Mode::Guided), (1.0, 1.0, Mode::Guided)]
+    {
+        let mut bench = Bench::new(Ardupilot, Attitude, |options| {
+            options.parameters =
+                vec![("SIM_RC_FAIL".into(), no_radio), ("FS_LONG_ACTN".into(), action)];
+        });
+        bench.run(6.0);
+        bench.engage(15.0, 3.0);
+        bench.steer(15.0, 3.0, 3.0);
+        bench.cut = true;
+        // The last heartbeat may be a second older than the cut.
+        bench.run(0.9);
+        assert_eq!(bench.controller.mode(), Mode::Guided, "{no_radio} {action}");
+        bench.run(2.5);
+        assert_eq!(bench.controller.mode(), ends, "{no_radio} {action}");
+    }
+}
+
+#[test]
+fn without_a_radio_ardupilot_flies_home_after_a_hand_back_from_surfaces() {
+    use greylag::link::autopilot::Autopilot;
+    // Its channels have ended with our overrides: LOITER is left by FS_LONG_ACTN.
+    for (no_radio, ends) in [(1.0, Mode::Return), (0.0, Mode::Hold)] {
+        let mut bench = Bench::new(Ardupilot, Surfaces, |options| {
+            options.parameters = vec![("SIM_RC_FAIL".into(), no_radio)];
+        });
+        bench.run(6.0);
+        bench.engage(15.0, 3.0);
+        bench.steer(15.0, 3.0, 3.0);
+        let now = bench.desk.now(bench.host);
+        assert_eq!(bench.desk.pilot().disarm(now, true), Verdict::Accepted);
+        bench.run(2.0);
+        assert_eq!(bench.controller.mode(), Mode::Hold, "{:?}", bench.texts());
+        bench.run(3.0);
+        assert_eq!(bench.controller.mode(), ends, "{:?}", bench.texts());
+    }
+}
+
+#[test]
+fn the_shipped_parameters_are_what_both_ways_are_engaged_with() {
+    for (personality, file) in
+        [(Px4, "params/x8/px4.parm"), (Ardupilot, "params/x8/arduplane.parm")]
+    {
+        let shipped = greylag_sitl::parameter_file::read(std::path::Path::new(file)).unwrap();
+        let played = |(name, _): &&(String, f64)| FlightController::plays(personality, name);
+        let played: Vec<_> = shipped.iter().filter(played).cloned().collect();
+        assert!(played.len() >= 7, "{file}: {played:?}");
+        for authority in [Surfaces, Attitude] {
+            let mut bench =
+                Bench::new(personality, authority, |options| options.parameters = played.clone());
+            bench.run(6.0);
+            assert_eq!(bench.desk.vehicle().obstacle(), None, "{file} {authority:?}");
+            bench.engage(10.0, 3.0);
+            bench.steer(10.0, 3.0, 3.0);
+            assert!(bench.said("engaged"), "{file} {authority:?}: {:?}", bench.texts());
+        }
+    }
+}
+
+#[test]
+fn heartbeats_of_the_same_system_that_would_hide_a_dead_companion_are_an_obstacle_with_a_radio() {
+    let gimbal = MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_GIMBAL,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+        ..HEARTBEAT_DATA::DEFAULT
+    });
+    for (no_radio, refused) in [(0.0, true), (1.0, false)] {
+        let mut bench = Bench::new(Ardupilot, Surfaces, |options| {
+            options.parameters = vec![("SIM_RC_FAIL".into(), no_radio)];
+        });
+        bench.run(6.0);
+        assert_eq!(bench.desk.vehicle().obstacle(), None);
+        bench.beside(&flight_support::frame(1, 154, &gimbal));
+        let obstacle = bench.desk.vehicle().obstacle().unwrap_or_default();
+        let said = obstacle.contains("component 154 of system 1 sends heartbeats too");
+        assert_eq!(said, refused, "{obstacle}");
+        // It has gone.
+        bench.run(3.5);
+        assert_eq!(bench.desk.vehicle().obstacle(), None);
     }
 }
 

@@ -210,6 +210,57 @@ fn arming_is_refused_at_an_absurd_airspeed_or_attitude() {
 }
 
 #[test]
+fn an_attitude_beyond_the_limits_is_flown_as_the_nearest_within_and_said_once() {
+    let mut flight = Flight::offboard();
+    flight.fly(5);
+    assert!(!flight.texts().contains("limits"));
+    let mut ask = |roll_deg: f64, pitch_deg: f64, ticks: usize| {
+        let (roll, pitch) = (roll_deg.to_radians(), pitch_deg.to_radians());
+        let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
+        for _ in 0..ticks {
+            flight.pilot.attitude_setpoint(flight.now, setpoint);
+            flight.tick();
+        }
+        (flight.pilot.status().target.map(|x| x.to_degrees().round()), flight.texts())
+    };
+    // The X8 may be banked by 60 and pitched by 30 degrees at 20 m/s.
+    let (flown, said) = ask(170.0, 89.0, 100);
+    assert_eq!(flown, [60.0, 30.0]);
+    let words =
+        "setpoint beyond the limits: roll 170 deg is flown as 60, pitch 89 deg is flown as 30\n";
+    assert_eq!(said, words);
+    // However long it is asked for.
+    assert_eq!(ask(170.0, 89.0, 1500), ([60.0, 30.0], String::new()));
+    // Another one is another line; one within is none.
+    let (flown, said) = ask(-170.0, 5.0, 100);
+    assert_eq!((flown, said.matches("roll -170 deg is flown as -60\n").count()), ([-60.0, 5.0], 1));
+    assert_eq!(ask(40.0, 5.0, 600), ([40.0, 5.0], String::new()));
+}
+
+#[test]
+fn an_airspeed_that_is_late_is_not_called_wrong_and_a_short_gap_is_not_said() {
+    let mut flight = Flight::armed();
+    flight.texts();
+    let mut late = |ticks: usize| {
+        for _ in 0..ticks {
+            flight.now = flight.now.plus(TICK);
+            let mut seen = frame(flight.now);
+            seen.faults.insert(Faults::LATE_AIR);
+            flight.tick_with(seen);
+        }
+        let said = flight.texts();
+        flight.fly(600);
+        flight.texts();
+        said
+    };
+    // After a gap the first VFR_HUD is 20 ms away.
+    assert_eq!(late(40), "");
+    let said = late(70);
+    assert!(said.contains("vehicle state refused: airspeed and altitude are late"), "{said}");
+    assert!(!said.contains("airspeed or altitude"), "{said}");
+}
+
+#[test]
 fn disarming_in_the_air_needs_force() {
     let mut flight = Flight::armed();
     let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else { panic!() };

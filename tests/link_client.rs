@@ -382,6 +382,31 @@ fn intervals_are_per_client_and_limited() {
 }
 
 #[test]
+fn the_attitude_target_is_streamed_before_there_is_one_and_says_so() {
+    let (mut clients, mut double) = new();
+    double.status.target = [f64::NAN; 2];
+    clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);
+    let asked = ask(&mut clients, &mut double, at_ms(0), 1, &command(511, &[83.0, 1e5]));
+    assert_eq!(acks(&asked), [(511, 0)]);
+    let targets = |seen: &[Seen]| -> Vec<ATTITUDE_TARGET_DATA> {
+        let target = |s: &Seen| match s.message() {
+            MavMessage::ATTITUDE_TARGET(m) => Some(m),
+            _ => None,
+        };
+        seen.iter().filter_map(target).collect()
+    };
+    // Rates ignored is 7, attitude ignored 128; nobody reads an attitude out of it that is not flown.
+    let none = targets(&run(&mut clients, &mut double, 0, 1000));
+    assert_eq!(none.len(), 10);
+    assert!(none.iter().all(|m| m.type_mask.bits() == 7 | 128), "{none:?}");
+    assert!(none.iter().all(|m| m.q.iter().all(|x| x.is_finite())), "{none:?}");
+    double.status.target = [0.2, 0.0];
+    let some = targets(&run(&mut clients, &mut double, 1000, 2000));
+    assert_eq!(some.len(), 10);
+    assert!(some.iter().all(|m| m.type_mask.bits() == 7), "{some:?}");
+}
+
+#[test]
 fn a_data_stream_request_concerns_the_asker_only() {
     let (mut clients, mut double) = new();
     clients.handle(at_ms(0), peer(2), &hello(V2), &mut double);
@@ -430,6 +455,14 @@ fn missions_files_time_and_pings_are_answered() {
     // An upload of three items: MAV_MISSION_UNSUPPORTED is 3.
     let upload = answer(&raw_frame(44, &[3, 0, 1, 1]));
     assert_eq!((upload[0].id, &upload[0].payload[..3]), (47, &[255, 190, 3][..]));
+    // A fence (MAV_MISSION_TYPE 1) likewise, in its own type; and the items themselves, which some send unasked.
+    let fence = answer(&raw_frame(44, &[3, 0, 1, 1, 1]));
+    assert_eq!((fence[0].id, &fence[0].payload[..4]), (47, &[255, 190, 3, 1][..]));
+    let fences = answer(&raw_frame(43, &[1, 1, 1]));
+    let MavMessage::MISSION_COUNT(count) = fences[0].message() else { panic!() };
+    assert_eq!((count.count, count.mission_type as u8), (0, 1));
+    let item = answer(&raw_frame(51, &[0, 0, 1, 1]));
+    assert_eq!((item[0].id, item[0].payload[2]), (47, 13), "there is no item 0");
     let cleared = answer(&raw_frame(45, &[1, 1]));
     assert_eq!(cleared[0].id, 47);
 

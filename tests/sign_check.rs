@@ -159,7 +159,9 @@ fn wrong_signs_are_refused_with_the_axis_and_the_remedy() {
         assert!(words.iter().all(|words| bench.said(words)), "{:?}", outcome.texts);
         assert!(outcome.departed_deg < DEPARTURE, "{outcome:?}");
         bench.run(4.0);
-        assert_eq!(bench.controller.mode(), Mode::Hold);
+        // Without a radio ArduPlane's LOITER becomes RTL three seconds after its channels have ended.
+        let home = personality == Ardupilot && bench.controller.mode() == Mode::Return;
+        assert!(home || bench.controller.mode() == Mode::Hold, "{:?}", bench.controller.mode());
         let level = bench.controller.measured().roll_rad.to_degrees().abs();
         assert!(level < 5.0, "{level}");
     }

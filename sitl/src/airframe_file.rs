@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::plant::{Mixing, Moved, PlantOptions};
+use crate::text_file;
 
 /// Error of reading an airframe file; `why` names the entry.
 #[derive(Debug, thiserror::Error)]
@@ -71,8 +72,7 @@ impl Effector {
 /// If the file cannot be read, or describes surfaces that cannot be flown.
 pub fn apply(path: &Path, plant: &mut PlantOptions) -> Result<(), AirframeError> {
     let fail = |why: String| AirframeError { path: path.to_owned(), why };
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| fail(format!("cannot be read: {e}; name an existing file")))?;
+    let text = text_file::read(path).map_err(fail)?;
     let file: File = toml::from_str(&text).map_err(|e| fail(e.message().to_owned()))?;
     plant.held.extend(file.conditions);
     let all = || file.surfaces.values().chain(file.motors.values());

@@ -1,11 +1,13 @@
 //! The command line of `greylag-sitl`, in units a person writes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::airframe_file::{self, AirframeError};
 use crate::error_arguments::{FaultArgs, SensorArgs};
+use crate::parameter_file::{self, ParameterFileError};
 use crate::plant::Start;
 use crate::plant_arguments::PlantArgs;
+use crate::shim::controller::FlightController;
 use crate::shim::{
     Address, ArdupilotOptions, ChannelRange, Existing, Launch, OutputMap, Pace, Personality,
     Px4Noise, Px4Options, ShimOptions, TruthFile,
@@ -30,6 +32,9 @@ pub struct Cli {
     /// Set a parameter of that stack (may be repeated).
     #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = parameter)]
     parameter: Vec<(String, f64)>,
+    /// Set the parameters of a file, as params/x8/arduplane.parm: those that stack plays; --parameter goes on top.
+    #[arg(long, value_name = "FILE", requires = "personality")]
+    parameters: Option<PathBuf>,
     #[command(flatten)]
     px4: Px4Args,
     #[command(flatten)]
@@ -192,8 +197,14 @@ impl Cli {
     /// Options of the run that the command line describes.
     ///
     /// # Errors
-    /// If the airframe file cannot be used.
-    pub fn options(&self) -> Result<ShimOptions, AirframeError> {
+    /// If the airframe file or the parameter file cannot be used.
+    pub fn options(&self) -> Result<ShimOptions, CliError> {
+        let personality = self.personality.map(Personality::from);
+        let (mut parameters, unplayed) = match (&self.parameters, personality) {
+            (Some(path), Some(personality)) => played(path, personality)?,
+            _ => Default::default(),
+        };
+        parameters.extend(self.parameter.iter().cloned());
         let mut plant = self.plant.options(self.seed);
         if let Some(path) = &self.airframe {
             airframe_file::apply(path, &mut plant)?;
@@ -215,14 +226,47 @@ impl Cli {
             noise: self.sensors.noise(),
             bias: self.sensors.bias(),
             faults: self.faults.rule(),
-            personality: self.personality.map(|name| match name {
-                PersonalityName::Px4 => Personality::Px4,
-                PersonalityName::Ardupilot => Personality::Ardupilot,
-            }),
-            parameters: self.parameter.clone(),
+            personality,
+            parameters,
+            unplayed,
             clock_start_s: self.clock_start_s,
         })
     }
+}
+
+/// The parameters of a file that `personality` plays, and the names of the others.
+fn played(
+    path: &Path,
+    personality: Personality,
+) -> Result<(Vec<(String, f64)>, Vec<String>), ParameterFileError> {
+    let (played, others): (Vec<_>, Vec<_>) = parameter_file::read(path)?
+        .into_iter()
+        .partition(|(name, _)| FlightController::plays(personality, name));
+    if played.is_empty() {
+        let stack = personality.to_string();
+        return Err(ParameterFileError::Foreign { path: path.to_owned(), stack });
+    }
+    Ok((played, others.into_iter().map(|(name, _)| name).collect()))
+}
+
+impl From<PersonalityName> for Personality {
+    fn from(name: PersonalityName) -> Self {
+        match name {
+            PersonalityName::Px4 => Personality::Px4,
+            PersonalityName::Ardupilot => Personality::Ardupilot,
+        }
+    }
+}
+
+/// Why the command line cannot be followed.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// The airframe file.
+    #[error(transparent)]
+    Airframe(#[from] AirframeError),
+    /// The parameter file.
+    #[error(transparent)]
+    Parameters(#[from] ParameterFileError),
 }
 
 impl StartArgs {
@@ -236,5 +280,35 @@ impl StartArgs {
             altitude_m: self.start_altitude_m,
             ..Start::NEUTRAL
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The options of `--personality stack` with a parameter file of this text, and `--parameter` words.
+    fn options(stack: &str, text: &str, more: &[&str]) -> Result<ShimOptions, CliError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("some.parm");
+        std::fs::write(&path, text).unwrap();
+        let file = path.to_str().unwrap();
+        let words = ["greylag-sitl", "--personality", stack, "--parameters", file];
+        Cli::try_parse_from(words.iter().chain(more)).unwrap().options()
+    }
+
+    #[test]
+    fn a_parameter_file_sets_what_is_played_and_the_command_line_goes_on_top() {
+        let text = "RC_OVERRIDE_TIME 0.4\nRLL_RATE_P 0.08\nFS_GCS_ENABL 1\n";
+        let options = options("ardupilot", text, &["--parameter", "FS_GCS_ENABL=0"]).unwrap();
+        let expected = [("RC_OVERRIDE_TIME", 0.4), ("FS_GCS_ENABL", 1.0), ("FS_GCS_ENABL", 0.0)];
+        assert_eq!(options.parameters, expected.map(|(name, value)| (name.to_owned(), value)));
+        assert_eq!(options.unplayed, ["RLL_RATE_P"]);
+    }
+
+    #[test]
+    fn a_file_of_the_other_stack_is_refused() {
+        let said = options("ardupilot", "COM_RC_IN_MODE 1\n", &[]).unwrap_err().to_string();
+        assert!(said.contains("the ArduPilot personality plays"), "{said}");
     }
 }

@@ -6,6 +6,8 @@ pub mod arguments;
 pub mod airframe_file;
 pub mod error_arguments;
 pub mod hidden;
+pub mod parameter_file;
 pub mod plant;
 pub mod plant_arguments;
 pub mod shim;
+mod text_file;

@@ -30,6 +30,10 @@ fn fly(cli: &Cli) -> anyhow::Result<()> {
     ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed))
         .context("cannot listen for Ctrl-C")?;
     print(format_args!("greylag-sitl: {}", intent(&options)));
+    if !options.unplayed.is_empty() {
+        let (count, names) = (options.unplayed.len(), options.unplayed.join(", "));
+        print(format_args!("{count} parameters of the file are not played: {names}"));
+    }
     let mut tell =
         |notice: shim::Notice| print(format_args!("{:9.2} s  {}", notice.time_s, notice.event));
     let summary = shim::run(&options, &stop, &mut tell)?;

@@ -108,7 +108,7 @@ impl FlownWith {
         }
         let context =
             || format!("cannot use {}; name the flight's options instead", path.display());
-        let text = std::fs::read_to_string(&path).with_context(context)?;
+        let text = crate::physics::text_file::read(&path).with_context(context)?;
         let said: FlownWith = toml::from_str(&text).with_context(context)?;
         if said.schema != SCHEMA {
             bail!("{} has schema {}, this program reads {SCHEMA}", path.display(), said.schema);

@@ -117,6 +117,11 @@ impl Bench {
         self.host += STEP;
     }
 
+    /// Bytes of somebody else on the wire between controller and companion.
+    pub fn beside(&mut self, bytes: &[u8]) {
+        self.desk.hear(self.host, bytes, &mut self.up, |_, _| {});
+    }
+
     pub fn run(&mut self, seconds: f64) {
         (0..(seconds * 100.0) as usize).for_each(|_| self.step());
     }

@@ -171,6 +171,8 @@ pub struct ShimOptions {
     pub personality: Option<Personality>,
     /// Parameters of the played stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
+    /// Names of a parameter file that the played stack does not have: they are said, and have no effect.
+    pub unplayed: Vec<String>,
     /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
     pub px4: Option<Px4Options>,
     /// Be the simulator of ArduPilot SITL instead; `None` speaks to a companion.
@@ -201,6 +203,7 @@ impl ShimOptions {
             faults: FrameFaults::default(),
             personality: None,
             parameters: Vec::new(),
+            unplayed: Vec::new(),
             px4: None,
             ardupilot: None,
             clock_start_s: 0.0,

@@ -102,7 +102,7 @@ fn print(found: &[Nearest]) {
 
 /// Flies the scenario in `file` and prints its distance to breaking each rule; fails if one is broken.
 pub(super) fn fly(factory: &CompanionFactory, file: &Path) -> Result<ExitCode> {
-    let text = std::fs::read_to_string(file)
+    let text = crate::physics::text_file::read(file)
         .with_context(|| format!("reading the scenario {}", file.display()))?;
     let scenario: Scenario = serde_json::from_str(&text).with_context(|| {
         format!("{} holds no scenario; give a file of what --search prints", file.display())

@@ -66,6 +66,10 @@ pub struct Real {
     controller: Option<Controller>,
     /// Another autopilot on the link, or another companion with our ids.
     intruder: Option<Source>,
+    /// Another component of the controller's system (a gimbal, a camera) that sends heartbeats, and when it last did.
+    sibling: Option<(Duration, Source)>,
+    /// The host's clock when something was last due.
+    now: Duration,
     parameters: Parameters,
     survey: Survey,
     requests: Requests,
@@ -101,6 +105,8 @@ impl Real {
             profile,
             controller: None,
             intruder: None,
+            sibling: None,
+            now: Duration::ZERO,
             parameters: Parameters::new(profile.stack.rules(profile.authority)),
             survey: Survey::default(),
             requests: Requests::default(),

@@ -6,6 +6,7 @@
 //! sampling of sticks, time-outs, the stack's own attitude loops. Estimation is perfect but for the
 //! sensor errors of the options.
 
+mod ardupilot_failsafe;
 mod connect;
 mod lag;
 mod law;
@@ -28,6 +29,7 @@ use super::flight::{Flight, Over};
 use super::options::ShimOptions;
 use super::telemetry::StateFrame;
 use crate::plant::{Inputs, Truth};
+use ardupilot_failsafe::{Failsafes, Seen};
 use lag::Lag;
 use law::Law;
 pub use modes::Mode;
@@ -46,8 +48,6 @@ const LOOK_EVERY: u64 = 10;
 /// ... and sticks reach it through another module: real PX4 refused MANUAL 150 ms after the first
 /// stick in two of three requests, and never after 300 ms.
 const STICKS_SEEN_S: f64 = 0.15;
-/// ArduPilot was 1.2 s on the last stick at an RC_FS_TIMEOUT of 1 s.
-const FAILSAFE_LAG_S: f64 = 0.2;
 /// A radio with its sticks released, µs: idle throttle.
 const RADIO_US: [u16; 3] = [1500, 1500, 1000];
 /// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
@@ -113,6 +113,7 @@ pub struct FlightController {
     sticks: Sticks,
     /// When the last heartbeat of the system came that ArduPilot takes for its ground station, µs.
     station_us: Option<u64>,
+    failsafes: Failsafes,
     /// Where aileron and elevator stick, if they do.
     jammed: [Option<f64>; 2],
     setpoint: Option<Setpoint>,
@@ -144,6 +145,11 @@ impl FlightController {
         FlightController::with(personality, Flight::new(options)?, &options.parameters)
     }
 
+    /// Whether the played `personality` has a parameter of this name.
+    pub fn plays(personality: Personality, name: &str) -> bool {
+        Table::has(personality, name)
+    }
+
     pub(super) fn with(
         personality: Personality,
         mut flight: Flight,
@@ -165,6 +171,7 @@ impl FlightController {
             distorter: Distorter::default(),
             sticks: Sticks::default(),
             station_us: None,
+            failsafes: Failsafes::default(),
             jammed: [None; 2],
             setpoint: None,
             mode: Mode::Hold,
@@ -437,6 +444,8 @@ impl FlightController {
         let ours = f64::from(system) == self.parameters.get("MAV_GCS_SYSID");
         if self.personality == Personality::Ardupilot && ours && m.target_system == SYSTEM {
             self.sticks.override_channels(self.now_us, m);
+            // Overrides count as its heartbeats do.
+            self.station_us = Some(self.now_us);
             self.counts.sticks += 1;
         } else {
             self.counts.ignored += 1;
@@ -529,21 +538,36 @@ impl FlightController {
         Some((mode, b"Manual control lost"))
     }
 
-    /// ArduPilot's, in MANUAL. That of the throttle acts without a radio alone, since a radio's sticks are there; that of the
-    /// ground station, by its heartbeats, acts in either case.
+    /// ArduPilot's.
     fn ardupilot_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
-        let age = |at: u64| (self.now_us - at) as f64 * 1e-6;
-        let alone =
-            self.station_us.is_some_and(|at| age(at) > self.parameters.get("FS_LONG_TIMEOUT"));
-        if self.mode == Mode::Manual && alone && self.parameters.get("FS_GCS_ENABL") > 0.0 {
-            return Some((Mode::Return, b"GCS failsafe on"));
+        let act = self.failsafes.watch(&self.seen(), &self.parameters)?;
+        if act.drops_overrides {
+            self.sticks = Sticks::default();
         }
-        let patience = self.parameters.get("RC_FS_TIMEOUT") + FAILSAFE_LAG_S;
-        let lost = self.sticks.age_s(self.now_us).is_none_or(|age| age > patience);
-        let acts = self.parameters.get("THR_FAILSAFE") == 1.0
-            && matches!(self.parameters.get("FS_SHORT_ACTN") as i32, 0 | 1);
-        let fails = self.mode == Mode::Manual && !self.has_radio() && self.settled();
-        (fails && lost && acts).then_some((Mode::Circle, b"Throttle failsafe on"))
+        if act.mode.is_none() {
+            self.say(4, act.words);
+        }
+        act.mode.map(|mode| (mode, act.words))
+    }
+
+    /// What ArduPilot's failsafes look at.
+    fn seen(&self) -> Seen {
+        let age = |at: u64| (self.now_us - at) as f64 * 1e-6;
+        Seen {
+            steps: self.steps,
+            now_us: self.now_us,
+            mode: self.mode,
+            radio: self.has_radio(),
+            sticks_s: self.sticks.overridden_s(self.now_us),
+            station_s: self.station_us.map(age),
+        }
+    }
+
+    /// Whether ArduPilot takes its sticks for released, after RC_FS_TIMEOUT without any.
+    fn sticks_end(&self) -> bool {
+        let patience = self.parameters.get("RC_FS_TIMEOUT");
+        let ended = self.sticks.age_s(self.now_us).is_some_and(|age| age > patience);
+        self.personality == Personality::Ardupilot && !self.has_radio() && ended
     }
 
     /// Whether a radio is bound, its sticks released and its throttle closed.
@@ -568,6 +592,7 @@ impl FlightController {
                 true if self.has_radio() && !self.sticks_alive() => {
                     sticks::ardupilot(RADIO_US, &self.parameters)
                 }
+                true if self.sticks_end() => sticks::released(),
                 true => self.sticks.inputs(self.personality, &self.parameters, self.commanded),
                 false => self.commanded,
             };

@@ -27,7 +27,7 @@ const PX4: [(&str, f64, u8); 14] = [
 ];
 
 /// ArduPilot's are of one radio's calibration, with a reversed pitch channel.
-const ARDUPILOT: [(&str, f64, u8); 37] = [
+const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
     ("SYSID_THISMAV", 1.0, INT),
@@ -41,6 +41,7 @@ const ARDUPILOT: [(&str, f64, u8); 37] = [
     ("RC_FS_TIMEOUT", 1.0, REAL),
     ("FS_GCS_ENABL", 1.0, INT),
     ("FS_LONG_TIMEOUT", 2.0, REAL),
+    ("MAV_GCS_SYSID_HI", 0.0, INT),
     ("RC_OPTIONS", 32.0, INT),
     // Of ArduPilot's own simulator: 1 is no radio, 0 one with its sticks released.
     ("SIM_RC_FAIL", 1.0, INT),
@@ -51,6 +52,9 @@ const ARDUPILOT: [(&str, f64, u8); 37] = [
     ("RCMAP_PITCH", 2.0, INT),
     ("RCMAP_THROTTLE", 3.0, INT),
     ("RCMAP_YAW", 4.0, INT),
+    ("RC1_OPTION", 0.0, INT),
+    ("RC2_OPTION", 0.0, INT),
+    ("RC3_OPTION", 0.0, INT),
     ("MAN_EXPO_ROLL", 0.0, INT),
     ("MAN_EXPO_PITCH", 0.0, INT),
     ("RC1_MIN", 1000.0, INT),
@@ -69,6 +73,14 @@ const ARDUPILOT: [(&str, f64, u8); 37] = [
     ("AIRSPEED_CRUISE", 20.0, REAL),
 ];
 
+/// What a stack has.
+fn rows(personality: Personality) -> &'static [(&'static str, f64, u8)] {
+    match personality {
+        Personality::Px4 => &PX4,
+        Personality::Ardupilot => &ARDUPILOT,
+    }
+}
+
 /// The table in force.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
@@ -77,14 +89,16 @@ pub(super) struct Table {
 }
 
 impl Table {
+    /// Whether a stack has a parameter of this name.
+    pub(super) fn has(personality: Personality, name: &str) -> bool {
+        rows(personality).iter().any(|(known, ..)| *known == name)
+    }
+
     pub(super) fn new(
         personality: Personality,
         changed: &[(String, f64)],
     ) -> Result<Self, ShimError> {
-        let rows: &[_] = match personality {
-            Personality::Px4 => &PX4,
-            Personality::Ardupilot => &ARDUPILOT,
-        };
+        let rows = rows(personality);
         let mut table = Table { personality, rows: rows.to_vec() };
         for (name, value) in changed {
             let row = table.rows.iter_mut().find(|(known, ..)| known == name);

@@ -10,6 +10,8 @@ use crate::shim::codec::{ManualControl, RcChannelsOverride};
 pub(super) struct Sticks {
     manual: Option<(u64, [i16; 3])>,
     channels: Option<(u64, [u16; 3])>,
+    /// When channels were last overridden, though they were given back since.
+    overridden: Option<u64>,
     /// When the stream of MANUAL_CONTROL that lasts began.
     since: Option<u64>,
 }
@@ -34,6 +36,12 @@ impl Sticks {
         let [one, two, three, ..] = m.channel;
         let given_back = [one, two, three].contains(&0);
         self.channels = (!given_back).then_some((now_us, [one, two, three]));
+        self.overridden = self.channels.map(|(at, _)| at).or(self.overridden);
+    }
+
+    /// Seconds since channels were last overridden.
+    pub(super) fn overridden_s(&self, now_us: u64) -> Option<f64> {
+        self.overridden.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
     /// Seconds since the last stick message; `None` before the first.
@@ -70,6 +78,11 @@ fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
     let sign = |output: u32| if reversed >> output & 1 == 1 { -1.0 } else { 1.0 };
     Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z), rudder: 0.0 }
         .clamped()
+}
+
+/// All at neutral, the throttle closed.
+pub(super) fn released() -> Inputs {
+    Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 }
 }
 
 /// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.

@@ -20,6 +20,7 @@ impl Real {
     /// Frames due at `host`, other than replies to states: heartbeat, requests, the return of control authority.
     pub fn due(&mut self, host: Duration) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
+        self.now = host;
         if host >= self.next_heartbeat {
             self.next_heartbeat = host + HEARTBEAT;
             let message = wire::heartbeat(self.engagement.steers());

@@ -96,6 +96,8 @@ impl Real {
             let ourselves = known.is_some_and(|c| c.system == from.system);
             if from.component == ONBOARD && ourselves {
                 self.intrude(from, "another onboard computer with our ids");
+            } else if ourselves {
+                self.sibling = Some((host, from));
             }
             return;
         }
@@ -151,7 +153,7 @@ impl Real {
         self.parameters.forget();
         self.survey = Survey::default();
         self.requests = Requests::default();
-        (self.signs, self.radio) = (false, None);
+        (self.signs, self.radio, self.sibling) = (false, None, None);
         let stack = Stack::of(autopilot);
         let who = stack.map_or("an unknown autopilot".to_owned(), |stack| stack.to_string());
         self.say(Severity::Info, format!("controller found: {who}, system {system}"));

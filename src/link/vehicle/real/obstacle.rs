@@ -1,7 +1,7 @@
 //! Conditions that prevent engaging, as texts with their remedies.
 
 use super::profile::{Authority, Stack};
-use super::{ENOUGH, Real};
+use super::{ENOUGH, GONE, Real};
 use crate::framing::Source;
 
 /// Text for a controller that requires signatures when this companion does not sign.
@@ -57,7 +57,25 @@ impl Real {
         }
         let radio = self.radio == Some(true);
         let parameters = self.parameters.obstacle(controller.system, radio);
-        parameters.or_else(|| self.delay_obstacle()).or_else(|| self.thin_stream())
+        parameters
+            .or_else(|| self.hidden_death())
+            .or_else(|| self.delay_obstacle())
+            .or_else(|| self.thin_stream())
+    }
+
+    /// ArduPlane tells its ground station by the system id alone, and that is the aircraft's own here: the heartbeats of
+    /// another component of it would hide that this companion is dead, and a radio's sticks would fly for good.
+    fn hidden_death(&self) -> Option<String> {
+        let by_channels =
+            (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
+        let (_, from) = self.sibling.filter(|(heard, _)| {
+            by_channels && self.radio == Some(true) && self.now.saturating_sub(*heard) <= GONE
+        })?;
+        Some(format!(
+            "component {} of system {} sends heartbeats too, which ArduPilot takes for ours: with a radio bound they would hide \
+             that this computer is dead. Give it another system id, or fly with --command attitude",
+            from.component, from.system
+        ))
     }
 
     /// A needed stream whose rate is too low.

@@ -156,9 +156,9 @@ const ZERO: &[f64] = &[0.0];
 const PX4_SURFACES: [Rule; 8] = [
     rule(
         &["COM_RC_IN_MODE"],
-        Need::OneOf(&[1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]),
+        Need::OneOf(ONE),
         1.0,
-        "MANUAL_CONTROL is ignored otherwise",
+        "with any other value PX4 ignores the companion's sticks, or flies on a radio's in MANUAL when the companion dies",
     ),
     rule(
         &["COM_RC_LOSS_T"],
@@ -189,7 +189,7 @@ const PX4_ATTITUDE: [Rule; 2] = [
     rule(&["COM_OBL_RC_ACT"], Need::OneOf(&[5.0]), 5.0, "it must hold, not wait for a radio"),
 ];
 
-const ARDUPILOT_SURFACES: [Rule; 28] = [
+const ARDUPILOT_SURFACES: [Rule; 31] = [
     rule(
         &["RC_OVERRIDE_TIME"],
         Need::Between(0.1, 0.5),
@@ -217,9 +217,13 @@ const ARDUPILOT_SURFACES: [Rule; 28] = [
     with_radio(rule(&["FS_LONG_TIMEOUT"], Need::Between(1.5, 3.0), 2.0, RADIO)),
     optional(with_radio(rule(&["MAV_GCS_SYSID_HI"], Need::OneOf(ZERO), 0.0, STATION))),
     rule(&["RC_OPTIONS"], Need::Without(2), 32.0, "bit 1 makes it ignore overrides"),
-    rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, "channel 1 is sent as roll"),
-    rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, "channel 2 is sent as pitch"),
-    rule(&["RCMAP_THROTTLE"], Need::OneOf(&[3.0]), 3.0, "channel 3 is sent as throttle"),
+    // Until 4.7 a channel's place is RCMAP's and its option 0; later the option says it, and there is no RCMAP.
+    optional(rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, ROLL)),
+    optional(rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, PITCH)),
+    optional(rule(&["RCMAP_THROTTLE"], Need::OneOf(&[3.0]), 3.0, THROTTLE)),
+    optional(rule(&["RC1_OPTION"], Need::OneOf(&[0.0, 201.0]), 201.0, ROLL)),
+    optional(rule(&["RC2_OPTION"], Need::OneOf(&[0.0, 202.0]), 202.0, PITCH)),
+    optional(rule(&["RC3_OPTION"], Need::OneOf(&[0.0, 203.0]), 203.0, THROTTLE)),
     rule(&["MAN_EXPO_ROLL"], Need::OneOf(ZERO), 0.0, "the stick must be linear"),
     rule(&["MAN_EXPO_PITCH"], Need::OneOf(ZERO), 0.0, "the stick must be linear"),
     rule(&["RC1_MIN"], Need::Pulse, 1100.0, SCALE),
@@ -234,6 +238,9 @@ const ARDUPILOT_SURFACES: [Rule; 28] = [
     rule(&["RC3_MAX"], Need::Pulse, 1900.0, SCALE),
     rule(&["RC3_REVERSED"], Need::OneOf(&[0.0, 1.0]), 0.0, SCALE),
 ];
+const ROLL: &str = "channel 1 is sent as roll";
+const PITCH: &str = "channel 2 is sent as pitch";
+const THROTTLE: &str = "channel 3 is sent as throttle";
 const NO_RADIO: &str = "without a radio the controller must act when the companion is dead";
 const RADIO: &str = "a radio is bound: nothing else makes ArduPlane leave MANUAL when the companion dies; or fly with --command attitude";
 const STATION: &str =

@@ -1,0 +1,137 @@
+//! ArduPlane's failsafes, as its sources have them (`events.cpp`, `radio.cpp`, `system.cpp` of 4.6 to 4.8-dev).
+//!
+//! One state remembers what has failed; each failure acts once, when it is found, and what has acted hides lesser ones.
+
+use super::modes::Mode;
+use super::parameters::Table;
+
+/// ArduPilot neutralises its sticks at RC_FS_TIMEOUT, and counts ten readings of its channels at 50 Hz more.
+const COUNTED_S: f64 = 0.2;
+/// Long failures are looked for at 3 Hz.
+const LOOK_EVERY: u64 = 33;
+/// FS_SHORT_TIMEOUT: a ground station heard within this is back, s.
+const BACK_S: f64 = 1.5;
+
+/// What has failed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Failed {
+    #[default]
+    Nothing,
+    /// The receiver, since this time, µs; what was flown before.
+    Short(u64, Mode),
+    /// The receiver, for longer.
+    Long,
+    /// The ground station.
+    Station,
+}
+
+/// What is seen at a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Steps so far, and the time, µs.
+    pub(super) steps: u64,
+    pub(super) now_us: u64,
+    pub(super) mode: Mode,
+    /// Whether a radio is bound.
+    pub(super) radio: bool,
+    /// Age of the last overrides and of the last heartbeat of the ground station, s.
+    pub(super) sticks_s: Option<f64>,
+    pub(super) station_s: Option<f64>,
+}
+
+/// What a failsafe does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Act {
+    /// The mode to go to; none where it stays.
+    pub(super) mode: Option<Mode>,
+    /// Whether what a companion has put in the place of the channels is dropped.
+    pub(super) drops_overrides: bool,
+    /// For the ground station.
+    pub(super) words: &'static [u8],
+}
+
+/// Goes to a mode, and keeps the overrides.
+fn go(mode: Mode, words: &'static [u8]) -> Option<Act> {
+    Some(Act { mode: Some(mode), drops_overrides: false, words })
+}
+
+/// The failsafes of one aircraft.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Failsafes {
+    failed: Failed,
+    begun: bool,
+}
+
+impl Failsafes {
+    /// Looks at a step.
+    pub(super) fn watch(&mut self, seen: &Seen, parameters: &Table) -> Option<Act> {
+        let patience = parameters.get("RC_FS_TIMEOUT") + COUNTED_S;
+        let silent = !seen.radio && seen.sticks_s.is_none_or(|age| age > patience);
+        let receiver = parameters.get("THR_FAILSAFE") == 1.0 && silent;
+        if !std::mem::replace(&mut self.begun, true) && receiver {
+            // On the ground already.
+            self.failed = Failed::Long;
+        }
+        let short = parameters.get("FS_SHORT_ACTN") as i32;
+        match self.failed {
+            Failed::Nothing if receiver && short != SHORT_DISABLED => {
+                self.failed = Failed::Short(seen.now_us, seen.mode);
+                let circles = match seen.mode {
+                    Mode::Manual => matches!(short, 0 | 1),
+                    Mode::Guided | Mode::Hold => short == 1,
+                    Mode::Return | Mode::Circle => false,
+                };
+                return go(Mode::Circle, b"RC Short Failsafe").filter(|_| circles);
+            }
+            Failed::Short(_, before) if !receiver => {
+                self.failed = Failed::Nothing;
+                let restored = seen.mode == Mode::Circle && before != Mode::Circle;
+                return go(before, b"RC Short Failsafe Cleared").filter(|_| restored);
+            }
+            _ => {}
+        }
+        if seen.steps.is_multiple_of(LOOK_EVERY) {
+            self.look(seen, receiver, parameters)
+        } else {
+            None
+        }
+    }
+
+    /// What is looked for more seldom.
+    fn look(&mut self, seen: &Seen, receiver: bool, parameters: &Table) -> Option<Act> {
+        let timeout = parameters.get("FS_LONG_TIMEOUT");
+        let since = match self.failed {
+            Failed::Long => {
+                self.failed = if receiver { Failed::Long } else { Failed::Nothing };
+                return None;
+            }
+            Failed::Station => {
+                let back = seen.station_s.is_some_and(|age| age < BACK_S);
+                self.failed = if back { Failed::Nothing } else { Failed::Station };
+                return None;
+            }
+            Failed::Short(at, _) => Some((seen.now_us - at) as f64 * 1e-6),
+            Failed::Nothing => seen.sticks_s,
+        };
+        let watches = matches!(parameters.get("FS_GCS_ENABL") as i32, 1 | 2);
+        let words: &'static [u8] = if receiver && since.is_none_or(|s| s > timeout) {
+            self.failed = Failed::Long;
+            b"RC Long Failsafe On"
+        } else if watches && seen.station_s.is_some_and(|age| age > timeout) {
+            self.failed = Failed::Station;
+            b"GCS Failsafe On"
+        } else {
+            return None;
+        };
+        let long = parameters.get("FS_LONG_ACTN") as i32;
+        let returns = match seen.mode {
+            Mode::Manual | Mode::Circle | Mode::Hold => matches!(long, 0 | 1),
+            Mode::Guided => long == 1,
+            Mode::Return => false,
+        };
+        Some(Act { mode: returns.then_some(Mode::Return), drops_overrides: true, words })
+    }
+}
+
+/// FS_SHORT_ACTN that leaves it to the long failsafe.
+const SHORT_DISABLED: i32 = 3;

@@ -1,0 +1,23 @@
+//! Text files that a person wrote: read whole, unless they are too long to be that.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Bytes of the longest file that is read: all parameters of a firmware take 60 KiB, an airframe file 10.
+const LONGEST: u64 = 1 << 20;
+
+/// The text of the file at `path`.
+///
+/// # Errors
+/// The reason with its remedy, if it cannot be read, is no UTF-8, or is longer than a mebibyte.
+pub fn read(path: &Path) -> Result<String, String> {
+    let mut text = String::new();
+    File::open(path)
+        .and_then(|file| file.take(LONGEST + 1).read_to_string(&mut text))
+        .map_err(|e| format!("cannot be read: {e}; name an existing file"))?;
+    if text.len() as u64 > LONGEST {
+        return Err(format!("is longer than {} KiB, which no such file is", LONGEST >> 10));
+    }
+    Ok(text)
+}
