@@ -119,7 +119,7 @@ impl Bench {
 
     /// Bytes of somebody else on the wire between controller and companion.
     pub fn beside(&mut self, bytes: &[u8]) {
-        self.desk.hear(self.host, bytes, &mut self.up, |_, _| {});
+        self.desk.receive(self.host, bytes, &mut self.up, |_, _| {});
     }
 
     pub fn run(&mut self, seconds: f64) {

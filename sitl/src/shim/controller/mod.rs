@@ -545,7 +545,7 @@ impl FlightController {
             self.sticks = Sticks::default();
         }
         if act.mode.is_none() {
-            self.say(4, act.words);
+            self.send_text(4, act.words);
         }
         act.mode.map(|mode| (mode, act.words))
     }
