@@ -1,6 +1,7 @@
 //! `greylag aircraft`: create, import, check and export the files of an aircraft.
 
 mod check;
+mod draw;
 mod export;
 mod from_log;
 mod import;
@@ -26,6 +27,8 @@ enum Command {
     /// Check a model's aircraft in flight: trim, modes, authority of the surfaces, margins of the
     /// LQI.
     Check(check::Arguments),
+    /// Draw aircraft from a distribution: how they fly, whether the shipped ones lie among them; their files.
+    Draw(draw::Arguments),
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),
     /// Fit an aircraft of known mass, span and area to a flight: its model, its page, what to fly next.
@@ -43,6 +46,7 @@ enum Command {
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Check(arguments) => check::run(arguments),
+        Command::Draw(arguments) => draw::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::FromLog(arguments) => from_log::run(arguments),
         Command::Import(arguments) => import::run(arguments),

@@ -1,5 +1,6 @@
 //! `greylag evaluate`: score controllers on the target file.
 
+mod any;
 mod draws;
 mod tables;
 mod targets;
@@ -85,6 +86,13 @@ pub struct Arguments {
     /// --model that they are built from.
     #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: Option<u32>,
+    /// Fly aircraft drawn from a distribution, so many, in place of JSBSim: a minute of random attitudes each. A controller
+    /// that needs a model is designed from the aircraft's own and from a textbook's.
+    #[arg(long, value_name = "N", conflicts_with_all = IN_JSBSIM, conflicts_with_all = ["draws", "steps", "targets", "groups", "every"], value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    any: Option<u32>,
+    /// The distribution of --any, and models beside it whose aircraft fly the same minute.
+    #[command(flatten)]
+    of_any: any::AnyArguments,
     /// Whether the controllers fly behind the envelope limiter, as in `fly` and `demo`, or bare, as in the paper.
     #[arg(long, value_name = "WHAT", default_value = "free", value_enum)]
     envelope: EnvelopeName,
@@ -133,6 +141,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         files::writable(path, overwrite)?;
     }
     controllers::check_changes(&arguments.controllers, &arguments.changes)?;
+    if let Some(count) = arguments.any {
+        return any::fly(arguments, count);
+    }
     let rows = targets::rows(arguments)?;
     let mut plant = arguments.plant.options(arguments.seed);
     // everything that can be wrong is found before the first flight

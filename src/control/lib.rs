@@ -1,6 +1,8 @@
 //! Controllers: from observation and target to a command, once every 10 ms.
 
+pub mod adaptive;
 pub mod aircraft_check;
+pub mod any;
 pub mod cem;
 mod disturbance;
 pub mod envelope;

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::policy::{Agent, Policy};
-use crate::{Controller, cem, ilqr, lqi, pid};
+use crate::{Controller, adaptive, any, cem, ilqr, lqi, pid};
 use greylag_model::GreyBox;
 
 /// A controller cannot be built.
@@ -43,6 +43,14 @@ pub enum SetupError {
     /// The controller needs a trained policy, and none was given.
     #[error("a controller that was trained needs its files; give their folder with --policy")]
     Untrained,
+    /// The policy for any aircraft that the program ships cannot be used.
+    #[error(
+        "the policy for any aircraft cannot be read: {why}; train it again with params/any/train.py and build anew"
+    )]
+    Any {
+        /// What is wrong with it.
+        why: String,
+    },
     /// The planner needs critics, and the policy has none.
     #[error(
         "controller {name} values the end of its plans with critics, and this policy has none; fly it as \
@@ -189,6 +197,8 @@ macro_rules! controllers {
 controllers! {
     Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_from| pid::Pid::new(pid::PUBLIC),
     PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
+    Adaptive "adaptive" Immediate Gains "Attitude hold of an aircraft that nobody has modelled: control powers are estimated in flight." => |from| adaptive::Adaptive::new(&from.model.airframe),
+    Any "any" Immediate Gains "One recurrent policy for any fixed wing, trained on aircraft drawn from a distribution." => |from| any::AnyPolicy::new(&from.model.airframe)?,
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
     LqiDamped "lqi-damped" Immediate Model "The LQI with softer loops, for a link with more delay." => |from| lqi::Lqi::weighted("lqi-damped", from.model, &lqi::Weights::DAMPED)?,
     Ilqr "ilqr" Planned Model "iLQR over half a second, beside the model's LQI: offset-free." => |from| ilqr::Ilqr::new(from.model, lqi::Lqi::new(from.model)?),

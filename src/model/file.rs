@@ -137,6 +137,24 @@ impl GreyBox {
     }
 }
 
+impl GreyBox {
+    /// A model from the texts of a model file and its airframe file that lie in no folder. It has neither a residual nor
+    /// effects of files.
+    ///
+    /// # Errors
+    /// What is wrong with a text, as for [`GreyBox::load`].
+    pub fn from_texts(model: &str, airframe: &str) -> Result<GreyBox, String> {
+        let file: File = toml::from_str(model).map_err(|e| toml_error(model, &e))?;
+        check_schema(file.schema, 1)?;
+        if file.residual.is_some() || !file.effect_files.is_empty() {
+            return Err("it names files beside it; load it from its folder".into());
+        }
+        let mut read = file.into_model(Airframe::parse(airframe)?)?;
+        read.sha256 = hash(model.as_bytes());
+        Ok(read)
+    }
+}
+
 /// Range of moments of inertia of aircraft, kg m², from a few grams of mass to airliners.
 const INERTIA: [f64; 2] = [1e-7, 1e9];
 

@@ -14,6 +14,7 @@ mod linear;
 pub mod jsbsim;
 pub mod modes;
 pub mod plausible;
+pub mod population;
 mod newton;
 pub mod residual;
 pub mod textbook;

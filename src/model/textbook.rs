@@ -44,6 +44,29 @@ pub struct Measures {
     pub pitch_speed: f64,
 }
 
+/// Servos and motor of an aircraft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drives {
+    /// Natural frequency of the servos, rad/s.
+    pub frequency: f64,
+    /// Their damping ratio.
+    pub damping: f64,
+    /// Lag of the thrust, s.
+    pub lag: f64,
+    /// Where these come from.
+    pub source: &'static str,
+}
+
+impl Drives {
+    /// Hobby servos and an electric motor.
+    pub const HOBBY: Drives = Drives {
+        frequency: 40.0,
+        damping: 0.7,
+        lag: 0.2,
+        source: "estimate: hobby servo, electric motor",
+    };
+}
+
 /// An estimated number: name, value, relative standard deviation, source.
 pub type Estimate = (&'static str, f64, f64, &'static str);
 
@@ -100,9 +123,26 @@ impl Measures {
         self.airframe_with_chord(f.chord, [self.slope(&f), self.zero_lift()])
     }
 
-    /// The airframe file with mean chord (m), lift slope (1/rad) and lift coefficient at α = 0 from another source.
-    pub(crate) fn airframe_with_chord(&self, chord: f64, [slope, zero_lift]: [f64; 2]) -> String {
+    /// The airframe file with these servos and this motor.
+    pub(crate) fn airframe_with_drives(&self, drives: &Drives) -> String {
         let f = self.figures();
+        self.airframe_of(f.chord, [self.slope(&f), self.zero_lift()], drives)
+    }
+
+    /// Airspeed at which it cruises, m/s, and incidence there, rad.
+    pub(crate) fn cruise(&self) -> [f64; 2] {
+        let f = self.figures();
+        [f.cruise, (f.lift - self.zero_lift()) / self.slope(&f)]
+    }
+
+    /// The same with the mean chord (m), the slope of the lift (1/rad) and the lift at α = 0 of another source.
+    pub(crate) fn airframe_with_chord(&self, chord: f64, lift: [f64; 2]) -> String {
+        self.airframe_of(chord, lift, &Drives::HOBBY)
+    }
+
+    fn airframe_of(&self, chord: f64, [slope, zero_lift]: [f64; 2], drives: &Drives) -> String {
+        let f = self.figures();
+        let Drives { frequency, damping, lag, source } = *drives;
         let mut out = format!(
             "# Written by `greylag aircraft`: measure what is marked as an estimate.\nschema = 2\nname = {:?}\n\n\
              [geometry]\nwing_area_m2 = {{ value = {:?}, source = \"given\" }}\nspan_m = {{ value = {:?}, source = \
@@ -111,7 +151,6 @@ impl Measures {
              \"estimate\" }}\n\n",
             self.name, self.area, self.span, chord, f.cruise
         );
-        let servo = "estimate: a hobby servo";
         let surfaces = [
             ("aileron", Some(self.travel)),
             ("elevator", Some(self.travel)),
@@ -121,8 +160,8 @@ impl Measures {
             if let Some(travel) = travel {
                 let _ = write!(
                     out,
-                    "[controls.{name}]\nfrequency_radps = {{ value = 40.0, source = \"{servo}\" }}\n\
-                     damping = {{ value = 0.7, source = \"{servo}\" }}\ntravel_rad = {{ value = {travel:.5}, \
+                    "[controls.{name}]\nfrequency_radps = {{ value = {frequency:?}, source = \"{source}\" }}\n\
+                     damping = {{ value = {damping:?}, source = \"{source}\" }}\ntravel_rad = {{ value = {travel:.5}, \
                      source = \"given\" }}\n\n"
                 );
             }
@@ -131,7 +170,7 @@ impl Measures {
         let limits = incidence_limits(incidence(f.lift), incidence(LIFT_MAX));
         let _ = write!(
             out,
-            "[controls.throttle]\nlag_s = {{ value = 0.2, source = \"estimate: an electric motor\" }}\n\n{limits}\
+            "[controls.throttle]\nlag_s = {{ value = {lag:?}, source = \"{source}\" }}\n\n{limits}\
              # The stall at a lift coefficient of {LIFT_MAX} is at {:.1} m/s.\n[envelope]\nbank_max_deg = 45.0\n\
              pitch_max_deg = 20.0\npitch_min_deg = -10.0\nload_factor_max = 2.0\nairspeed_min_mps = {:.1}\n\
              airspeed_max_mps = {:.1}\nairspeed_cruise_mps = {:.1}\nsurface_slew_per_s = 20.0\n",
@@ -150,6 +189,16 @@ impl Measures {
 
     /// Text of a model file with the effects `sections`, and mass and inertia of these measures.
     pub(crate) fn model_of(&self, sections: &[Section], description: &str) -> String {
+        self.model_with(&self.inertia(), sections, description)
+    }
+
+    /// The same with other moments of inertia.
+    pub(crate) fn model_with(
+        &self,
+        inertia: &[Estimate; 4],
+        sections: &[Section],
+        description: &str,
+    ) -> String {
         let mut out = format!(
             "# Written by `greylag aircraft`: fly, then `greylag amend --tune-only`.\nschema = 1\nname = {:?}\n\
              description = {description:?}\nairframe = \"airframe.toml\"\n\
@@ -158,7 +207,7 @@ impl Measures {
         );
         let given: [Estimate; 1] = [("mass_kg", self.mass, 0.01, "given")];
         numbers(&mut out, &given);
-        numbers(&mut out, &self.inertia());
+        numbers(&mut out, inertia);
         let _ = write!(
             out,
             "\n[air]\ngravity_mps2 = {{ value = 9.806, source = \"middle latitudes\" }}\ndensity = \"standard\"\n"
@@ -200,7 +249,7 @@ impl Measures {
     }
 
     /// Radii of gyration relative to half span, half length and half their mean.
-    fn inertia(&self) -> [Estimate; 4] {
+    pub(crate) fn inertia(&self) -> [Estimate; 4] {
         let length =
             if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };
         let about = |share: f64, reach: f64| self.mass * (share * reach / 2.0).powi(2);

@@ -6,7 +6,7 @@ use greylag_sitl::plant::PlantError;
 use greylag_control::Observation;
 use greylag_model::{GreyBox, Twin};
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
-use greylag_physics::{Command, Time};
+use greylag_physics::{Command, State, Time};
 
 /// An environment cannot continue.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +51,7 @@ pub trait Environment {
 #[derive(Clone, Debug)]
 pub struct Imagined {
     model: GreyBox,
+    start: State,
     twin: Twin,
     previous: [Command; 2],
     steps: u64,
@@ -59,8 +60,20 @@ pub struct Imagined {
 impl Imagined {
     /// An aircraft simulated by `model`.
     pub fn new(model: GreyBox) -> Imagined {
-        let twin = Twin::new(model.airframe.start(), model.airframe.reference.altitude);
-        Imagined { model, twin, previous: [Command::IDLE; 2], steps: 0 }
+        let start = model.airframe.start();
+        Imagined::starting(model, start)
+    }
+
+    /// The same that starts at its cruise airspeed in place of the reference airspeed.
+    pub fn cruising(model: GreyBox) -> Imagined {
+        let airspeed = model.airframe.envelope.airspeed_cruise_mps;
+        let start = State { airspeed, ..model.airframe.start() };
+        Imagined::starting(model, start)
+    }
+
+    fn starting(model: GreyBox, start: State) -> Imagined {
+        let twin = Twin::new(start, model.airframe.reference.altitude);
+        Imagined { model, start, twin, previous: [Command::IDLE; 2], steps: 0 }
     }
 
     fn observe(&self) -> Observation {
@@ -76,8 +89,7 @@ impl Imagined {
 
 impl Environment for Imagined {
     fn reset(&mut self) -> Result<Observation, Trouble> {
-        let airframe = &self.model.airframe;
-        self.twin = Twin::new(airframe.start(), airframe.reference.altitude);
+        self.twin = Twin::new(self.start, self.model.airframe.reference.altitude);
         (self.previous, self.steps) = ([Command::IDLE; 2], 0);
         Ok(self.observe())
     }

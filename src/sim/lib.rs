@@ -6,6 +6,7 @@ pub mod collect;
 pub mod described;
 #[cfg(all(feature = "sitl", feature = "study"))]
 pub mod design;
+pub mod attitudes;
 pub mod environment;
 pub mod episode;
 pub mod evaluation;

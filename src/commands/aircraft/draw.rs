@@ -1,0 +1,169 @@
+//! `greylag aircraft draw`: aircraft from a distribution, and whether others lie among them.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+
+use crate::commands::files::{self, Overwrite, shipped};
+use crate::model::GreyBox;
+use crate::model::population::{Character, Drawn, Population, TRAITS};
+use crate::num::statistics::quantile;
+
+/// Models of the aircraft that the program ships, whose place among the draws is said.
+const SHIPPED: [&str; 5] = [
+    "params/x8/jsbsim.toml",
+    "params/aerosonde/jsbsim.toml",
+    "params/c172p/jsbsim.toml",
+    "params/c172p-flaps/jsbsim.toml",
+    "params/a430/prior.toml",
+];
+/// An aircraft lies among the draws where each of its numbers lies between these quantiles of theirs.
+const INSIDE: [f64; 2] = [0.005, 0.995];
+
+/// Options of `greylag aircraft draw`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Distribution to draw from.
+    #[arg(long, value_name = "FILE", default_value = "params/any/aircraft.toml")]
+    population: PathBuf,
+    /// Seed of the draws.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How many to draw.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    count: u32,
+    /// Show the first draws one by one, so many.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    show: usize,
+    /// Models whose place among the draws is said [default: those of the shipped aircraft].
+    #[arg(long = "model", value_name = "FILE", num_args = 1..)]
+    models: Vec<PathBuf>,
+    /// Folder to write each draw's airframe.toml and model.toml to, in a folder of its number.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+/// Draws, prints, writes.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let population = Population::load(&shipped(&arguments.population))?;
+    let mut characters = Vec::new();
+    let mut shown = listing();
+    for number in 0..u64::from(arguments.count) {
+        let drawn = population.draw(arguments.seed, number)?;
+        let character = Character::of(&drawn.exact)?;
+        if (number as usize) < arguments.show {
+            shown.add_row(listed(&drawn));
+        }
+        if let Some(folder) = &arguments.out {
+            write(&folder.join(number.to_string()), &drawn)?;
+        }
+        characters.push(character);
+    }
+    if arguments.show > 0 {
+        println!("{shown}\n");
+    }
+    let given: Vec<PathBuf> = match arguments.models.is_empty() {
+        true => SHIPPED.map(PathBuf::from).to_vec(),
+        false => arguments.models.clone(),
+    };
+    let models = given.iter().map(|p| GreyBox::load(&shipped(p))).collect::<Result<Vec<_>, _>>()?;
+    print(&characters, &models)?;
+    if let Some(folder) = &arguments.out {
+        println!("wrote {} aircraft below {}", arguments.count, folder.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(folder: &Path, drawn: &Drawn) -> Result<()> {
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    for (name, text) in ["airframe.toml", "model.toml"].iter().zip(&drawn.files) {
+        files::write(&folder.join(name), text, Overwrite::Never)?;
+    }
+    Ok(())
+}
+
+fn listing() -> Table {
+    let mut table = Table::new();
+    table.load_style(NOTHING);
+    table.set_header([
+        "draw",
+        "layout",
+        "mass kg",
+        "span m",
+        "area m2",
+        "cruise m/s",
+        "margin %",
+        "delay ms",
+        "thrust/weight",
+    ]);
+    table
+}
+
+fn listed(drawn: &Drawn) -> Vec<String> {
+    let m = &drawn.measures;
+    let weight = m.mass * crate::physics::atmosphere::STANDARD_GRAVITY;
+    vec![
+        drawn.number.to_string(),
+        drawn.layout.name().into(),
+        format!("{:.3}", m.mass),
+        format!("{:.2}", m.span),
+        format!("{:.3}", m.area),
+        format!("{:.1}", drawn.exact.airframe.envelope.airspeed_cruise_mps),
+        format!("{:.1}", 100.0 * drawn.static_margin),
+        format!("{:.0}", 1e3 * drawn.delay_s),
+        format!("{:.2}", m.static_thrust / weight),
+    ]
+}
+
+/// Quantiles of each trait with the numbers of `models`, then what lies outside.
+fn print(characters: &[Character], models: &[GreyBox]) -> Result<()> {
+    let own = models
+        .iter()
+        .map(|m| Character::of(m).with_context(|| format!("cannot place {}", m.airframe.name)))
+        .collect::<Result<Vec<_>>>()?;
+    let mut table = Table::new();
+    table.load_style(NOTHING);
+    let names = models.iter().map(|m| m.airframe.name.clone());
+    table.set_header(["", "0.5 %", "median", "99.5 %"].map(String::from).into_iter().chain(names));
+    let mut outside = vec![Vec::new(); models.len()];
+    for (k, about) in TRAITS.iter().enumerate() {
+        let all: Vec<f64> = characters.iter().map(|c| c.values[k]).collect();
+        let [low, high] = INSIDE.map(|q| quantile(&all, q));
+        let mut row = vec![about.name.to_owned()];
+        row.extend([low, quantile(&all, 0.5), high].map(number));
+        for (character, out) in own.iter().zip(&mut outside) {
+            let value = character.values[k];
+            let inside = (low..=high).contains(&value);
+            row.push(number(value) + if inside { "" } else { " !" });
+            if !inside {
+                out.push(about.name);
+            }
+        }
+        table.add_row(row);
+    }
+    println!("{table}");
+    for about in &TRAITS {
+        println!("{}: {}", about.name, about.meaning);
+    }
+    for (model, out) in models.iter().zip(outside) {
+        match out.is_empty() {
+            true => println!("{} lies among the draws", model.airframe.name),
+            false => println!("{} lies outside in {}", model.airframe.name, out.join(", ")),
+        }
+    }
+    Ok(())
+}
+
+/// Three digits that count.
+fn number(value: f64) -> String {
+    match value.abs() {
+        x if x >= 100.0 => format!("{value:.0}"),
+        x if x >= 10.0 => format!("{value:.1}"),
+        x if x >= 1.0 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
+}

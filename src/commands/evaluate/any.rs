@@ -1,0 +1,235 @@
+//! Evaluation on aircraft drawn from a distribution, and on others that were not drawn.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use comfy_table::Table;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Arguments, progress};
+use crate::commands::files::{self, shipped};
+use crate::control::{Controller, ControllerKind, Needs, build};
+use crate::model::GreyBox;
+use crate::model::population::{Drawn, Population};
+use crate::num::statistics::quantile;
+use crate::sim::attitudes::{self, Minute};
+
+/// What `--any` flies.
+#[derive(clap::Args)]
+pub(super) struct AnyArguments {
+    /// Distribution that --any draws from.
+    #[arg(long, value_name = "FILE", default_value = "params/any/aircraft.toml", requires = "any")]
+    population: PathBuf,
+    /// Models whose aircraft --any flies too; a controller that needs a model is designed from them.
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "any")]
+    beside: Vec<PathBuf>,
+}
+
+/// A controller with what it knows of the aircraft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Knowledge {
+    /// Cruise airspeed and rudder.
+    Nothing,
+    /// Mass, span, area, tail: a textbook's estimates.
+    Textbook,
+    /// The aircraft's own model.
+    Exact,
+}
+
+impl Knowledge {
+    fn name(self) -> &'static str {
+        match self {
+            Knowledge::Nothing => "cruise airspeed",
+            Knowledge::Textbook => "textbook",
+            Knowledge::Exact => "own model",
+        }
+    }
+}
+
+/// One minute of one aircraft.
+#[derive(Serialize)]
+struct Flight {
+    aircraft: String,
+    controller: &'static str,
+    knows: Knowledge,
+    /// `None` where no controller could be designed.
+    minute: Option<Minute>,
+}
+
+#[derive(Serialize)]
+struct AnyDocument<'a> {
+    schema: &'static str,
+    program: &'static str,
+    command_line: String,
+    seed: u32,
+    drawn: u32,
+    flights: &'a [Flight],
+}
+
+/// Flies `count` drawn aircraft and those beside them, prints the tables, writes the JSON.
+pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
+    let kinds = &arguments.controllers;
+    if let Some(kind) =
+        kinds.iter().find(|kind| !matches!(kind.needs(), Needs::Gains | Needs::Model))
+    {
+        bail!("--any flies controllers that need no policy; leave {kind} out");
+    }
+    let population = Population::load(&shipped(&arguments.of_any.population))?;
+    let load = |path: &PathBuf| GreyBox::load(&shipped(path));
+    let beside = arguments.of_any.beside.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let bar = progress(count.into(), "aircraft", "drawn aircraft");
+    let seed = u64::from(arguments.seed);
+    let flown: Result<Vec<Vec<Flight>>> = (0..u64::from(count))
+        .into_par_iter()
+        .map(|number| {
+            let drawn = population.draw(seed, number)?;
+            bar.inc(1);
+            Ok(of_drawn(kinds, &drawn, seed))
+        })
+        .collect();
+    let drawn: Vec<Flight> = flown?.into_iter().flatten().collect();
+    bar.finish_and_clear();
+    let others: Vec<Vec<Flight>> =
+        beside.par_iter().map(|model| of_model(kinds, model, seed)).collect();
+    let others: Vec<Flight> = others.into_iter().flatten().collect();
+    if !files::is_stdout(arguments.json.as_deref()) {
+        println!("{}", summary(kinds, &drawn));
+        println!(
+            "lost: beyond recovery within 60 s of 12 random attitudes; settled and integral: of those kept, the integral beside that of"
+        );
+        println!(
+            "the first controller that knows the aircraft's own model, aircraft by aircraft; medians, then the 90th percentile"
+        );
+        if !others.is_empty() {
+            println!("{}", one_by_one(&others));
+        }
+    }
+    let flights: Vec<Flight> = drawn.into_iter().chain(others).collect();
+    if let Some(path) = &arguments.json {
+        let document = AnyDocument {
+            schema: "greylag.any-aircraft/1",
+            program: concat!("greylag ", env!("CARGO_PKG_VERSION")),
+            command_line: files::command_line(),
+            seed: arguments.seed,
+            drawn: count,
+            flights: &flights,
+        };
+        let text = serde_json::to_string_pretty(&document)? + "\n";
+        files::write(path, &text, arguments.force.into())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What a controller of this kind may know.
+fn knowledge(kind: ControllerKind) -> &'static [Knowledge] {
+    match kind.needs() {
+        Needs::Gains => &[Knowledge::Nothing],
+        _ => &[Knowledge::Exact, Knowledge::Textbook],
+    }
+}
+
+fn of_drawn(kinds: &[ControllerKind], drawn: &Drawn, seed: u64) -> Vec<Flight> {
+    let all =
+        kinds.iter().flat_map(|kind| knowledge(*kind).iter().map(move |knows| (*kind, *knows)));
+    all.map(|(kind, knows)| {
+        let from = if knows == Knowledge::Textbook { &drawn.textbook } else { &drawn.exact };
+        one(kind, knows, [from, &drawn.exact], [seed, drawn.number])
+    })
+    .collect()
+}
+
+fn of_model(kinds: &[ControllerKind], model: &GreyBox, seed: u64) -> Vec<Flight> {
+    kinds.iter().map(|kind| one(*kind, knowledge(*kind)[0], [model; 2], [seed, 0])).collect()
+}
+
+fn one(
+    kind: ControllerKind,
+    knows: Knowledge,
+    [from, exact]: [&GreyBox; 2],
+    [seed, number]: [u64; 2],
+) -> Flight {
+    let fly = |mut c: Box<dyn Controller>| attitudes::fly(exact, c.as_mut(), seed, number);
+    let minute = build(kind, from).ok().map(fly);
+    Flight { aircraft: exact.airframe.name.clone(), controller: kind.name(), knows, minute }
+}
+
+/// A table of all drawn aircraft: a row for each controller and what it knows.
+fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "controller",
+        "knows",
+        "aircraft",
+        "lost %",
+        "settled °",
+        "90 %",
+        "integral",
+        "90 %",
+    ]);
+    let reference: Vec<&Flight> = {
+        let first = kinds.iter().find(|kind| kind.needs() == Needs::Model);
+        let own = |f: &&Flight| {
+            first.is_some_and(|k| k.name() == f.controller) && f.knows == Knowledge::Exact
+        };
+        flights.iter().filter(own).collect()
+    };
+    for kind in kinds {
+        for knows in knowledge(*kind) {
+            let of: Vec<&Flight> = flights
+                .iter()
+                .filter(|f| f.controller == kind.name() && f.knows == *knows)
+                .collect();
+            table.add_row(row([kind.name(), knows.name()], &of, &reference));
+        }
+    }
+    table
+}
+
+fn kept(flight: &Flight) -> Option<Minute> {
+    flight.minute.filter(|m| m.lost_s.is_none())
+}
+
+fn row([controller, knows]: [&str; 2], flights: &[&Flight], reference: &[&Flight]) -> Vec<String> {
+    let flown: Vec<Minute> = flights.iter().filter_map(|f| kept(f)).collect();
+    let settled: Vec<f64> = flown.iter().map(|m| m.settled_deg).collect();
+    let ratios: Vec<f64> = flights
+        .iter()
+        .zip(reference)
+        .filter_map(|(f, r)| Some(kept(f)?.integral_deg_s / kept(r)?.integral_deg_s))
+        .collect();
+    let lost = 100.0 * (flights.len() - flown.len()) as f64 / flights.len() as f64;
+    let both = |all: &[f64], digits: usize| {
+        [0.5, 0.9].map(|q| match all.is_empty() {
+            true => "-".to_owned(),
+            false => format!("{:.digits$}", quantile(all, q)),
+        })
+    };
+    let mut row =
+        vec![controller.into(), knows.into(), flights.len().to_string(), format!("{lost:.1}")];
+    row.extend(both(&settled, 2));
+    row.extend(both(&ratios, 2));
+    row
+}
+
+fn one_by_one(flights: &[Flight]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["aircraft", "controller", "knows", "lost at s", "settled °", "integral ° s"]);
+    for f in flights {
+        let mut row = vec![f.aircraft.clone(), f.controller.into(), f.knows.name().into()];
+        row.extend(match &f.minute {
+            None => ["no design", "", ""].map(String::from),
+            Some(m) => [
+                m.lost_s.map_or("kept".into(), |s| format!("{s:.1}")),
+                format!("{:.2}", m.settled_deg),
+                format!("{:.0}", m.integral_deg_s),
+            ],
+        });
+        table.add_row(row);
+    }
+    table
+}

@@ -1,0 +1,142 @@
+//! What one axis of an unknown aircraft does to its controls: control power, damping and stiffness, estimated in flight.
+//!
+//! Recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark, "Adaptive Control",
+//! 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂, each side differentiated and low-passed alike, so that what is
+//! constant or slow (trim, wind, asymmetry) drops out.
+
+use greylag_model::STEP;
+
+/// Corner of the filters that both sides of the regression pass, rad/s.
+const CORNER: f64 = 20.0;
+/// Lags that stand for an unknown servo and an unknown delay, 1/s.
+const SERVO: [f64; 2] = [25.0, 40.0];
+/// Error of the regression that does not grow with it, in g/V of the cruise airspeed and 1/s.
+const NOISE: f64 = 4.0;
+/// Error of the regression as a share of what is seen: servos and delays are not those assumed.
+const SHARE: f64 = 0.2;
+/// How fast what is known gets old, 1/s.
+const AGEING: f64 = 1e-3;
+
+/// Power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Prior {
+    pub mean: [f64; 3],
+    pub sd: [f64; 3],
+    /// The least power that is believed.
+    pub least: f64,
+}
+
+/// The running estimate of one axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Estimate {
+    prior: Prior,
+    /// Power, damping, stiffness, in the prior's units.
+    pub theta: [f64; 3],
+    covariance: [[f64; 3]; 3],
+    servo: [f64; 2],
+    filters: Option<[[f64; 4]; 2]>,
+}
+
+/// What one axis shows at an instant.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Rate, rad/s, and the command that was in force, −1..1, positive for positive rates.
+    pub rate: f64,
+    pub command: f64,
+    /// Stand-in for the incidence, rad; zero where none matters.
+    pub incidence: f64,
+    /// Airspeed over that of cruise.
+    pub speed: f64,
+    /// V/g at cruise, s.
+    pub time: f64,
+}
+
+impl Estimate {
+    pub(super) fn new(prior: Prior) -> Estimate {
+        let mut covariance = [[0.0; 3]; 3];
+        (0..3).for_each(|k| covariance[k][k] = prior.sd[k] * prior.sd[k]);
+        Estimate { prior, theta: prior.mean, covariance, servo: [0.0; 2], filters: None }
+    }
+
+    /// Takes an instant in; one that is no number is left out.
+    pub(super) fn see(&mut self, seen: &Seen) {
+        let Seen { rate, command, incidence, speed, time } = *seen;
+        if ![rate, command, incidence, speed].iter().all(|x| x.is_finite()) {
+            return;
+        }
+        let [first, second] = &mut self.servo;
+        *first += STEP * SERVO[0] * (command - *first);
+        *second += STEP * SERVO[1] * (*first - *second);
+        let square = speed * speed;
+        let raw = [rate, *second * square, rate * speed, incidence * square];
+        let [low, slope] = self.filters.get_or_insert([raw, [0.0; 4]]);
+        let mut bend = 0.0;
+        for k in 0..4 {
+            low[k] += STEP * CORNER * (raw[k] - low[k]);
+            let steep = CORNER * (raw[k] - low[k]);
+            slope[k] += STEP * CORNER * (steep - slope[k]);
+            if k == 0 {
+                bend = CORNER * (steep - slope[k]);
+            }
+        }
+        let x = [slope[1], -slope[2] * time, -slope[3]];
+        self.learn(x, bend * time * time, NOISE * time);
+    }
+
+    /// One step of the least squares: `y` = θ·x with an error of `noise`.
+    fn learn(&mut self, x: [f64; 3], y: f64, noise: f64) {
+        let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let spread: [f64; 3] = std::array::from_fn(|k| dot(&self.covariance[k], &x));
+        let variance = dot(&x, &spread) + noise * noise + (SHARE * y).powi(2);
+        let error = y - dot(&self.theta, &x);
+        for i in 0..3 {
+            self.theta[i] += spread[i] * error / variance;
+            for j in 0..3 {
+                self.covariance[i][j] -= spread[i] * spread[j] / variance;
+            }
+            let before = self.prior.sd[i] * self.prior.sd[i];
+            if self.covariance[i][i] < before {
+                self.covariance[i][i] += AGEING * STEP * before;
+            }
+        }
+        self.theta[0] = self.theta[0].max(self.prior.least);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Power in (V/g)² that is believed of ω̇ = g u − a ω, V/g = 2 s, after five seconds of a square wave.
+    fn found(power: f64, damping: f64) -> f64 {
+        let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
+        let mut estimate = Estimate::new(prior);
+        let (time, mut rate, mut servo) = (2.0, 0.0, [0.0; 2]);
+        for k in 0..500 {
+            let command = if k / 40 % 2 == 0 { 0.1 } else { -0.1 };
+            estimate.see(&Seen { rate, command, incidence: 0.0, speed: 1.0, time });
+            servo[0] += STEP * SERVO[0] * (command - servo[0]);
+            servo[1] += STEP * SERVO[1] * (servo[0] - servo[1]);
+            rate += STEP * (power * servo[1] - damping * rate);
+        }
+        estimate.theta[0]
+    }
+
+    /// From a prior of 400 to a third and to twice of it. A step of delay that the regression does not know takes a fifth.
+    #[test]
+    fn the_power_of_an_axis_is_found_in_five_seconds() {
+        for (power, damping) in [(30.0, 6.0), (200.0, 8.0)] {
+            let (found, truth) = (found(power, damping), 4.0 * power);
+            assert!((found / truth - 1.0).abs() < 0.25, "{found} for {truth}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_left_out() {
+        let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
+        let mut estimate = Estimate::new(prior);
+        let seen = Seen { rate: f64::NAN, command: 0.0, incidence: 0.0, speed: 1.0, time: 2.0 };
+        estimate.see(&seen);
+        assert_eq!(estimate, Estimate::new(prior));
+    }
+}

@@ -1,0 +1,228 @@
+//! Attitude hold of an aircraft that nobody has modelled: cascaded loops whose gains are divided by control powers that
+//! are estimated in flight. It needs the cruise airspeed, and to know whether there is a rudder.
+//!
+//! Times and rates count in V/g at the cruise airspeed V (Froude's scaling), so that one set of numbers serves a toy and a
+//! light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`); the loops' gains were
+//! found on aircraft drawn from it, see `docs/validation/any-aircraft.md`.
+
+mod estimate;
+
+use crate::{Controller, Observation, Target};
+use estimate::{Estimate, Prior, Seen};
+use greylag_model::STEP;
+use greylag_physics::atmosphere::STANDARD_GRAVITY;
+use greylag_physics::{Airframe, Command};
+
+/// What is believed of the roll axis before anything was seen: twice the median power, since too little gain loses less.
+const ROLL: Prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
+/// The same of the pitch axis.
+const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], least: 10.0 };
+/// Lift slope −Z_α, in g/V: cruise at about half the lift of the stall makes it nearly the same for all.
+const LIFT_SLOPE: f64 = 9.0;
+
+/// Rate asked for by an error in roll and in pitch, 1/s.
+const ATTITUDE: [f64; 2] = [3.0, 2.4];
+/// Bandwidth of the rate loops, 1/s.
+const RATE: f64 = 6.0;
+/// Integral over proportional gain of the rate loops, 1/s.
+const INTEGRAL: f64 = 3.5;
+/// Largest part of the command that the integral holds.
+const INTEGRAL_MOST: f64 = 0.8;
+/// Share of the estimated stiffness that is fed forward.
+const STIFFNESS_SHARE: f64 = 0.7;
+/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s.
+const REFERENCE: [f64; 2] = [0.9, 0.5];
+const ROUNDING: f64 = 0.35;
+
+/// Throttle: at cruise; by parts of airspeed missing; its integral by V/g; by the sine of the pitch.
+const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
+/// The nose goes down from here to there, parts of the cruise airspeed, and so far, rad.
+const SLOW: [f64; 2] = [0.80, 0.65];
+const NOSE_DOWN: f64 = 0.15;
+/// Rudder by the yaw rate beyond that of a coordinated turn, V/g; and at most.
+const YAW_DAMPING: f64 = 0.25;
+const RUDDER_MOST: f64 = 0.5;
+
+/// What is believed of the aircraft at its cruise airspeed. The powers are those that act within a tenth of a second: a
+/// slow servo and a delay look like missing power, so that they lie below the aerodynamic ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belief {
+    /// Roll acceleration at full aileron, rad/s².
+    pub roll_power: f64,
+    /// Decay of the roll rate, 1/s.
+    pub roll_damping: f64,
+    /// Pitch acceleration at full elevator, rad/s².
+    pub pitch_power: f64,
+    /// Decay of the pitch rate at a constant incidence, 1/s.
+    pub pitch_damping: f64,
+    /// Pitch acceleration by incidence, nose down, 1/s².
+    pub pitch_stiffness: f64,
+}
+
+/// One axis: its estimate and the integral of its loop.
+#[derive(Clone, Debug)]
+struct Axis {
+    estimate: Estimate,
+    integral: f64,
+}
+
+impl Axis {
+    fn new(prior: Prior) -> Axis {
+        Axis { estimate: Estimate::new(prior), integral: 0.0 }
+    }
+
+    /// The command (−1..1) for a `rate` where `wanted` is wanted (rad/s); `feed` maps damping (1/s) and stiffness (1/s²) to
+    /// the acceleration that holds the wanted rate (rad/s²).
+    fn command(
+        &mut self,
+        [rate, wanted]: [f64; 2],
+        [speed, time]: [f64; 2],
+        feed: impl Fn(f64, f64) -> f64,
+    ) -> f64 {
+        let [power, damping, stiffness] = self.estimate.theta;
+        let power = power * (speed / time).powi(2);
+        let damping = damping.clamp(0.0, 60.0) * speed / time;
+        let stiffness = stiffness.clamp(-20.0, 200.0) * (speed / time).powi(2);
+        let push = RATE * (wanted - rate) / power;
+        let raw = push + feed(damping, stiffness) / power + self.integral;
+        let grown = INTEGRAL * push * STEP;
+        // conditional integration: a surface at its stop does not wind up
+        let outward = (raw > 1.0 && grown > 0.0) || (raw < -1.0 && grown < 0.0);
+        if !outward && grown.is_finite() {
+            self.integral = (self.integral + grown).clamp(-INTEGRAL_MOST, INTEGRAL_MOST);
+        }
+        raw.clamp(-1.0, 1.0)
+    }
+}
+
+/// The controller.
+#[derive(Clone, Debug)]
+pub struct Adaptive {
+    /// Cruise airspeed, m/s.
+    cruise: f64,
+    rudder: bool,
+    reference: Option<[f64; 2]>,
+    axes: [Axis; 2],
+    /// Stand-in for the change of incidence, rad.
+    incidence: f64,
+    thrust: f64,
+}
+
+impl Adaptive {
+    /// A controller of the aircraft that `airframe` describes, of which it reads the cruise airspeed and whether there is a
+    /// rudder.
+    pub fn new(airframe: &Airframe) -> Adaptive {
+        Adaptive {
+            cruise: airframe.envelope.airspeed_cruise_mps,
+            rudder: airframe.actuators.rudder.is_some(),
+            reference: None,
+            axes: [ROLL, PITCH].map(Axis::new),
+            incidence: 0.0,
+            thrust: 0.0,
+        }
+    }
+
+    /// What it believes of the aircraft by now.
+    pub fn belief(&self) -> Belief {
+        let time = self.cruise / STANDARD_GRAVITY;
+        let [roll, pitch] = [0, 1].map(|k| self.axes[k].estimate.theta);
+        Belief {
+            roll_power: roll[0] / (time * time),
+            roll_damping: roll[1] / time,
+            pitch_power: pitch[0] / (time * time),
+            pitch_damping: pitch[1] / time,
+            pitch_stiffness: pitch[2] / (time * time),
+        }
+    }
+
+    /// Moves the reference towards `wanted`; the reference with its rates, rad and rad/s.
+    fn follow(&mut self, now: [f64; 2], wanted: [f64; 2]) -> [[f64; 2]; 2] {
+        let mut reference = self.reference.unwrap_or(now);
+        let mut rates = [0.0; 2];
+        for k in 0..2 {
+            let rate = ((wanted[k] - reference[k]) / ROUNDING).clamp(-REFERENCE[k], REFERENCE[k]);
+            if rate.is_finite() {
+                rates[k] = rate;
+                reference[k] += rate * STEP;
+            }
+        }
+        self.reference = Some(reference);
+        [reference, rates]
+    }
+
+    fn throttle(&mut self, speed: f64, time: f64, pitch: f64) -> f64 {
+        let [level, proportional, integral, climb] = THROTTLE;
+        let missing = 1.0 - speed;
+        let raw = level + proportional * missing + self.thrust + climb * pitch.sin();
+        let outward = (raw > 1.0 && missing > 0.0) || (raw < 0.0 && missing < 0.0);
+        if !outward && missing.is_finite() {
+            self.thrust = (self.thrust + integral * missing * STEP / time).clamp(-0.6, 0.8);
+        }
+        raw.clamp(0.0, 1.0)
+    }
+}
+
+/// The attitude to fly to, rad: too slow, with the nose lower and less bank.
+fn wanted(target: &Target, speed: f64) -> [f64; 2] {
+    let slow = ((SLOW[0] - speed) / (SLOW[0] - SLOW[1])).clamp(0.0, 1.0);
+    let lower = target.pitch * (1.0 - slow) - slow * NOSE_DOWN;
+    let pitch = if slow > 0.0 { target.pitch.min(lower) } else { target.pitch };
+    [target.roll * (1.0 - 0.5 * slow), pitch]
+}
+
+impl Controller for Adaptive {
+    fn name(&self) -> &'static str {
+        "adaptive"
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(self.clone())
+    }
+
+    fn reset(&mut self, _seed: u64) {
+        self.reference = None;
+        self.axes = [ROLL, PITCH].map(Axis::new);
+        (self.incidence, self.thrust) = (0.0, 0.0);
+    }
+
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        let (state, before) = (&seen.state, &seen.previous[0]);
+        let time = self.cruise / STANDARD_GRAVITY;
+        let speed = (state.airspeed / self.cruise).clamp(0.3, 3.0);
+        let (sin, cos) = state.roll.sin_cos();
+        let level = state.pitch.cos();
+        // of a coordinated turn, about the vertical, rad/s
+        let turn = state.roll.clamp(-1.2, 1.2).tan() * level / (speed * time);
+        let slope = LIFT_SLOPE * speed / time;
+        let pull = turn * sin * level;
+        if state.q.is_finite() && pull.is_finite() {
+            self.incidence += STEP * (state.q - pull - slope * self.incidence);
+        }
+        let seen_of = |rate: f64, command: f64, incidence: f64| Seen {
+            rate,
+            command,
+            incidence,
+            speed,
+            time,
+        };
+        self.axes[0].estimate.see(&seen_of(state.p, before.aileron, 0.0));
+        self.axes[1].estimate.see(&seen_of(state.q, -before.elevator, self.incidence));
+
+        // the airspeed asked for is held as far as it is not slower than a cruise: nothing is known of the stall
+        let asked = state.airspeed / target.airspeed.max(self.cruise);
+        let wanted = wanted(target, speed);
+        let [reference, rates] = self.follow([state.roll, state.pitch], wanted);
+        let roll = rates[0] - state.pitch.sin() * turn + ATTITUDE[0] * (reference[0] - state.roll);
+        let climb = rates[1] + ATTITUDE[1] * (reference[1] - state.pitch);
+        let pitch = climb * cos + pull;
+        let scale = [speed, time];
+        let aileron = self.axes[0].command([state.p, roll], scale, |damping, _| damping * roll);
+        let up = self.axes[1].command([state.q, pitch], scale, |damping, stiffness| {
+            damping * pitch + STIFFNESS_SHARE * stiffness * (pitch - pull) / slope
+        });
+        let throttle = self.throttle(asked, time, reference[1]);
+        let skid = state.r - turn * cos * level;
+        let rudder = (YAW_DAMPING * time * skid).clamp(-RUDDER_MOST, RUDDER_MOST);
+        Command { aileron, elevator: -up, throttle, rudder: if self.rudder { rudder } else { 0.0 } }
+    }
+}

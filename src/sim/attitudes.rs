@@ -1,0 +1,91 @@
+//! A minute of random attitudes: whether an aircraft is lost, how far off it is when settled, the integral of the error.
+
+use rand::RngExt;
+use serde::Serialize;
+
+use crate::environment::{Environment, Imagined};
+use crate::episode::{attitude_error_deg, settled_error_deg};
+use greylag_control::{Controller, Observation, Target};
+use greylag_model::{GreyBox, STEP};
+use greylag_num::statistics::mean;
+use greylag_num::stream;
+use greylag_physics::Airframe;
+
+/// Attitudes of a flight.
+pub const LEGS: usize = 12;
+/// Steps for which each is wanted: 5 s.
+const LEG: usize = 500;
+/// Steps at the end of each over which the settled error is taken: 1 s.
+const SETTLED: usize = 100;
+/// The largest roll and pitch that are asked for, degrees, where the airframe's envelope allows them.
+const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
+/// Purpose of the random stream.
+const ATTITUDES: u64 = 60;
+
+/// Beyond these an aircraft counts as lost: it is on its back or stands on its tail, or no model is believed there. Roll,
+/// pitch, angle of attack and sideslip, rad.
+const LOST: [f64; 4] = [1.75, 1.2, 0.5, 0.7];
+/// Airspeed over that of cruise between which it is not lost.
+const LOST_SPEED: [f64; 2] = [0.45, 2.5];
+
+/// What came of a minute.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Minute {
+    /// When the aircraft was lost, s; `None` if it was not.
+    pub lost_s: Option<f64>,
+    /// Mean over the attitudes of the settled error, degrees; 180 if the aircraft was lost.
+    pub settled_deg: f64,
+    /// Integral of the absolute errors of roll and pitch together, from each change of what is wanted, ° s.
+    pub integral_deg_s: f64,
+}
+
+/// The attitudes of flight `number` of `seed`: uniform within ±40° of roll and ±15° of pitch, or the envelope's where that
+/// is narrower, at the cruise airspeed.
+pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] {
+    let mut rng = stream::stream(seed, &[ATTITUDES, number]);
+    let envelope = &airframe.envelope;
+    let bank = LARGEST_DEG[0].min(envelope.bank_max_deg);
+    let up = LARGEST_DEG[1].min(envelope.pitch_max_deg);
+    let down = LARGEST_DEG[1].min(-envelope.pitch_min_deg);
+    std::array::from_fn(|_| Target {
+        roll: rng.random_range(-bank..bank).to_radians(),
+        pitch: rng.random_range(-down..up).to_radians(),
+        airspeed: envelope.airspeed_cruise_mps,
+    })
+}
+
+/// Flies `controller` for a minute in `model`, towards the [`attitudes`] of flight `number` of `seed`.
+pub fn fly(model: &GreyBox, controller: &mut dyn Controller, seed: u64, number: u64) -> Minute {
+    let mut world = Imagined::cruising(model.clone());
+    let cruise = model.airframe.envelope.airspeed_cruise_mps;
+    let lost =
+        |s: f64, integral| Minute { lost_s: Some(s), settled_deg: 180.0, integral_deg_s: integral };
+    let (mut integral, mut settled) = (0.0, Vec::with_capacity(LEGS));
+    let Ok(mut seen) = world.reset() else { return lost(0.0, integral) };
+    controller.reset(seed);
+    for (leg, target) in attitudes(&model.airframe, seed, number).iter().enumerate() {
+        let mut errors = Vec::with_capacity(SETTLED);
+        for step in 0..LEG {
+            let now = (leg * LEG + step) as f64 * STEP;
+            match world.step(controller.command(&seen, target)) {
+                Ok(next) if is_flown(&next, cruise) => seen = next,
+                _ => return lost(now, integral),
+            }
+            let error = attitude_error_deg([seen.state.roll, seen.state.pitch], target);
+            integral += (error[0].abs() + error[1].abs()) * STEP;
+            if step >= LEG - SETTLED {
+                errors.push(error);
+            }
+        }
+        settled.push(settled_error_deg(&errors));
+    }
+    Minute { lost_s: None, settled_deg: mean(&settled), integral_deg_s: integral }
+}
+
+fn is_flown(seen: &Observation, cruise: f64) -> bool {
+    let s = &seen.state;
+    let angles = [s.roll, s.pitch, s.alpha, s.beta];
+    let [slowest, fastest] = LOST_SPEED;
+    angles.iter().zip(LOST).all(|(angle, most)| angle.abs() < most)
+        && (slowest * cruise..fastest * cruise).contains(&s.airspeed)
+}
