@@ -1,6 +1,8 @@
 //! The dynamics model: which effects act, with which coefficients, on which rigid body.
 
-use crate::{Integrator, Residual};
+use std::sync::Arc;
+
+use crate::{Integrator, Known, Residual};
 use greylag_num::{Grid, Real, Table};
 use greylag_physics::actuators::LAGS;
 use greylag_physics::atmosphere::Atmosphere;
@@ -109,6 +111,8 @@ pub struct GreyBox {
     pub(super) lags: usize,
     /// Whether the link that it is flown through carries no command for a rudder.
     pub(super) rudder_is_left: bool,
+    /// What its file knows of the installation and of single flights.
+    pub known: Arc<Known>,
 }
 
 impl GreyBox {

@@ -12,6 +12,8 @@ use super::finding;
 use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
+use super::known;
+use super::power::Power;
 use super::result::{
     ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace, RegimeBins,
     Settings,
@@ -19,6 +21,7 @@ use super::result::{
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::known::KnownFlight;
 use crate::progress::{Progress, say};
 use crate::rudder;
 use crate::weak_form::channels::ChannelId;
@@ -30,10 +33,6 @@ use greylag_model::GreyBox;
 /// Why a channel is abstained from.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
 const DOUBTFUL: &str = "the remaining errors of the sensors may account for all that is left";
-
-/// The channel's variance, less noise, must be at least this part of itself for a share to mean
-/// something.
-const EXCITED: f64 = 0.05;
 
 /// What a comparison is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -191,16 +190,19 @@ fn one_model(
     options: &Options,
 ) -> ModelResult {
     let (runs, paths) = free_run::fly(model, flights, &options.horizons_s);
+    let known = known::used(model, flights, &options.horizons_s);
     let (series, shifts) = seen(model, flights, from);
     let seen = Seen { flights, series: &series, shifts: &shifts };
     let channels = all_channels(model, &seen, options.seed);
     let traces = paths.into_iter().zip(flights).zip(&series);
     let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
-    let sentences = verdict::sentences(&free_run, &channels);
+    let mut sentences = verdict::sentences(&free_run, &channels);
+    sentences.extend(known.as_ref().and_then(|k| k.sentence(&free_run)));
     ModelResult {
         name: model.name.clone(),
         sentences,
         free_run,
+        known,
         growth: runs.growth(),
         channels,
         traces: traces
@@ -231,7 +233,11 @@ type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
 
 /// What `flights` measure in every channel, and what the doubts of their sensors do there.
 fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
-    let series = flights.par_iter().map(|f| windows::channels(model, f)).collect();
+    let of = |f: &Prepared| match KnownFlight::of(model, f) {
+        Some(known) => windows::channels(&known.model, &known.flight),
+        None => windows::channels(model, f),
+    };
+    let series = flights.par_iter().map(of).collect();
     let pairs = flights.par_iter().zip(from);
     let shifts = pairs.map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances));
     (series, shifts.collect())
@@ -332,42 +338,6 @@ fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
     let own = || series.iter().flatten().filter(|s| s.channel == id);
     let windows = |s: &Series| s.measured.iter().filter(|x| x.is_finite()).count() as f64;
     own().map(|s| s.noise_variance * windows(s)).sum::<f64>() / own().map(windows).sum::<f64>()
-}
-
-/// Mean squares of a channel.
-struct Power {
-    /// Variance of what was measured.
-    measured: f64,
-    /// Mean square residual.
-    residual: f64,
-    /// Variance that noise accounts for.
-    noise: f64,
-    /// Share of the mean square residual that is its mean.
-    offset: f64,
-}
-
-impl Power {
-    fn of(residuals: &[Residual], noise: f64) -> Power {
-        let count = residuals.len() as f64;
-        let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;
-        let residual = residuals.iter().map(|r| r.value.powi(2)).sum::<f64>() / count;
-        let offset = residuals.iter().map(|r| r.value).sum::<f64>() / count;
-        Power {
-            measured: residuals.iter().map(|r| (r.measured - mean).powi(2)).sum::<f64>() / count,
-            residual,
-            noise,
-            offset: offset * offset / residual,
-        }
-    }
-
-    fn unexplained(&self) -> f64 {
-        let signal = self.measured - self.noise;
-        if signal > EXCITED * self.measured {
-            (self.residual - self.noise).max(0.0) / signal
-        } else {
-            f64::NAN
-        }
-    }
 }
 
 fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {

@@ -5,6 +5,7 @@
 //! they are asked for, each flight's own beside what all flights have in common.
 
 pub mod askew;
+pub mod known;
 pub mod trims;
 
 use serde::Serialize;

@@ -2,10 +2,13 @@
 
 use std::collections::HashSet;
 
+use nalgebra::DMatrix;
+
 use crate::diagnose::answer::result::{FlightTrim, Measurement};
 use crate::diagnose::answer::sentences::{INTERVAL, figures};
 use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
+use greylag_num::statistics::correlation_length;
 
 /// Standard deviations beyond which a constant is clearly not zero.
 const CLEARLY: f64 = 4.0;
@@ -94,9 +97,12 @@ fn fitted(round: &Round) -> Vec<Fitted> {
     let (p, flights) = (&round.projected, round.flights.len());
     let place =
         |flight: usize, which: usize| round.coefficients.len() + flight * constants.len() + which;
+    if constants.is_empty() {
+        return Vec::new();
+    }
+    let hanging = hanging(round);
     let one = |flight: usize, which: usize| {
         let misfit = misfit(round, flight);
-        let sd = |variance: f64| misfit * variance.max(0.0).sqrt();
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
         let share = 1.0 / flights as f64;
@@ -105,21 +111,60 @@ fn fitted(round: &Round) -> Vec<Fitted> {
             (0..flights).map(|k| f64::from(u8::from(k == flight)) - share).collect();
         let pairs = places.iter().zip(&weights);
         let beside: f64 = pairs.clone().map(|(k, w)| w * p.tuned[*k]).sum();
-        let row = |a: usize| pairs.clone().map(|(b, w)| w * p.covariance[(a, *b)]).sum::<f64>();
-        let variance: f64 = pairs.clone().map(|(a, w)| w * row(*a)).sum();
+        let of = |covariance: &DMatrix<f64>| {
+            let row = |a: usize| pairs.clone().map(|(b, w)| w * covariance[(a, *b)]).sum::<f64>();
+            pairs.clone().map(|(a, w)| w * row(*a)).sum::<f64>()
+        };
+        let sd = |white: f64, hanging: f64| (misfit * misfit * white).max(hanging).max(0.0).sqrt();
         Fitted {
             flight: round.flights[flight].measured.name.clone(),
             which,
             constant: constants[which],
             value: p.tuned[own],
-            sd: sd(p.covariance[(own, own)]),
-            beside_mean: (flights > 1).then(|| [beside, sd(variance)]),
+            sd: sd(p.covariance[(own, own)], hanging[(own, own)]),
+            beside_mean: (flights > 1).then(|| [beside, sd(of(&p.covariance), of(&hanging))]),
         }
     };
     (0..flights)
         .flat_map(|k| (0..constants.len()).map(move |i| (k, i)))
         .map(|(k, i)| one(k, i))
         .collect()
+}
+
+/// The covariance of the known unknowns if what each channel of each flight leaves is as large as it is there and hangs together
+/// for as long: a sandwich between the rows of each cell, weighted by their mean square times their correlation length.
+///
+/// The noise is whitened by channel over all flights, which leaves a flight whose residual is larger or slower than the
+/// others' with too much information; a trim that acts in one channel knows no more than that channel tells.
+fn hanging(round: &Round) -> DMatrix<f64> {
+    let p = &round.projected;
+    let count = round.known.len();
+    let mut meat = DMatrix::zeros(count, count);
+    for (k, known) in round.known.iter().enumerate().filter(|(_, of)| of.width.is_finite()) {
+        meat[(k, k)] = known.width.powi(-2);
+    }
+    for (cell, rows) in round.cells.list.iter().zip(&p.rows) {
+        let left: Vec<f64> = rows.column(rows.ncols() - 1).iter().copied().collect();
+        let mut from = 0;
+        let runs: Vec<Vec<f64>> = cell
+            .runs
+            .iter()
+            .map(|&to| left[std::mem::replace(&mut from, to)..to].to_vec())
+            .collect();
+        let square = left.iter().map(|x| x * x).sum::<f64>() / left.len().max(1) as f64;
+        let weight = square * correlation_length(&runs);
+        let whitener = &round.noise.whiteners[cell.channel];
+        let (places, z) = cell.matrix(&round.placed[cell.flight], whitener);
+        let known = places.iter().take_while(|place| **place < count).count();
+        let own = z.columns(0, known);
+        let gram = own.tr_mul(&own);
+        for (i, a) in places[..known].iter().enumerate() {
+            for (j, b) in places[..known].iter().enumerate() {
+                meat[(*a, *b)] += weight.max(1.0) * gram[(i, j)];
+            }
+        }
+    }
+    &p.covariance * meat * &p.covariance
 }
 
 /// By how much what a flight leaves exceeds its noise, at least 1: where something is missing, nothing is known as well as
