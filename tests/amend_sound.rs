@@ -118,8 +118,14 @@ fn bounds_are_the_users_and_free_runs_are_written() {
 
 #[test]
 fn leaving_out_one_flight_after_the_other_names_the_lag() {
-    let all: Vec<Reconstruction> =
+    let mut all: Vec<Reconstruction> =
         (61..64).map(|k| flight("actuator_lag=0.08", 25.0, Manoeuvres::Usual, k)).collect();
+    // a flight of 0.8 s reaches no horizon: it is fitted to and never left out
+    let mut short = all[0].clone();
+    short.name = "short".into();
+    short.segments.truncate(1);
+    short.segments[0].instants.truncate(80);
+    all.push(short);
     let model = sensors::model();
     let of = |ids: &[&str]| Structure {
         name: ids.join(" "),
@@ -135,7 +141,80 @@ fn leaving_out_one_flight_after_the_other_names_the_lag() {
     let chosen: Vec<&str> =
         scored.iter().filter(|s| s.chosen).map(|s| s.structure.as_str()).collect();
     assert_eq!(chosen, ["actuator_lag"]);
+    for s in &scored {
+        assert_eq!(s.flights.len(), 3, "{:?}", s.flights);
+        assert!(!s.flights.contains(&"short".to_owned()) && s.mean.is_finite(), "{s:?}");
+    }
     assert!(scored[2].mean < 0.5 * scored[1].mean, "{} {}", scored[2].mean, scored[1].mean);
     let few = leave_one_out(&model, &all[..2], &structures, &[1.0], &ignore_progress);
     assert!(matches!(few, Err(AmendError::TooFewFlights { flights: 2, .. })));
+}
+
+/// A coefficient of which nothing is known but a range far narrower than any flight can tell.
+#[test]
+fn a_coefficient_of_which_flights_say_nothing_is_said_to_be_undetermined_and_held() {
+    let mut model = sensors::model();
+    let name = "roll_linear.Clp";
+    let value = model.coefficients().iter().find(|c| c.name == name).unwrap().value;
+    model.set_bounds(name, [value - 1e-6, value + 1e-6]);
+    let model = model.with_widths(|c| (c.name == name).then_some(2e-6));
+    let flights: Vec<Reconstruction> =
+        (71..73).map(|k| flight("", 20.0, Manoeuvres::Usual, k)).collect();
+    let found =
+        amend(&model, &flights[..1], &flights[1..], &Options::default(), &ignore_progress).unwrap();
+    let story = &found.amendment;
+    assert!(story.parameters.iter().all(|p| p.name != name));
+    let note = story.notes.iter().find(|n| n.starts_with("Undetermined")).unwrap();
+    assert!(note.contains(name), "{note}");
+    let kept = found.model.coefficients().iter().find(|c| c.name == name).unwrap();
+    assert_eq!(kept.value, value);
+    // the others are fitted as ever
+    assert!(story.parameters.iter().any(|p| p.name == "pitch_linear.Cmq"));
+}
+
+/// A second of a slow aircraft under motion capture is read where a mapping says from when on it flies.
+#[test]
+fn a_second_of_flight_is_read_where_a_mapping_says_from_when_on_it_flies() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let whole = root.join("tests/data/a430/short_u_8_20230215_143434.csv");
+    let rows = std::fs::read_to_string(whole).unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // one second from the third on
+    let cut: Vec<&str> = rows.lines().take(1).chain(rows.lines().skip(300).take(100)).collect();
+    std::fs::write(at("cut.csv"), cut.join("\n") + "\n").unwrap();
+    let own = std::fs::read_to_string(root.join("tests/data/a430/mapping.toml")).unwrap();
+    std::fs::write(at("usual.toml"), &own).unwrap();
+    let stated = own + "\n[flight]\nfrom_mps = 2.5\nshortest_s = 0.5\n";
+    std::fs::write(at("stated.toml"), stated).unwrap();
+    let info =
+        |mapping: &str| greylag(&["logs", "info", &at("cut.csv"), "--mapping", &at(mapping)]);
+    let said = |output: &Output| String::from_utf8_lossy(&output.stdout).into_owned();
+    let usual = info("usual.toml");
+    assert!(said(&usual).contains("no flight in this log"), "{}", said(&usual));
+    let stated = info("stated.toml");
+    assert!(!said(&stated).contains("no flight in this log"), "{}", said(&stated));
+    let prior = root.join("params/a430/prior.toml").display().to_string();
+    let (log, csv) = (at("cut.csv"), at("path.csv"));
+    let reconstructed = |mapping: &str| {
+        let line = ["logs", "reconstruct", &log, &csv, "--force", "--model", &prior];
+        greylag(&[&line[..], &["--mapping", &at(mapping)]].concat())
+    };
+    // without it 2 s, and at 5 m/s 0.7 s, are the least; the whole second is read with it
+    let read = reconstructed("stated.toml");
+    assert!(read.status.success(), "{}", String::from_utf8_lossy(&read.stderr));
+    let short = stated_and_cut(&rows, folder.path());
+    let line = ["logs", "reconstruct", &short, &csv, "--force", "--model", &prior];
+    let usual = greylag(&[&line[..], &["--mapping", &at("usual.toml")]].concat());
+    assert!(!usual.status.success(), "{}", said(&usual));
+    let stated = greylag(&[&line[..], &["--mapping", &at("stated.toml")]].concat());
+    assert!(stated.status.success(), "{}", String::from_utf8_lossy(&stated.stderr));
+}
+
+/// Writes 0.65 s of `rows`.
+fn stated_and_cut(rows: &str, folder: &Path) -> String {
+    let cut: Vec<&str> = rows.lines().take(1).chain(rows.lines().skip(300).take(66)).collect();
+    let path = folder.join("short.csv");
+    std::fs::write(&path, cut.join("\n") + "\n").unwrap();
+    path.to_str().unwrap().to_owned()
 }

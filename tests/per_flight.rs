@@ -4,7 +4,12 @@
 
 mod amend_support;
 
+use std::path::Path;
+use std::process::Command;
+
 use amend_support::{Manoeuvres, errors, fly_hiding, off, rebuilt, sensors};
+use greylag::logs::{Flight, csv};
+use greylag::model::GreyBox;
 use greylag::physics::formula::register;
 use greylag::sim::missing::Missing;
 use greylag::sysid::amend;
@@ -38,8 +43,8 @@ fn trim([lift, pitch]: [f64; 2]) -> Hidden {
     Missing::written(register::read(&text).unwrap(), &[lift, pitch]).unwrap().hidden.unwrap()
 }
 
-/// A flight with `trim` (CL0, Cm0), logged by a board that is turned by `askew` (roll, pitch, yaw, °).
-fn flight(trimmed: [f64; 2], askew: [f64; 3], seed: u64) -> Reconstruction {
+/// The log of a flight with `trim` (CL0, Cm0) by a board that is turned by `askew` (roll, pitch, yaw, °).
+fn log(trimmed: [f64; 2], askew: [f64; 3], seed: u64) -> Flight {
     let flown = fly_hiding(vec![trim(trimmed)], FLOWN_S, Manoeuvres::Usual, seed);
     let mut log = sensors::spoil(&flown, &errors(seed), seed);
     let turn = Rotation3::from_scaled_axis(Vector3::from(askew.map(f64::to_radians)));
@@ -52,7 +57,12 @@ fn flight(trimmed: [f64; 2], askew: [f64; 3], seed: u64) -> Reconstruction {
             (Rotation3::from_euler_angles(roll, pitch, yaw) * turn).euler_angles();
         sample.attitude_rad = [roll, pitch, yaw];
     }
-    rebuilt(&log, seed)
+    log
+}
+
+/// The same, reconstructed.
+fn flight(trimmed: [f64; 2], askew: [f64; 3], seed: u64) -> Reconstruction {
+    rebuilt(&log(trimmed, askew, seed), seed)
 }
 
 fn asked(flights: &[Reconstruction], per_flight: PerFlight) -> Diagnosis {
@@ -176,4 +186,69 @@ fn free_runs_find_trims_and_axes_and_leave_the_model_what_flights_have_in_common
     println!("{} {}", after(&without), after(&with));
     assert!(after(&with) < 0.8 * after(&without));
     assert!(with.notes.iter().any(|n| n.contains("nothing is taken from them")));
+}
+
+fn greylag(arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_greylag")).args(arguments).output().unwrap();
+    let said = [&output.stdout[..], &output.stderr[..]].map(String::from_utf8_lossy).concat();
+    // 3 is "done, in doubt"
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{arguments:?}: {said}");
+    said
+}
+
+/// A board that stands askew in the same way in all flights, each flight with its own trim: the model's file keeps both,
+/// a flight that nobody fitted is predicted with the board, one that was with its trim too.
+#[test]
+fn what_was_learned_of_the_board_and_of_flights_is_kept_and_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let turned = [4.0, 0.0, 5.0];
+    let trims = [[0.04, 0.012], [-0.04, -0.012], [0.0, 0.0], [0.0, 0.0]];
+    let names = ["a.csv", "b.csv", "c.csv", "d.csv"].map(at);
+    for (k, name) in names.iter().enumerate() {
+        csv::save(&log(trims[k], turned, 31 + k as u64), Path::new(name)).unwrap();
+    }
+    let [a, b, c, d] = names.each_ref().map(String::as_str);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let model = root.join("params/x8/prior-mild.toml").display().to_string();
+    let line = ["amend", "--model", &model, "--log", a, b, c, "--hold-out", d, "--tune-only"];
+    let own = ["--flight-trims", "--axes-askew", "5", "--out", &at("out")];
+    let said = greylag(&[&line[..], &own].concat());
+    assert!(said.contains("kept as [installation]"), "{said}");
+    let fitted = at("out/model.toml");
+    let known = GreyBox::load(Path::new(&fitted)).unwrap().known;
+    println!("{known:#?}");
+    let axes = known.installation.as_ref().unwrap().axes_deg.unwrap();
+    assert!((axes[0] - 4.0).abs() < 1.0 && (axes[2] - 5.0).abs() < 1.0, "{axes:?}");
+    let pitching = |name: &str| known.of(name).unwrap().trims.unwrap()[4];
+    assert!((pitching("a.csv") - pitching("b.csv") - 0.024).abs() < 0.004);
+    let json = at("compared.json");
+    let said = greylag(&[
+        "compare",
+        "--model",
+        &fitted,
+        "--log",
+        a,
+        d,
+        "--horizon",
+        "1,5",
+        "--json",
+        &json,
+    ]);
+    assert!(said.contains("A without"), "{said}");
+    let read: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    let of = &read["models"][0]["known"];
+    assert_eq!(of["flights"][0].as_str(), Some("a.csv"));
+    assert_eq!(of["by_installation"][0].as_str(), Some("d.csv"));
+    let error = |scores: &serde_json::Value| scores[1]["rmse_scaled"].as_f64().unwrap();
+    let (with, without) = (error(&read["free_run"]), error(&of["without"]));
+    println!("{with} with what is known, {without} without");
+    assert!(with < 0.7 * without, "{with} {without}");
+    let predicted = at("runs.csv");
+    greylag(&["compare", "--model", &fitted, "--log", d, "--predictions", &predicted]);
+    let text = std::fs::read_to_string(&predicted).unwrap();
+    assert!(text.contains("without its flights' constants"));
+    let said = greylag(&["diagnose", "--model", &fitted, "--log", a, b, "--nulls", "20"]);
+    assert!(said.contains("as the model's file has them: a.csv, b.csv"), "{said}");
 }

@@ -17,7 +17,9 @@ use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
 use crate::sysid::amend::Origin;
-use crate::sysid::compare::{Answer, Comparison, ModelResult, Options, compare, scores};
+use crate::sysid::compare::{
+    Answer, Comparison, HorizonScore, ModelResult, Options, compare, scores,
+};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -168,7 +170,7 @@ fn baselines(comparison: &Comparison) -> Option<String> {
     (!all.is_empty()).then_some(said)
 }
 
-/// Free-run errors in the units of a flight.
+/// Free-run errors in the units of a flight, of a model that knows flights also without that.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
         "", "s", "NRMSE", "lost", "roll °", "pitch °", "V m/s", "p °/s", "q °/s", "r °/s", "α °",
@@ -176,21 +178,28 @@ fn free_run_table(comparison: &Comparison) -> Table {
     ];
     let mut table = table(header, 1);
     for (model, letter) in comparison.models.iter().zip(LETTERS) {
-        for score in model.free_run.iter().filter(|s| s.runs > 0) {
-            let mut row = vec![
-                letter.to_string(),
-                format!("{}", score.horizon_s),
-                format!("{:.5}", score.rmse_scaled),
-                format!("{}/{}", score.diverged, score.runs),
-            ];
-            row.extend(score.states.iter().map(|s| {
-                let angle = s.state != "airspeed_mps";
-                number(if angle { s.rmse.to_degrees() } else { s.rmse })
-            }));
-            table.add_row(row);
+        let without = model.known.as_ref().map_or(&[][..], |k| k.without.as_slice());
+        let with = model.free_run.iter().map(|s| (letter.to_string(), s));
+        let all = with.chain(without.iter().map(|s| (format!("{letter} without"), s)));
+        for (name, score) in all.filter(|(_, s)| s.runs > 0) {
+            table.add_row(free_run_row(name, score));
         }
     }
     table
+}
+
+fn free_run_row(name: String, score: &HorizonScore) -> Vec<String> {
+    let mut row = vec![
+        name,
+        format!("{}", score.horizon_s),
+        format!("{:.5}", score.rmse_scaled),
+        format!("{}/{}", score.diverged, score.runs),
+    ];
+    row.extend(score.states.iter().map(|s| {
+        let angle = s.state != "airspeed_mps";
+        number(if angle { s.rmse.to_degrees() } else { s.rmse })
+    }));
+    row
 }
 
 fn channel_table(models: &[ModelResult]) -> Table {

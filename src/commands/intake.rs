@@ -108,7 +108,8 @@ impl Reading {
     pub fn options(&self) -> Result<logs::Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
         let (tolerance, sources) = (self.tolerance(), self.source.clone());
-        Ok(logs::Options { tolerance, mapping, flies: Flying::default(), sources })
+        let flies = mapping.flies(None);
+        Ok(logs::Options { tolerance, mapping, flies, sources })
     }
 
     /// The logs and options for a workbench.
@@ -147,7 +148,8 @@ impl Reading {
         clock: ActuatorClock,
     ) -> Result<Intake> {
         let flies = Flying::from(model.airframe.envelope.flying_from_mps());
-        let mut reading = logs::Options { flies, ..self.options()? };
+        let mut reading = self.options()?;
+        reading.flies = reading.mapping.flies(Some(flies));
         reading.mapping = reading.mapping.with_mixer(model.airframe.mixer.clone());
         let mut intake = Intake::default();
         for (k, (path, name)) in paths.iter().zip(logs::names(paths)).enumerate() {
@@ -196,7 +198,7 @@ impl Reading {
         if !self.despite_problems {
             refuse_problems(path, &log.findings)?;
         }
-        let options = flight_path::Options::of(name, model, clock);
+        let options = flight_path::Options::of(name, model, clock).down_to(log.flies.sustained_s);
         let flight = reconstruct(&log.flight, &options)
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))

@@ -111,8 +111,8 @@ impl Reading {
             mapping.with_mixer(own.or_else(|| model.and_then(|m| m.airframe.mixer.clone())));
         let tolerance = if self.lenient { csv::Tolerance::Lenient } else { csv::Tolerance::Strict };
         let flies = model.map(|m| Flying::from(m.airframe.envelope.flying_from_mps()));
-        let sources = self.source.clone();
-        Ok(Options { tolerance, mapping, flies: flies.unwrap_or_default(), sources })
+        let (flies, sources) = (mapping.flies(flies), self.source.clone());
+        Ok(Options { tolerance, mapping, flies, sources })
     }
 }
 
@@ -151,7 +151,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let model = GreyBox::load(&files::shipped(model))?;
             let log = crate::logs::load(input, &reading.options(Some(&model))?)?;
             let options =
-                flight_path::Options::of(&log.flight.name, &model, ActuatorClock::Estimated);
+                flight_path::Options::of(&log.flight.name, &model, ActuatorClock::Estimated)
+                    .down_to(log.flies.sustained_s);
             let flight = flight_path::reconstruct(&log.flight, &options)?;
             csv_file(&flight.to_flight(), output, *force)?;
             print_reconstruction(&flight, output);

@@ -30,7 +30,8 @@ struct Row<'a> {
 pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64]) -> Result<String> {
     let longest = horizons_s.iter().copied().fold(0.0, f64::max);
     let mut text = header();
-    for model in models {
+    for model in models.iter().flat_map(|model| with_and_without(model, flights)) {
+        let model = &model;
         let mut rows = Vec::new();
         for flight in flights {
             let flight = Prepared::new(flight, model.airframe.envelope.flying_from_mps())?;
@@ -46,6 +47,18 @@ pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64])
         );
     }
     Ok(text)
+}
+
+/// `model`, and the same without what its file knows of `flights`, where it knows anything of them.
+fn with_and_without(model: &GreyBox, flights: &[Reconstruction]) -> Vec<GreyBox> {
+    let mut all = vec![model.clone()];
+    if flights.iter().any(|f| model.known.of(&f.name).is_some()) {
+        let mut bare = model.clone();
+        bare.known = Default::default();
+        bare.name += " without its flights' constants";
+        all.push(bare);
+    }
+    all
 }
 
 fn header() -> String {

@@ -59,6 +59,10 @@ pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
         }
         notes.push("airspeed is made from the velocity over ground and the stated wind".into());
     }
+    if let Some(board) = mapping.board() {
+        rows.iter_mut().for_each(|row| board.turn(row));
+        notes.push(board.to_string());
+    }
     notes
 }
 

@@ -1,5 +1,6 @@
 //! Edits of a model file's text: new values and effects, with everything else unchanged.
 
+use crate::known::{FlightConstants, Known, SENSORS, TRIMS};
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 /// Error of editing a model file's text.
@@ -48,6 +49,8 @@ pub struct Edit {
     pub effect_files: Vec<String>,
     /// Flights that the values were fitted to, for their sources.
     pub fitted_to: String,
+    /// What the file is to know of the installation and of flights, in place of what it has; `None` to leave that.
+    pub known: Option<Known>,
 }
 
 impl Edit {
@@ -100,6 +103,9 @@ impl Edit {
             let source = format!("greylag amend: added, {source}; fitted to {}", self.fitted_to);
             table.insert(short, Item::Value(Value::InlineTable(sourced(number, &source))));
         }
+        if let Some(known) = &self.known {
+            write_known(&mut document, known);
+        }
         Ok(document.to_string())
     }
 
@@ -125,6 +131,47 @@ impl Edit {
         }
         Ok(())
     }
+}
+
+/// Replaces the tables of the installation and of flights in `document` by those of `known`.
+fn write_known(document: &mut DocumentMut, known: &Known) {
+    document.remove("installation");
+    document.remove("flights");
+    if let Some(shared) = &known.installation {
+        document.insert("installation", Item::Table(constants(shared)));
+    }
+    if !known.flights.is_empty() {
+        let mut flights = Table::new();
+        flights.set_implicit(true);
+        for (name, own) in &known.flights {
+            flights.insert(name, Item::Table(constants(own)));
+        }
+        document.insert("flights", Item::Table(flights));
+    }
+}
+
+fn constants(of: &FlightConstants) -> Table {
+    let named = |names: &[&str], values: &[f64]| {
+        let stated = names.iter().zip(values).filter(|(_, x)| **x != 0.0);
+        let mut table = InlineTable::new();
+        stated.for_each(|(name, x)| {
+            table.insert(*name, (*x).into());
+        });
+        Item::Value(Value::InlineTable(table))
+    };
+    let mut table = Table::new();
+    table.insert("source", Item::Value(of.source.as_str().into()));
+    if let Some(axes) = of.axes_deg {
+        let angles: toml_edit::Array = axes.into_iter().collect();
+        table.insert("axes_deg", Item::Value(angles.into()));
+    }
+    if let Some(trims) = of.trims {
+        table.insert("trims", named(&TRIMS, &trims));
+    }
+    if let Some(sensors) = of.sensors {
+        table.insert("sensors", named(&SENSORS, &sensors));
+    }
+    table
 }
 
 /// Entry of the coefficient `name`.
@@ -208,6 +255,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
             replaced: vec![(&["air", "density"], "standard")],
             effect_files: vec!["own.toml".into()],
             fitted_to: "a.csv (sha256 01)".into(),
+            known: None,
         }
     }
 

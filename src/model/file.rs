@@ -1,10 +1,13 @@
 //! Model files: TOML that names the effects and states every number with its source.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use serde::Deserialize;
 
 use super::grey_box::{Points, Term};
+use super::known::{self, ConstantsFile};
 use super::residual::hash;
 use super::{GreyBox, Integrator, Named, Residual};
 use greylag_num::{Grid, Table};
@@ -36,6 +39,9 @@ struct File {
     #[serde(default)]
     effect_files: Vec<String>,
     effects: toml::Table,
+    installation: Option<ConstantsFile>,
+    #[serde(default)]
+    flights: BTreeMap<String, ConstantsFile>,
 }
 
 #[derive(Deserialize)]
@@ -165,6 +171,7 @@ fn inertia(field: &str, number: &Sourced) -> Result<f64, String> {
 impl File {
     fn into_model(self, airframe: Airframe) -> Result<GreyBox, String> {
         let body = self.rigid_body.checked()?;
+        let known = known::checked(self.installation, self.flights)?;
         let size = Size::new(&body, &airframe.geometry).lifted_at(
             airframe.envelope.airspeed_min_mps,
             &body,
@@ -207,6 +214,7 @@ impl File {
             independent: 0,
             inputs: acting,
             coefficients,
+            known: Arc::new(known),
         };
         model.settle();
         if model.body.is_physical() {

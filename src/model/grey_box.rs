@@ -1,6 +1,8 @@
 //! The grey-box dynamics model: physical effects with their coefficients on a rigid body, and a learned residual.
 
-use crate::{Integrator, Residual};
+use std::sync::Arc;
+
+use crate::{Integrator, Known, Residual};
 use greylag_num::{Grid, Real, Table};
 use greylag_physics::actuators::LAGS;
 use greylag_physics::atmosphere::Atmosphere;
@@ -130,6 +132,8 @@ pub struct GreyBox {
     pub(super) lags: usize,
     /// Whether the link carries no rudder command.
     pub(super) rudder_is_left: bool,
+    /// What its file knows of the installation and of single flights.
+    pub known: Arc<Known>,
 }
 
 impl GreyBox {

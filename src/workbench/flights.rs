@@ -58,13 +58,15 @@ impl Loaded {
         let mixer = model.airframe.mixer.clone();
         let flies = Flying::from(model.airframe.envelope.flying_from_mps());
         let mapping = reading.mapping.clone().with_mixer(mixer);
+        let flies = mapping.flies(Some(flies));
         let reading = logs::Options { flies, mapping, ..reading.clone() };
         let log = logs::parse(bytes, Path::new(name), &reading)?;
         Loaded::of(&log, name, model)
     }
 
     fn of(log: &Log, name: &str, model: &GreyBox) -> Result<Arc<Loaded>, WorkbenchError> {
-        let options = flight_path::Options::of(name, model, ActuatorClock::AsRecorded);
+        let options = flight_path::Options::of(name, model, ActuatorClock::AsRecorded)
+            .down_to(log.flies.sustained_s);
         let flight = reconstruct(&log.flight, &options)?;
         let slowest = model.airframe.envelope.flying_from_mps();
         let prepared = Prepared::new(&flight, slowest)?;

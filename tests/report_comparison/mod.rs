@@ -130,6 +130,7 @@ fn model(name: &str, size: f64, flights: &[FlightResult]) -> ModelResult {
         name: name.into(),
         sentences: channels.iter().take(4).map(|c| capital(&c.worst_regime) + ".").collect(),
         free_run: [1.0, 2.0, 5.0, 10.0].map(|h| score(h, size)).into(),
+        known: None,
         growth: (1..=100).map(|i| growth(f64::from(i) * 0.1, size)).collect(),
         channels,
         traces: traces.collect(),

@@ -62,8 +62,15 @@ pub fn run(
     println!("{}", table(&scored));
     for s in &scored {
         let by: Vec<String> =
-            flights.iter().zip(&s.errors).map(|(f, e)| format!("{} {e:.4}", f.name)).collect();
+            s.flights.iter().zip(&s.errors).map(|(f, e)| format!("{f} {e:.4}")).collect();
         println!("{}: {}", s.structure, by.join(", "));
+    }
+    let judged = scored.first().map_or(&[][..], |s| s.flights.as_slice());
+    let short = flights.iter().map(|f| &f.name).filter(|name| !judged.contains(*name));
+    for name in short {
+        println!(
+            "{name}: too short for the shortest horizon, so it is fitted to and never left out"
+        );
     }
     match scored.iter().find(|s| s.chosen) {
         Some(s) if s.free == 0 => {

@@ -16,9 +16,11 @@
 //! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
 //! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, by a
 //! parabola through so many seconds of rows. `[derive] body_rates_over_s` makes p, q, r from roll, pitch and
-//! yaw in the same way. `[sensors]` describes sensors and wind, see [`Sensors`].
+//! yaw in the same way. `[board]` turns the axes of a log (see [`Board`]), `[flight]` sets what counts as flight:
+//! `from_mps` (airspeed; a model's envelope takes precedence) and `shortest_s` (0.5 s at least). `[sensors]` describes sensors and wind, see [`Sensors`].
 
 mod ardupilot;
+mod board;
 mod telemetry;
 mod px4;
 pub(super) mod rule;
@@ -33,7 +35,10 @@ use super::columns::index;
 use super::csv::Order;
 use super::derive;
 use super::format::Format;
+use super::phases::Flying;
 use super::topics::Topics;
+pub use board::Board;
+use board::WrittenBoard;
 use greylag_physics::Sensors;
 use greylag_physics::mixer::Mixer;
 use greylag_physics::sensors::CONSTANTS;
@@ -91,6 +96,10 @@ pub struct Mapping {
     sensors: Sensors,
     /// Where the attitude comes from as a quaternion.
     quaternion: Option<Turn>,
+    /// How the log's axes stand.
+    board: Option<Board>,
+    /// From when on the aircraft flies.
+    flight: WrittenFlight,
     /// The mixer of the aircraft.
     mixer: Option<Mixer>,
 }
@@ -117,6 +126,16 @@ struct Written {
     derive: Derive,
     #[serde(default)]
     sensors: Sensors,
+    board: Option<WrittenBoard>,
+    #[serde(default)]
+    flight: WrittenFlight,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+struct WrittenFlight {
+    from_mps: Option<f64>,
+    shortest_s: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -197,7 +216,27 @@ impl Mapping {
             gyros.for_each(|(name, _)| sensors.hold(name, 0.0));
         }
         let quaternion = written.attitude.map(turn).transpose().map_err(wrong)?;
-        Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, mixer: None })
+        let board = written.board.map(Board::try_from).transpose().map_err(wrong)?;
+        let flight = thresholds(written.flight).map_err(wrong)?;
+        Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, board, flight, mixer: None })
+    }
+
+    /// How the log's axes stand, if the mapping says so.
+    pub(super) fn board(&self) -> Option<&Board> {
+        self.board.as_ref()
+    }
+
+    /// From when on an aircraft flies of which `model` is known, the usual one if nothing is.
+    pub fn flies(&self, model: Option<Flying>) -> Flying {
+        let mut flies = model.unwrap_or_else(|| match self.flight.from_mps {
+            Some(from) => Flying::from(from),
+            None => Flying::default(),
+        });
+        if let Some(shortest) = self.flight.shortest_s {
+            flies.sustained_s = flies.sustained_s.min(shortest);
+            flies.shortest_s = shortest;
+        }
+        flies
     }
 
     /// Known properties of sensors and wind.
@@ -317,6 +356,19 @@ impl Mapping {
 /// The rules of a format without a mapping.
 pub(super) fn format_rules(format: Format, topics: &Topics) -> Vec<Rule> {
     Mapping::default().rules(format, topics)
+}
+
+/// The least flight that a mapping may ask for, s.
+const SHORTEST_S: f64 = 0.5;
+
+fn thresholds(flight: WrittenFlight) -> Result<WrittenFlight, String> {
+    if flight.from_mps.is_some_and(|v| !(v > 0.0 && v <= 400.0)) {
+        return Err("flight.from_mps must lie above 0 and up to 400 m/s".into());
+    }
+    if flight.shortest_s.is_some_and(|t| !(SHORTEST_S..=60.0).contains(&t)) {
+        return Err(format!("flight.shortest_s must lie within {SHORTEST_S} to 60 s"));
+    }
+    Ok(flight)
 }
 
 fn turn(written: WrittenTurn) -> Result<Turn, String> {

@@ -72,7 +72,7 @@ fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     if flights.is_empty() {
         let fastest = relation::values(rows, |s| s.airspeed_mps).into_iter().fold(0.0, f64::max);
         return Some(Finding::problem(format!(
-            "there is no flight in this log: airspeed never stays above {:.3} m/s for {:.1} s (largest value {fastest:.1} m/s); give a log with a flight, check the airspeed channel, or name the aircraft's model, whose envelope says from when on it flies",
+            "there is no flight in this log: airspeed never stays above {:.3} m/s for {:.1} s (largest value {fastest:.1} m/s); give a log with a flight, check the airspeed channel, or name the aircraft's model, whose envelope says from when on it flies, or state [flight] from_mps and shortest_s in a mapping",
             flies.from_mps, flies.sustained_s
         )));
     }

@@ -2,6 +2,7 @@
 
 mod selection;
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
 use super::error::AmendError;
@@ -9,11 +10,11 @@ use super::flight::Flight;
 use super::judge::{self, JUDGED_AT_S, Judge};
 use super::output_error::{Fit, FitOptions};
 use super::result::{Amendment, Settings};
-use super::{answer, parameters, story};
-use crate::compare::Answer;
+use super::{answer, learned, parameters, story};
+use crate::compare::{Answer, HorizonScore};
 use crate::diagnose::Candidate;
 use crate::flight_path::reconstruction::{Reconstruction, Segment};
-use crate::per_flight::PerFlight;
+use crate::per_flight::{PerFlight, known};
 use crate::progress::Progress;
 use crate::rudder;
 use greylag_model::GreyBox;
@@ -144,6 +145,21 @@ pub fn amend(
     for added in &options.effects {
         joined(&mut model.clone(), added)?;
     }
+    let Right { flights, asked, notes } = right(model, flights, options.per_flight);
+    let options = Options { per_flight: asked, ..options.clone() };
+    let mut amended = of_right(model, &flights, held_out, &options, progress)?;
+    amended.amendment.notes.extend(notes);
+    Ok(amended)
+}
+
+/// The same for flights that are as the model's file knows them.
+fn of_right(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    held_out: &[Reconstruction],
+    options: &Options,
+    progress: &Progress,
+) -> Result<Amended, AmendError> {
     let slowest = model.airframe.envelope.flying_from_mps();
     let ready = |all: &[Reconstruction]| {
         all.iter().map(|f| Flight::new(f, slowest)).collect::<Result<Vec<_>, _>>()
@@ -161,8 +177,12 @@ pub fn amend(
         false => (best, Vec::new()),
     };
     let Selection { fit, after, effects, .. } = best;
+    let (fit, after, note) = match options.per_flight.angles() {
+        0 => (fit, after, None),
+        _ => installed(fit, after, &judge),
+    };
     let mut notes = notes(model, &tuned.model, &fit);
-    notes.extend(story::apart(&options.per_flight));
+    notes.extend(story::apart(&options.per_flight).into_iter().chain(note));
     let mut amendment = Amendment {
         schema: "greylag.amend/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -191,6 +211,66 @@ pub fn amend(
     amendment.sentences.extend(story::sentences(&amendment));
     amendment.answer = answer::answer(&amendment);
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
+}
+
+/// Flights to fit to, as the model's file knows them.
+struct Right {
+    flights: Vec<Reconstruction>,
+    asked: PerFlight,
+    notes: Vec<String>,
+}
+
+/// `flights` with the axes and sensors that the file of `model` has of them put right, unless axes are asked for anew; a
+/// flight whose trims it has keeps trims of its own.
+fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
+    let mut notes = Vec::new();
+    let (flights, named) = match asked.askew_deg {
+        Some(_) => (flights.to_vec(), Vec::new()),
+        None => known::put_right(&model.known, flights),
+    };
+    if !named.is_empty() {
+        notes.push(format!(
+            "Axes and sensors are used as the model's file has them: {}.",
+            named.join(", ")
+        ));
+    }
+    let trimmed = known::trimmed(&model.known, &flights);
+    if !trimmed.is_empty() && asked.trims.is_none() {
+        asked.trims = Some(1.0);
+        notes.push(format!(
+            "The model's file has trims of {}, so each flight is given trims of its own, as by --flight-trims.",
+            trimmed.join(", ")
+        ));
+    }
+    Right { flights, asked, notes }
+}
+
+/// The `fit` with its scores `after`, its installation kept only where the flights held out bear it out, and what became of it.
+fn installed(
+    mut fit: Fit,
+    after: Vec<HorizonScore>,
+    judge: &Judge,
+) -> (Fit, Vec<HorizonScore>, Option<String>) {
+    let Some(shared) = fit.model.known.installation.clone() else { return (fit, after, None) };
+    let with = fit.model.known.clone();
+    Arc::make_mut(&mut fit.model.known).installation = None;
+    let bare = judge.scores(&fit.model);
+    let words = learned::in_words(&shared);
+    let errors = judge::judged(&after).zip(judge::judged(&bare));
+    let (said, [a, b]) = match errors {
+        Some((a, b)) if a <= b => ("kept as [installation]", [a, b]),
+        Some((a, b)) => ("not kept", [a, b]),
+        None => ("not kept, for no flight held out can judge it", [f64::NAN; 2]),
+    };
+    let note = format!(
+        "The measured axes of the flights fitted stand askew in common ({words}), which is {said}: the error of the flights \
+         held out is {a:.5} with it, {b:.5} without."
+    );
+    if a <= b {
+        fit.model.known = with;
+        return (fit, after, Some(note));
+    }
+    (fit, bare, Some(note))
 }
 
 /// Adds the effect `added` to `model` at its starting values.

@@ -161,6 +161,7 @@ fn edit(before: &GreyBox, amended: &Amended, logs: &[Hashed], airframe: String) 
         added: all.iter().filter(|c| new(&c.name)).map(|c| (number(c), source(&c.name))).collect(),
         effect_files: amended.model.written().map(effect_file).collect(),
         fitted_to: logs.join(", "),
+        known: (amended.model.known != before.known).then(|| (*amended.model.known).clone()),
     }
 }
 
@@ -181,6 +182,9 @@ pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
     }
     if read.coefficients().len() != meant.coefficients().len() {
         return Some("number of coefficients".into());
+    }
+    if read.known != meant.known {
+        return Some("installation or flights".into());
     }
     let same = |name: &str, value: f64| {
         read.coefficients().iter().any(|c| c.name == name && c.value.to_bits() == value.to_bits())

@@ -28,7 +28,7 @@ pub enum AmendError {
     },
     /// There are too few flights to leave one out.
     #[error(
-        "cannot leave out one flight after the other: there are {flights}, and {needed} are the least; name more logs, \
+        "cannot leave out one flight after the other: {flights} are long enough to be predicted, and {needed} are the least; name more logs, \
          or cut one into parts with `greylag logs convert`"
     )]
     TooFewFlights {

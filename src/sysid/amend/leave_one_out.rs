@@ -13,6 +13,7 @@ use super::parameters;
 use crate::compare::forecast;
 use crate::flight_path::reconstruction::Reconstruction;
 use crate::per_flight::PerFlight;
+use crate::per_flight::known::put_right;
 use crate::progress::{Progress, ignore_progress, report};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
@@ -52,7 +53,9 @@ pub struct Scored {
     pub structure: String,
     /// Number of free coefficients plus constants of one flight.
     pub free: usize,
-    /// Scaled free-run error of each flight by the fit to the others; NaN where that failed.
+    /// The flights that are long enough to be predicted.
+    pub flights: Vec<String>,
+    /// Free-run error of each of them, of the reference scale, by the fit to all others; NaN where that failed.
     pub errors: Vec<f64>,
     /// Mean of `errors`; infinite where a fit failed.
     pub mean: f64,
@@ -72,7 +75,7 @@ pub struct Scored {
 /// Trees, 1984, section 3.4.3, in pairs).
 ///
 /// # Errors
-/// There are fewer than [`LEAST_FLIGHTS`], an effect cannot join the model, or `progress` cancelled.
+/// Fewer than [`LEAST_FLIGHTS`] are long enough for the shortest horizon, an effect cannot join the model, or `progress` ended it.
 pub fn leave_one_out(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -84,35 +87,57 @@ pub fn leave_one_out(
         return Err(AmendError::TooFewFlights { flights: flights.len(), needed: LEAST_FLIGHTS });
     }
     let slowest = model.airframe.envelope.flying_from_mps();
-    let ready: Vec<Flight> =
-        flights.par_iter().map(|f| Flight::new(f, slowest)).collect::<Result<_, _>>()?;
-    // every structure is judged at the same horizon: the longest that all flights reach
+    let ready = |all: &[Reconstruction]| {
+        all.par_iter().map(|f| Flight::new(f, slowest)).collect::<Result<Vec<_>, _>>()
+    };
+    let right = ready(&put_right(&model.known, flights).0)?;
+    let ready = ready(flights)?;
+    // every structure is judged at the same horizon: the longest that all flights reach which reach any
     let reached = |f: &Flight| judged_at(&scores(model, std::slice::from_ref(f), horizons_s));
-    let at = ready.iter().filter_map(reached).fold(f64::INFINITY, f64::min);
+    let reached: Vec<Option<f64>> = ready.iter().map(reached).collect();
+    let at = reached.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    let judges: Vec<usize> = (0..ready.len()).filter(|k| reached[*k].is_some()).collect();
+    if judges.len() < LEAST_FLIGHTS {
+        return Err(AmendError::TooFewFlights { flights: judges.len(), needed: LEAST_FLIGHTS });
+    }
+    let names: Vec<String> = judges.iter().map(|k| flights[*k].name.clone()).collect();
+    let set = Set { judged: &ready, fitted: &right, judges: &judges, at };
     let mut all = Vec::new();
     for (k, structure) in structures.iter().enumerate() {
         let doing = format!("{}: leaving out one flight after the other", structure.name);
         report(progress, &doing, k as f64 / structures.len() as f64)?;
-        let one = |left: usize| error_of(model, &ready, left, &structure.fitted, at);
-        let errors: Vec<f64> =
-            (0..ready.len()).into_par_iter().map(one).collect::<Result<_, _>>()?;
+        let one = |left: &usize| error_of(model, &set, *left, &structure.fitted);
+        let errors: Vec<f64> = judges.par_iter().map(one).collect::<Result<_, _>>()?;
         all.push(scored(structure, free(model, &structure.fitted)?, errors));
     }
     choose(&mut all);
-    all.extend(black_boxes(model, &ready, at));
+    all.extend(black_boxes(model, &set));
+    all.iter_mut().for_each(|s| s.flights = names.clone());
     Ok(all)
 }
 
-/// Baselines without aerodynamics: constant state, straight flight, and a linear model fitted to the other flights.
-fn black_boxes(model: &GreyBox, flights: &[Flight], at: f64) -> Vec<Scored> {
-    let prepared: Vec<Prepared> = flights.iter().map(|f| f.prepared.clone()).collect();
+/// The flights of a table of structures.
+struct Set<'a> {
+    /// All flights as they are predicted.
+    judged: &'a [Flight],
+    /// The same as they are fitted to: put right by what the model's file knows of them.
+    fitted: &'a [Flight],
+    /// Which of them are long enough to be predicted; the others are fitted to alone.
+    judges: &'a [usize],
+    /// The horizon, s.
+    at: f64,
+}
+
+/// What a structure must beat: the state held, straight flight, and a linear model fitted to the other flights.
+fn black_boxes(model: &GreyBox, set: &Set) -> Vec<Scored> {
+    let prepared: Vec<Prepared> = set.judged.iter().map(|f| f.prepared.clone()).collect();
     let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];
     let mut errors = vec![Vec::new(); names.len()];
-    for left in 0..prepared.len() {
+    for &left in set.judges {
         let others = prepared.iter().enumerate().filter(|(k, _)| *k != left);
         let others: Vec<Prepared> = others.map(|(_, f)| f.clone()).collect();
         let one = std::slice::from_ref(&prepared[left]);
-        let results = forecast::on_unseen(&others, one, model.scale(), &[at]);
+        let results = forecast::on_unseen(&others, one, model.scale(), &[set.at]);
         for (k, list) in errors.iter_mut().enumerate() {
             list.push(results.get(k).map_or(f64::NAN, |r| r.free_run[0].rmse_scaled));
         }
@@ -131,18 +156,14 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of flight `left` at the horizon `at` (s) by the fit to the others; NaN if that fails.
-fn error_of(
-    model: &GreyBox,
-    flights: &[Flight],
-    left: usize,
-    fitted: &Fitted,
-    at: f64,
-) -> Result<f64, AmendError> {
+/// Error of the flight number `left` by the fit to the others; NaN where that fails.
+fn error_of(model: &GreyBox, set: &Set, left: usize, fitted: &Fitted) -> Result<f64, AmendError> {
+    let anew = matches!(fitted, Fitted::Coefficients { per_flight, .. } if per_flight.angles() > 0);
+    let flights = if anew { set.judged } else { set.fitted };
     let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
     let others: Vec<Flight> = others.map(|(_, f)| f.clone()).collect();
-    let test = std::slice::from_ref(&flights[left]);
-    let error = |model: &GreyBox| judged(&scores(model, test, &[at])).unwrap_or(f64::NAN);
+    let test = std::slice::from_ref(&set.judged[left]);
+    let error = |model: &GreyBox| judged(&scores(model, test, &[set.at])).unwrap_or(f64::NAN);
     let (start, options) = match fitted {
         Fitted::Nothing => return Ok(error(model)),
         Fitted::FromScratch => (parameters::from_scratch(model), FitOptions::default()),
@@ -180,7 +201,17 @@ fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
     let [mean, standard_error] = mean_with_error(&errors);
     let mean = if mean.is_nan() { f64::INFINITY } else { mean };
     let structure = structure.name.clone();
-    Scored { structure, free, errors, mean, standard_error, beside_best: f64::NAN, chosen: false }
+    let flights = Vec::new();
+    Scored {
+        structure,
+        free,
+        flights,
+        errors,
+        mean,
+        standard_error,
+        beside_best: f64::NAN,
+        chosen: false,
+    }
 }
 
 /// Mean and standard error of the mean.

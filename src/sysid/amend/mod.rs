@@ -12,6 +12,7 @@ mod error;
 mod flight;
 mod interval;
 mod judge;
+mod learned;
 pub mod leave_one_out;
 mod normal;
 pub mod output_error;

@@ -152,7 +152,13 @@ pub fn fit(
             false => search.settle(options.renewals.min(2), NEAR, &step)?,
         }
     }
-    search.finish(model)
+    let held = search.hold_undetermined();
+    if !held.is_empty() {
+        let step =
+            |_: f64| report(progress, "undetermined coefficients held, the others again", 0.99);
+        search.settle(options.renewals, RENEWED, &step)?;
+    }
+    search.finish(model, &held)
 }
 
 /// The actuators' delays estimated with an effect on the deflections in the model, since free runs cannot distinguish

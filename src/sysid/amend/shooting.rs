@@ -107,13 +107,7 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
 
 /// Change of the state for a unit of each misalignment angle.
 pub(super) fn turned(flight: &Prepared, state: &[f64; 8]) -> [[f64; 8]; askew::NAMES.len()] {
-    let [roll, pitch, _, p, q, r, alpha, beta] = *state;
-    let attitude = askew::attitude(roll, pitch);
-    let (rates, flow) = (askew::vector([p, q, r]), flight.turning.at(alpha, beta));
-    std::array::from_fn(|axis| {
-        let ([roll, pitch], [p, q, r], [alpha, beta]) = (attitude[axis], rates[axis], flow[axis]);
-        [roll, pitch, 0.0, p, q, r, alpha, beta]
-    })
+    askew::state(&flight.turning, state)
 }
 
 /// Offsets that a flight's sensors add to the state, with the constants and axes of `own`.

@@ -66,8 +66,8 @@ pub fn apart(asked: &PerFlight) -> Option<String> {
         (true, true) => "trims and axes",
     };
     Some(format!(
-        "Each flight was fitted with {what} of its own; the model file has what all flights have in common, and the \
-         flights held out are judged with that: nothing is taken from them."
+        "Each flight was fitted with {what} of its own, which the model's file keeps ([flights.NAME]) and free runs of that \
+         flight use; flights held out are judged with what all have in common: nothing is taken from them."
     ))
 }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::result::{GrowthPoint, HorizonScore, StateScore};
 use crate::flight_path::reconstruction::Instant;
+use crate::per_flight::known::KnownFlight;
 use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, Memory};
 use greylag_num::statistics::{mean, quantile};
@@ -35,7 +36,7 @@ pub struct Runs {
 /// [`FlightTrace`](super::result::FlightTrace).
 pub type Trace = [Vec<f64>; 8];
 
-/// Flies `model` over all `flights`, looking at the `horizons` (s) and at the points of the growth
+/// Flies `model` over all `flights`, each as the model's file knows it, looking at the `horizons` (s) and at the points of the growth
 /// curve up to the longest of them.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
     let longest = horizons.iter().copied().fold(0.0, f64::max);
@@ -46,11 +47,24 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     let mut runs = Vec::new();
     let mut traces = Vec::new();
     for flight in flights {
-        let (flown, trace) = fly_one(model, &flight.acting(model), &times);
+        let known = KnownFlight::of(model, flight);
+        let (with, right) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
+        let (flown, mut trace) = fly_one(with, &right.acting(with), &times);
+        if let Some(known) = &known {
+            measured_from(&mut trace, known);
+        }
         runs.extend(flown);
         traces.push(trace);
     }
     (Runs { times, runs, scale: model.scale() }, traces)
+}
+
+/// The states of `trace` as the sensors of the flight would show them.
+fn measured_from(trace: &mut Trace, known: &KnownFlight) {
+    for k in 0..trace[0].len() {
+        let state = known.as_measured(std::array::from_fn(|i| trace[i][k]));
+        trace.iter_mut().zip(state).for_each(|(list, x)| list[k] = x);
+    }
 }
 
 fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>, Trace) {
@@ -94,6 +108,8 @@ pub struct Path {
 /// Flies `model` from the measured state at the sample nearest to `time_s` for `seconds`, or until the flight
 /// ends or the run diverges; `None` outside of all segments.
 pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64) -> Option<Path> {
+    let known = KnownFlight::of(model, flight);
+    let (model, flight) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
     let flight = &*flight.acting(model);
     let inside = |s: &&Vec<Instant>| {
         s.first().is_some_and(|i| i.time_s - flight.dt <= time_s)
@@ -107,6 +123,9 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     for (instant, row) in segment[start..].iter().zip(rows) {
         path.time_s.push(instant.time_s);
         path.states.iter_mut().zip(row).for_each(|(list, x)| list.push(x));
+    }
+    if let Some(known) = &known {
+        measured_from(&mut path.states, known);
     }
     Some(path)
 }

@@ -13,6 +13,8 @@ mod finding;
 mod flight;
 pub mod forecast;
 pub mod free_run;
+mod known;
+mod power;
 mod result;
 mod run;
 mod sentence;
@@ -23,7 +25,7 @@ pub use answer::Answer;
 pub use error::CompareError;
 pub use result::{
     Abstention, Bin, ChannelResult, ChannelTrace, Comparison, Document, FlightResult, FlightTrace,
-    GrowthPoint, HorizonScore, Map, MapCell, ModelResult, ModelTrace, NuisanceResult, Regime,
-    RegimeBins, Settings, StateScore,
+    GrowthPoint, HorizonScore, KnownUse, Map, MapCell, ModelResult, ModelTrace, NuisanceResult,
+    Regime, RegimeBins, Settings, StateScore,
 };
 pub use run::{Options, abstentions, compare, scores};

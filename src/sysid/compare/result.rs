@@ -89,6 +89,9 @@ pub struct ModelResult {
     pub sentences: Vec<String>,
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
+    /// What the model's file knows of the flights, where it knows any; `free_run` uses it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
     pub growth: Vec<GrowthPoint>,
     /// Channels D, L, Y, l, m, n and the rates of V, α, β, as far as the logs allow.
@@ -96,6 +99,17 @@ pub struct ModelResult {
     /// Its predictions over time, one entry a flight, in the order of [`Comparison::flights`].
     #[serde(skip)]
     pub traces: Vec<ModelTrace>,
+}
+
+/// What a model's file knows of the flights, and what its free runs are worth without it.
+#[derive(Clone, Debug, Serialize)]
+pub struct KnownUse {
+    /// Flights of which it has constants of their own (`[flights.NAME]`).
+    pub flights: Vec<String>,
+    /// Other flights, for which its `[installation]` is used.
+    pub by_installation: Vec<String>,
+    /// Free-run error without all that, one entry a horizon.
+    pub without: Vec<HorizonScore>,
 }
 
 /// Free-run error at one horizon: at that time after the start, over all starts.

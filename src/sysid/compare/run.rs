@@ -12,6 +12,8 @@ use super::finding;
 use super::flight;
 use super::forecast::forecasts;
 use super::free_run::{self, DIVERGENCE_BOUND, START_EVERY_S};
+use super::known;
+use super::power::Power;
 use super::result::{
     Abstention, ChannelResult, ChannelTrace, Comparison, HorizonScore, ModelResult, ModelTrace,
     RegimeBins, Settings,
@@ -19,6 +21,7 @@ use super::result::{
 use super::sentence::{NOTHING_LEFT, Subject, sentence};
 use super::verdict;
 use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::known::KnownFlight;
 use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::channels::ChannelId;
@@ -30,9 +33,6 @@ use greylag_model::GreyBox;
 /// Reason for abstaining from a channel.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
 const DOUBTFUL: &str = "the remaining errors of the sensors may account for all that is left";
-
-/// A channel is excited if its variance less noise is at least this share of its variance.
-const EXCITED: f64 = 0.05;
 
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -191,16 +191,19 @@ fn one_model(
     options: &Options,
 ) -> ModelResult {
     let (runs, paths) = free_run::fly(model, flights, &options.horizons_s);
+    let known = known::used(model, flights, &options.horizons_s);
     let (series, shifts) = seen(model, flights, from);
     let seen = Seen { flights, series: &series, shifts: &shifts };
     let channels = all_channels(model, &seen, options.seed);
     let traces = paths.into_iter().zip(flights).zip(&series);
     let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
-    let sentences = verdict::sentences(&free_run, &channels);
+    let mut sentences = verdict::sentences(&free_run, &channels);
+    sentences.extend(known.as_ref().and_then(|k| k.sentence(&free_run)));
     ModelResult {
         name: model.name.clone(),
         sentences,
         free_run,
+        known,
         growth: runs.growth(),
         channels,
         traces: traces
@@ -237,7 +240,11 @@ type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
 
 /// Measured channels of `flights` with the shifts due to uncertain sensor errors.
 fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
-    let series = flights.par_iter().map(|f| windows::channels(model, f)).collect();
+    let of = |f: &Prepared| match KnownFlight::of(model, f) {
+        Some(known) => windows::channels(&known.model, &known.flight),
+        None => windows::channels(model, f),
+    };
+    let series = flights.par_iter().map(of).collect();
     let pairs = flights.par_iter().zip(from);
     let shifts = pairs.map(|(flight, from)| doubt::shifts(model, flight, &from.nuisances));
     (series, shifts.collect())
@@ -338,42 +345,6 @@ fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
     let own = || series.iter().flatten().filter(|s| s.channel == id);
     let windows = |s: &Series| s.measured.iter().filter(|x| x.is_finite()).count() as f64;
     own().map(|s| s.noise_variance * windows(s)).sum::<f64>() / own().map(windows).sum::<f64>()
-}
-
-/// Mean squares of a channel.
-struct Power {
-    /// Variance of the measured values.
-    measured: f64,
-    /// Mean square of the residuals.
-    residual: f64,
-    /// Variance that noise accounts for.
-    noise: f64,
-    /// Share of the mean square residual due to its mean.
-    offset: f64,
-}
-
-impl Power {
-    fn of(residuals: &[Residual], noise: f64) -> Power {
-        let count = residuals.len() as f64;
-        let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;
-        let residual = residuals.iter().map(|r| r.value.powi(2)).sum::<f64>() / count;
-        let offset = residuals.iter().map(|r| r.value).sum::<f64>() / count;
-        Power {
-            measured: residuals.iter().map(|r| (r.measured - mean).powi(2)).sum::<f64>() / count,
-            residual,
-            noise,
-            offset: offset * offset / residual,
-        }
-    }
-
-    fn unexplained(&self) -> f64 {
-        let signal = self.measured - self.noise;
-        if signal > EXCITED * self.measured {
-            (self.residual - self.noise).max(0.0) / signal
-        } else {
-            f64::NAN
-        }
-    }
 }
 
 fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {

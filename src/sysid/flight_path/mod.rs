@@ -107,6 +107,11 @@ impl Options {
             ..usual
         }
     }
+
+    /// The same for segments of `shortest_s` (s) too, where that is less.
+    pub fn down_to(self, shortest_s: f64) -> Options {
+        Options { shortest_s: self.shortest_s.min(shortest_s), ..self }
+    }
 }
 
 /// Error of a reconstruction.

@@ -71,6 +71,18 @@ impl Turning {
     }
 }
 
+/// What a unit of each angle adds to a state whose α and β are turned as `turning` says, in the order and the units of the
+/// state.
+pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
+    let [roll, pitch, _, p, q, r, alpha, beta] = *state;
+    let attitude = attitude(roll, pitch);
+    let (rates, flow) = (vector([p, q, r]), turning.at(alpha, beta));
+    std::array::from_fn(|axis| {
+        let ([roll, pitch], [p, q, r], [alpha, beta]) = (attitude[axis], rates[axis], flow[axis]);
+        [roll, pitch, 0.0, p, q, r, alpha, beta]
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

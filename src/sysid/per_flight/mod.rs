@@ -5,6 +5,7 @@
 //! request, for each flight beside the coefficients common to all flights.
 
 pub mod askew;
+pub mod known;
 pub mod trims;
 
 use serde::Serialize;

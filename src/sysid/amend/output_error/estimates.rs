@@ -1,5 +1,7 @@
 //! Results of a finished fit: estimates with their intervals, by flight too, and notes for the reader.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::gauss_newton::System;
@@ -7,13 +9,16 @@ use super::{Fit, Left, Search};
 use crate::amend::error::AmendError;
 use crate::amend::flight::{Flight, SENSORS};
 use crate::amend::interval::{self, Covariance};
+use crate::amend::learned::{self, Learned};
 use crate::amend::parameters::{self, Free};
 use crate::amend::result::{FittedFlight, FlightEstimate, OwnConstant, Parameter};
 use crate::amend::shooting::Shot;
-use greylag_model::GreyBox;
+use greylag_model::{GreyBox, Known};
 
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.96;
+/// Share of its bounds' range from which on a prior's width says no more than they do.
+const WIDE: f64 = 0.5;
 /// A coefficient counts as learned if its posterior width is below this share of the prior's.
 const LEARNED: f64 = 0.7;
 /// Error correlation beyond which two coefficients are confounded.
@@ -23,9 +28,46 @@ const UNSETTLED: f64 = 0.5;
 /// Last change, in standard deviations, above which no estimate of the fit is usable, if the step was taken.
 const LOST: f64 = 5.0;
 
+/// That coefficients were held, if any were.
+fn held_note(held: &[String]) -> Option<String> {
+    (!held.is_empty()).then(|| {
+        format!(
+            "Undetermined by these flights, so held at the value of the model's file: {}. Their 95 % intervals would hold all \
+             that is physically possible; fly what moves them, or state a standard deviation (sd) in the file.",
+            held.join(", ")
+        )
+    })
+}
+
 impl Search<'_> {
-    /// Completes the fit with intervals. Its model is `given` with the fitted coefficients, without trims of flights.
-    pub(super) fn finish(self, given: &GreyBox) -> Result<Fit, AmendError> {
+    /// Takes out of the search, at the model's own values, coefficients of which nothing is known beforehand but bounds and
+    /// whose 95 % intervals hold all that these allow; their names. All are left free if nothing else would be.
+    pub(super) fn hold_undetermined(&mut self) -> Vec<String> {
+        let Some(cholesky) = self.system().information.cholesky() else { return Vec::new() };
+        let inverse = cholesky.inverse();
+        let undetermined = |(k, f): (usize, &Free)| {
+            let (value, half) = (self.place.theta[k], NORMAL_95 * inverse[(k, k)].sqrt());
+            let wide = f.width >= WIDE * (f.bounds.1 - f.bounds.0);
+            !f.added && wide && value - half <= f.bounds.0 && value + half >= f.bounds.1
+        };
+        let out: Vec<bool> = self.free.iter().enumerate().map(undetermined).collect();
+        if !out.contains(&true) || !out.contains(&false) {
+            return Vec::new();
+        }
+        let names = self.free.iter().zip(&out).filter(|(_, held)| **held);
+        let names = names.map(|(f, _)| f.name.clone()).collect();
+        let mut keep = out.iter().map(|held| !held);
+        self.free.retain(|_| keep.next().unwrap_or(true));
+        let mut keep = out.iter().map(|held| !held);
+        self.place.theta.retain(|_| keep.next().unwrap_or(true));
+        self.change = (f64::INFINITY, 0);
+        names
+    }
+
+    /// The fit as it stands, with intervals.
+    /// Its model is `given`, without trims of flights.
+    /// The coefficients `held` were undetermined.
+    pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
             return Err(AmendError::NotConverged {
@@ -62,9 +104,11 @@ impl Search<'_> {
         by_flight.iter_mut().flatten().for_each(|e| e.sd *= wider);
         let parameters = self.parameters(&sd, &by_flight, &covariance);
         let flights = self.fitted_flights(&sd, &covariance);
+        let mut model = parameters::with(given, &self.free, &self.place.theta);
+        model.known = Arc::new(self.known(given, &sd));
         let weakened = self.shots.iter().filter(|s| s.weight < 0.5).count() + self.short;
         Ok(Fit {
-            model: parameters::with(given, &self.free, &self.place.theta),
+            model,
             parameters,
             flights,
             residual_sd: self.residual_sd(),
@@ -73,9 +117,23 @@ impl Search<'_> {
             left: self.left(),
             weights: self.weights,
             iterations: self.iterations,
-            notes: self.notes(weakened, &unsettled),
+            notes: self.notes(weakened, &unsettled).into_iter().chain(held_note(held)).collect(),
             unsettled,
         })
+    }
+
+    /// What the model's file will know of the flights, `given` being the model before.
+    fn known(&self, given: &GreyBox, sd: &[f64]) -> Known {
+        let place = |k: usize| self.free.len() + k * self.of_flight();
+        let numbered = self.flights.iter().enumerate();
+        let flights: Vec<Learned> = numbered
+            .map(|(k, flight)| Learned {
+                name: flight.prepared.name.as_str(),
+                own: &self.place.own[k],
+                sd: &sd[place(k)..place(k + 1)],
+            })
+            .collect();
+        learned::known(&given.known, &flights, &self.asked)
     }
 
     fn fitted_flights(&self, sd: &[f64], covariance: &Covariance) -> Vec<FittedFlight> {

@@ -20,6 +20,7 @@ use crate::diagnose::search::excitation;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::known::{put_right, trimmed};
 use crate::progress::{Progress, report};
 use crate::rudder;
 use crate::weak_form::prepared::Prepared;
@@ -44,6 +45,39 @@ const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have se
 /// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or `progress`
 /// cancelled.
 pub fn diagnose(
+    model: &GreyBox,
+    flights: &[Reconstruction],
+    options: &Options,
+    progress: &Progress,
+) -> Result<Diagnosis, DiagnoseError> {
+    if model.known.is_empty() {
+        return of_unknown(model, flights, options, progress);
+    }
+    let (right, named) = match options.per_flight.askew_deg {
+        Some(_) => (flights.to_vec(), Vec::new()),
+        None => put_right(&model.known, flights),
+    };
+    let (mut bare, mut options, mut said) = (model.clone(), options.clone(), Vec::new());
+    bare.known = Default::default();
+    if !named.is_empty() {
+        let names = named.join(", ");
+        said.push(format!("Axes and sensors are used as the model's file has them: {names}."));
+    }
+    let trimmed = trimmed(&model.known, flights);
+    if !trimmed.is_empty() && options.per_flight.trims.is_none() {
+        options.per_flight.trims = Some(1.0);
+        said.push(format!(
+            "The model's file has trims of {}, so each flight is given trims of its own.",
+            trimmed.join(", ")
+        ));
+    }
+    let mut diagnosis = of_unknown(&bare, &right, &options, progress)?;
+    diagnosis.notes.splice(0..0, said);
+    Ok(diagnosis)
+}
+
+/// The diagnosis of flights of which the file of `model` knows nothing.
+fn of_unknown(
     model: &GreyBox,
     flights: &[Reconstruction],
     options: &Options,

@@ -1,0 +1,183 @@
+//! What a model's file knows of the installation of the sensors and of single flights.
+//!
+//! ```toml
+//! [installation]                       # holds for every flight without an entry of its own
+//! source = "greylag amend: 3 flights"
+//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes against the body's
+//!
+//! [flights."flight-1.csv"]
+//! source = "greylag amend"
+//! axes_deg = [0.3, -9.0, 0.1]          # in place of the installation's
+//! trims = { CL0 = 0.021, Cm0 = -0.004 }
+//! sensors = { airspeed_share = 0.01, alpha_rad = -0.002 }
+//! ```
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// Names of the trims that a flight may have of its own.
+pub const TRIMS: [&str; 7] = ["CD0", "CL0", "CY0", "Cl0", "Cm0", "Cn0", "thrust_share"];
+/// Names of what sensors add to the reconstructed state: a share of the airspeed, then body rates, α and β.
+pub const SENSORS: [&str; 6] =
+    ["airspeed_share", "p_radps", "q_radps", "r_radps", "alpha_rad", "beta_rad"];
+/// Largest angle of measured axes against the body's, °: farther round a mapping's `[board]` turns them.
+pub const MOST_DEG: f64 = 30.0;
+
+/// Constants of a flight, or of the installation that flights share; what is not stated is not known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FlightConstants {
+    /// Where they come from.
+    pub source: String,
+    /// The small rotation from body axes to the measured ones, about x, y and z of the body, °.
+    pub axes_deg: Option<[f64; 3]>,
+    /// What is added to the model's coefficients, in the order of [`TRIMS`], dimensionless; absent in an installation.
+    pub trims: Option<[f64; TRIMS.len()]>,
+    /// What the sensors add to the reconstructed state, in the order of [`SENSORS`].
+    pub sensors: Option<[f64; SENSORS.len()]>,
+}
+
+/// What a model's file knows beside the aircraft.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Known {
+    /// The installation.
+    pub installation: Option<FlightConstants>,
+    /// Flights by their names.
+    pub flights: BTreeMap<String, FlightConstants>,
+}
+
+impl FlightConstants {
+    /// The rotation of the axes, rad; zero where none is known.
+    pub fn axes_rad(&self) -> [f64; 3] {
+        self.axes_deg.unwrap_or_default().map(f64::to_radians)
+    }
+}
+
+impl Known {
+    /// Whether nothing is known.
+    pub fn is_empty(&self) -> bool {
+        self.installation.is_none() && self.flights.is_empty()
+    }
+
+    /// What is known of `flight`: its own constants, those of the installation where it has none.
+    pub fn of(&self, flight: &str) -> Option<FlightConstants> {
+        let shared = self.installation.as_ref();
+        let Some(own) = self.flights.get(flight) else { return shared.cloned() };
+        let mut own = own.clone();
+        own.axes_deg = own.axes_deg.or(shared.and_then(|all| all.axes_deg));
+        own.sensors = own.sensors.or(shared.and_then(|all| all.sensors));
+        Some(own)
+    }
+
+    /// Whether `flight` has constants of its own.
+    pub fn names(&self, flight: &str) -> bool {
+        self.flights.contains_key(flight)
+    }
+}
+
+/// Constants as a model file has them.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ConstantsFile {
+    source: String,
+    axes_deg: Option<[f64; 3]>,
+    trims: Option<BTreeMap<String, f64>>,
+    sensors: Option<BTreeMap<String, f64>>,
+}
+
+/// Checks what a model file says of `installation` and `flights`.
+pub(super) fn checked(
+    installation: Option<ConstantsFile>,
+    flights: BTreeMap<String, ConstantsFile>,
+) -> Result<Known, String> {
+    if installation.as_ref().is_some_and(|all| all.trims.is_some()) {
+        return Err(
+            "installation.trims: trims that all flights share belong to the coefficients of \
+                    [effects]; [flights.NAME] holds what one flight adds to them"
+                .into(),
+        );
+    }
+    let installation = installation.map(|all| constants("installation", all)).transpose()?;
+    let one = |(name, own): (String, ConstantsFile)| {
+        let constants = constants(&format!("flights.{name:?}"), own)?;
+        Ok((name, constants))
+    };
+    let flights = flights.into_iter().map(one).collect::<Result<_, String>>()?;
+    Ok(Known { installation, flights })
+}
+
+fn constants(place: &str, written: ConstantsFile) -> Result<FlightConstants, String> {
+    let axes = written.axes_deg;
+    if axes.is_some_and(|all| all.iter().any(|x| x.is_nan() || x.abs() > MOST_DEG)) {
+        return Err(format!(
+            "{place}.axes_deg: each angle must lie within ±{MOST_DEG}°; `[board]` in a mapping turns a log by more"
+        ));
+    }
+    Ok(FlightConstants {
+        source: written.source,
+        axes_deg: axes,
+        trims: written.trims.map(|all| named(place, "trims", all, TRIMS)).transpose()?,
+        sensors: written.sensors.map(|all| named(place, "sensors", all, SENSORS)).transpose()?,
+    })
+}
+
+/// The `values` in the order of `names`, zero where one is absent.
+fn named<const N: usize>(
+    place: &str,
+    key: &str,
+    values: BTreeMap<String, f64>,
+    names: [&str; N],
+) -> Result<[f64; N], String> {
+    if let Some(other) = values.keys().find(|name| !names.contains(&name.as_str())) {
+        return Err(format!("{place}.{key}.{other} is unknown; it has {}", names.join(", ")));
+    }
+    if let Some((name, value)) = values.iter().find(|(_, x)| x.is_nan() || x.abs() > 1.0) {
+        return Err(format!("{place}.{key}.{name} = {value} must lie within −1..1"));
+    }
+    Ok(names.map(|name| values.get(name).copied().unwrap_or(0.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Deserialize)]
+    struct Part {
+        installation: Option<ConstantsFile>,
+        #[serde(default)]
+        flights: BTreeMap<String, ConstantsFile>,
+    }
+
+    fn read(text: &str) -> Result<Known, String> {
+        let part: Part = toml::from_str(text).unwrap();
+        checked(part.installation, part.flights)
+    }
+
+    #[test]
+    fn a_flight_has_its_own_constants_and_else_those_of_the_installation() {
+        let known = read(
+            "[installation]\nsource = \"s\"\naxes_deg = [0, -9, 0]\nsensors = { alpha_rad = 0.01 }\n\
+             [flights.\"a.csv\"]\nsource = \"s\"\naxes_deg = [1, 0, 0]\ntrims = { Cm0 = 0.02 }\n",
+        )
+        .unwrap();
+        let a = known.of("a.csv").unwrap();
+        assert_eq!(a.axes_rad(), [1f64.to_radians(), 0.0, 0.0]);
+        assert_eq!(a.trims.unwrap()[4], 0.02);
+        assert_eq!(a.sensors.unwrap()[4], 0.01);
+        let other = known.of("b.csv").unwrap();
+        assert_eq!(other.axes_deg.unwrap()[1], -9.0);
+        assert_eq!(other.trims, None);
+        assert!(known.names("a.csv") && !known.names("b.csv"));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_its_place() {
+        let said = |text: &str| read(text).unwrap_err();
+        let own = "[flights.x]\nsource = \"s\"\n";
+        assert!(said(&format!("{own}trims = {{ CM0 = 0.1 }}")).contains("trims.CM0 is unknown"));
+        assert!(said(&format!("{own}axes_deg = [0, 90, 0]")).contains("[board]"));
+        assert!(
+            said("[installation]\nsource = \"s\"\ntrims = { Cm0 = 0.1 }").contains("[effects]")
+        );
+    }
+}

@@ -1,0 +1,112 @@
+//! What a fit has learned of its flights and of the installation that they share, as the model's file keeps it.
+
+use super::flight::{OFFSETS, Own, SENSORS, SKEW};
+use crate::per_flight::PerFlight;
+use greylag_model::{FlightConstants, Known};
+
+/// Standard errors by which a mean over flights must exceed zero to be an installation's.
+const CLEAR: f64 = 2.0;
+/// Where the constants come from, as their source says.
+const BY: &str = "greylag amend";
+
+/// A flight's constants with the standard deviations of its unknowns, in the order of [`Own::unknowns`].
+pub(super) struct Learned<'a> {
+    /// The flight.
+    pub name: &'a str,
+    /// Its constants.
+    pub own: &'a Own,
+    /// Their standard deviations.
+    pub sd: &'a [f64],
+}
+
+impl Learned<'_> {
+    fn angles_deg(&self) -> [[f64; 2]; 3] {
+        let of = |k: usize| [self.own.askew[k], self.sd[SENSORS + k]].map(f64::to_degrees);
+        std::array::from_fn(of)
+    }
+
+    fn sensors(&self) -> [[f64; 2]; OFFSETS.len()] {
+        std::array::from_fn(|k| [self.own.sensors[SKEW + 1 + k], self.sd[SKEW + 1 + k]])
+    }
+}
+
+/// What the model's file keeps once `flights` were fitted with what is `asked` of each, `before` being known already:
+/// of every flight its own constants, of the installation the means over the flights that are clear of zero.
+pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> Known {
+    let anew = asked.angles() > 0;
+    if !anew && !asked.has_trims() {
+        return without_trims(before);
+    }
+    let mut all = without_trims(before);
+    let constants = |f: &Learned| {
+        let known = before.of(f.name).unwrap_or_default();
+        let had = if anew { Default::default() } else { known.sensors.unwrap_or_default() };
+        let left = f.sensors();
+        let axes = f.angles_deg().map(|[angle, _]| angle);
+        FlightConstants {
+            source: BY.into(),
+            axes_deg: if anew { Some(axes) } else { known.axes_deg },
+            trims: asked.has_trims().then_some(f.own.trims),
+            sensors: Some(std::array::from_fn(|k| had[k] + left[k][0])),
+        }
+    };
+    all.flights.extend(flights.iter().map(|f| (f.name.to_owned(), constants(f))));
+    if anew {
+        all.installation = installation(flights);
+    }
+    all
+}
+
+/// The same without trims, which stand beside coefficients that have changed.
+fn without_trims(known: &Known) -> Known {
+    let mut kept = known.clone();
+    kept.flights.values_mut().for_each(|own| own.trims = None);
+    kept.flights.retain(|_, own| own.axes_deg.is_some() || own.sensors.is_some());
+    kept
+}
+
+/// What the `flights` have in common; `None` if nothing is clear of zero.
+fn installation(flights: &[Learned]) -> Option<FlightConstants> {
+    let angles: Vec<_> = flights.iter().map(Learned::angles_deg).collect();
+    let axes: [f64; 3] =
+        std::array::from_fn(|k| common(&angles.iter().map(|of| of[k]).collect::<Vec<_>>()));
+    if axes.iter().all(|angle| *angle == 0.0) {
+        return None;
+    }
+    let number = flights.len();
+    let source = format!("{BY}: the mean of {number} flight(s), angles that are clear of zero");
+    Some(FlightConstants { source, axes_deg: Some(axes), trims: None, sensors: None })
+}
+
+/// The mean of estimates with their standard deviations; zero unless it exceeds its standard error clearly, by what the
+/// estimates are known to or by how they differ, whichever is worse.
+fn common(estimates: &[[f64; 2]]) -> f64 {
+    let n = estimates.len() as f64;
+    let mean = estimates.iter().map(|[x, _]| x).sum::<f64>() / n;
+    let known = estimates.iter().map(|[_, sd]| sd * sd).sum::<f64>() / n;
+    let spread =
+        estimates.iter().map(|[x, _]| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    let error = (known.max(spread) / n).sqrt();
+    if mean.abs() > CLEAR * error { mean } else { 0.0 }
+}
+
+/// An installation in words: its angles.
+pub(super) fn in_words(installation: &FlightConstants) -> String {
+    let named = ["roll", "pitch", "yaw"].into_iter().zip(installation.axes_deg.unwrap_or_default());
+    let turned: Vec<String> =
+        named.filter(|(_, x)| *x != 0.0).map(|(name, x)| format!("{name} {x:.1}°")).collect();
+    turned.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_is_common_only_where_flights_agree_on_it() {
+        assert_eq!(common(&[[-9.0, 1.0], [-11.0, 1.0]]), -10.0);
+        // 2° in one flight and none in the other are no installation
+        assert_eq!(common(&[[2.0, 0.1], [0.0, 0.1]]), 0.0);
+        assert_eq!(common(&[[1.0, 1.0]]), 0.0);
+    }
+}

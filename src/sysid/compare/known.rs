@@ -1,0 +1,45 @@
+//! What a model's file knows of the flights that it is compared with, and what that is worth.
+
+use super::free_run;
+use super::result::{HorizonScore, KnownUse};
+use crate::weak_form::prepared::Prepared;
+use greylag_model::GreyBox;
+
+/// What the file of `model` knows of `flights`, with the free-run errors without it; `None` if it knows nothing of them.
+pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option<KnownUse> {
+    let (own, shared): (Vec<&Prepared>, Vec<_>) =
+        flights.iter().partition(|f| model.known.names(&f.name));
+    let names = |all: &[&Prepared]| all.iter().map(|f| f.name.clone()).collect::<Vec<_>>();
+    let by_installation = model.known.installation.as_ref().map_or(Vec::new(), |_| names(&shared));
+    let flights_of_own = names(&own);
+    if flights_of_own.is_empty() && by_installation.is_empty() {
+        return None;
+    }
+    let mut bare = model.clone();
+    bare.known = Default::default();
+    let (runs, _) = free_run::fly(&bare, flights, horizons_s);
+    let without = horizons_s.iter().map(|h| runs.score(*h)).collect();
+    Some(KnownUse { flights: flights_of_own, by_installation, without })
+}
+
+impl KnownUse {
+    /// What is used, and the error `with` it beside that without, at the longest horizon that a run reaches.
+    pub fn sentence(&self, with: &[HorizonScore]) -> Option<String> {
+        let both = with.iter().zip(&self.without).rfind(|(a, b)| a.runs > 0 && b.runs > 0)?;
+        let mut what = Vec::new();
+        if !self.flights.is_empty() {
+            what.push(format!("constants of their own for {}", self.flights.join(", ")));
+        }
+        if !self.by_installation.is_empty() {
+            what.push(format!("the installation for {}", self.by_installation.join(", ")));
+        }
+        let (with, without) = both;
+        Some(format!(
+            "What the model's file knows of the flights is used ({}): the error over {} s is {:.5} with it, {:.5} without.",
+            what.join("; "),
+            with.horizon_s,
+            with.rmse_scaled,
+            without.rmse_scaled
+        ))
+    }
+}

@@ -1,0 +1,45 @@
+//! Mean squares of a channel: measured, left over, noise.
+
+use super::bins::Residual;
+
+/// The channel's variance, less noise, must be at least this part of itself for a share to mean
+/// something.
+const EXCITED: f64 = 0.05;
+
+/// Mean squares of a channel.
+pub struct Power {
+    /// Variance of what was measured.
+    pub measured: f64,
+    /// Mean square residual.
+    pub residual: f64,
+    /// Variance that noise accounts for.
+    pub noise: f64,
+    /// Share of the mean square residual that is its mean.
+    pub offset: f64,
+}
+
+impl Power {
+    /// That of `residuals` whose noise has the variance `noise`.
+    pub fn of(residuals: &[Residual], noise: f64) -> Power {
+        let count = residuals.len() as f64;
+        let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;
+        let residual = residuals.iter().map(|r| r.value.powi(2)).sum::<f64>() / count;
+        let offset = residuals.iter().map(|r| r.value).sum::<f64>() / count;
+        Power {
+            measured: residuals.iter().map(|r| (r.measured - mean).powi(2)).sum::<f64>() / count,
+            residual,
+            noise,
+            offset: offset * offset / residual,
+        }
+    }
+
+    /// The unexplained share of what is not noise; NaN where the channel is not excited.
+    pub fn unexplained(&self) -> f64 {
+        let signal = self.measured - self.noise;
+        if signal > EXCITED * self.measured {
+            (self.residual - self.noise).max(0.0) / signal
+        } else {
+            f64::NAN
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Flights as a model's file knows them: measured axes turned back into the body's, the sensors' constants taken away, and
+//! the model with the trims of the flight.
+
+use greylag_model::known::{FlightConstants, SENSORS};
+use greylag_model::{GreyBox, Known};
+use greylag_physics::State;
+
+use crate::flight_path::reconstruction::{Instant, Reconstruction};
+use crate::per_flight::askew::{self, Turning};
+use crate::per_flight::trims;
+use crate::weak_form::prepared::Prepared;
+
+/// The state that each of the sensors' constants is added to; the airspeed's is a share of it.
+const ADDED_TO: [usize; SENSORS.len()] = [AIRSPEED, 3, 4, 5, 6, 7];
+const AIRSPEED: usize = 2;
+
+/// A flight with the model that flies it.
+#[derive(Clone, Debug)]
+pub struct KnownFlight {
+    /// The model with the trims of the flight, and nothing more that it knows of flights.
+    pub model: GreyBox,
+    /// The flight in the axes of the body, the sensors' constants taken away.
+    pub flight: Prepared,
+    added: Added,
+}
+
+impl KnownFlight {
+    /// `flight` as the file of `model` knows it; `None` if it knows nothing of it.
+    pub fn of(model: &GreyBox, flight: &Prepared) -> Option<KnownFlight> {
+        let own = model.known.of(&flight.name)?;
+        let added = Added { own: own.clone(), turning: flight.turning };
+        let mut flight = flight.clone();
+        flight.segments.iter_mut().flatten().for_each(|at| added.take_away(at));
+        Some(KnownFlight { model: with_trims(model, &own), flight, added })
+    }
+
+    /// A predicted state as the sensors of the flight would show it.
+    pub fn as_measured(&self, state: [f64; 8]) -> [f64; 8] {
+        let by = self.added.to(&state);
+        std::array::from_fn(|k| state[k] + by[k])
+    }
+}
+
+/// What is added to the state of a flight.
+#[derive(Clone, Debug)]
+struct Added {
+    own: FlightConstants,
+    turning: Turning,
+}
+
+impl Added {
+    fn to(&self, state: &[f64; 8]) -> [f64; 8] {
+        let mut by = [0.0; 8];
+        for (place, x) in ADDED_TO.iter().zip(self.own.sensors.unwrap_or_default()) {
+            by[*place] += if *place == AIRSPEED { x * state[AIRSPEED] } else { x };
+        }
+        for (angle, turned) in self.own.axes_rad().iter().zip(askew::state(&self.turning, state)) {
+            by.iter_mut().zip(turned).for_each(|(sum, x)| *sum += angle * x);
+        }
+        by
+    }
+
+    fn take_away(&self, at: &mut Instant) {
+        let measured = at.state.to_array();
+        let by = self.to(&measured);
+        at.state = State::from_array(std::array::from_fn(|k| measured[k] - by[k]));
+        let turned = askew::vector(at.specific_force);
+        for (angle, by) in self.own.axes_rad().iter().zip(turned) {
+            at.specific_force.iter_mut().zip(by).for_each(|(f, by)| *f -= angle * by);
+        }
+    }
+}
+
+/// `model` with the trims of a flight as coefficients of its own.
+fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
+    let mut bare = model.clone();
+    bare.known = Default::default();
+    let Some(values) = own.trims else { return bare };
+    // a model that has trims already is in a fit, which finds them itself
+    match trims::joined(&bare) {
+        Ok(mut with) => {
+            trims::set(&mut with, &values);
+            with
+        }
+        Err(_) => bare,
+    }
+}
+
+/// `flights` with the axes and the sensors' constants that `known` has of them put right, and which these are.
+pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstruction>, Vec<String>) {
+    let mut named = Vec::new();
+    let one = |flight: &Reconstruction| {
+        let own = known.of(&flight.name);
+        let Some(own) = own.filter(|o| o.axes_deg.is_some() || o.sensors.is_some()) else {
+            return flight.clone();
+        };
+        let pieces: Vec<Vec<Instant>> =
+            flight.segments.iter().map(|s| s.instants.clone()).collect();
+        let added = Added { own, turning: Turning::of(flight, &pieces) };
+        let mut right = flight.clone();
+        let all = right.segments.iter_mut().flat_map(|s| &mut s.instants);
+        all.for_each(|at| added.take_away(at));
+        named.push(flight.name.clone());
+        right
+    };
+    let right = flights.iter().map(one).collect();
+    (right, named)
+}
+
+/// The names of `flights` of which `known` has trims.
+pub fn trimmed<'a>(known: &Known, flights: &'a [Reconstruction]) -> Vec<&'a str> {
+    let has = |f: &&Reconstruction| known.of(&f.name).is_some_and(|own| own.trims.is_some());
+    flights.iter().filter(has).map(|f| f.name.as_str()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trims_have_the_same_names_in_files_and_in_fits() {
+        assert_eq!(greylag_model::known::TRIMS, trims::TRIMS.map(|t| t.name));
+    }
+}
