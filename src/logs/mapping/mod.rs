@@ -25,24 +25,22 @@ mod telemetry;
 mod px4;
 pub(super) mod rule;
 mod servos;
+mod written;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
-use super::columns::index;
 use super::csv::Order;
 use super::derive;
 use super::format::Format;
 use super::phases::Flying;
 use super::topics::Topics;
 pub use board::Board;
-use board::WrittenBoard;
 use greylag_physics::Sensors;
 use greylag_physics::mixer::Mixer;
 use greylag_physics::sensors::CONSTANTS;
 use rule::Rule;
+use written::{Written, WrittenFlight, entry, over, thresholds, turn};
 
 /// The topic name by which a mapping means the columns of a CSV file.
 pub const TEXT: &str = "csv";
@@ -113,72 +111,6 @@ pub struct Turn {
     pub fields: [String; 4],
     /// Which part comes first; `None` finds it from the rates and gravity.
     pub order: Option<Order>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Written {
-    schema: u32,
-    #[serde(default)]
-    columns: BTreeMap<String, WrittenEntry>,
-    attitude: Option<WrittenTurn>,
-    #[serde(default)]
-    derive: Derive,
-    #[serde(default)]
-    sensors: Sensors,
-    board: Option<WrittenBoard>,
-    #[serde(default)]
-    flight: WrittenFlight,
-}
-
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
-#[serde(deny_unknown_fields)]
-struct WrittenFlight {
-    from_mps: Option<f64>,
-    shortest_s: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WrittenTurn {
-    quaternion: [String; 4],
-    order: Option<WrittenOrder>,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum WrittenOrder {
-    Wxyz,
-    Xyzw,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct Derive {
-    body_rates_over_s: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WrittenEntry {
-    from: String,
-    #[serde(default = "one")]
-    scale: f64,
-    #[serde(default)]
-    offset: f64,
-    instance: Option<Instance>,
-    rate_over_s: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Instance {
-    Number(u16),
-    Source(String),
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 impl Mapping {
@@ -356,79 +288,4 @@ impl Mapping {
 /// The rules of a format without a mapping.
 pub(super) fn format_rules(format: Format, topics: &Topics) -> Vec<Rule> {
     Mapping::default().rules(format, topics)
-}
-
-/// The least flight that a mapping may ask for, s.
-const SHORTEST_S: f64 = 0.5;
-
-fn thresholds(flight: WrittenFlight) -> Result<WrittenFlight, String> {
-    if flight.from_mps.is_some_and(|v| !(v > 0.0 && v <= 400.0)) {
-        return Err("flight.from_mps must lie above 0 and up to 400 m/s".into());
-    }
-    if flight.shortest_s.is_some_and(|t| !(SHORTEST_S..=60.0).contains(&t)) {
-        return Err(format!("flight.shortest_s must lie within {SHORTEST_S} to 60 s"));
-    }
-    Ok(flight)
-}
-
-fn turn(written: WrittenTurn) -> Result<Turn, String> {
-    let split = |part: &String| part.split_once('.').map(|(a, b)| (a.to_owned(), b.to_owned()));
-    let parts = written.quaternion.each_ref().map(split);
-    let [Some(a), Some(b), Some(c), Some(d)] = parts else {
-        return Err("attitude.quaternion names four of \"topic.field\"".into());
-    };
-    if [&b, &c, &d].iter().any(|other| other.0 != a.0) {
-        return Err("attitude.quaternion names fields of one topic".into());
-    }
-    let order = written.order.map(|order| match order {
-        WrittenOrder::Wxyz => Order::Wxyz,
-        WrittenOrder::Xyzw => Order::Xyzw,
-    });
-    Ok(Turn { topic: a.0, fields: [a.1, b.1, c.1, d.1], order })
-}
-
-fn entry(column: &str, e: WrittenEntry) -> Result<Entry, String> {
-    if index(column).is_none() {
-        return Err(format!(
-            "`{column}` is no column of the log format; use one of its names, such as airspeed_mps"
-        ));
-    }
-    let Some((topic, field)) = e.from.split_once('.') else {
-        return Err(format!("column `{column}`: from = \"{}\" is not \"topic.field\"", e.from));
-    };
-    if !e.scale.is_finite() || !e.offset.is_finite() {
-        return Err(format!("column `{column}`: scale and offset must be finite"));
-    }
-    over(&format!("column `{column}`: rate_over_s"), e.rate_over_s)?;
-    let instance = match e.instance {
-        None => None,
-        Some(Instance::Number(n)) => Some(n),
-        Some(Instance::Source(text)) => Some(source(&text).ok_or_else(|| {
-            format!("column `{column}`: instance \"{text}\" is not \"system/component\"")
-        })?),
-    };
-    Ok(Entry {
-        topic: topic.to_owned(),
-        field: field.to_owned(),
-        scale: e.scale,
-        offset: e.offset,
-        instance,
-        rate_over_s: e.rate_over_s,
-    })
-}
-
-/// Refuses a time over which no rate can be taken.
-fn over(what: &str, time: Option<f64>) -> Result<(), String> {
-    match time {
-        Some(x) if !(x > 0.0 && x <= 10.0) => {
-            Err(format!("{what} = {x} must lie above 0 and up to 10 s, and hold at least 5 rows"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// `system/component` as an instance.
-fn source(text: &str) -> Option<u16> {
-    let (system, component) = text.split_once('/')?;
-    Some(u16::from_be_bytes([system.trim().parse().ok()?, component.trim().parse().ok()?]))
 }
