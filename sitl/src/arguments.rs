@@ -234,11 +234,11 @@ impl Cli {
     }
 }
 
+/// Parameters that are played, by name and value, and the names of the others.
+type Played = (Vec<(String, f64)>, Vec<String>);
+
 /// The parameters of a file that `personality` plays, and the names of the others.
-fn played(
-    path: &Path,
-    personality: Personality,
-) -> Result<(Vec<(String, f64)>, Vec<String>), ParameterFileError> {
+fn played(path: &Path, personality: Personality) -> Result<Played, ParameterFileError> {
     let (played, others): (Vec<_>, Vec<_>) = parameter_file::read(path)?
         .into_iter()
         .partition(|(name, _)| FlightController::plays(personality, name));

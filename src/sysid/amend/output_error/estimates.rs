@@ -39,6 +39,13 @@ fn held_note(held: &[String]) -> Option<String> {
     })
 }
 
+/// Whether `value` lies at a bound of `free`, to a millionth of their range.
+fn at_bound(free: &Free, value: f64) -> bool {
+    let (low, high) = free.bounds;
+    let at = |bound: f64| (value - bound).abs() <= 1e-6 * (high - low);
+    at(low) || at(high)
+}
+
 impl Search<'_> {
     /// Takes out of the search, at the model's own values, coefficients of which nothing is known beforehand but bounds and
     /// whose 95 % intervals hold all that these allow; their names. All are left free if nothing else would be.
@@ -48,7 +55,10 @@ impl Search<'_> {
         let undetermined = |(k, f): (usize, &Free)| {
             let (value, half) = (self.place.theta[k], NORMAL_95 * inverse[(k, k)].sqrt());
             let wide = f.width >= WIDE * (f.bounds.1 - f.bounds.0);
-            !f.added && wide && value - half <= f.bounds.0 && value + half >= f.bounds.1
+            // data that press a value against its bound do say something of it
+            let inside = !at_bound(f, value);
+            let holds_all = value - half <= f.bounds.0 && value + half >= f.bounds.1;
+            !f.added && wide && inside && holds_all
         };
         let out: Vec<bool> = self.free.iter().enumerate().map(undetermined).collect();
         if !out.contains(&true) || !out.contains(&false) {
@@ -185,7 +195,6 @@ impl Search<'_> {
         let one = |(k, f): (usize, &Free)| {
             let value = self.place.theta[k];
             let half = NORMAL_95 * sd[k];
-            let at = |bound: f64| (value - bound).abs() <= 1e-6 * (f.bounds.1 - f.bounds.0);
             Parameter {
                 name: f.name.clone(),
                 meaning: f.meaning,
@@ -195,7 +204,7 @@ impl Search<'_> {
                 value,
                 sd: sd[k],
                 ci95: [value - half, value + half],
-                at_bound: at(f.bounds.0) || at(f.bounds.1),
+                at_bound: at_bound(f, value),
                 by_flight: by_flight[k].clone(),
                 same_as: if f.added { same(k) } else { None },
             }
