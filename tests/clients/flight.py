@@ -13,6 +13,8 @@ import threading
 import time
 
 # The attitude that every client flies, degrees, and how near it has to come.
+# ArduPlane's parameters as the docs ship them
+PARAMETERS = str(pathlib.Path(__file__).resolve().parents[2] / "params/x8/arduplane.parm")
 ROLL_DEG, PITCH_DEG, NEAR_DEG = 20.0, 5.0, 0.5
 # What a controller's own loops leave by themselves: the companion routes, and trims nothing. PX4's, played as the real
 # ones fly, leave 3 to 4 degrees of pitch for half a minute at half thrust.
@@ -159,6 +161,9 @@ class Flight:
     def start_shim(self):
         """Starts a shim, also in place of one that has died."""
         played = ["--personality", self.personality] if self.personality else []
+        if self.personality == "ardupilot":
+            # its own gyro filter and loop rate are too slow for the controller that is flown
+            played += ["--parameters", PARAMETERS]
         link = f"udpout:127.0.0.1:{self.vehicle_port}"
         self.shim = Program("shim", [self.arguments.sitl, "--link", link, *played])
 
