@@ -12,9 +12,9 @@ import tempfile
 import threading
 import time
 
-# The attitude that every client flies, degrees, and how near it has to come.
 # ArduPlane's parameters as the docs ship them
 PARAMETERS = str(pathlib.Path(__file__).resolve().parents[2] / "params/x8/arduplane.parm")
+# The attitude that every client flies, degrees, and how near it has to come.
 ROLL_DEG, PITCH_DEG, NEAR_DEG = 20.0, 5.0, 0.5
 # What a controller's own loops leave by themselves: the companion routes, and trims nothing. PX4's, played as the real
 # ones fly, leave 3 to 4 degrees of pitch for half a minute at half thrust.
