@@ -3,6 +3,7 @@
 mod check;
 mod draw;
 mod export;
+#[cfg(feature = "study")]
 mod from_log;
 mod import;
 mod import_derivatives;
@@ -32,6 +33,7 @@ enum Command {
     /// Write a model as an aircraft of another program.
     Export(export::Arguments),
     /// Fit an aircraft of known mass, span and area to a flight: its model, its page, what to fly next.
+    #[cfg(feature = "study")]
     FromLog(from_log::Arguments),
     /// Make airframe and model of another program's aircraft.
     Import(import::Arguments),
@@ -48,6 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Check(arguments) => check::run(arguments),
         Command::Draw(arguments) => draw::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+        #[cfg(feature = "study")]
         Command::FromLog(arguments) => from_log::run(arguments),
         Command::Import(arguments) => import::run(arguments),
         Command::New(arguments) => new::run(arguments),

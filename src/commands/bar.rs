@@ -2,7 +2,6 @@
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, Once};
@@ -105,7 +104,7 @@ impl Bar {
 
 /// Shares of a bar: of the work, then of the report, if one is asked for.
 #[cfg(feature = "study")]
-pub fn shares(report: Option<&Path>) -> [[f64; 2]; 2] {
+pub fn shares(report: Option<&std::path::Path>) -> [[f64; 2]; 2] {
     let end = if report.is_some() { 0.9 } else { 1.0 };
     [[0.0, end], [end, 1.0]]
 }

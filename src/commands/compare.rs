@@ -7,7 +7,7 @@ use anyhow::Result;
 use comfy_table::Table;
 
 use crate::commands::bar::Bar;
-use crate::commands::files::{self, shipped};
+use crate::commands::files;
 use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::predictions;
@@ -16,10 +16,9 @@ use crate::commands::terminal::{print_answer, print_summary, table};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::ComparisonReport;
+#[cfg(feature = "study")]
 use crate::sysid::amend::Origin;
-use crate::sysid::compare::{
-    Answer, Comparison, HorizonScore, ModelResult, Options, compare, scores,
-};
+use crate::sysid::compare::{Answer, Comparison, HorizonScore, ModelResult, Options, compare};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
@@ -102,6 +101,32 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
+/// The answer with tuning and effect apart, if the second of two models was made of the first.
+#[cfg(feature = "study")]
+fn traced(
+    arguments: &Arguments,
+    models: &[GreyBox],
+    flights: &[Reconstruction],
+    comparison: &Comparison,
+) -> Result<Option<Answer>> {
+    let ([before, _], [_, after]) = (models, &arguments.models[..]) else { return Ok(None) };
+    let Some(origin) = Origin::beside(&files::shipped(after), before) else { return Ok(None) };
+    let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
+    let tuned = crate::sysid::compare::scores(&tuned, flights, &arguments.horizons)?;
+    Ok(Some(origin.answer(comparison, &tuned, &arguments.logs.paths)))
+}
+
+/// None: a build without the study cannot read what an amendment wrote.
+#[cfg(not(feature = "study"))]
+fn traced(
+    _: &Arguments,
+    _: &[GreyBox],
+    _: &[Reconstruction],
+    _: &Comparison,
+) -> Result<Option<Answer>> {
+    Ok(None)
+}
+
 /// The answer with the command that comes next; tuning and effect apart where the second model was made of the first.
 fn answer(
     arguments: &Arguments,
@@ -109,18 +134,9 @@ fn answer(
     flights: &[Reconstruction],
     comparison: &Comparison,
 ) -> Result<Answer> {
+    let traced = traced(arguments, models, flights, comparison)?;
+    let answer = traced.unwrap_or_else(|| comparison.answer.clone());
     let files = &arguments.models;
-    let answer = match (models, &files[..]) {
-        ([before, _], [_, after]) => match Origin::beside(&shipped(after), before) {
-            Some(origin) => {
-                let tuned = origin.tuned(before).unwrap_or_else(|| before.clone());
-                let tuned = scores(&tuned, flights, &arguments.horizons)?;
-                origin.answer(comparison, &tuned, &arguments.logs.paths)
-            }
-            None => comparison.answer.clone(),
-        },
-        _ => comparison.answer.clone(),
-    };
     let last = quoted(files.last().map_or(Path::new(""), PathBuf::as_path));
     Ok(answer.then(match models.len() {
         1 => format!("greylag diagnose --model {last}{}", arguments.logs.words()),

@@ -85,6 +85,7 @@ impl LogArguments {
     }
 
     /// The options for reading the logs, as arguments of another command.
+    #[cfg(feature = "study")]
     pub fn reading_words(&self) -> Vec<std::ffi::OsString> {
         let Reading { mapping, lenient, despite_problems, source } = &self.reading;
         let mapping = mapping.iter().flat_map(|file| ["--mapping".into(), file.clone().into()]);

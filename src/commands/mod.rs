@@ -46,6 +46,7 @@ mod margin;
 mod mistake;
 #[cfg(feature = "demo")]
 mod mystery;
+#[cfg(feature = "study")]
 mod per_flight;
 mod predictions;
 #[cfg(feature = "study")]

@@ -23,7 +23,6 @@ pub struct PerFlightArguments {
 
 impl PerFlightArguments {
     /// The constants that the options request.
-    #[cfg(feature = "study")]
     pub fn asked(&self) -> PerFlight {
         PerFlight { trims: self.flight_trims, askew_deg: self.axes_askew }
     }
