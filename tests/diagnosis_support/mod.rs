@@ -20,10 +20,13 @@ pub fn contradictions(d: &Diagnosis) -> Vec<String> {
     let asserted = d.effects.iter().any(|c| c.asserted);
     expect(asserted == (d.verdict == Verdict::Effect), "verdict and asserted effects".into());
     let all_abstain = d.channels.iter().all(|c| c.abstained);
+    let sensors = all_abstain && said("in every channel the remaining errors of the sensors");
+    let of_no_state = d.learnable_remainder < 0.1 && said("is not a function of the states");
+    let faultless = said("The model as given has no sure error in any channel");
+    let reasons = [!d.doubtful.is_empty(), sensors, of_no_state, faultless];
     expect(
-        (d.verdict == Verdict::Unknown)
-            == (!d.doubtful.is_empty() || (all_abstain && said("cannot say"))),
-        "verdict unknown without its reason".into(),
+        (d.verdict == Verdict::Unknown) == (reasons.into_iter().filter(|r| *r).count() == 1),
+        "verdict unknown without its one reason".into(),
     );
     expect(
         d.doubtful.is_empty()
