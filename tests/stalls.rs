@@ -1,16 +1,18 @@
 //! The companion's own process stopped, slowed and flooded while a client flies: OFFBOARD survives what the aircraft survives,
 //! and a stall is called a stall.
 //!
-//! Counts of lines and modes decide, not times: these tests hold on a busy machine.
+//! Counts of lines and modes decide, not times. Each test has the machine to itself, for what they stop and flood takes its
+//! processors from the client and the vehicle of another.
 
 #![cfg(target_os = "linux")]
 
 mod flight_support;
+mod real_time;
 
 use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use flight_support::*;
@@ -18,6 +20,12 @@ use mavlink::dialects::ardupilotmega::*;
 
 /// The commanded attitude: a turn of 20 degrees.
 const TURN: (f64, f64) = (20.0, 5.0);
+
+/// Held by the test that runs.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// `greylag fly` in a process of its own.
 struct Process {
@@ -142,8 +150,8 @@ impl Scene {
     }
 }
 
-#[test]
 fn a_companion_that_is_stopped_in_a_turn_flies_on_and_names_the_stall() {
+    let _alone = alone();
     for ms in [100, 600, 1200, 5000] {
         let mut scene = Scene::in_offboard();
         scene.during(|process| process.stop(Duration::from_millis(ms)));
@@ -156,8 +164,8 @@ fn a_companion_that_is_stopped_in_a_turn_flies_on_and_names_the_stall() {
     }
 }
 
-#[test]
 fn a_companion_that_gets_a_tenth_of_the_time_flies_on() {
+    let _alone = alone();
     let mut scene = Scene::in_offboard();
     scene.during(|process| {
         for _ in 0..40 {
@@ -168,8 +176,8 @@ fn a_companion_that_gets_a_tenth_of_the_time_flies_on() {
     scene.recovers("slowed");
 }
 
-#[test]
 fn a_flood_of_a_client_costs_nobody_the_flight() {
+    let _alone = alone();
     let mut scene = Scene::in_offboard();
     let heartbeat = frame(
         99,
@@ -197,3 +205,9 @@ fn a_flood_of_a_client_costs_nobody_the_flight() {
     let texts = scene.recovers("flooded");
     assert!(!texts.iter().any(|text| text.contains("lost")), "{texts:?}");
 }
+
+real_time::tests!(
+    a_companion_that_is_stopped_in_a_turn_flies_on_and_names_the_stall,
+    a_companion_that_gets_a_tenth_of_the_time_flies_on,
+    a_flood_of_a_client_costs_nobody_the_flight
+);
