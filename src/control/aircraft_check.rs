@@ -254,7 +254,7 @@ mod tests {
     use std::path::Path;
 
     fn model(path: &str) -> GreyBox {
-        GreyBox::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+        GreyBox::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)).unwrap()
     }
 
     #[test]

@@ -137,7 +137,11 @@ mod tests {
     fn the_model_says_of_delay_what_the_official_simulator_does() {
         // Oscillates in JSBSim's steps of 1 ms, after a pulse of full deflection: `lqi` from 46 ms in pitch on,
         // `lqi-damped`
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         let margin = |kind| {
             delay_margin(build(kind, &model).unwrap().as_ref(), &model)
                 .map_or(120, |d| d.as_millis())

@@ -347,7 +347,12 @@ mod tests {
     use greylag_sitl::hidden::EFFECTS;
 
     fn craft(path: &str) -> Craft {
-        Craft::of(&GreyBox::load(path.as_ref()).unwrap())
+        Craft::of(
+            &GreyBox::load(
+                &std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path),
+            )
+            .unwrap(),
+        )
     }
 
     #[test]

@@ -223,7 +223,11 @@ mod tests {
 
     #[test]
     fn what_the_data_refuse_has_not_joined() {
-        let model = GreyBox::load(Path::new("params/x8/prior.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/prior.toml"
+        )))
+        .unwrap();
         let fitted = |joined: bool| {
             let effects = json!([{ "id": "actuator_lag", "joined": joined }, { "id": "drag_beta2", "joined": false }]);
             Fitted {

@@ -179,7 +179,11 @@ mod tests {
     const DT: f64 = 0.01;
 
     fn model() -> GreyBox {
-        GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()
+        GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap()
     }
 
     /// A flight of `truth` for so many seconds, watched with the model: `commanded` are the surfaces that are reported,

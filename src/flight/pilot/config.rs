@@ -237,7 +237,11 @@ mod tests {
     use std::path::Path;
 
     fn model() -> GreyBox {
-        GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap()
+        GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap()
     }
 
     fn x8() -> Config {
@@ -247,7 +251,11 @@ mod tests {
     #[test]
     fn every_model_of_the_x8_gives_settings_that_can_be_flown() {
         for name in ["jsbsim", "prior", "prior-mild", "prior-severe"] {
-            let model = GreyBox::load(Path::new(&format!("params/x8/{name}.toml"))).unwrap();
+            let model = GreyBox::load(Path::new(&format!(
+                "{}/../../params/x8/{name}.toml",
+                env!("CARGO_MANIFEST_DIR")
+            )))
+            .unwrap();
             assert_eq!(Config::for_model(&model).unwrap().check(), Ok(()), "{name}");
         }
     }

@@ -115,7 +115,11 @@ mod tests {
     use std::path::Path;
 
     fn x8() -> Limits {
-        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        let airframe = Airframe::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/airframe.toml"
+        )))
+        .unwrap();
         Limits::from(&Config::new(airframe.envelope, vec![]))
     }
 

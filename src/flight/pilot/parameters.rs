@@ -99,7 +99,11 @@ mod tests {
     use std::path::Path;
 
     fn x8() -> Config {
-        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        let airframe = Airframe::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/airframe.toml"
+        )))
+        .unwrap();
         let row =
             TrimPoint { airspeed_mps: 20.0, pitch_deg: 0.858, elevator: 0.13, throttle: 0.185 };
         Config::new(airframe.envelope, vec![row])

@@ -65,7 +65,11 @@ mod tests {
 
     #[test]
     fn the_aileron_rolls_and_the_elevator_pitches_as_the_simulator_has_it() {
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         let answers = Answers::of(&model, 20.0).unwrap();
         // a command appears in the surfaces of the next state, in the rates of the one after
         assert_eq!([answers.after(0, -1), answers.after(0, 0), answers.after(0, 1)], [0.0; 3]);

@@ -196,7 +196,11 @@ mod tests {
     }
 
     fn x8() -> Answers {
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         Answers::of(&model, 20.0).unwrap()
     }
 

@@ -214,7 +214,11 @@ mod tests {
         late: usize,
         wired: impl Fn([f64; 2]) -> [f64; 2],
     ) -> (Verdict, u64) {
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         let full = model.airframe.actuators.elevator.travel.most;
         let trim = Trim::level(&model, 20.0, 600.0).unwrap();
         let (elevator, throttle) = (trim.controls.elevator / full, trim.controls.throttle);
@@ -288,7 +292,11 @@ mod tests {
     /// for the states that never were.
     #[test]
     fn a_clock_that_jumps_ahead_ends_the_check() {
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         for before in [1, 30] {
             let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
             check.await_authority();
@@ -307,7 +315,11 @@ mod tests {
 
     #[test]
     fn only_an_attitude_that_departs_from_the_first_ends_the_check() {
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         for (roll_deg, pitch_deg, open) in
             [(35.0, 15.0, true), (14.0, 15.0, false), (56.0, 15.0, false), (35.0, -6.0, false)]
         {
@@ -327,7 +339,11 @@ mod tests {
 
     #[test]
     fn pulses_begin_to_the_right_and_down_one_after_the_other_and_sum_to_nothing() {
-        let model = GreyBox::load(Path::new("params/x8/jsbsim.toml")).unwrap();
+        let model = GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap();
         let level = Command { elevator: 0.1, throttle: 0.2, ..Command::IDLE };
         let mut check = Check::new(Answers::of(&model, 22.0).unwrap());
         check.await_authority();

@@ -280,7 +280,11 @@ mod tests {
     use std::path::Path;
 
     fn assembly() -> Assembly {
-        let airframe = Airframe::load(Path::new("params/x8/airframe.toml")).unwrap();
+        let airframe = Airframe::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/airframe.toml"
+        )))
+        .unwrap();
         Assembly::new(airframe.actuators)
     }
 

@@ -183,7 +183,7 @@ mod tests {
         // the airspeed's error falls most by the effect, 0.05 to 0.002 of its scale; sideslip's is left, 0.0067 of its own
         assert_eq!(
             answer.effect,
-            "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.996). With it the \
+            "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \
              airspeed predicted 5 s ahead is off by 0.02 m/s instead of 0.5 m/s."
         );
         assert_eq!(answer.left, "Left: most in sideslip, 0.115° after 5 s.");
