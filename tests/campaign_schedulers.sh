@@ -111,30 +111,30 @@ one_node_hyperqueue() {
   started+=($!)
 }
 
-on_hyperqueue() {
-  one_node_hyperqueue
-  "$greylag" campaign run "$file" --out "$work/hyperqueue" --launcher hyperqueue --submit > "$work/hq.txt" 2>&1 &
+# Submits under launcher $1, and kills the cells that run, twice: the launcher's script tries them again.
+submit_and_kill() {
+  "$greylag" campaign run "$file" --out "$work/$1" --launcher "$1" --submit > "$work/$1.txt" 2>&1 &
   submit=$!
-  # two rounds of kills: tasks are tried again by the launcher's script
+  killed=0
   for _ in 1 2; do
-    for _ in $(seq 200); do [ -n "$(cells hyperqueue)" ] && break; sleep 0.1; done
-    sleep 0.7
-    kill -KILL $(cells hyperqueue) 2> /dev/null && echo "hyperqueue: killed" || true
+    for _ in $(seq 200); do [ -n "$(cells "$1")" ] && break; sleep 0.1; done
+    sleep 0.2
+    kill -KILL $(cells "$1") 2> /dev/null && killed=$((killed + 1)) || true
   done
   wait "$submit"
+  [ "$killed" = 2 ] || { echo "$1: cells were killed $killed times of 2; their commands are too short, give another campaign"; exit 1; }
+  echo "$1: killed twice"
+}
+
+on_hyperqueue() {
+  one_node_hyperqueue
+  submit_and_kill hyperqueue
 }
 
 # GNU parallel's joblog has exit value 0 for a job that a signal killed, so the script looks at each cell's own status.
 on_parallel() {
   need parallel
-  "$greylag" campaign run "$file" --out "$work/parallel" --launcher parallel --submit > "$work/parallel.txt" 2>&1 &
-  submit=$!
-  for _ in 1 2; do
-    for _ in $(seq 200); do [ -n "$(cells parallel)" ] && break; sleep 0.1; done
-    sleep 0.7
-    kill -KILL $(cells parallel) 2> /dev/null && echo "parallel: killed" || true
-  done
-  wait "$submit"
+  submit_and_kill parallel
 }
 
 "$greylag" campaign run "$file" --out "$work/local" --local

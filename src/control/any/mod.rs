@@ -10,7 +10,8 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 use network::{HIDDEN, INPUTS, Network};
 
-/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s.
+/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s. The policy was
+/// trained with them (`params/any/train.py`), so they are not those of another controller.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
 /// Largest integral of the attitude errors, rad s, and of the airspeed's, parts of the cruise airspeed times s.
