@@ -286,6 +286,7 @@ fn rollout<R: Packed>(
         None => HORIZON,
     };
     // plain loops, and one call of the model: an iterator that is not inlined leaves the vector
+    // instructions, a second copy of the model doubles what takes minutes to compile
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];

@@ -40,6 +40,7 @@ pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
 /// PARAM_VALUE of one table entry.
 pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
     // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. Encoded by hand, so that no bit pattern passes through a
+    // float on its way.
     let (value, kind) = match parameter.value {
         ParameterValue::Real(x) => (x.to_le_bytes(), 9),
         ParameterValue::Int(n) => (n.to_le_bytes(), 6),

@@ -250,6 +250,7 @@ fn servo_output(status: &Status, scene: &Scene) -> MavMessage {
 fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     type S = MavSysStatusSensor;
     // sensors behind the vehicle's own estimate, all or none; the compass is included because
+    // MAVSDK's `health_all_ok` waits for it
     let sensors = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
         | S::MAV_SYS_STATUS_SENSOR_3D_MAG
