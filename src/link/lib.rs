@@ -11,14 +11,14 @@
 //! use std::time::Instant;
 //!
 //! use crossbeam_channel::{bounded, select};
-//! use greylag::link::autopilot::Autopilot;
-//! use greylag::link::client::{Clients, Now};
-//! use greylag::link::framing::Source;
-//! use greylag::link::peer::LinkId;
-//! use greylag::link::transport::{Arrival, Network};
-//! use greylag::link::vehicle::{Demand, Outputs, Sitl, Vehicle};
-//! use greylag::physics::Time;
-//! use greylag::physics::servos::Travels;
+//! use greylag_link::autopilot::Autopilot;
+//! use greylag_link::client::{Clients, Now};
+//! use greylag_link::framing::Source;
+//! use greylag_link::peer::LinkId;
+//! use greylag_link::transport::{Arrival, Network};
+//! use greylag_link::vehicle::{Demand, Outputs, Sitl, Vehicle};
+//! use greylag_physics::Time;
+//! use greylag_physics::servos::Travels;
 //!
 //! fn serve(pilot: &mut dyn Autopilot) -> Result<(), Box<dyn std::error::Error>> {
 //!     let network = Network::start()?;

@@ -25,6 +25,7 @@ use greylag_link::framing::Source;
 use greylag_link::routing::Router;
 use greylag_link::transport::{Arrival, Remark};
 use greylag_link::vehicle::{Outputs, Real, Sitl, Vehicle};
+use greylag_physics::Time;
 
 /// Interval of periodic duties: heartbeats, streams, timeouts.
 const POLL: Duration = Duration::from_millis(10);
@@ -37,6 +38,8 @@ const LOAD_WEIGHT: f64 = 0.02;
 /// Identity of the autopilot towards clients.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
+/// Wait for a live state after a stall, and the age up to which a state counts as live.
+const CATCH_UP: Duration = Duration::from_millis(50);
 /// Time for the network thread to deliver queued packets after a stall.
 const HAND_OVER: Duration = Duration::from_secs(2);
 /// Interval of queries to the scheduler.
@@ -155,19 +158,28 @@ impl Control {
             recv(self.ports.from_clients) -> arrival => arrival.ok().map(Arrived::Client),
             default(wait) => None,
         };
-        self.excuse_stall();
+        let resumed = self.excuse_stall();
         match arrived {
-            Some(Arrived::Vehicle(arrival)) => self.take_vehicles(arrival),
-            Some(Arrived::Client(arrival)) => self.take_client(arrival),
+            Some(Arrived::Vehicle(arrival)) => self.take_vehicles(Some(arrival), resumed),
+            Some(Arrived::Client(arrival)) => {
+                // setpoints are dated by the vehicle's clock, which stood still during the stall
+                if resumed.is_some() {
+                    self.take_vehicles(None, resumed);
+                }
+                self.take_client(arrival);
+            }
+            None if resumed.is_some() => self.take_vehicles(None, resumed),
             None => {}
         }
     }
 
     /// Detects a stall of this computer, waits until the network thread has delivered what arrived meanwhile, and
-    /// excludes the stall from all timeouts.
-    fn excuse_stall(&mut self) {
+    /// excludes the stall from all timeouts. After a stall, returns the vehicle time from which states are live and no
+    /// longer history.
+    fn excuse_stall(&mut self) -> Option<Time> {
         let host = Instant::now();
-        let Some((behind, since)) = self.attention.look(host, self.ports.rounds()) else { return };
+        let (behind, since) = self.attention.look(host, self.ports.rounds())?;
+        let before = self.clock.at(since);
         // one round may end what the stall began; the next has polled every socket
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
@@ -191,6 +203,7 @@ impl Control {
         if let Some(words) = self.reports.note(now, missed, cause) {
             self.pilot.send_text(Severity::Warning, &words);
         }
+        Some(before.plus(missed.saturating_sub(CATCH_UP)))
     }
 
     /// Reports a link condition to the ground stations and as an event.

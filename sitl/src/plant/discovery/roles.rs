@@ -22,6 +22,8 @@ pub(super) struct Tried {
 const SHARE_RAD: f64 = 0.349;
 /// Least share of a moment beside the largest of its axis.
 const LEAST: f64 = 0.05;
+/// Least share of a moment beside the largest of any axis: less is rounding.
+const LEAST_OF_ALL: f64 = 1e-3;
 
 /// A control: the aileron is one of these with the axis 0.
 struct Role {
@@ -99,6 +101,10 @@ fn listed(tried: &[Tried], names: &Names) -> String {
 /// The command or pair that moves the axis most and the others least.
 fn best<'a>(tried: &'a [Tried], role: &Role) -> Option<Choice<'a>> {
     let largest = tried.iter().map(|t| t.moments[role.axis].abs()).fold(0.0, f64::max);
+    let of_all = tried.iter().flat_map(|t| t.moments).fold(0.0, |most, m| m.abs().max(most));
+    if largest < LEAST_OF_ALL * of_all {
+        return None;
+    }
     let mut all: Vec<Choice<'a>> = Vec::new();
     for (k, one) in tried.iter().enumerate() {
         all.push(Choice { parts: vec![(one, 1.0)], score: 0.0 });

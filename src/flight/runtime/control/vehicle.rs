@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{CYCLE, Control, LOAD_WEIGHT};
+use super::{CATCH_UP, CYCLE, Control, LOAD_WEIGHT};
 use crate::pilot::{Decision, Plan};
 use crate::recorder::call::Planned;
 use crate::recorder::{Call, Row};
@@ -12,6 +12,7 @@ use greylag_link::autopilot::{Autopilot, Severity};
 use greylag_link::peer::PeerId;
 use greylag_link::transport::Arrival;
 use greylag_link::vehicle::{Notice, Order, Telemetry};
+use greylag_physics::Time;
 
 /// Largest number of states per packet: a TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;
@@ -26,20 +27,34 @@ struct Heard {
 
 impl Control {
     /// Takes `arrival` and all that is queued behind it. In real time only the newest state is answered; in lockstep
-    /// the vehicle waits for each reply.
-    pub(super) fn take_vehicles(&mut self, arrival: Arrival) {
-        let mut newest = self.take_vehicle(arrival, None);
+    /// the vehicle waits for each reply. After a stall, states are live from the vehicle time `live` on.
+    pub(super) fn take_vehicles(&mut self, arrival: Option<Arrival>, live: Option<Time>) {
+        let mut newest = arrival.and_then(|arrival| self.take_vehicle(arrival, None));
         if self.clock.pace() == Pace::RealTime {
             // later arrivals are handled in the next round
             for _ in 0..self.ports.from_vehicle.len() {
                 let Ok(arrival) = self.ports.from_vehicle.try_recv() else { break };
                 newest = self.take_vehicle(arrival, newest);
             }
+            // the program may have been stopped since the last check
+            if let Some(live) = live.or_else(|| self.excuse_stall()) {
+                newest = self.catch_up(newest, live);
+            }
         }
         if let Some(heard) = newest {
             self.tick(&heard);
         }
         self.take_notices();
+    }
+
+    /// Takes arrivals until a state is live: a full socket keeps the oldest of a stall, which are history.
+    fn catch_up(&mut self, mut newest: Option<Heard>, live: Time) -> Option<Heard> {
+        let until = Instant::now() + CATCH_UP;
+        while newest.is_none_or(|heard| heard.state.time < live) {
+            let Ok(arrival) = self.ports.from_vehicle.recv_deadline(until) else { break };
+            newest = self.take_vehicle(arrival, newest);
+        }
+        newest
     }
 
     /// Takes one arrival; returns the newest state, `newest` or one that it completed.
