@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::pilot::TICK_S;
 use greylag_control::{Controller, Observation, Target};
-use greylag_model::{GreyBox, Trim, Twin};
+use greylag_model::{GreyBox, Integrator, Trim, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
@@ -28,6 +28,12 @@ const TICK_MS: usize = 10;
 /// The observed surface positions are undelayed, as with a real flight controller, which does not report them. It
 /// takes a second for a controller that needs microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
+    // JSBSim's Euler steps delay the attitude by one cycle, which no aircraft does
+    let model = &{
+        let mut continuous = model.clone();
+        continuous.integrator = Integrator::Rk4;
+        continuous
+    };
     let mut delays = (0..=LONGEST_MS).step_by(STEP_MS);
     let swings = |delay: usize| {
         [Axis::Pitch, Axis::Roll].into_iter().any(|axis| swings(controller, model, axis, delay))
@@ -148,7 +154,6 @@ mod tests {
                 .map_or(120, |d| d.as_millis())
         };
         let (lqi, damped) = (margin(ControllerKind::Lqi), margin(ControllerKind::LqiDamped));
-        assert!((36..=56).contains(&lqi), "{lqi}");
-        assert!(damped >= 90, "{damped}");
+        assert!(lqi.abs_diff(46) <= 8 && damped.abs_diff(104) <= 8, "{lqi} {damped}");
     }
 }
