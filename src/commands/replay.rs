@@ -37,7 +37,7 @@ pub struct Arguments {
 /// What flew, where it is not what the recording says.
 #[derive(Args, Debug)]
 pub struct FlownArguments {
-    /// Controller that flew [default: what the recording says, else hybrid-lqi].
+    /// Controller that flew [default: what the recording says, else lqi].
     #[arg(long, value_name = "NAME", value_parser = choices::controller())]
     controller: Option<ControllerKind>,
     /// Model that it was designed from [default: what the recording says].

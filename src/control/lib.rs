@@ -55,6 +55,15 @@ impl<R: Copy> Target<R> {
     }
 }
 
+/// A command that was not flown as its controller gave it, because it would have left the envelope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overruled {
+    /// The command as it was given, in range.
+    pub wanted: Command,
+    /// The command that was flown instead.
+    pub flown: Command,
+}
+
 /// A control law, called every 10 ms of vehicle time. A controller that cannot be built says so in [`build`]; one that
 /// is built returns no errors: a command that is not finite says that it has none, see [`Controller::command`].
 pub trait Controller: Send + Sync {
@@ -70,6 +79,8 @@ pub trait Controller: Send + Sync {
     /// A controller that has no command, as a planner without a plan, returns NaN: the caller must check
     /// [`Command::is_finite`] and fly something else, as the pilot does with its fallback.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
+    /// Hears, before its next command, that its last one was not flown: an integrator must not wind up behind a limit.
+    fn overruled(&mut self, _by: &Overruled) {}
     /// Computes what it can before the next tick is seen: whoever has time between two commands calls this. The
     /// commands are the same if nobody does.
     fn prepare(&mut self) {}

@@ -11,9 +11,9 @@
 //! brings x to its limit without overshoot. A controller that stays below is not touched. Accelerations and surface effects are
 //! the model's at the state predicted for the moment at which a command acts, so rolling, speed and gravity are in them.
 
-use crate::Observation;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::envelope::{Bounds, load_factor_under};
+use crate::{Observation, Overruled};
 use greylag_model::{GreyBox, STEP};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::airframe::Envelope;
@@ -57,6 +57,15 @@ pub struct Limited {
     pub command: Command,
     /// What has limited it.
     pub by: Option<Limit>,
+}
+
+impl Limited {
+    /// What its controller has to hear, where `wanted` is not what is flown.
+    pub fn overruled(&self, wanted: Command) -> Option<Overruled> {
+        let wanted = wanted.clamped();
+        let limited = self.by.is_some_and(|by| by != Limit::Distrust);
+        limited.then_some(Overruled { wanted, flown: self.command })
+    }
 }
 
 /// The limiter of one aircraft. It takes no memory after it is built.

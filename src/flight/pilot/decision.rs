@@ -1,6 +1,6 @@
 //! What the pilot asks of a planner, and what it answers to the vehicle.
 
-use greylag_control::{Observation, Target};
+use greylag_control::{Controller, Observation, Overruled, Target};
 use greylag_link::autopilot::Mode;
 use greylag_link::vehicle::{Demand, Fault, Outputs};
 use greylag_physics::{Command, Time};
@@ -12,8 +12,26 @@ pub struct Request {
     pub observation: Observation,
     /// What is wanted, already inside the envelope.
     pub target: Target,
+    /// Set when its last command was not flown as it was given.
+    pub overruled: Option<Overruled>,
     /// Set when the planner takes over from something else: it must forget its past.
     pub engage: bool,
+}
+
+/// Seed of a controller's random numbers, the same at every engagement.
+const SEED: u64 = 0;
+
+impl Request {
+    /// The command of `controller` for it.
+    pub fn ask(&self, controller: &mut dyn Controller) -> Command {
+        if self.engage {
+            controller.reset(SEED);
+        }
+        if let Some(by) = &self.overruled {
+            controller.overruled(by);
+        }
+        controller.command(&self.observation, &self.target)
+    }
 }
 
 /// What became of the request.

@@ -14,12 +14,18 @@ impl Pilot {
         self.envelope = Some(limiter);
     }
 
+    /// What the pilot keeps commands inside the envelope by.
+    pub fn protection(&self) -> Option<&EnvelopeLimiter> {
+        self.envelope.as_ref()
+    }
+
     /// `command`, or the nearest one inside the envelope.
     pub(super) fn inside_envelope(&mut self, command: Command, seen: &Observation) -> Command {
         let Some(limiter) = self.envelope.as_mut().filter(|_| !self.by_attitude) else {
             return command;
         };
         let limited = limiter.limit(seen, command);
+        self.overruled = limited.overruled(command);
         let distrusted = limited.by == Some(Limit::Distrust);
         if distrusted && due(&mut self.complaints.envelope, self.clock) {
             self.texts.say(
