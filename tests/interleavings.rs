@@ -75,7 +75,8 @@ fn request(altitude: f64, engage: bool) -> Request {
         altitude,
         previous: [Command::IDLE; 2],
     };
-    Request { observation, target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 }, engage }
+    let target = Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 };
+    Request { observation, target, overruled: None, engage }
 }
 
 fn planner(pace: Pace) -> Threaded {

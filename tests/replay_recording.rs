@@ -17,9 +17,10 @@ use flight_support::*;
 use greylag::commands::controllers::POLICY;
 use greylag::commands::fly::companion_with;
 use greylag::control::{Controller, ControllerKind, Observation, Target};
+use greylag::flight::pilot::{Config, Pilot};
 use greylag::flight::recorder::Place;
 use greylag::flight::replay::{Outcome, replay};
-use greylag::flight::runtime::{FlightOptions, Pace, Placement};
+use greylag::flight::runtime::{self, FlightOptions, Pace, Placement};
 use greylag::link::vehicle::{Authority, Real, Sitl, Vehicle};
 use greylag::logs::csv::{self, Tolerance};
 use greylag_sitl::shim::{self, Noise, Personality};
@@ -32,6 +33,14 @@ use shim_support::Shim;
 fn again(folder: &Path, vehicle: Vehicle) -> Outcome {
     replay(folder, companion_with(ControllerKind::Lqi, x8(), Path::new(POLICY)).unwrap(), vehicle)
         .unwrap()
+}
+
+/// An LQI whose pilot has no envelope limiter.
+fn unlimited() -> runtime::Companion {
+    let companion = companion_with(ControllerKind::Lqi, x8(), Path::new(POLICY)).unwrap();
+    let config = Config::for_model(x8()).unwrap();
+    let pilot = Pilot::new(config, companion.controller.boxed_clone()).unwrap();
+    runtime::Companion { pilot, ..companion }
 }
 
 fn sitl() -> Vehicle {
@@ -52,6 +61,9 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     let mut client = Client::new(companion.client(0));
     client.engage(30.0, 10.0);
     client.steer(30.0, 10.0, 2.0);
+    // A way on which the envelope limiter acts.
+    client.steer(-55.0, -27.0, 2.5);
+    client.steer(57.0, 28.0, 2.0);
     // A lost stream of setpoints, a parameter, an absurd setpoint, a disarming and an arming.
     std::thread::sleep(Duration::from_millis(1500));
     client.send(&shim_support::parameter("GL_BANK_MAX_DEG", 40.0));
@@ -68,6 +80,9 @@ fn a_flight_with_everything_in_it_replays_to_the_bit() {
     println!("{outcome:?}");
     assert!(outcome.ticks > 500 && !outcome.cut_short, "{outcome:?}");
     assert_eq!((outcome.different, outcome.plans_different, outcome.without_state), (0, 0, 0));
+    // What the limiter did is in the replay: without it other commands come out.
+    let unlimited = replay(&folder, unlimited(), sitl()).unwrap();
+    assert!(unlimited.different > 0 && unlimited.plans_different > 0, "{unlimited:?}");
     // Another controller gives other commands: the comparison can fail.
     let other = replay(
         &folder,

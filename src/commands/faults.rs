@@ -257,6 +257,7 @@ fn show(report: &Report) {
 mod tests {
     use super::*;
     use crate::control::{Controller, Observation, Target};
+    use crate::flight::pilot::{Config, Pilot};
     use crate::flight::runtime::Companion;
     use crate::physics::Command;
     use crate::sim::faults::Finding;
@@ -336,7 +337,10 @@ mod tests {
         roomy(|| {
             let model = fly::model("params/x8/jsbsim.toml".as_ref(), None).unwrap();
             let lqi = companion_with(ControllerKind::Lqi, &model, POLICY.as_ref()).unwrap();
-            let hardover = Companion { controller: Box::new(Hardover), ..lqi };
+            // the envelope limiter would hold the bank
+            let config = Config::for_model(&model).unwrap();
+            let pilot = Pilot::new(config, lqi.controller.boxed_clone()).unwrap();
+            let hardover = Companion { pilot, controller: Box::new(Hardover), ..lqi };
             let factory = CompanionFactory::new(hardover, &model).unwrap();
             let case =
                 Case { seed: 0, controller: ControllerKind::Lqi, counterpart: Counterpart::Sitl };

@@ -19,6 +19,7 @@ use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::commands::watchdog;
 use crate::commands::{margin, punctual};
 use crate::control::cem::Change;
+use crate::control::envelope::EnvelopeLimiter;
 use crate::control::{self, Controller, ControllerKind, build};
 use crate::flight::monitor::Monitor;
 use crate::flight::pilot::{Config, Pilot};
@@ -37,7 +38,7 @@ use crate::physics::airframe::ActuatorFigures;
 /// The model that is flown where no other is named: learned from flights, from an imperfect prior.
 pub const MODEL: &str = "params/x8/learned/model.toml";
 /// The controller that flies where no other is named.
-pub const CONTROLLER: &str = "hybrid-lqi";
+pub const CONTROLLER: &str = "lqi";
 
 /// The arguments of `greylag fly`.
 #[derive(Args, Debug)]
@@ -278,7 +279,7 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// A pilot with its controllers: `kind` flies, with the policy in `folder` as
+/// A pilot with its controllers, behind the envelope limiter of `model`: `kind` flies, with the policy in `folder` as
 /// [`controllers::policy`](crate::commands::controllers::policy) finds it; an LQI of the same model is the fallback, or `pid-retuned`, with a line on standard error, where none can be designed.
 ///
 /// # Errors
@@ -310,7 +311,8 @@ pub fn companion_with_planner(
     } else {
         fallback(model)?
     };
-    let pilot = Pilot::new(Config::for_model(model)?, fallback)?;
+    let mut pilot = Pilot::new(Config::for_model(model)?, fallback)?;
+    pilot.protect_with(EnvelopeLimiter::new(model));
     let placement =
         if kind.pace() == control::Pace::Planned { Placement::Thread } else { Placement::Loop };
     Ok(Companion { pilot, controller, placement })

@@ -57,11 +57,21 @@ impl<R: Copy> Target<R> {
     }
 }
 
+/// A command that the envelope limiter changed before it was flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overruled {
+    /// The controller's command, in range.
+    pub wanted: Command,
+    /// The command that was flown instead.
+    pub flown: Command,
+}
+
 /// A control law, called every 10 ms of vehicle time.
 ///
 /// Order of calls: [`Controller::reset`] before the first tick of an engagement, then [`Controller::command`] once
-/// per tick, [`Controller::prepare`] optionally between two ticks. [`Controller::insight`] describes the last
-/// command. Errors occur only on construction ([`build`]); a tick without a command returns NaN.
+/// per tick, [`Controller::prepare`] optionally between two ticks; [`Controller::overruled`] before the next command
+/// where the last one was limited. [`Controller::insight`] describes the last command. Errors occur only on construction
+/// ([`build`]); a tick without a command returns NaN.
 pub trait Controller: Send + Sync {
     /// The name that selects it on the command line.
     fn name(&self) -> &'static str;
@@ -75,6 +85,9 @@ pub trait Controller: Send + Sync {
     /// A controller without a command, such as a planner without a plan, returns NaN: the caller must check
     /// [`Command::is_finite`] and fly another controller, as the pilot does with its fallback.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
+    /// Informs the controller, before its next command, that its last one was limited: an integrator must not wind up
+    /// behind a limit.
+    fn overruled(&mut self, _by: &Overruled) {}
     /// Computes in advance what the next tick needs, when there is time between two commands. It never changes the
     /// commands.
     fn prepare(&mut self) {}

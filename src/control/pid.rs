@@ -1,6 +1,6 @@
 //! PID: three independent loops, roll by aileron, pitch by elevator, airspeed by throttle.
 
-use crate::{Controller, Observation, Target};
+use crate::{Controller, Observation, Overruled, Target};
 use greylag_model::STEP;
 use greylag_physics::Command;
 
@@ -78,12 +78,14 @@ pub const RETUNED: Tuning = Tuning {
 pub struct Pid {
     tuning: Tuning,
     integrals: [f64; 3],
+    /// What the last command added to them.
+    added: [f64; 3],
 }
 
 impl Pid {
     /// A controller with these gains and empty integrators.
     pub fn new(tuning: Tuning) -> Pid {
-        Pid { tuning, integrals: [0.0; 3] }
+        Pid { tuning, integrals: [0.0; 3], added: [0.0; 3] }
     }
 
     /// One loop; `stops` are the saturation limits of its output.
@@ -102,7 +104,9 @@ impl Pid {
         let raw = output(grown);
         let outward =
             (raw > stops.1 && gains.ki * error > 0.0) || (raw < stops.0 && gains.ki * error < 0.0);
+        self.added[axis] = 0.0;
         if grown.is_finite() && (self.tuning.windup == Windup::Free || !outward) {
+            self.added[axis] = grown - self.integrals[axis];
             self.integrals[axis] = grown;
         }
         output(if grown.is_finite() { self.integrals[axis] } else { grown }).clamp(stops.0, stops.1)
@@ -120,6 +124,22 @@ impl Controller for Pid {
 
     fn reset(&mut self, _seed: u64) {
         self.integrals = [0.0; 3];
+        self.added = [0.0; 3];
+    }
+
+    fn overruled(&mut self, by: &Overruled) {
+        if self.tuning.windup == Windup::Free {
+            return;
+        }
+        let Overruled { wanted, flown } = by;
+        for (axis, stopped) in [wanted.aileron != flown.aileron, wanted.elevator != flown.elevator]
+            .into_iter()
+            .enumerate()
+        {
+            if stopped {
+                self.integrals[axis] -= std::mem::take(&mut self.added[axis]);
+            }
+        }
     }
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {

@@ -16,8 +16,6 @@ use greylag_physics::Time;
 
 /// The only peer of the vehicle link.
 const WIRE: PeerId = PeerId { link: LinkId(0), address: SERIAL };
-/// Seed of the controller's random numbers, as in real flight.
-const SEED: u64 = 0;
 
 /// A companion whose input and time are arguments.
 ///
@@ -74,12 +72,8 @@ impl Desk {
         for state in states.iter().filter(|state| state.order != Order::Late) {
             self.anchor = Some((host, state.time));
             let request = self.pilot.observe(state.time, state);
-            let plan = request.map_or(Plan::None, |request| {
-                if request.engage {
-                    self.controller.reset(SEED);
-                }
-                Plan::Ready(self.controller.command(&request.observation, &request.target))
-            });
+            let plan = request
+                .map_or(Plan::None, |request| Plan::Ready(request.ask(self.controller.as_mut())));
             let decision = self.pilot.decide(plan);
             let demand = decision.demand();
             self.outputs = demand.outputs;

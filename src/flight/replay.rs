@@ -14,8 +14,6 @@ use greylag_link::peer::{LinkId, PeerId, SERIAL};
 use greylag_link::vehicle::{Order, Telemetry, Vehicle};
 use greylag_physics::{Command, Time};
 
-/// Seed of the controller's random numbers, as in flight.
-const SEED: u64 = 0;
 /// Number of differences kept for display.
 const SHOWN: usize = 10;
 
@@ -239,10 +237,7 @@ impl Replayed<'_, '_> {
         let own = heard.map(|request| {
             let engage = request.engage || std::mem::take(&mut self.owed);
             let request = Request { engage, ..request };
-            if request.engage {
-                self.companion.controller.reset(SEED);
-            }
-            let command = self.companion.controller.command(&request.observation, &request.target);
+            let command = request.ask(self.companion.controller.as_mut());
             (self.watch)(time, &request, self.companion.controller.as_ref());
             command
         });

@@ -16,7 +16,7 @@ use crate::ilqr::Ilqr;
 use crate::insight::Insight;
 use crate::lqi::{Ahead, Lqi};
 use crate::policy::Agent;
-use crate::{Controller, Observation, Target};
+use crate::{Controller, Observation, Overruled, Target};
 pub use changes::{Change, ChangeError};
 use greylag_model::{GreyBox, STEP};
 use greylag_num::stream;
@@ -343,6 +343,13 @@ impl Controller for Cem {
         }
         if let Some(ilqr) = &mut self.ilqr {
             ilqr.reset(seed);
+        }
+    }
+
+    fn overruled(&mut self, by: &Overruled) {
+        // a plan begins anew from what is seen; the base has integrals
+        if let (None, Some(base)) = (&self.last, &mut self.base) {
+            base.lqi.overruled(by);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;
-use crate::{Controller, Observation, Target};
+use crate::{Controller, Observation, Overruled, Target};
 use greylag_model::GreyBox;
 use greylag_physics::Command;
 
@@ -10,12 +10,13 @@ use greylag_physics::Command;
 pub struct Guarded {
     controller: Box<dyn Controller>,
     limiter: EnvelopeLimiter,
+    overruled: Option<Overruled>,
 }
 
 impl Guarded {
     /// `controller` behind the envelope of the aircraft that `model` describes.
     pub fn new(controller: Box<dyn Controller>, model: &GreyBox) -> Guarded {
-        Guarded { controller, limiter: EnvelopeLimiter::new(model) }
+        Guarded { controller, limiter: EnvelopeLimiter::new(model), overruled: None }
     }
 }
 
@@ -27,11 +28,17 @@ impl Controller for Guarded {
     fn reset(&mut self, seed: u64) {
         self.controller.reset(seed);
         self.limiter.reset();
+        self.overruled = None;
     }
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        if let Some(by) = self.overruled.take() {
+            self.controller.overruled(&by);
+        }
         let wanted = self.controller.command(seen, target);
-        self.limiter.limit(seen, wanted).command
+        let limited = self.limiter.limit(seen, wanted);
+        self.overruled = limited.overruled(wanted);
+        limited.command
     }
 
     fn prepare(&mut self) {
@@ -44,6 +51,7 @@ impl Controller for Guarded {
 
     fn boxed_clone(&self) -> Box<dyn Controller> {
         let controller = self.controller.boxed_clone();
-        Box::new(Guarded { controller, limiter: self.limiter.clone() })
+        let (limiter, overruled) = (self.limiter.clone(), self.overruled);
+        Box::new(Guarded { controller, limiter, overruled })
     }
 }

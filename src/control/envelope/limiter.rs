@@ -12,9 +12,9 @@
 //! evaluated with the model at the state predicted for the time at which a command acts, so that they include rolling,
 //! speed and gravity.
 
-use crate::Observation;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::envelope::{Bounds, load_factor_under};
+use crate::{Observation, Overruled};
 use greylag_model::{GreyBox, STEP};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::airframe::Envelope;
@@ -58,6 +58,15 @@ pub struct Limited {
     pub command: Command,
     /// The limit that changed it; `None` if it is unchanged.
     pub by: Option<Limit>,
+}
+
+impl Limited {
+    /// What the controller must learn where the command flown is not `wanted`.
+    pub fn overruled(&self, wanted: Command) -> Option<Overruled> {
+        let wanted = wanted.clamped();
+        let limited = self.by.is_some_and(|by| by != Limit::Distrust);
+        limited.then_some(Overruled { wanted, flown: self.command })
+    }
 }
 
 /// The envelope limiter of one aircraft. It allocates only when it is built.

@@ -15,7 +15,7 @@ use crate::envelope::Bounds;
 use crate::insight::{Insight, Path};
 use crate::lqi::{Ahead, Lqi};
 use crate::policy::{Actor, Agent};
-use crate::{Controller, Observation, Target};
+use crate::{Controller, Observation, Overruled, Target};
 use greylag_model::GreyBox;
 use greylag_num::dense::Units;
 use greylag_physics::Command;
@@ -149,6 +149,13 @@ impl Controller for Ilqr {
         self.lqi.reset(seed);
         self.disturbance = Disturbance::new(TIME_CONSTANT_S);
         self.desk.plan = None;
+    }
+
+    fn overruled(&mut self, by: &Overruled) {
+        // a plan begins anew from what is seen; the LQI has integrals
+        if self.desk.plan.is_none() {
+            self.lqi.overruled(by);
+        }
     }
 
     fn insight(&self, _seen: &Observation) -> Option<Insight> {

@@ -128,6 +128,11 @@ impl Law {
         [ailerons.command(u[0]), elevators.command(u[1]), rudder]
     }
 
+    /// Deflection of aileron and elevator (rad) by the reference roll and pitch (rad) of their own axes.
+    pub(super) fn by_reference(&self) -> [f64; 2] {
+        [self.gain[0][0], self.gain[1][1]]
+    }
+
     pub(super) fn throttle(&self) -> f64 {
         self.throttle
     }

@@ -9,7 +9,7 @@ mod riccati;
 
 use std::sync::Arc;
 
-use crate::{Controller, Observation, SetupError, Target};
+use crate::{Controller, Observation, Overruled, SetupError, Target};
 pub(crate) use ahead::Ahead;
 use ahead::{HOLD, Inner, Law, Surfaces};
 pub use design::Weights;
@@ -48,6 +48,18 @@ pub struct Lqi {
     reference: Option<[f64; 2]>,
     integral: [f64; 2],
     airspeed_integral: f64,
+    last: Option<Given>,
+}
+
+/// What a command was made of, to take it back where it was not flown.
+#[derive(Clone, Copy, Debug)]
+struct Given {
+    /// Roll and pitch of the aircraft, rad.
+    attitude: [f64; 2],
+    /// What was added to the integrals, rad s.
+    added: [f64; 2],
+    /// Deflection of aileron and elevator by their own angle's reference, rad by rad.
+    by_reference: [f64; 2],
 }
 
 impl Lqi {
@@ -78,6 +90,7 @@ impl Lqi {
             reference: None,
             integral: [0.0; 2],
             airspeed_integral: 0.0,
+            last: None,
         })
     }
 
@@ -163,6 +176,29 @@ impl Controller for Lqi {
         self.reference = None;
         self.integral = [0.0; 2];
         self.airspeed_integral = 0.0;
+        self.last = None;
+    }
+
+    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987): the reference goes back to where it would
+    /// have led to what was flown, but no further than to the aircraft, and the integral to where it was.
+    fn overruled(&mut self, by: &Overruled) {
+        let (Some(last), Some(reference)) = (self.last.take(), &mut self.reference) else { return };
+        let Overruled { wanted, flown } = by;
+        let [ailerons, elevators] =
+            [self.surfaces.figures.aileron.travel, self.surfaces.figures.elevator.travel];
+        let moved = [
+            ailerons.deflection(flown.aileron) - ailerons.deflection(wanted.aileron),
+            elevators.deflection(flown.elevator) - elevators.deflection(wanted.elevator),
+        ];
+        for axis in 0..2 {
+            let back = moved[axis] / last.by_reference[axis];
+            if moved[axis] == 0.0 || !back.is_finite() {
+                continue;
+            }
+            let (here, there) = (last.attitude[axis], reference[axis]);
+            reference[axis] = (there + back).clamp(here.min(there), here.max(there));
+            self.integral[axis] -= last.added[axis];
+        }
     }
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
@@ -173,11 +209,13 @@ impl Controller for Lqi {
             law.surfaces(&inner, &seen.state, &seen.actuators, &seen.previous, &self.surfaces);
         let error = [seen.state.roll - roll, seen.state.pitch - pitch];
         // conditional integration: an axis whose surface is at its stop does not wind up
-        for axis in 0..2 {
-            if raw[axis].abs() < 1.0 && error[axis].is_finite() {
-                self.integral[axis] += error[axis] * STEP;
-            }
-        }
+        let added: [f64; 2] = std::array::from_fn(|axis| {
+            let free = raw[axis].abs() < 1.0 && error[axis].is_finite();
+            if free { error[axis] * STEP } else { 0.0 }
+        });
+        self.integral = [self.integral[0] + added[0], self.integral[1] + added[1]];
+        let attitude = [seen.state.roll, seen.state.pitch];
+        self.last = Some(Given { attitude, added, by_reference: law.by_reference() });
         let throttle = self.throttle(seen, target, law.throttle());
         Command { aileron: raw[0], elevator: raw[1], throttle, rudder: raw[2] }.clamped()
     }

@@ -114,6 +114,8 @@ impl Pilot {
         if !self.fallback_engaged {
             self.fallback.reset(0);
             self.fallback_engaged = true;
+        } else if let Some(by) = &self.overruled {
+            self.fallback.overruled(by);
         }
         let command = self.fallback.command(seen, &self.target);
         if command.is_finite() {

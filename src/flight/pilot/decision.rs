@@ -1,6 +1,6 @@
 //! Requests to a planner and decisions for the vehicle.
 
-use greylag_control::{Observation, Target};
+use greylag_control::{Controller, Observation, Overruled, Target};
 use greylag_link::autopilot::Mode;
 use greylag_link::vehicle::{Demand, Fault, Outputs};
 use greylag_physics::{Command, Time};
@@ -12,8 +12,26 @@ pub struct Request {
     pub observation: Observation,
     /// Target, already limited to the envelope.
     pub target: Target,
+    /// The controller's last command, if the envelope limiter changed it.
+    pub overruled: Option<Overruled>,
     /// Set on engagement: the planner must reset its internal state.
     pub engage: bool,
+}
+
+/// Seed of a controller's random numbers, the same at every engagement.
+const SEED: u64 = 0;
+
+impl Request {
+    /// The command of `controller` for this request.
+    pub fn ask(&self, controller: &mut dyn Controller) -> Command {
+        if self.engage {
+            controller.reset(SEED);
+        }
+        if let Some(by) = &self.overruled {
+            controller.overruled(by);
+        }
+        controller.command(&self.observation, &self.target)
+    }
 }
 
 /// Reply to the request.

@@ -14,12 +14,18 @@ impl Pilot {
         self.envelope = Some(limiter);
     }
 
+    /// The envelope limiter, if commands are limited.
+    pub fn protection(&self) -> Option<&EnvelopeLimiter> {
+        self.envelope.as_ref()
+    }
+
     /// The command nearest to `command` inside the envelope.
     pub(super) fn inside_envelope(&mut self, command: Command, seen: &Observation) -> Command {
         let Some(limiter) = self.envelope.as_mut().filter(|_| !self.by_attitude) else {
             return command;
         };
         let limited = limiter.limit(seen, command);
+        self.overruled = limited.overruled(command);
         let distrusted = limited.by == Some(Limit::Distrust);
         if distrusted && due(&mut self.complaints.envelope, self.clock) {
             self.texts.say(

@@ -37,7 +37,7 @@ use crate::monitor::Monitor;
 use complaints::{Complaints, due};
 use estimate::{Estimate, Frame, RESTART, within};
 use greylag_control::envelope::EnvelopeLimiter;
-use greylag_control::{Controller, Observation, Target};
+use greylag_control::{Controller, Observation, Overruled, Target};
 use greylag_link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
 use greylag_link::vehicle::{Fault, Telemetry, Vehicle};
 use greylag_manoeuvres::Schedule;
@@ -124,6 +124,8 @@ pub struct Pilot {
     monitor: Option<Monitor>,
     /// The envelope limiter, where there is a model for its predictions.
     envelope: Option<EnvelopeLimiter>,
+    /// The last command of a controller, where it was not flown as it was given.
+    overruled: Option<Overruled>,
 }
 
 /// Result of `observe` for `decide`.
@@ -190,6 +192,7 @@ impl Pilot {
             refused: None,
             monitor: None,
             envelope: None,
+            overruled: None,
         })
     }
 
@@ -251,7 +254,12 @@ impl Pilot {
             Pending::Fly { seen, .. } => {
                 let engage = !self.planner_engaged;
                 self.planner_engaged = true;
-                Some(Request { observation: seen, target: self.target, engage })
+                Some(Request {
+                    observation: seen,
+                    target: self.target,
+                    overruled: self.overruled.filter(|_| self.source == Source::Planned),
+                    engage,
+                })
             }
             Pending::Repeated => None,
             _ => {
@@ -350,6 +358,7 @@ impl Pilot {
     fn forget_controllers(&mut self) {
         self.planner_engaged = false;
         self.fallback_engaged = false;
+        self.overruled = None;
     }
 
     fn assess(&mut self, quality: Frame) -> Pending {

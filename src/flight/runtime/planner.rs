@@ -7,7 +7,6 @@ use std::time::Instant;
 use crate::pilot::{Plan, Request};
 use greylag_control::Controller;
 pub(super) use threaded::Threaded;
-use threaded::run;
 
 /// The controller of the flight and where it runs.
 pub(super) enum Planner {
@@ -21,7 +20,7 @@ impl Planner {
     /// The plan for `request`, waited for until `deadline` after `arrived` at most.
     pub(super) fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         match self {
-            Planner::Inline(controller) => Plan::Ready(run(controller.as_mut(), request)),
+            Planner::Inline(controller) => Plan::Ready(request.ask(controller.as_mut())),
             Planner::Threaded(threaded) => threaded.plan(request, arrived),
         }
     }
@@ -45,7 +44,8 @@ mod tests {
             altitude: 600.0,
             previous: [Command::IDLE; 2],
         };
-        Request { observation, target: Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 }, engage }
+        let target = Target { roll: 0.0, pitch: 0.0, airspeed: 20.0 };
+        Request { observation, target, overruled: None, engage }
     }
 
     /// A controller whose first plans wait until they are let go. Its throttle counts its engagements, its

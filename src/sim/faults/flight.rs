@@ -114,7 +114,10 @@ impl CompanionFactory {
 
     fn desk(&self, counterpart: Counterpart) -> Result<Desk, FaultsError> {
         let config = self.companion.pilot.config().clone();
-        let pilot = Pilot::new(config, self.fallback.boxed_clone())?;
+        let mut pilot = Pilot::new(config, self.fallback.boxed_clone())?;
+        if let Some(limiter) = self.companion.pilot.protection() {
+            pilot.protect_with(limiter.clone());
+        }
         let controller = self.companion.controller.boxed_clone();
         let companion = Companion { pilot, controller, placement: self.companion.placement };
         Ok(Desk::new(companion, vehicle(counterpart, &self.model)))

@@ -8,17 +8,6 @@ use crate::threads::{Builder, JoinHandle, Receiver, RecvTimeoutError, Sender, bo
 use greylag_control::Controller;
 use greylag_physics::Command;
 
-/// Seed of a controller's random numbers, the same at every engagement.
-const SEED: u64 = 0;
-
-/// The command of `controller` for `request`.
-pub(super) fn run(controller: &mut dyn Controller, request: &Request) -> Command {
-    if request.engage {
-        controller.reset(SEED);
-    }
-    controller.command(&request.observation, &request.target)
-}
-
 /// A controller on its own thread.
 pub struct Threaded {
     requests: Option<Sender<(u64, Request)>>,
@@ -42,7 +31,7 @@ impl Threaded {
         let (answers, plans) = bounded(2);
         let work = move || {
             for (tick, request) in orders {
-                if answers.send((tick, run(controller.as_mut(), &request))).is_err() {
+                if answers.send((tick, request.ask(controller.as_mut()))).is_err() {
                     return;
                 }
                 controller.prepare();
