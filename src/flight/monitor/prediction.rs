@@ -18,6 +18,8 @@ const THROTTLE_SD: f64 = 0.02;
 /// 1.9 σ_w / √(L b).
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
+/// Largest step of a difference in α and β, rad: a step of a whole gust would end behind the stall, where lift has come back down.
+const INCIDENCE_STEP: f64 = 2.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// A model with the standard deviations of its coefficients.
@@ -82,13 +84,15 @@ impl Predictor {
     pub fn variance(&self, frame: &Telemetry, mean: &Six) -> Six {
         let asked = Asked::at(frame);
         let mut variance = self.of_coefficients(&asked);
-        let deviations =
-            Deviations { incidence: frame.incidence_sd, air_rotation: self.air_rotation };
-        for change in CHANGES {
+        let incidence = frame.incidence_sd.map(|sd| sd.min(INCIDENCE_STEP));
+        let steps = Deviations { incidence, air_rotation: self.air_rotation };
+        let mut in_steps = [1.0; CHANGES.len()];
+        (0..2).for_each(|k| in_steps[k] = frame.incidence_sd[k] / incidence[k]);
+        for (change, in_steps) in CHANGES.iter().zip(in_steps) {
             let mut changed = asked;
-            change(&mut changed, &deviations);
+            change(&mut changed, &steps);
             let moved = self.accelerations(&changed);
-            (0..6).for_each(|k| variance[k] += (moved[k] - mean[k]).powi(2));
+            (0..6).for_each(|k| variance[k] += ((moved[k] - mean[k]) * in_steps).powi(2));
         }
         variance
     }

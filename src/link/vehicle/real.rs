@@ -10,6 +10,7 @@ mod attitude_trim;
 mod delay;
 mod duties;
 mod engagement;
+mod gusts;
 mod hearing;
 mod obstacle;
 pub mod parameters;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::air_data::{self, AirData, Measured};
+use super::gusts::Gusts;
 use crate::vehicle::{Faults, Order, Telemetry, VehicleCounts, limits};
 use crate::wire::controller::ControllerMessage;
 use crate::wire::setpoint::euler;
@@ -19,6 +20,11 @@ const RESTART_MS: i32 = 1000;
 const STALE: Duration = Duration::from_millis(300);
 /// Largest number of actuator-model steps run after a gap: a fifth of a second, longer than any transient.
 const CATCH_UP: u64 = 20;
+/// Factor of the gusts in the deviation of the flow angles: a gust lasts for half a minute, so that it is not averaged and the
+/// largest of a flight counts, 3.5 standard deviations where independent errors count two.
+const LASTING: f64 = 1.75;
+/// Airspeed at least by which a gust is divided, m/s.
+const SLOWEST_MPS: f64 = 3.0;
 
 /// The last value of a stream with its arrival time, host clock.
 type Heard<T> = Option<(Duration, T)>;
@@ -33,6 +39,7 @@ pub(super) struct Assembly {
     air: Heard<[f64; 3]>,
     incidence: Heard<[f64; 2]>,
     estimator: AirData,
+    gusts: Gusts,
     /// Whether a velocity was received since the estimator's last update.
     new_velocity: bool,
     actuators: Actuators,
@@ -55,6 +62,7 @@ impl Assembly {
             air: None,
             incidence: None,
             estimator: AirData::default(),
+            gusts: Gusts::default(),
             new_velocity: false,
             actuators: Actuators::at_rest(&Controls::default()),
             boot_ms: None,
@@ -222,6 +230,11 @@ impl Assembly {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),
         }
+        let incidence = [next.state.alpha, next.state.beta];
+        let Measured { attitude, airspeed, velocity, .. } = measured;
+        self.gusts.update(attitude, incidence, airspeed, velocity, step);
+        let gust = LASTING * self.gusts.deviation() / airspeed.max(SLOWEST_MPS);
+        next.incidence_sd = air_data::DEVIATION.map(|sd| sd.hypot(gust));
     }
 
     /// Vehicle time, unwrapped after 49 days of milliseconds, and its order relative to the last.
@@ -258,6 +271,7 @@ impl Assembly {
     fn start(&mut self, boot_ms: u32, time: Time) -> (Time, Order) {
         self.boot_ms = Some(boot_ms);
         self.estimator = AirData::default();
+        self.gusts = Gusts::default();
         self.counts.starts += 1;
         self.counts.states += 1;
         (time, Order::First)
