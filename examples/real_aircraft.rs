@@ -41,7 +41,7 @@ struct Aircraft {
 
 fn main() -> Result<()> {
     println!(
-        "NRMSE of free runs on flights held out: mean over those held out ± its standard error"
+        "Scaled error of free runs on flights held out: mean over those held out ± its standard error"
     );
     for aircraft in [a430()?, dawn_one()?, thor()?, proto()?] {
         let Aircraft { name, model, flights } = aircraft;

@@ -132,7 +132,9 @@ fn the_pilot_keeps_to_it_by_default() {
     for kind in [ControllerKind::Lqi, ControllerKind::HybridIlqr] {
         let companion = companion_with(kind, &model, Path::new(POLICY)).unwrap();
         let (load, alpha, errors) = piloted(companion, &model);
-        assert!(load[0] >= 1.05 * least && load[1] <= 1.05 * most, "{kind}: {load:?}");
+        // planners pass it by more than the LQI (SAFETY.md)
+        let transient = if kind == ControllerKind::Lqi { 1.05 } else { 1.1 };
+        assert!(load[0] >= transient * least && load[1] <= transient * most, "{kind}: {load:?}");
         assert!(alpha < 12.3, "{kind}: {alpha}");
         // a plan of half a second does not see that a steep bank leaves no load factor to raise the nose with
         if kind == ControllerKind::Lqi {

@@ -1,5 +1,6 @@
 //! Requests to a planner and decisions for the vehicle.
 
+use super::Pilot;
 use greylag_control::{Controller, Observation, Overruled, Target};
 use greylag_link::autopilot::Mode;
 use greylag_link::vehicle::{Demand, Fault, Outputs};
@@ -120,6 +121,22 @@ impl Decision {
             outputs: if self.armed { Outputs::Armed(self.command) } else { Outputs::Disarmed },
             attitude: [or_level(self.target.roll), or_level(self.target.pitch)],
             fault: fault.filter(|_| self.armed),
+        }
+    }
+}
+
+impl Pilot {
+    /// The decision of this tick.
+    pub(super) fn decision(&self) -> Decision {
+        Decision {
+            time: self.answering,
+            command: self.in_force,
+            source: self.source,
+            armed: self.armed,
+            mode: self.mode,
+            target: self.target,
+            failsafe: self.failsafe(),
+            refused: self.refused,
         }
     }
 }

@@ -341,19 +341,6 @@ impl Pilot {
         self.armed && (self.setpoint_lost || self.vehicle_lost)
     }
 
-    fn decision(&self) -> Decision {
-        Decision {
-            time: self.answering,
-            command: self.in_force,
-            source: self.source,
-            armed: self.armed,
-            mode: self.mode,
-            target: self.target,
-            failsafe: self.failsafe(),
-            refused: self.refused,
-        }
-    }
-
     /// Resets the controllers, so that the next one starts from the last command.
     fn forget_controllers(&mut self) {
         self.planner_engaged = false;

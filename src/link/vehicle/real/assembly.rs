@@ -20,12 +20,6 @@ const RESTART_MS: i32 = 1000;
 const STALE: Duration = Duration::from_millis(300);
 /// Largest number of actuator-model steps run after a gap: a fifth of a second, longer than any transient.
 const CATCH_UP: u64 = 20;
-/// Factor of the gusts in the deviation of the flow angles: a gust lasts for half a minute, so that it is not averaged and the
-/// largest of a flight counts, 3.5 standard deviations where independent errors count two.
-const LASTING: f64 = 1.75;
-/// Airspeed at least by which a gust is divided, m/s.
-const SLOWEST_MPS: f64 = 3.0;
-
 /// The last value of a stream with its arrival time, host clock.
 type Heard<T> = Option<(Duration, T)>;
 
@@ -233,7 +227,7 @@ impl Assembly {
         let incidence = [next.state.alpha, next.state.beta];
         let Measured { attitude, airspeed, velocity, .. } = measured;
         self.gusts.update(attitude, incidence, airspeed, velocity, step);
-        let gust = LASTING * self.gusts.deviation() / airspeed.max(SLOWEST_MPS);
+        let gust = self.gusts.incidence(airspeed);
         next.incidence_sd = air_data::DEVIATION.map(|sd| sd.hypot(gust));
     }
 

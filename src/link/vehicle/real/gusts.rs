@@ -13,6 +13,11 @@ const SUPPOSED_MPS: f64 = 1.5;
 const SUPPOSED_S: f64 = 20.0;
 /// Length of gusts at altitude, m (MIL-F-8785C above 2000 ft).
 const LENGTH_M: f64 = 533.0;
+/// Factor of the gusts in the deviation of the flow angles: a gust lasts for half a minute, so that it is not averaged and the
+/// largest of a flight counts, 3.5 standard deviations where independent errors count two.
+const LASTING: f64 = 1.75;
+/// Airspeed at least by which a gust is divided, m/s.
+const SLOWEST_MPS: f64 = 3.0;
 /// Longest gap between two velocities, s.
 const GAP_S: f64 = 1.0;
 
@@ -66,8 +71,13 @@ impl Gusts {
         self.power += (whole - self.power) * dt / self.averaged;
     }
 
+    /// Error of an angle of attack or sideslip that does not see the gusts, rad, to be counted with two standard deviations.
+    pub fn incidence(&self, airspeed: f64) -> f64 {
+        LASTING * self.deviation() / airspeed.max(SLOWEST_MPS)
+    }
+
     /// Standard deviation of each component of the gusts, m/s.
-    pub fn deviation(&self) -> f64 {
+    fn deviation(&self) -> f64 {
         self.power.sqrt()
     }
 }
