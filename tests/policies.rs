@@ -188,10 +188,9 @@ fn a_controller_that_does_not_fly_breaks_the_rules_of_the_aircraft() {
     let wild = Companion { controller: Box::new(Wild), ..lqi() };
     let factory = CompanionFactory::new(wild, &x8()).unwrap();
     let broken = broken(&factory, &quiet(Counterpart::Sitl));
-    // it is rolled upright again and again, and so comes by the attitude that it is to reach
-    assert!(broken.contains(&"bank"), "{broken:?}");
-    // what the companion itself answers for holds whatever the controller does
-    for rule in ["finite", "range", "slew", "idle", "bank-target", "failsafe-reported"] {
+    assert!(broken.contains(&"nose-down") && broken.contains(&"reached"), "{broken:?}");
+    // what the companion itself answers for holds whatever the controller does; the bank by the envelope limiter
+    for rule in ["finite", "range", "slew", "idle", "bank", "bank-target", "failsafe-reported"] {
         assert!(!broken.contains(&rule), "{broken:?}");
     }
 }
