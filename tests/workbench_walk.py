@@ -340,7 +340,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     wait(browser, "document.getElementById('trouble').textContent.includes('no flight log')", 10, "a foreign file is refused")
     found += shoot(browser, folder, "1-empty")
 
-    if not browser.value("document.querySelector('.welcome') && document.querySelector('.picture')"):
+    if not browser.value("!!(document.querySelector('.welcome') && document.querySelector('.picture'))"):
         found.append("the empty page shows nothing of what will come")
     drop(browser, logs)
     wait(browser, "document.querySelector('#flights [role=status]')", 10, "flights that are being read are counted")

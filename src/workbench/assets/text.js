@@ -120,10 +120,16 @@ async function shape(id, figure, step) {
   const key = `${id} ${step.story ? "fit" : "estimate"} ${bench.state.revision}`;
   try {
     if (!curves.has(key)) curves.set(key, await get(`/api/curve/${id}`));
-    const found = curves.get(key);
-    if (!found || !figure.isConnected) return;
+    if (!figure.isConnected) return;
+    // a fit that refuses the effect has no curve of it: that of the estimate stays
+    const refused = step.story && !curves.get(key);
+    const found = refused ? [...curves].findLast(([k, c]) => c && k.startsWith(`${id} estimate `))?.[1] : curves.get(key);
+    const way = refused ? "equation error; the fit by output error refuses it" : step.story ? "output error" : "equation error";
     const plot = el("div", { class: "plot", "data-shape": id });
-    figure.replaceChildren(el("figcaption", {}, el("b", {}, `${found.channel} (${found.unit}) over ${found.variable}, by ${step.story ? "output error" : "equation error"}`)), plot);
+    if (!found && !refused) return;
+    figure.replaceChildren(el("figcaption", {}, el("b", {}, found ? `${found.channel} (${found.unit}) over ${found.variable}, by ${way}` : "The fit by output error refuses it")));
+    if (!found) return;
+    figure.append(plot);
     curve(plot, found);
   } catch (error) { complain(error.message); }
 }
