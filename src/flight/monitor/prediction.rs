@@ -87,7 +87,7 @@ impl Predictor {
         let incidence = frame.incidence_sd.map(|sd| sd.min(INCIDENCE_STEP));
         let steps = Deviations { incidence, air_rotation: self.air_rotation };
         let mut in_steps = [1.0; CHANGES.len()];
-        (0..2).for_each(|k| in_steps[k] = frame.incidence_sd[k] / incidence[k]);
+        (0..2).for_each(|k| in_steps[k] = (frame.incidence_sd[k] / INCIDENCE_STEP).max(1.0));
         for (change, in_steps) in CHANGES.iter().zip(in_steps) {
             let mut changed = asked;
             change(&mut changed, &steps);

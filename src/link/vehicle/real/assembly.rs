@@ -224,7 +224,7 @@ impl Assembly {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),
         }
-        let incidence = [next.state.alpha, next.state.beta];
+        let incidence = estimated.unwrap_or([f64::NAN; 2]);
         let Measured { attitude, airspeed, velocity, .. } = measured;
         self.gusts.update(attitude, incidence, airspeed, velocity, step);
         let gust = self.gusts.incidence(airspeed);

@@ -16,7 +16,7 @@ const LENGTH_M: f64 = 533.0;
 /// Factor of the gusts in the deviation of the flow angles: a gust lasts for half a minute, so that it is not averaged and the
 /// largest of a flight counts, 3.5 standard deviations where independent errors count two.
 const LASTING: f64 = 1.75;
-/// Airspeed at least by which a gust is divided, m/s.
+/// Lowest airspeed at which gusts are estimated, and by which one is divided, m/s.
 const SLOWEST_MPS: f64 = 3.0;
 /// Longest gap between two velocities, s.
 const GAP_S: f64 = 1.0;
@@ -42,7 +42,7 @@ impl Default for Gusts {
 
 impl Gusts {
     /// Takes a state `step` seconds after the last one: roll, pitch and yaw, α and β (rad), the true airspeed (m/s), and
-    /// the velocity over ground (NED, m/s), NaN where none has come with it.
+    /// the velocity over ground (NED, m/s), NaN where none has come with it. Below flying speed it begins anew.
     pub fn update(
         &mut self,
         attitude: [f64; 3],
@@ -51,6 +51,10 @@ impl Gusts {
         velocity: [f64; 3],
         step: f64,
     ) {
+        if airspeed < SLOWEST_MPS {
+            *self = Gusts::default();
+            return;
+        }
         self.since += step.max(0.0);
         if !velocity.iter().chain(&attitude).chain(&incidence).all(|x| x.is_finite()) {
             return;
@@ -134,6 +138,16 @@ mod tests {
         let rough: Vec<f64> = (0..20).map(|seed| found(3.0, seed)).collect();
         let mean = rough.iter().sum::<f64>() / 20.0;
         assert!((2.0..4.0).contains(&mean), "{mean} {rough:?}");
+    }
+
+    #[test]
+    fn standing_on_the_ground_leaves_nothing_behind() {
+        let mut gusts = Gusts::default();
+        (0..1000).for_each(|_| gusts.update([0.0; 3], [0.0; 2], 0.0, [0.0; 3], 0.1));
+        gusts.update([0.0; 3], [0.0; 2], 20.0, [20.0, 0.0, 0.0], 0.1);
+        gusts.update([0.0; 3], [0.0; 2], 20.0, [20.0, 0.0, 0.0], 0.1);
+        let deviation = gusts.deviation();
+        assert!((1.0..=SUPPOSED_MPS).contains(&deviation), "{deviation}");
     }
 
     #[test]
