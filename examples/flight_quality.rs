@@ -16,15 +16,17 @@
 //! | `every=N` `steps=N` | how much is flown; 0 leaves it out |
 //! | `turbulence=N` | MIL-spec severity: 3 light, 4 moderate |
 //! | `delay=N` | commands arrive N ticks of 10 ms late |
+//! | `trace=FILE` | appends every tick: controller, time, target, roll, pitch, p, q, r (°, °/s), airspeed, α, load factor, commands |
 //! | `seed=N` | seed of the steps and of the air |
 
 use std::collections::VecDeque;
+use std::io::Write;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use greylag::control::envelope::Guarded;
-use greylag::control::ilqr::{Ilqr, Settings, Start};
+use greylag::control::ilqr::{Ilqr, Settings, Start, Towards};
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::Agent;
 use greylag::control::{Controller, ControllerKind, Observation, Source, Target, build};
@@ -52,6 +54,7 @@ struct Options {
     turbulence: u8,
     delay: usize,
     seed: u32,
+    trace: Option<PathBuf>,
     names: Vec<String>,
 }
 
@@ -65,6 +68,7 @@ fn options() -> Result<Options> {
         turbulence: 0,
         delay: 0,
         seed: 1,
+        trace: None,
         names: Vec::new(),
     };
     for word in std::env::args().skip(1) {
@@ -76,6 +80,7 @@ fn options() -> Result<Options> {
             Some(("steps", x)) => o.steps = x.parse()?,
             Some(("turbulence", x)) => o.turbulence = x.parse()?,
             Some(("delay", x)) => o.delay = x.parse()?,
+            Some(("trace", x)) => o.trace = Some(x.into()),
             Some(("seed", x)) => o.seed = x.parse()?,
             Some((key, _)) if !key.contains(':') => bail!("there is no {key}"),
             _ => o.names.push(word),
@@ -190,7 +195,35 @@ struct Flown {
     measures: Vec<Measures>,
 }
 
+/// Appends a tick to the file of `trace=`.
+fn note(o: &Options, name: &str, tick: usize, target: &Target, world: &World) -> Result<()> {
+    let Some(path) = &o.trace else { return Ok(()) };
+    let mut file = std::fs::OpenOptions::new().create(true).append(true).open(path)?;
+    let t = &world.truth;
+    let c = world.previous[0];
+    writeln!(
+        file,
+        "{name},{:.2},{:.2},{:.2},{:.2},{:.2},{:.1},{:.1},{:.1},{:.2},{:.2},{:.2},{:.3},{:.3},{:.3}",
+        tick as f64 * STEP,
+        target.roll.to_degrees(),
+        target.pitch.to_degrees(),
+        t.roll_rad.to_degrees(),
+        t.pitch_rad.to_degrees(),
+        t.p_radps.to_degrees(),
+        t.q_radps.to_degrees(),
+        t.r_radps.to_degrees(),
+        t.airspeed_mps,
+        t.alpha_rad.to_degrees(),
+        -t.specific_force_mps2[2] / G,
+        c.aileron,
+        c.elevator,
+        c.throttle,
+    )?;
+    Ok(())
+}
+
 fn leg(
+    o: &Options,
     world: &mut World,
     controller: &mut dyn Controller,
     target: &Target,
@@ -226,6 +259,9 @@ fn leg(
         if world.step(command).is_err() || !world.truth.roll_rad.is_finite() {
             m.lost = true;
             break;
+        }
+        if let Err(why) = note(o, controller.name(), tick, target, world) {
+            eprintln!("trace: {why}");
         }
         let t = &world.truth;
         let e = error(t);
@@ -284,7 +320,7 @@ fn fly(
                 Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: start };
             world.reset(o.seed + number as u32)?;
             controller.reset(number as u64);
-            let m = leg(&mut world, controller, &target, FLIGHT, &mut times);
+            let m = leg(o, &mut world, controller, &target, FLIGHT, &mut times);
             match all.iter_mut().find(|f| f.group == group) {
                 Some(f) => f.measures.push(m),
                 None => all.push(Flown { group, measures: vec![m] }),
@@ -306,7 +342,7 @@ fn fly(
             let pitch = rng.random_range(e.pitch_min_deg..e.pitch_max_deg);
             let target =
                 Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: cruise };
-            flown.measures.push(leg(&mut world, controller, &target, SHORT, &mut times));
+            flown.measures.push(leg(o, &mut world, controller, &target, SHORT, &mut times));
         }
         all.push(flown);
     }
@@ -327,6 +363,9 @@ fn print(name: &str, airframe: &Airframe, all: &[Flown], times: &[f64]) {
     for Flown { group, measures } in all {
         let of =
             |f: &dyn Fn(&Measures) -> f64, q: f64| quantile(measures.iter().map(f).collect(), q);
+        // the ranks between which the median of such a sample lies in 95 % (binomial, normal approximation)
+        let half = 0.98 / (measures.len() as f64).sqrt();
+        let interval = [0.5 - half, 0.5 + half].map(|q| of(&|m| m.iae, q.clamp(0.0, 1.0)));
         let over = |axis: usize| of(&|m| m.overshoot[axis], 0.95);
         let fits = |m: &Measures| (0..2).all(|a| m.overshoot[a] <= (0.03 * m.step[a]).max(1.0));
         let fit = measures.iter().filter(|m| fits(m)).count() as f64 / measures.len() as f64;
@@ -335,12 +374,14 @@ fn print(name: &str, airframe: &Airframe, all: &[Flown], times: &[f64]) {
             .filter(|m| m.load[1] > 1.05 * most || m.load[0] < -0.4 * 1.05 * most)
             .count();
         println!(
-            "{name:<34} {group:<8} {:>4} {:>7.3} {:>7.3} {:>5.2} {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>4.0}% {:>6.2} {:>6.2} {:>5.2} {:>6.2} {:>6.2} {:>6} {:>6.1} {:>6.1} {:>5.1} {:>5.1} {:>5} {:>6.3} {:>6.3}",
+            "{name:<34} {group:<8} {:>4} {:>7.3} {:>7.3} {:>5.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>4.0}% {:>6.2} {:>6.2} {:>5.2} {:>6.2} {:>6.2} {:>6} {:>6.1} {:>6.1} {:>5.1} {:>5.1} {:>5} {:>6.3} {:>6.3}",
             measures.len(),
             of(&|m| m.settled, 0.5),
             of(&|m| m.settled, 1.0),
             of(&|m| m.to_one, 0.5),
             of(&|m| m.iae, 0.5),
+            interval[0],
+            interval[1],
             measures.iter().map(|m| m.iae).sum::<f64>() / measures.len() as f64,
             over(0),
             over(1),
@@ -367,7 +408,7 @@ fn main() -> Result<()> {
     let model = GreyBox::load(&o.model)?;
     let agent = Agent::load(&o.policy, &model.airframe).ok();
     println!(
-        "{:<34} {:<8} {:>4} {:>7} {:>7} {:>5} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6}",
+        "{:<34} {:<8} {:>4} {:>7} {:>7} {:>5} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6}",
         "controller",
         "group",
         "n",
@@ -375,6 +416,8 @@ fn main() -> Result<()> {
         "worst",
         "to1",
         "IAE",
+        "from",
+        "to",
         "mean",
         "ovR95",
         "ovP95",
@@ -435,6 +478,7 @@ fn settings(changes: &str) -> Result<Settings> {
             ("iterations", _) => s.iterations = value.parse()?,
             ("start", _) => s.start = if value == "policy" { Start::Policy } else { Start::Own },
             ("envelope", _) => s.envelope = None,
+            ("direct", _) => s.towards = Towards::Target,
             ("part", Some(e)) => e.part = number()?,
             ("load", Some(e)) => e.load = number()?,
             ("alpha", Some(e)) => e.alpha = number()?,

@@ -71,8 +71,8 @@ fn the_load_factor_is_kept() {
         // 5 % for transients; the wing stalls at 12.3°
         assert!(load[0] >= 1.05 * least && load[1] <= 1.05 * most, "{kind}: {load:?}");
         assert!(alpha < 12.3, "{kind}: {alpha}");
+        assert!(error < 0.5, "{kind}: {error}");
         if kind == ControllerKind::Lqi {
-            assert!(error < 0.5, "{error}");
             let (load, ..) = extremes(bare.as_mut());
             assert!(load[1] > 1.5 * most, "the limiter has nothing to do: {load:?}");
         }
@@ -132,14 +132,9 @@ fn the_pilot_keeps_to_it_by_default() {
     for kind in [ControllerKind::Lqi, ControllerKind::HybridIlqr] {
         let companion = companion_with(kind, &model, Path::new(POLICY)).unwrap();
         let (load, alpha, errors) = piloted(companion, &model);
-        // planners pass it by more than the LQI (SAFETY.md)
-        let transient = if kind == ControllerKind::Lqi { 1.05 } else { 1.1 };
-        assert!(load[0] >= transient * least && load[1] <= transient * most, "{kind}: {load:?}");
+        assert!(load[0] >= 1.05 * least && load[1] <= 1.05 * most, "{kind}: {load:?}");
         assert!(alpha < 12.3, "{kind}: {alpha}");
-        // a plan of half a second does not see that a steep bank leaves no load factor to raise the nose with
-        if kind == ControllerKind::Lqi {
-            assert!(errors.iter().all(|e| *e < 0.5), "{errors:?}");
-        }
+        assert!(errors.iter().all(|e| *e < 0.5), "{kind}: {errors:?}");
     }
 }
 
@@ -184,4 +179,41 @@ fn a_limited_lqi_does_not_wind_up() {
     assert!(worst(&kept) < worst(&bare) + 0.1, "{} {}", worst(&kept), worst(&bare));
     let passed = |q: &Quality| q.load_factor[1] > 2.31;
     assert!(bare.iter().any(|f| passed(&f.quality)), "the limiter has nothing to do");
+}
+
+/// The planner that flies by default keeps to the envelope, overshoots in fewer steps than the LQI, and is at the target sooner
+/// in the mean.
+#[test]
+fn the_default_planner_is_better_than_the_lqi() {
+    let planned = stepped(ControllerKind::HybridIlqr, 40, false);
+    let lqi = stepped(ControllerKind::Lqi, 40, false);
+    all_kept(&planned);
+    let little =
+        |flights: &[Scored]| flights.iter().filter(|f| f.quality.overshoots_little()).count();
+    assert!(little(&planned) >= little(&lqi).max(34), "{} {}", little(&planned), little(&lqi));
+    let mean = |flights: &[Scored]| {
+        flights.iter().map(|f| f.quality.error_integral_deg_s).sum::<f64>() / flights.len() as f64
+    };
+    assert!(mean(&planned) < mean(&lqi), "{} {}", mean(&planned), mean(&lqi));
+}
+
+/// A model that is wrong now and then does not fly in between: on a prior with wrong moments the planner leaves the flight to
+/// the LQI. Before it waited after a wrong prediction it lost 4 of 20 steps.
+#[test]
+fn a_wrong_model_is_not_planned_with() {
+    let model = model("prior-mild.toml");
+    let fly = |kind| {
+        let source = Source { model: &model, agent: None, changes: &[] };
+        let built = build(kind, source).unwrap();
+        let make =
+            || -> Box<dyn Controller> { Box::new(Guarded::new(built.boxed_clone(), &model)) };
+        let courses = steps(23, 20, &model.airframe);
+        let outcomes =
+            evaluate_courses(&PlantOptions::default(), &make, &courses, 23, &|| ()).unwrap();
+        let limits = Limits::of(&model.airframe);
+        Evaluation::measured(["", ""], &courses, &outcomes, &limits).flights
+    };
+    let worst = |flights: &[Scored]| flights.iter().map(|f| f.settled_deg).fold(0.0, f64::max);
+    let (planned, lqi) = (fly(ControllerKind::HybridIlqr), fly(ControllerKind::Lqi));
+    assert!(worst(&planned) < worst(&lqi) + 0.1, "{} {}", worst(&planned), worst(&lqi));
 }

@@ -38,7 +38,7 @@ use crate::physics::airframe::ActuatorFigures;
 /// The model that is flown where no other is named: learned from flights, from an imperfect prior.
 pub const MODEL: &str = "params/x8/learned/model.toml";
 /// The controller that flies where no other is named.
-pub const CONTROLLER: &str = "lqi";
+pub const CONTROLLER: &str = "hybrid-ilqr";
 
 /// The arguments of `greylag fly`.
 #[derive(Args, Debug)]

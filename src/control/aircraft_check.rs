@@ -154,6 +154,14 @@ fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Level> {
     Some(Level { airspeed, alpha, elevator, throttle, path: trim.path() })
 }
 
+/// Steady roll rate with full aileron in level flight at the cruise airspeed, rad/s; `None` without level flight there.
+pub(crate) fn roll_rate(model: &GreyBox) -> Option<f64> {
+    let altitude = model.airframe.reference.altitude;
+    let trim = Trim::level(model, model.airframe.envelope.airspeed_cruise_mps, altitude).ok()?;
+    let rate = authority(model, &trim, altitude).roll_rate;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
 fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
     let linear = rates(model, trim, altitude);
     let figures = &model.airframe.actuators;

@@ -6,10 +6,12 @@
 //! LQI. The disturbance estimate is part of the prediction, so that there is no steady-state error.
 
 mod cost;
+mod course;
 mod problem;
 mod settings;
 mod solve;
 
+use crate::aircraft_check::roll_rate;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::envelope::Bounds;
 use crate::insight::{Insight, Path};
@@ -21,12 +23,17 @@ use greylag_num::dense::Units;
 use greylag_physics::Command;
 use std::sync::Arc;
 
+use course::{Approach, Course};
 use problem::{Problem, Trajectory};
-pub use settings::{Barrier, Settings, Start};
+pub use settings::{Barrier, Settings, Start, Towards};
 use solve::Solver;
 
 /// Horizon in steps of 10 ms.
 const STEPS: usize = 50;
+
+/// Ticks for which the LQI flies after a prediction that was wrong: longer than the mean that judges the model, so that a model
+/// that is wrong now and then does not fly in between.
+const WAIT: usize = 500;
 
 /// Aileron and elevator commands as fractions of the largest deflection.
 type Surfaces = [f64; 2];
@@ -43,6 +50,10 @@ pub struct Ilqr {
     lqi: Lqi,
     ahead: Ahead,
     disturbance: Disturbance,
+    approach: Option<Approach>,
+    course: Course,
+    /// Ticks for which the LQI still flies.
+    waiting: usize,
     desk: Desk,
 }
 
@@ -71,6 +82,11 @@ impl Ilqr {
             lqi,
             ahead: Ahead::new(STEPS, &model.airframe),
             disturbance: Disturbance::new(TIME_CONSTANT_S),
+            approach: roll_rate(model)
+                .filter(|_| settings.towards == Towards::Path)
+                .map(|full| Approach::of(model, full)),
+            course: Course::new(),
+            waiting: 0,
             desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
         }
     }
@@ -149,6 +165,8 @@ impl Controller for Ilqr {
         self.lqi.reset(seed);
         self.disturbance = Disturbance::new(TIME_CONSTANT_S);
         self.desk.plan = None;
+        self.course.reset();
+        self.waiting = 0;
     }
 
     fn overruled(&mut self, by: &Overruled) {
@@ -175,13 +193,27 @@ impl Controller for Ilqr {
         let alone = self.lqi.command(seen, target);
         // a model whose predictions are wrong must not be planned with
         if self.disturbance.is_wrong(TRUST) {
+            self.waiting = WAIT;
+        }
+        if self.waiting > 0 {
+            self.waiting -= 1;
             self.desk.plan = None;
+            self.course.reset();
             return alone;
+        }
+        let goal = self.lqi.goal(seen, target);
+        match (&self.approach, &self.bounds) {
+            (Some(approach), Some(bounds)) => {
+                self.course.towards(&seen.state, goal.attitude, bounds.load, approach);
+            }
+            _ => self.course.stay(goal.attitude),
         }
         let problem = Problem {
             model: &self.model,
             seen,
-            goal: self.lqi.goal(seen, target),
+            goal,
+            course: &self.course,
+            approach: self.approach.as_ref(),
             throttle: alone.throttle,
             rudder: alone.rudder,
             memory: self.disturbance.memory(),

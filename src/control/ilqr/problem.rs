@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::cost::{Cost, attitude, beyond, square};
+use super::course::{Approach, Course};
 use super::settings::Settings;
 use super::{STEPS, Surfaces};
 use crate::envelope::{Bounds, load_factor, load_factor_slopes};
@@ -39,6 +40,10 @@ pub(super) struct Problem<'a> {
     pub model: &'a GreyBox,
     pub seen: &'a Observation,
     pub goal: Goal,
+    /// Attitude to follow over the plan.
+    pub course: &'a Course,
+    /// How it approaches the target; `None` where it is the target.
+    pub approach: Option<&'a Approach>,
     /// Constant throttle over the plan, 0..1.
     pub throttle: f64,
     /// Constant rudder command over the plan, from the LQI.
@@ -201,17 +206,22 @@ impl Problem<'_> {
             let size = self.settings.moves;
             cost += 0.5 * (moved[0] * moved[0] + moved[1] * moved[1]) / (size * size);
             let last = step + 1 == STEPS;
-            cost += self.stage(&flight.state) * if last { self.settings.last } else { 1.0 };
+            cost +=
+                self.stage(&flight.state, step + 1) * if last { self.settings.last } else { 1.0 };
             cost += self.load(&from, &flight.state).value;
         }
         (plan, cost)
     }
 
     /// Cost of each state component with its index in the state.
-    fn costs(&self, s: &State) -> [(usize, Cost); 7] {
-        let [p, q, r, _, beta] = self.goal.steady;
+    fn costs(&self, s: &State, step: usize) -> [(usize, Cost); 7] {
+        let [mut p, mut q, mut r, _, beta] = self.goal.steady;
+        let point = self.course.at(step);
+        if self.approach.is_some() {
+            [p, q, r] = point.body_rates(self.seen.state.airspeed);
+        }
         let tau = std::f64::consts::TAU;
-        let turn = (s.roll - self.goal.attitude[0] + tau / 2.0).rem_euclid(tau) - tau / 2.0;
+        let turn = (s.roll - point.attitude[0] + tau / 2.0).rem_euclid(tau) - tau / 2.0;
         let of = self.settings;
         let incidence = match (&self.bounds, &of.envelope) {
             (Some(bounds), Some(barrier)) => beyond(s.alpha, bounds.alpha, barrier.alpha),
@@ -222,8 +232,8 @@ impl Problem<'_> {
             sideslip += beyond(s.beta, [-bounds.sideslip, bounds.sideslip], barrier.sideslip);
         }
         [
-            (0, attitude(turn, of.attitude, of.far)),
-            (1, attitude(s.pitch - self.goal.attitude[1], of.attitude, of.far)),
+            (0, attitude(turn, self.approach.map_or(of.attitude, |a| a.roll), of.far)),
+            (1, attitude(s.pitch - point.attitude[1], of.attitude, of.far)),
             (3, square(s.p - p, of.rate)),
             (4, square(s.q - q, of.rate)),
             (5, square(s.r - r, of.rate)),
@@ -232,8 +242,8 @@ impl Problem<'_> {
         ]
     }
 
-    fn stage(&self, state: &State) -> f64 {
-        self.costs(state).iter().map(|(_, cost)| cost.value).sum()
+    fn stage(&self, state: &State, step: usize) -> f64 {
+        self.costs(state, step).iter().map(|(_, cost)| cost.value).sum()
     }
 
     /// Cost of the load factor between two states.
@@ -272,7 +282,7 @@ impl Problem<'_> {
     pub fn stage_terms(&self, trajectory: &Trajectory, step: usize) -> (Vector, Vector) {
         let (mut slope, mut curvature) = (Vector::zeros(), Vector::zeros());
         let weight = if step == STEPS { self.settings.last } else { 1.0 };
-        for (at, cost) in self.costs(&trajectory.states[step]) {
+        for (at, cost) in self.costs(&trajectory.states[step], step) {
             slope[at] += weight * cost.slope;
             curvature[at] += weight * cost.curvature;
         }

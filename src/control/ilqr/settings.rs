@@ -17,6 +17,8 @@ pub struct Settings {
     pub last: f64,
     /// Soft limits on load factor, incidence and sideslip; `None` leaves them out.
     pub envelope: Option<Barrier>,
+    /// What the plan follows.
+    pub towards: Towards,
     /// Iterations per tick.
     pub iterations: usize,
     /// Starting points other than the last plan and the LQI's.
@@ -45,6 +47,15 @@ pub enum Start {
     Policy,
 }
 
+/// What the plan follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Towards {
+    /// The target itself, at once.
+    Target,
+    /// A path to the target within the rates and the load factor that the aircraft can fly.
+    Path,
+}
+
 impl Settings {
     /// Settings of `ilqr`. Of a few variants on every seventh target they settle as fast as any and are the steadiest
     /// in moderate turbulence.
@@ -56,13 +67,16 @@ impl Settings {
         moves: 0.3,
         last: 20.0,
         envelope: None,
+        towards: Towards::Target,
         iterations: 1,
         start: Start::Own,
     };
     /// Settings of the controller `hybrid-ilqr`.
     pub const HYBRID: Settings = Settings {
+        moves: 0.15,
         far: Some(0.15),
         envelope: Some(Barrier { part: 0.94, load: 0.05, alpha: 0.01, sideslip: 0.05 }),
+        towards: Towards::Path,
         start: Start::Policy,
         ..Settings::PLAIN
     };

@@ -1,0 +1,326 @@
+//! The attitude that a plan follows: a path to the target that the aircraft can fly.
+//!
+//! Each axis is driven by a cascade of limited rate and acceleration, as a flight controller drives its rate loops from its
+//! attitude loops. Pitch is limited by the load factor n: in coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid
+//! body's force equations with V and α constant. The path goes on from tick to tick, and waits for an aircraft that falls behind.
+
+use super::STEPS;
+use crate::envelope::G0;
+use greylag_model::{GreyBox, STEP};
+use greylag_physics::State;
+use std::f64::consts::TAU;
+
+/// Bank (rad) beyond which body rates of the path are no longer derived from its turn.
+const STEEP: f64 = 1.4;
+/// Largest roll and pitch rates, rad/s: 70 and 60 °/s, the defaults of PX4's FW_R_RMAX and FW_P_RMAX_POS.
+const MOST: [f64; 2] = [1.22, 1.05];
+/// How far the path may be ahead of the aircraft, rad.
+const AHEAD: f64 = 0.02;
+/// Banks on the way that are tried, as fractions of the target's, and for how many ticks.
+const PARTS: [f64; 3] = [0.0, 0.35, 0.7];
+const TICKS: [usize; 6] = [30, 60, 100, 150, 210, 300];
+/// Ticks of a trial and of its steps.
+const TRIAL: usize = 600;
+const COARSE: usize = 5;
+/// Part of the cost of the bank on the way that is flown, below which another takes its place.
+const BETTER: f64 = 0.97;
+/// Bank and pitch-up (rad) from which a bank on the way is considered.
+const STEEP_ENOUGH: f64 = 0.5;
+const UP_ENOUGH: f64 = 0.1;
+/// Part of the acceleration that is planned for slowing down.
+const BRAKING: f64 = 0.7;
+
+/// How fast a path approaches its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Approach {
+    /// Rate per error close to the target, 1/s.
+    gain: f64,
+    /// Largest roll and pitch rates, rad/s.
+    rates: [f64; 2],
+    /// Largest roll and pitch accelerations, rad/s².
+    accelerations: [f64; 2],
+    /// Part of the roll rate that is left where a steep bank takes all of the load factor.
+    steep: f64,
+    /// Scale of the roll error to the path, rad.
+    pub roll: f64,
+}
+
+impl Approach {
+    /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder adverse yaw goes into
+    /// pitch, which the load factor may not be left to correct: it rolls slowly, and the roll yields before the pitch does.
+    pub fn of(model: &GreyBox, full: f64) -> Approach {
+        if model.has_rudder() {
+            let rates = [full, MOST[1]];
+            Approach {
+                gain: 6.0,
+                rates,
+                accelerations: rates.map(|r| 6.0 * r),
+                steep: 1.0,
+                roll: 0.05,
+            }
+        } else {
+            let rates = [(0.4 * full).min(MOST[0]), MOST[1]];
+            let accelerations = [4.0 * rates[0], 6.0 * rates[1]];
+            Approach { gain: 3.0, rates, accelerations, steep: 0.7, roll: 0.1 }
+        }
+    }
+
+    /// Angle and rate of an axis `span` seconds later, on the way to an angle that is `error` away.
+    fn step(
+        &self,
+        axis: usize,
+        at: [f64; 2],
+        error: f64,
+        [least, most]: [f64; 2],
+        span: f64,
+    ) -> [f64; 2] {
+        let [angle, rate] = at;
+        let acceleration = self.accelerations[axis];
+        let braking = (2.0 * BRAKING * acceleration * error.abs()).sqrt();
+        let wanted = error.signum() * (self.gain * error.abs()).min(braking);
+        // the limits may exclude zero: a bank that the load factor cannot hold
+        let wanted = wanted.max(least).min(most);
+        // four times the outer loop's gain: critically damped
+        let change = (wanted - rate) * (4.0 * self.gain);
+        let rate = rate + change.clamp(-acceleration, acceleration) * span;
+        [angle + rate * span, rate]
+    }
+}
+
+/// A point of the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    /// Roll and pitch, rad.
+    pub attitude: [f64; 2],
+    /// Their rates, rad/s.
+    rates: [f64; 2],
+}
+
+impl Point {
+    /// The measured attitude with its rates.
+    fn of(s: &State) -> Point {
+        let (sin, cos) = s.roll.sin_cos();
+        let turn = s.q * sin + s.r * cos;
+        let rates = [s.p + s.pitch.tan() * turn, s.q * cos - s.r * sin];
+        Point { attitude: [s.roll, s.pitch], rates }
+    }
+
+    /// Roll, pitch and yaw rates of the body in a coordinated turn along the path, rad/s.
+    pub fn body_rates(&self, airspeed: f64) -> [f64; 3] {
+        let [roll, pitch] = self.attitude;
+        let (sin, cos) = roll.clamp(-STEEP, STEEP).sin_cos();
+        let r = G0 / airspeed * pitch.cos() * sin;
+        let q = (self.rates[1] + r * sin) / cos;
+        [self.rates[0] - pitch.tan() * (q * sin + r * cos), q, r]
+    }
+}
+
+/// A bank on the way: where the target's bank takes the load factor that pitching up needs, it comes later.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct First {
+    /// The bank as a fraction of the target's.
+    part: f64,
+    /// Ticks for which it is flown.
+    ticks: usize,
+}
+
+impl First {
+    const NONE: First = First { part: 1.0, ticks: 0 };
+
+    /// The same a tick later.
+    fn later(self) -> First {
+        First { ticks: self.ticks.saturating_sub(1), ..self }
+    }
+
+    /// The bank to go to after `tick` ticks.
+    fn bank(self, tick: usize, target: f64) -> f64 {
+        if tick < self.ticks { self.part * target } else { target }
+    }
+}
+
+/// What a path is made for.
+struct Task<'a> {
+    /// g / V, 1/s.
+    turn: f64,
+    /// Roll and pitch, rad.
+    target: [f64; 2],
+    load: [f64; 2],
+    approach: &'a Approach,
+}
+
+impl Task<'_> {
+    /// The point `span` seconds later on the way to `bank` and the target's pitch.
+    fn step(&self, from: &Point, bank: f64, span: f64) -> Point {
+        let Point { attitude: [roll, pitch], rates: [rolling, pitching] } = *from;
+        let approach = self.approach;
+        let spare = (self.load[1] * roll.cos() - pitch.cos()) / (self.load[1] - pitch.cos());
+        let fastest = approach.rates[0] * spare.clamp(approach.steep, 1.0);
+        let by_load = self.load.map(|n| self.turn * (n * roll.cos() - pitch.cos()));
+        let most = approach.rates[1];
+        let limits = [by_load[0].max(-most), by_load[1].min(most)];
+        let around = wrapped(bank - roll);
+        let roll = approach.step(0, [roll, rolling], around, [-fastest, fastest], span);
+        let up = self.target[1] - pitch;
+        let pitch = approach.step(1, [pitch, pitching], up, limits, span);
+        Point { attitude: [roll[0], pitch[0]], rates: [roll[1], pitch[1]] }
+    }
+
+    /// Integral of the absolute errors of roll and pitch with a bank on the way, rad s.
+    fn cost(&self, from: &Point, first: First) -> f64 {
+        let span = COARSE as f64 * STEP;
+        let mut now = *from;
+        let mut sum = 0.0;
+        for tick in (0..TRIAL).step_by(COARSE) {
+            now = self.step(&now, first.bank(tick, self.target[0]), span);
+            let [roll, pitch] = now.attitude;
+            sum += (wrapped(self.target[0] - roll).abs() + (self.target[1] - pitch).abs()) * span;
+        }
+        sum
+    }
+
+    /// The bank on the way with the least integral of the error. One that is being flown is left only for one that is
+    /// clearly better.
+    fn choose(&self, from: &Point, flown: First) -> First {
+        let [bank, pitch] = self.target;
+        if bank.abs() < STEEP_ENOUGH || pitch - from.attitude[1] < UP_ENOUGH {
+            return First::NONE;
+        }
+        let mut best = (flown, BETTER * self.cost(from, flown));
+        let held =
+            PARTS.iter().flat_map(|&part| TICKS.iter().map(move |&ticks| First { part, ticks }));
+        for first in held.chain([First::NONE]) {
+            let cost = self.cost(from, first);
+            if cost < best.1 {
+                best = (first, cost);
+            }
+        }
+        best.0
+    }
+}
+
+/// The path of a tick, which goes on in the next.
+#[derive(Clone, Debug)]
+pub(super) struct Course {
+    points: Vec<Point>,
+    next: Option<Point>,
+    first: First,
+}
+
+impl Course {
+    pub fn new() -> Course {
+        let point = Point { attitude: [0.0; 2], rates: [0.0; 2] };
+        Course { points: vec![point; STEPS + 1], next: None, first: First::NONE }
+    }
+
+    /// Begins anew at the aircraft's attitude.
+    pub fn reset(&mut self) {
+        self.next = None;
+        self.first = First::NONE;
+    }
+
+    /// The point after `step` steps.
+    pub fn at(&self, step: usize) -> &Point {
+        &self.points[step]
+    }
+
+    /// The target itself (roll and pitch, rad) in place of a path.
+    pub fn stay(&mut self, target: [f64; 2]) {
+        self.points.fill(Point { attitude: target, rates: [0.0; 2] });
+    }
+
+    /// The path from `seen` to `target` (roll and pitch, rad) within the load factors `load`.
+    pub fn towards(&mut self, seen: &State, target: [f64; 2], load: [f64; 2], approach: &Approach) {
+        let mut now = self.begin(seen);
+        let task = Task { turn: G0 / seen.airspeed.max(1.0), target, load, approach };
+        self.first = task.choose(&now, self.first.later());
+        for step in 0..=STEPS {
+            self.points[step] = now;
+            if step == 1 {
+                self.next = Some(now);
+            }
+            now = task.step(&now, self.first.bank(step, target[0]), STEP);
+        }
+    }
+
+    /// Where the path goes on: at most [`AHEAD`] from the aircraft in each axis.
+    fn begin(&self, seen: &State) -> Point {
+        let here = Point::of(seen);
+        let Some(mut now) = self.next else { return here };
+        for axis in 0..2 {
+            let off = wrapped(now.attitude[axis] - here.attitude[axis]);
+            if off.abs() > AHEAD {
+                now.attitude[axis] = here.attitude[axis] + off.clamp(-AHEAD, AHEAD);
+                now.rates[axis] = here.rates[axis];
+            }
+        }
+        now
+    }
+}
+
+/// The angle within half a turn, rad.
+fn wrapped(x: f64) -> f64 {
+    (x + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLOW: Approach = Approach {
+        gain: 3.0,
+        rates: [1.2, 1.05],
+        accelerations: [4.8, 6.3],
+        steep: 0.7,
+        roll: 0.1,
+    };
+
+    /// Follows a path exactly for `ticks`, with the point of each tick.
+    fn follow(target: [f64; 2], load: [f64; 2], ticks: usize) -> Vec<Point> {
+        let mut course = Course::new();
+        let mut state = State { airspeed: 20.0, ..State::NEUTRAL };
+        let mut out = Vec::new();
+        for _ in 0..ticks {
+            course.towards(&state, target, load, &SLOW);
+            let point = *course.at(1);
+            [state.roll, state.pitch] = point.attitude;
+            [state.p, state.q, state.r] = point.body_rates(state.airspeed);
+            out.push(point);
+        }
+        out
+    }
+
+    #[test]
+    fn a_path_arrives_without_overshoot_and_within_the_load_factor() {
+        for target in [[0.8, 0.3], [-0.9, -0.4], [0.2, 0.4]] {
+            let path = follow(target, [-0.8, 2.1], 800);
+            let last = path[799].attitude;
+            for axis in 0..2 {
+                assert!((last[axis] - target[axis]).abs() < 1e-3, "{target:?} {last:?}");
+                let beyond = path.iter().map(|p| p.attitude[axis] / target[axis]);
+                assert!(beyond.fold(0.0, f64::max) < 1.001, "{target:?}");
+            }
+            for point in &path {
+                let [roll, pitch] = point.attitude;
+                let n = (point.rates[1] * 20.0 / G0 + pitch.cos()) / roll.cos();
+                assert!((-1.0..2.3).contains(&n), "{target:?}: {n} at {point:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bank_that_the_load_factor_cannot_hold_lowers_the_nose() {
+        let path = follow([1.3, 0.0], [-0.8, 2.1], 300);
+        assert!(path[299].attitude[1] < -0.1, "{:?}", path[299]);
+    }
+
+    #[test]
+    fn a_path_waits_for_an_aircraft_that_does_not_move() {
+        let mut course = Course::new();
+        let still = State { airspeed: 20.0, ..State::NEUTRAL };
+        for _ in 0..100 {
+            course.towards(&still, [0.8, 0.3], [-0.8, 2.1], &SLOW);
+        }
+        let [roll, pitch] = course.at(0).attitude;
+        assert!(roll <= AHEAD && pitch <= AHEAD, "{roll} {pitch}");
+    }
+}
