@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use crate::Series;
-use crate::kit::html::{compact, escape};
+use crate::kit::html::compact;
+use crate::kit::xy::plotted;
 
 /// Lines over one horizontal quantity.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -41,11 +42,6 @@ pub struct Range {
 
 impl Curves {
     pub(crate) fn html(&self, index: usize) -> String {
-        let title = escape(&self.title);
-        format!(
-            "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
-             <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
-             aria-label=\"{title}\"></div></figure>\n"
-        )
+        plotted(&self.title, index)
     }
 }
