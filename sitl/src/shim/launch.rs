@@ -30,13 +30,13 @@ pub struct Launcher {
     at_once: Launch,
     step_s: f64,
     phase: Phase,
-    /// The state at the start, as JSBSim has it.
+    /// The start state in JSBSim.
     released: Truth,
     shown: Truth,
 }
 
 impl Launcher {
-    /// The aircraft on its stand, or in flight when launched at once.
+    /// The aircraft on its stand, or in flight if it is launched immediately.
     ///
     /// # Errors
     /// If the aircraft cannot be loaded or cannot be flown from `start`.

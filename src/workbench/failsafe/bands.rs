@@ -13,10 +13,10 @@ const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
 /// A decision older than this is no longer in force, s.
 const STALE_S: f64 = 0.2;
-/// A moment, such as a request, is drawn as long as this, s.
+/// Drawn length of an instantaneous event, such as a request, s.
 const MOMENT_S: f64 = 0.1;
 
-/// A state at a step: its name and kind; nothing where there is none.
+/// Name and kind of a state at a step; `None` without a state.
 type Seen = Option<(String, Tone)>;
 
 impl Flown {
