@@ -404,7 +404,7 @@ fn after_a_kill_the_controller_takes_over_and_a_restart_waits_to_be_asked() {
 }
 
 #[test]
-#[ignore = "a hundred kills, five minutes: cargo test … --test in_flight recording::hundred_kills_beside -- --ignored --nocapture"]
+#[ignore = "a hundred kills, five minutes: cargo test … --test in_flight hundred_kills_beside -- --ignored --nocapture"]
 fn after_a_hundred_kills_beside_a_controller_it_is_the_same() {
     kill(100, 6, 2);
 }

@@ -19,7 +19,7 @@ pub struct Curves {
     /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// The lines; one value for each horizontal one, what the scale has no height for is a gap.
+    /// The lines, with one value per abscissa. A value outside the domain of the scale leaves a gap.
     pub series: Vec<Series>,
     /// Shaded ranges around lines, such as the least and the most of several seeds.
     pub ranges: Vec<Range>,

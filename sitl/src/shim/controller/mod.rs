@@ -231,7 +231,7 @@ impl FlightController {
     /// Flies one step with the commands received so far.
     ///
     /// # Errors
-    /// If the plant cannot go on.
+    /// If the plant cannot be stepped.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         self.watch();
         self.commanded = self.command();
