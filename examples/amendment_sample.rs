@@ -1,6 +1,6 @@
 //! Writes the report of a made-up amendment: `cargo run --example amendment_sample -- OUT.html`.
 
-#[path = "../tests/report_amendment/mod.rs"]
+#[path = "../tests/report/report_amendment.rs"]
 mod report_amendment;
 
 use std::path::PathBuf;

@@ -1,6 +1,6 @@
 //! How long comparison or diagnosis of a ten-minute log takes, with the memory: `cargo run --release --example compare_speed`.
 
-#[path = "../tests/compare_support/mod.rs"]
+#[path = "../tests/support/compare.rs"]
 mod compare_support;
 
 use std::ops::ControlFlow;

@@ -1,6 +1,6 @@
 //! Writes the report of a made-up comparison: `cargo run --example comparison_sample -- OUT.html`.
 
-#[path = "../tests/report_comparison/mod.rs"]
+#[path = "../tests/report/report_comparison.rs"]
 mod synthetic;
 
 use std::path::PathBuf;

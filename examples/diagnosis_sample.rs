@@ -1,8 +1,8 @@
 //! Writes the report of a made-up diagnosis: `cargo run --example diagnosis_sample -- OUT.html`.
 
-#[path = "../tests/report_comparison/mod.rs"]
+#[path = "../tests/report/report_comparison.rs"]
 mod report_comparison;
-#[path = "../tests/report_diagnosis/mod.rs"]
+#[path = "../tests/report/report_diagnosis.rs"]
 mod report_diagnosis;
 
 use std::path::PathBuf;

@@ -6,9 +6,9 @@
 //! SHARE scales the number of inputs, 1 being 1.0e8; every target counts its own, and one that panics
 //! prints the seed of the batch: `-- SEED 0 TARGET` feeds that batch alone again.
 
-#[path = "../tests/fuzz_support/mod.rs"]
+#[path = "../tests/link/fuzz_support.rs"]
 mod fuzz_support;
-#[path = "../tests/link_support/mod.rs"]
+#[path = "../tests/link/link_support/mod.rs"]
 mod link_support;
 
 use std::process::ExitCode;

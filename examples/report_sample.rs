@@ -1,6 +1,6 @@
 //! Writes the report of a made-up flight: `cargo run --example report_sample -- OUT.html`.
 
-#[path = "../tests/report_synthetic/mod.rs"]
+#[path = "../tests/report/report_synthetic.rs"]
 mod synthetic;
 
 use std::path::PathBuf;

@@ -2,7 +2,7 @@
 //!
 //! It turns commanded roll and pitch into actuator outputs with a grey-box model of the
 //! aircraft. The modules below are declared in the order of their layers: each may use those
-//! above it, never those below (`tests/architecture.rs` holds them to it), so this list is the map. Each is a crate of its own, `greylag-num` to `greylag-workbench`.
+//! above it, never those below (`tests/house/architecture.rs` holds them to it), so this list is the map. Each is a crate of its own, `greylag-num` to `greylag-workbench`.
 //!
 //! ```text
 //! in flight   link ──► flight ──► link           flight ⇄ control ──► model ──► physics ──► num

@@ -22,7 +22,7 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch
 # what is built is run once: crates are compiled quickly rather than to be fast
 build=(--config 'profile.dev.package."*".opt-level=1' --ignore-rust-version --target "$triple" --no-default-features --features "${1-learn}")
 
-cargo test "${build[@]}" --test learn_gradient --test formula --test portable_numbers -- --nocapture
+cargo test "${build[@]}" --test learn --test physics -- --nocapture gradient:: formula:: portable_numbers::
 if [ -n "${LIBRARY:-}" ]; then
   # not the rooms that open sockets, logs or pages: nothing there is of one processor
   cargo test "${build[@]}" --lib -- num:: physics:: model:: control:: learn::

@@ -4,6 +4,7 @@
 //! target folder, which the first test to need it makes. Without Python or PyPI the tests say so
 //! and pass; with `GREYLAG_REQUIRE_CLIENTS=1` they fail instead.
 
+#[path = "support/real_time.rs"]
 mod real_time;
 
 use std::fs::{self, File};

@@ -1,5 +1,6 @@
 //! Hostile files: logs of all formats mutated by the thousand, their memory counted.
 
+#[path = "support/logs.rs"]
 mod logs_support;
 
 use std::alloc::{GlobalAlloc, Layout, System};

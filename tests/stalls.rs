@@ -6,7 +6,9 @@
 
 #![cfg(target_os = "linux")]
 
+#[path = "support/flight.rs"]
 mod flight_support;
+#[path = "support/real_time.rs"]
 mod real_time;
 
 use std::net::UdpSocket;

@@ -12,7 +12,7 @@
 mod alone;
 mod burn_side;
 mod clock;
-#[path = "../../tests/learn_support/in_burn.rs"]
+#[path = "../../tests/learn/learn_support/in_burn.rs"]
 mod in_burn;
 mod problem;
 mod processor;

@@ -5,7 +5,7 @@
 Needs jax and numpy alone (tried: 0.10.2 on a CPU, 0.11.2 on one GPU). Aircraft are drawn as `greylag aircraft draw`
 draws them, with random numbers of its own; the flight is the same rigid body with linear aerodynamics, second-order
 servos, a delay, a thrust lag. What the policy sees is written down twice: here and in src/control/any/mod.rs, and
-tests/any_aircraft.rs holds them together.
+tests/control/any_aircraft.rs holds them together.
 """
 
 import argparse

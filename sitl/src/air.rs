@@ -15,7 +15,7 @@ pub struct Air {
 ///
 /// Below 1000 ft the intensity is 0.1 of `wind_20ft_mps`; above 2000 ft it is read from the
 /// standard's table by `severity` alone; between them the two are blended linearly. An episode that
-/// starts at 600 m (1969 ft) therefore listens almost only to `severity`.
+/// starts at 600 m (1969 ft) therefore depends almost only on `severity`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turbulence {
     /// Wind speed 20 ft above ground, m/s, not negative: 7.6 light, 15 moderate, 23 severe.
@@ -46,7 +46,7 @@ impl Gust {
     }
 }
 
-/// Why an air cannot be flown in.
+/// Why the air is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AirError {
     /// A component of the wind is not a number JSBSim can use.
@@ -66,7 +66,7 @@ pub enum AirError {
         /// Severity as given; 1 to 7 are allowed.
         severity: u8,
     },
-    /// A gust without a shape.
+    /// A gust with an invalid shape.
     #[error(
         "gust {index}: start and hold must not be negative, rise and fall must be positive, the \
          velocity must be within ±{MAX_AIR_MPS} m/s and not zero"
@@ -75,7 +75,7 @@ pub enum AirError {
         /// Position in the list, from 0.
         index: usize,
     },
-    /// Two gusts at once, which JSBSim cannot blow.
+    /// Two gusts overlap, which JSBSim cannot simulate.
     #[error(
         "gusts overlap: one starts at {start_s} s before the one before it ends at {end_s} s; move it"
     )]
@@ -87,7 +87,7 @@ pub enum AirError {
     },
 }
 
-/// The fastest air taken for intended, m/s.
+/// Largest accepted air velocity, m/s.
 const MAX_AIR_MPS: f64 = 100.0;
 
 impl Air {

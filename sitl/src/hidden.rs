@@ -20,7 +20,7 @@ pub use effects::EFFECTS;
 pub struct Effect {
     /// Identifier in the catalogue of effects, stable between versions.
     pub id: &'static str,
-    /// What an amplitude a adds, with Q = ½ρV²S; δ are deflections in rad, δt the throttle position.
+    /// Contribution of an amplitude a, with Q = ½ρV²S; δ are deflections in rad, δt the throttle position.
     pub formula: &'static str,
     /// Unit of the amplitude; empty for a dimensionless one.
     pub unit: &'static str,

@@ -28,7 +28,7 @@ pub enum ParameterFileError {
         /// The line.
         text: String,
     },
-    /// Nothing in it is played.
+    /// No parameter in it is simulated.
     #[error(
         "{path} has no parameter that the {stack} personality plays; give the file of that stack",
         path = path.display()

@@ -37,7 +37,7 @@ pub enum PlantError {
     /// The aircraft could not be loaded.
     #[error(transparent)]
     Aircraft(#[from] AircraftError),
-    /// The air is not one that JSBSim can blow.
+    /// JSBSim cannot simulate this air.
     #[error(transparent)]
     Air(#[from] AirError),
     /// The aircraft has no property of that name.
@@ -67,12 +67,12 @@ pub enum PlantError {
     Travel {
         /// Name of the aircraft.
         aircraft: String,
-        /// The property that stays where it is.
+        /// The property that does not move.
         property: String,
     },
     /// Nothing steers the aircraft about an axis.
     #[error(
-        "no command of the aircraft '{aircraft}' {does} it: {tried}; it is none that ailerons and an elevator steer, or its own names must be \
+        "no command of the aircraft '{aircraft}' {does} it: {tried}; either ailerons and an elevator do not steer it, or its own names must be \
          given with --property (as KEY=NAME, KEY=-NAME*SCALE or KEY=NAME,-NAME)"
     )]
     Unmoved {
@@ -96,7 +96,7 @@ pub enum PlantError {
         /// Where it is read.
         place: String,
     },
-    /// The start of an episode is not one that can be flown from.
+    /// The aircraft cannot fly from this start.
     #[error(
         "cannot start at {0:?}: give finite angles and rates, an airspeed from 0.1 to 1000 m/s and an altitude from -400 to 80000 m"
     )]
@@ -240,7 +240,7 @@ impl Plant {
         self.truth
     }
 
-    /// The whole state, for [`Plant::restore`].
+    /// Saves the whole state for [`Plant::restore`].
     ///
     /// # Errors
     /// [`PlantError::Jsbsim`] when JSBSim cannot save its state.
@@ -250,7 +250,7 @@ impl Plant {
         Ok(Snapshot { fdm, truth: self.truth, steps: self.steps, next_gust: self.next_gust })
     }
 
-    /// Goes back to `snapshot`: what follows repeats to the bit.
+    /// Restores `snapshot`. The same inputs then repeat the same flight to the bit.
     ///
     /// # Errors
     /// [`PlantError::Jsbsim`] when the snapshot is of another aircraft.
@@ -262,7 +262,7 @@ impl Plant {
         Ok(())
     }
 
-    /// The seed of the turbulence from the next reset on.
+    /// Sets the seed of the turbulence, in force from the next reset.
     pub fn reseed(&mut self, seed: u32) {
         self.options.seed = seed;
     }

@@ -1,7 +1,8 @@
 //! How fast lockstep goes through the sockets with a companion that only echoes.
 
-#[path = "../../tests/real_time/mod.rs"]
+#[path = "../../tests/support/real_time.rs"]
 mod real_time;
+#[path = "support/shim_companion.rs"]
 mod shim_companion;
 
 use std::net::TcpListener;

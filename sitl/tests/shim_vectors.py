@@ -4,7 +4,7 @@
     python3 -m venv venv && venv/bin/pip install pymavlink==2.4.50
     venv/bin/python sitl/tests/shim_vectors.py > sitl/tests/shim_vectors.txt
 
-Every line is a name and a frame in hexadecimal. The values are repeated in shim_codec.rs.
+Every line is a name and a frame in hexadecimal. The values are repeated in shim/codec.rs.
 """
 
 import os

@@ -53,7 +53,7 @@ pub struct Finding {
     pub says: String,
     /// Result of the test.
     pub outcome: Outcome,
-    /// Values of both sides.
+    /// The values of both sides, as a sentence.
     pub because: String,
 }
 
@@ -89,7 +89,7 @@ pub fn summaries(file: &CampaignFile, records: &[Record]) -> Vec<Summary> {
 
 fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summary {
     let mut rows = Vec::new();
-    // a file that was read has no other choices
+    // the choices were checked when the file was read
     if let Ok((stage, fixed)) = file.choice(&table.stage) {
         let of_stage: Vec<&Record> = records.iter().filter(|r| r.has(&stage, &fixed)).collect();
         for metric in &table.metrics {
@@ -266,7 +266,7 @@ mod tests {
         [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
     }
 
-    /// Seeds differ by 10, the two sides by 1 in each: only pairs show it.
+    /// Seeds differ by 10 and the two sides by 1, so only the paired test can show the difference.
     #[test]
     fn cells_of_one_seed_are_compared_with_each_other() {
         let side = |more: f64| -> Vec<(Levels, f64)> {

@@ -1,4 +1,4 @@
-//! How a long command shows how far it is, and how Ctrl-C ends it.
+//! Progress of a long command, and its cancellation by Ctrl-C.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;

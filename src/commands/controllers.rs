@@ -72,10 +72,10 @@ fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Optio
     })
 }
 
-/// Refuses settings of a planner where none of `kinds` searches.
+/// Refuses planner settings if none of `kinds` is a planner.
 ///
 /// # Errors
-/// If there are `changes` that change nothing.
+/// If there are `changes` but no planner.
 pub fn check_changes(kinds: &[ControllerKind], changes: &[Change]) -> anyhow::Result<()> {
     if changes.is_empty() || kinds.iter().any(|kind| kind.searches()) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Logs that hold the same flight: counted twice, or judged by what was fitted.
+//! Refusal of logs that hold the same flight: it would be counted twice, or judged by its own fit.
 
 use std::path::{Path, PathBuf};
 

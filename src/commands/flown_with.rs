@@ -1,4 +1,4 @@
-//! What flew a recorded flight: written beside the recording, so that `replay` and `report` need no options.
+//! Model and controller of a recorded flight, written beside the recording so that `replay` and `report` need no options.
 
 use std::path::{Path, PathBuf};
 
@@ -69,7 +69,7 @@ pub struct Chosen<'a> {
     pub commanded: CommandName,
 }
 
-/// A file as it is found from any folder; one that the program carries keeps its name.
+/// Path that finds a file from any working directory; a file shipped with the program keeps its name.
 fn lasting(path: &Path) -> PathBuf {
     std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
@@ -127,7 +127,7 @@ impl FlownWith {
     /// The controller.
     ///
     /// # Errors
-    /// If this program has none of that name.
+    /// If this program has no controller of that name.
     pub fn kind(&self) -> Result<ControllerKind> {
         Ok(self.controller.parse()?)
     }

@@ -232,7 +232,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         punctual::print_timing(class);
     }
     if let Some(folder) = &flight.recording {
-        // the flight goes on: the recording is whole without it
+        // the flight continues: the recording is complete without it
         if let Err(why) = FlownWith::write(folder, &arguments.chosen(), &model) {
             eprintln!("greylag: `replay` will need this flight's options: {why:#}");
         }

@@ -10,7 +10,7 @@ use super::files::shipped;
 use crate::logs::Format;
 use crate::model::GreyBox;
 
-/// Bytes by which a file is known.
+/// Number of bytes at the start of a file that identify it.
 const HEAD: u64 = 4096;
 
 /// The model at `path`, or where the program ships it.

@@ -27,7 +27,7 @@ pub struct LogArguments {
     reading: Reading,
 }
 
-/// How logs are read.
+/// Options for reading logs.
 #[derive(Clone, clap::Args)]
 pub struct Reading {
     /// A TOML file that assigns fields of the logs to columns.

@@ -355,7 +355,7 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
     }
 }
 
-/// How the rate of a stream is raised.
+/// Remedy for a stream that is too slow.
 fn remedy(stack: Stack) -> &'static str {
     match stack {
         Stack::Px4 => "raise the port's data rate (MAV_1_RATE) or its baud rate",

@@ -4,19 +4,17 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use crate::logs::info::Info;
-use crate::logs::mapping::TEXT;
-use crate::logs::{Channel, Format};
 
-/// Columns whose unit a finding judges by the first of them.
+/// Columns that share a unit: a finding names only the first of each group.
 const ALIKE: [(&str, [&str; 2]); 2] =
     [("roll_rad", ["pitch_rad", "yaw_rad"]), ("p_radps", ["q_radps", "r_radps"])];
 
-/// The text of the mapping; `None` if no factor puts anything right.
+/// The text of the mapping; `None` if a factor corrects none of the findings.
 pub fn mapping(logs: &[Info]) -> Option<String> {
     let mut columns = BTreeMap::new();
     for log in logs {
         let cures = || log.findings.iter().filter_map(|f| f.cure.as_ref());
-        // with a wrong unit beside it a sign cannot be judged
+        // a sign can be judged only after the units are right
         let units = cures().any(|cure| cure.scale > 0.0);
         for cure in cures().filter(|cure| !units || cure.scale > 0.0) {
             let column = cure.column.as_str();
@@ -25,7 +23,7 @@ pub fn mapping(logs: &[Info]) -> Option<String> {
                 |c: &&&str| log.channels.iter().any(|own| own.columns.iter().any(|o| o == **c));
             let others = alike.into_iter().flat_map(|(_, others)| others.iter().filter(there));
             for column in std::iter::once(&column).chain(others) {
-                columns.insert((*column).to_owned(), (origin(log, column), cure.scale));
+                columns.insert((*column).to_owned(), (log.origin(column), cure.scale));
             }
         }
     }
@@ -34,13 +32,4 @@ pub fn mapping(logs: &[Info]) -> Option<String> {
         let _ = writeln!(text, "{column} = {{ from = {from:?}, scale = {scale:?} }}");
     }
     (!columns.is_empty()).then_some(text)
-}
-
-/// Field of the log that fills a column, in the syntax of a mapping.
-fn origin(log: &Info, column: &str) -> String {
-    let named = |c: &&Channel| c.columns.iter().any(|own| own == column);
-    match (log.format, log.channels.iter().find(named)) {
-        (Format::Csv, _) | (_, None) => format!("{TEXT}.{column}"),
-        (_, Some(channel)) => channel.origin.clone(),
-    }
 }

@@ -226,7 +226,7 @@ pub fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce)
         .init();
-    // what flies goes on without a reader
+    // a flight must continue when nobody reads its output
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
     }

@@ -75,7 +75,7 @@ impl Reporter<'_> {
 }
 
 impl Reporter<'_> {
-    /// How well the model predicts `flight`; a flight that cannot be compared is still reported.
+    /// Prediction errors of the model on `flight`; a flight that cannot be compared is still reported.
     fn compared(&self, flight: &Flight) -> Option<Comparison> {
         let options = flight_path::Options {
             gravity: self.model.atmosphere.gravity,

@@ -80,7 +80,7 @@ pub struct Again {
 }
 
 impl FlownArguments {
-    /// What flew the recording in `folder`: by the options, else as recorded.
+    /// Model and controller of the recording in `folder`, from the options or else from the recording.
     ///
     /// # Errors
     /// If a file cannot be used.

@@ -1,4 +1,4 @@
-//! What commands print: tables that fit a terminal, the answer in colour where it is one, the summary last.
+//! Output on a terminal: tables that fit it, the answer in colour, the summary last.
 
 use std::io::IsTerminal;
 

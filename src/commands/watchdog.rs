@@ -15,7 +15,7 @@ pub fn feed(rounds: Arc<AtomicU64>) {
         loop {
             let now = rounds.load(Ordering::Relaxed);
             if last != Some(now) {
-                // without systemd's socket nobody watches either
+                // without systemd's socket there is no watchdog
                 let _ = sd_notify::notify(&[NotifyState::Watchdog]);
             }
             last = Some(now);

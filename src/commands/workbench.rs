@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {
         let session = arguments.folder.display();
-        // whoever started it may have stopped reading; the page is served all the same
+        // the starter may have stopped reading; the page is served regardless
         let _ = write!(
             std::io::stdout(),
             "the workbench is open at {address}\nsession: {session}; Ctrl-C ends it\n"

@@ -71,7 +71,7 @@ pub struct AircraftCheck {
     pub authority: Authority,
     /// Stability margins of each LQI loop at the cruise airspeed.
     pub loops: Vec<LoopMargins>,
-    /// What should be corrected before a flight, most severe first.
+    /// Findings to correct before a flight, most severe first.
     pub findings: Vec<String>,
 }
 

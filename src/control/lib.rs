@@ -91,8 +91,8 @@ pub trait Controller: Send + Sync {
     /// Computes in advance what the next tick needs, when there is time between two commands. It never changes the
     /// commands.
     fn prepare(&mut self) {}
-    /// The candidates from which the last command, for `seen`, was chosen; `None` for a controller that does not
-    /// plan.
+    /// The candidates from which the last command was chosen, given the observation `seen`; `None` for a controller
+    /// that does not plan.
     fn insight(&self, _seen: &Observation) -> Option<Insight> {
         None
     }

@@ -33,7 +33,7 @@ pub struct Tuning {
     pub deflection: f64,
     /// Airspeed to hold instead of the target's, m/s.
     pub airspeed_override: Option<f64>,
-    /// What an integrator does while its output saturates.
+    /// Anti-windup: behaviour of an integrator while its output saturates.
     pub windup: Windup,
 }
 
@@ -78,7 +78,7 @@ pub const RETUNED: Tuning = Tuning {
 pub struct Pid {
     tuning: Tuning,
     integrals: [f64; 3],
-    /// What the last command added to them.
+    /// Increments of the integrators by the last command.
     added: [f64; 3],
 }
 

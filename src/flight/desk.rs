@@ -125,7 +125,7 @@ impl Desk {
         self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
     }
 
-    /// Arms, and thereby engages, as a client would.
+    /// Arms and so engages, as a client would.
     pub fn arm(&mut self, host: Duration) -> Verdict {
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(obstacle),

@@ -18,13 +18,13 @@ pub struct HostPort {
 /// The address of a MAVLink link.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Address {
-    /// Listens for datagrams here; replies to each sender.
+    /// Listens for datagrams on this address and replies to each sender.
     UdpIn(HostPort),
-    /// Sends datagrams there first; replies to whoever answers.
+    /// Sends the first datagram to this address, then replies to whoever answered.
     UdpOut(HostPort),
-    /// Listens for connections here.
+    /// Listens for connections on this address.
     TcpIn(HostPort),
-    /// Connects there, and reconnects when the connection is lost.
+    /// Connects to this address, and reconnects when the connection is lost.
     TcpOut(HostPort),
     /// A serial port at a baud rate.
     Serial {

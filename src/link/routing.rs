@@ -93,7 +93,7 @@ impl Router {
 
 /// Destination of a client's frame.
 pub fn way(frame: Option<&Frame<'_>>, us: Source, engaged: bool) -> Way {
-    // an unknown message is not one that is handled here
+    // unknown messages are not handled here
     let Some(frame) = frame else { return Way::Controller };
     if frame.source == us || frame.id == wire::SETUP_SIGNING {
         return Way::Nowhere;

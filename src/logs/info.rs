@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::columns::COLUMNS;
 use super::finding::{Finding, Severity};
+use super::mapping::TEXT;
 use super::phases::{self, Phase, PhaseKind};
 use super::rudder::RudderMotion;
 use super::sources::Source;
@@ -67,6 +68,15 @@ pub struct Purpose {
 }
 
 impl Info {
+    /// Field of the log that fills `column`, in the syntax of a mapping file.
+    pub fn origin(&self, column: &str) -> String {
+        let named = |c: &&Channel| c.columns.iter().any(|own| own == column);
+        match (self.format, self.channels.iter().find(named)) {
+            (Format::Csv, _) | (_, None) => format!("{TEXT}.{column}"),
+            (_, Some(channel)) => channel.origin.clone(),
+        }
+    }
+
     /// Summarises a log.
     pub fn of(log: &Log) -> Info {
         let samples = &log.flight.samples;

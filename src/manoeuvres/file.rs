@@ -108,7 +108,7 @@ impl Schedule {
         Schedule::new(named(file.name)?, file.description, steps)
     }
 
-    /// The schedule as a file's text, which reads back to the same schedule.
+    /// The text of a schedule file that parses to the same schedule.
     pub fn to_toml(&self) -> String {
         let quoted = |text: &str| toml::Value::String(text.into()).to_string();
         let mut out = format!("schema = 1\nname = {}\n", quoted(&self.name));
@@ -125,7 +125,7 @@ impl Schedule {
             );
             for excitation in &step.excitations {
                 out.push_str("[[step.excitation]]\n");
-                // numbers and words of our own: they can always be written
+                // a schedule holds only numbers and strings, which TOML can always write
                 let content = toml::to_string(&ExcitationFile::from(excitation));
                 out.push_str(&content.unwrap_or_default());
             }

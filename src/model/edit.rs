@@ -49,7 +49,7 @@ pub struct Edit {
     pub effect_files: Vec<String>,
     /// Flights that the values were fitted to, for their sources.
     pub fitted_to: String,
-    /// What the file is to know of the installation and of flights, in place of what it has; `None` to leave that.
+    /// Constants of the installation and of flights that replace those in the file; `None` keeps the file's.
     pub known: Option<Known>,
 }
 

@@ -132,7 +132,7 @@ pub struct GreyBox {
     pub(super) lags: usize,
     /// Whether the link carries no rudder command.
     pub(super) rudder_is_left: bool,
-    /// What its file knows of the installation and of single flights.
+    /// Constants of the installation and of single flights from its file.
     pub known: Arc<Known>,
 }
 

@@ -1,4 +1,4 @@
-//! What a model's file knows of the installation of the sensors and of single flights.
+//! Constants of the sensors' installation and of single flights in a model file.
 //!
 //! ```toml
 //! [installation]                       # holds for every flight without an entry of its own
@@ -31,13 +31,13 @@ pub struct FlightConstants {
     pub source: String,
     /// The small rotation from body axes to the measured ones, about x, y and z of the body, °.
     pub axes_deg: Option<[f64; 3]>,
-    /// What is added to the model's coefficients, in the order of [`TRIMS`], dimensionless; absent in an installation.
+    /// Offsets of the model's coefficients, in the order of [`TRIMS`], dimensionless; absent in an installation.
     pub trims: Option<[f64; TRIMS.len()]>,
-    /// What the sensors add to the reconstructed state, in the order of [`SENSORS`].
+    /// Errors of the sensors in the reconstructed state, in the order of [`SENSORS`].
     pub sensors: Option<[f64; SENSORS.len()]>,
 }
 
-/// What a model's file knows beside the aircraft.
+/// Constants in a model file besides those of the aircraft.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
     /// The installation.
@@ -59,7 +59,7 @@ impl Known {
         self.installation.is_none() && self.flights.is_empty()
     }
 
-    /// What is known of `flight`: its own constants, those of the installation where it has none.
+    /// Constants of `flight`: its own, or those of the installation if it has none.
     pub fn of(&self, flight: &str) -> Option<FlightConstants> {
         let shared = self.installation.as_ref();
         let Some(own) = self.flights.get(flight) else { return shared.cloned() };
@@ -85,7 +85,7 @@ pub(super) struct ConstantsFile {
     sensors: Option<BTreeMap<String, f64>>,
 }
 
-/// Checks what a model file says of `installation` and `flights`.
+/// Checks the sections `installation` and `flights` of a model file.
 pub(super) fn checked(
     installation: Option<ConstantsFile>,
     flights: BTreeMap<String, ConstantsFile>,

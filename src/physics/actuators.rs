@@ -42,7 +42,7 @@ impl Command {
 /// Largest number of lags and delays, `lag(…)` and `delay(…)` of effect files, in the formulas of one model.
 pub const LAGS: usize = 2;
 
-/// What acts on the airframe at an instant: deflections and throttle position.
+/// Deflections and throttle position that act on the airframe at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Controls<R = f64> {
     /// Aileron deflection δa, rad; positive rolls right.

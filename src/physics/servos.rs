@@ -82,7 +82,7 @@ pub struct Travels {
 }
 
 impl Travels {
-    /// Symmetric travel of ailerons and elevator by `most` (rad), no rudder.
+    /// Ailerons and elevator with the same symmetric travel of ±`most` (rad), no rudder.
     pub const fn alike(most: f64) -> Travels {
         let travel = Travel::symmetric(most);
         Travels { aileron: travel, elevator: travel, rudder: None }
@@ -126,8 +126,8 @@ pub struct ActuatorFigures {
 }
 
 impl ActuatorFigures {
-    /// Ailerons and elevator alike, of `frequency` (rad/s), `damping` and `deflection_max` (rad), no
-    /// rudder, and a throttle with `lag` (s), at `step` (s).
+    /// Identical ailerons and elevator with `frequency` (rad/s), `damping` and `deflection_max` (rad), no rudder, and a
+    /// throttle with `lag` (s), at time step `step` (s).
     pub fn tustin(frequency: f64, damping: f64, deflection_max: f64, lag: f64, step: f64) -> Self {
         let travel = Travel::symmetric(deflection_max);
         let surface = Surface::tustin(frequency, damping, travel, step);

@@ -1,4 +1,4 @@
-//! The page of an aircraft as its model has it: three views, trim, modes, what the stick does.
+//! The page of an aircraft from its model: three views, trim, modes, stick response.
 
 use std::fmt::Write;
 

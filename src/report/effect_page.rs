@@ -1,4 +1,4 @@
-//! The page of one effect: what the catalogue knows of it, with its signature drawn.
+//! The page of one effect: its entry in the catalogue and its signature as figures.
 
 use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeries};
 use greylag_physics::effects::Description;
@@ -15,9 +15,9 @@ pub struct EffectReport<'a> {
     pub place: &'static str,
     /// Signature of the effect; `None` for an error of the measurement.
     pub signature: Option<&'a Signature>,
-    /// The model that the signature is drawn on.
+    /// Name of the model whose signature is drawn.
     pub model: String,
-    /// The values of the coefficients that it is drawn at.
+    /// Values of the coefficients in the drawing.
     pub values: Vec<f64>,
 }
 

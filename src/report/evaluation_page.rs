@@ -1,4 +1,4 @@
-//! The page of an evaluation: scores beside the paper's, how targets were reached, what planners saw.
+//! The page of an evaluation: scores beside the paper's, step responses, and the planners' candidates.
 
 mod way;
 
@@ -15,16 +15,16 @@ use greylag_sim::evaluation::{Evaluation, Score};
 use greylag_sim::published::{Published, Value, published};
 use greylag_sim::tracking::{Tracking, seconds};
 
-/// An evaluation's story, with where it came from.
+/// Results of an evaluation with their provenance.
 #[derive(Clone, Debug)]
 pub struct EvaluationReport<'a> {
     /// A line under the title.
     pub subtitle: String,
     /// Results of each controller.
     pub evaluations: &'a [Evaluation],
-    /// Single flights: the target, and one flight for each of the evaluations.
+    /// Single flights: a target, and for it one flight of each evaluation.
     pub flights: &'a [(Target, Vec<Tracking>)],
-    /// Things and their values: files, options.
+    /// Inputs of the evaluation, such as files and options, as names and values.
     pub provenance: Vec<(String, String)>,
 }
 
@@ -192,7 +192,7 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// A controller with what it flies by.
+/// Name of a controller with its model or policy.
 fn label(e: &Evaluation) -> String {
     if e.model == "-" { e.controller.clone() } else { format!("{} ({})", e.controller, e.model) }
 }
@@ -246,7 +246,7 @@ mod tests {
         Evaluation::measured(names, &courses(&rows, 16.67), &vec![outcome; 8], &limits)
     }
 
-    /// Every controller is drawn with its interval and the paper's result; a lost aircraft draws no
+    /// Every controller is drawn with its interval and the paper's result. The page of a flight that ends early holds no
     /// NaN.
     #[test]
     fn the_page_has_ours_and_the_papers() {

@@ -1,4 +1,4 @@
-//! What a planner saw ahead: candidates and plan as they fan out, and the time of a tick's parts.
+//! Rollouts of a planner: candidates, plan, and computation time by part of a tick.
 
 use super::Align::Right;
 use super::{Figure, Style, Table, XyFigure, XyMark, XySeries};

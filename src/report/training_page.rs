@@ -17,7 +17,7 @@ pub struct TrainingReport<'a> {
     pub title: String,
     /// A line under it.
     pub subtitle: String,
-    /// How the training went, in order.
+    /// History of the training, in order.
     pub history: &'a [Moment],
     /// The coefficients that were trained.
     pub coefficients: &'a [Learned],

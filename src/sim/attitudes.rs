@@ -28,7 +28,7 @@ const LOST: [f64; 4] = [1.75, 1.2, 0.5, 0.7];
 /// Airspeed over that of cruise between which it is not lost.
 const LOST_SPEED: [f64; 2] = [0.45, 2.5];
 
-/// What came of a minute.
+/// Result of one minute of flight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Minute {
     /// When the aircraft was lost, s; `None` if it was not.

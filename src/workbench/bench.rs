@@ -31,7 +31,7 @@ pub struct Given {
     pub model: Option<PathBuf>,
     /// Logs to add; those that the session has already are skipped.
     pub logs: Vec<PathBuf>,
-    /// How logs are read.
+    /// Options for reading logs.
     pub reading: Reading,
     /// Flies the failsafe scenarios of the page `failsafes`.
     #[cfg(feature = "sitl")]
@@ -313,7 +313,7 @@ impl Before {
     }
 }
 
-/// The session with its model; a model that was edited since the last run is read as it is now.
+/// The session with its model. A model edited since the last run is read again.
 fn begin(
     folder: &Path,
     model: Option<&Path>,

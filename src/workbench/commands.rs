@@ -96,14 +96,14 @@ impl Inner {
         format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
     }
 
-    /// How a command must read logs.
+    /// Options of a command for reading the session's logs.
     fn mapping_words(&self) -> String {
         let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
         let lenient = (self.given.tolerance == Tolerance::Lenient).then(|| " --lenient".to_owned());
         mapping.chain(lenient).collect()
     }
 
-    /// How a command must read the logs of these roles; those with problems need a word more.
+    /// Options of a command for reading the logs of these roles; logs with problems need one more.
     fn reading_words(&self, roles: &[Role]) -> String {
         let doubtful = |k: &usize| self.flights[*k].as_ref().is_ok_and(|f| f.in_doubt());
         let despite = self.given.despite_problems || self.usable(roles).iter().any(doubtful);

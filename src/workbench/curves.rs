@@ -74,7 +74,7 @@ pub(super) fn data(flight: &Prepared, comparison: &Comparison, k: usize) -> Flig
     }
 }
 
-/// The windows in the rows of a channel's trace, which has one of its own between segments.
+/// Windows as rows of a channel's trace, which has an extra row between segments.
 pub(super) fn rows(flight: &Prepared) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(flight.windows.len());
     for (k, window) in flight.windows.iter().enumerate() {
@@ -98,7 +98,7 @@ pub(super) fn named(
     STATES.iter().zip(states).map(of).collect()
 }
 
-/// A variable as JSON has it.
+/// Name of a variable in JSON.
 fn word(variable: RegimeVariable) -> String {
     match serde_json::to_value(variable) {
         Ok(Value::String(word)) => word,
@@ -106,7 +106,7 @@ fn word(variable: RegimeVariable) -> String {
     }
 }
 
-/// Five digits of a number, which a screen does not show; nothing of what is none.
+/// A number in single precision, enough for a screen; `None` if it is not finite.
 fn some(x: f64) -> Option<f32> {
     if x == 0.0 {
         return Some(0.0);

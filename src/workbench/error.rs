@@ -20,7 +20,7 @@ use greylag_sysid::weak_form::prepared::ClockError;
 /// Kind of a failure, which sets the status of the HTTP answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The request does not fit the session, for example a log that is none.
+    /// The request does not fit the session, for example a file that is not a log.
     Bad,
     /// The session has moved on since the requester looked.
     Conflict,
@@ -112,7 +112,7 @@ pub enum WorkbenchError {
     /// A failure inside the program, such as a panic of a job.
     #[error("a fault of the program, please report it: {0}")]
     Fault(String),
-    /// Whoever waited has ended it.
+    /// The user cancelled the task.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
     /// A new session was given no model.
@@ -120,7 +120,7 @@ pub enum WorkbenchError {
         "a new session needs a model: name one, as in `greylag workbench --model params/x8/prior.toml`"
     )]
     NoModel,
-    /// Nothing to take back or to do.
+    /// There is nothing to undo or redo.
     #[error("there is nothing to {0}")]
     Nothing(&'static str),
     /// The session has the effect already.

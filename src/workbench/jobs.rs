@@ -201,7 +201,7 @@ impl Bench {
         (self.on_event)(Event::Progress { job });
     }
 
-    /// Diagnoses the model as given over the flights to fit to; the prior is tuned behind it, for fits to come.
+    /// Diagnoses the given model over the flights to fit to, then tunes the prior for later fits.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let ([key, tuned_key], model, flights, divided, with, tried) = {
             let inner = self.lock();

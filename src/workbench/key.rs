@@ -1,4 +1,4 @@
-//! What a result is about, as a key: it holds as long as nothing of that changes.
+//! Keys of results: a key names all inputs of a result, so that the result holds while they are unchanged.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};

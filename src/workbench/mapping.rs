@@ -5,30 +5,17 @@ use std::path::PathBuf;
 
 use super::bench::{Bench, Inner};
 use super::error::{WorkbenchError, io};
-use super::flights::Loaded;
 use super::session::Role;
-use greylag_logs::Format;
-use greylag_logs::mapping::TEXT;
 use greylag_report::write_over;
 
-/// The file in the session's folder.
+/// Name of the mapping file in the session's folder.
 pub(super) const FILE: &str = "mapping.toml";
 
 fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }
 
-/// Field of the log that fills a column, in the syntax of a mapping.
-fn origin(flight: &Loaded, column: &str) -> String {
-    let named = |c: &&greylag_logs::Channel| c.columns.iter().any(|own| own == column);
-    match (flight.info.format, flight.info.channels.iter().find(named)) {
-        (Format::Csv, _) | (_, None) => format!("{TEXT}.{column}"),
-        (_, Some(channel)) => channel.origin.clone(),
-    }
-}
-
-/// The mapping `text` with one more column; the scale of a column that it has already is
-/// multiplied.
+/// Adds a column to the mapping `text`, or multiplies the scale of a column that it already has.
 fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<String> {
     let mut table: toml::Table = toml::from_str(text).ok()?;
     table.insert("schema".into(), 1.into());
@@ -42,7 +29,7 @@ fn with_column(text: &str, column: &str, from: &str, scale: f64) -> Option<Strin
 }
 
 impl Bench {
-    /// Writes a factor for a column into the session's mapping, and reads the logs again by it.
+    /// Writes a factor for a column into the session's mapping and reads the logs again.
     pub(super) fn map(
         &self,
         seen: u64,
@@ -55,7 +42,7 @@ impl Bench {
         let mapped = self.change(seen, |inner| {
             let before = inner.mapping.text.clone();
             inner.map(place, column, scale)?;
-            // last, for what stands there is read at the next start
+            // written last, because the next start reads this file
             replaced = Some(before);
             Ok(write_over(&path, &inner.mapping.text)?)
         });
@@ -70,12 +57,12 @@ impl Bench {
 }
 
 impl Inner {
-    /// Reads the logs by a factor more. A log that is in doubt then serves for nothing; the one at `place`, if it is
-    /// right now, for what it usually would.
+    /// Reads the logs again with one more factor. Logs that remain in doubt lose their role; the log at `place` gets its
+    /// usual role if it is now right.
     fn map(&mut self, place: usize, column: &str, scale: f64) -> Result<(), WorkbenchError> {
         let path = self.folder.join(FILE);
         let flight = self.flights.get(place).and_then(|f| f.as_ref().ok());
-        let from = origin(flight.ok_or(WorkbenchError::NoFlight(place))?, column);
+        let from = flight.ok_or(WorkbenchError::NoFlight(place))?.info.origin(column);
         if self.given.mapping.is_some() {
             return Err(WorkbenchError::MappingGiven(format!(
                 "{column} = {{ from = \"{from}\", scale = {scale} }}"

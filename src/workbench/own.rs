@@ -163,7 +163,7 @@ impl Made {
     }
 }
 
-/// What the second model makes of a channel beyond the first one; `None` where it is not measured.
+/// Contribution of the second model to a channel beyond the first model's; `None` where the channel is not measured.
 fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -> Option<Made> {
     let mut all = Made { id, made: Vec::new(), left: Vec::new(), regimes: Vec::new() };
     let [without, with] = &comparison.models[..] else { return None };
@@ -228,7 +228,7 @@ impl Inner {
         self.session.own.iter().map(view).collect()
     }
 
-    /// What a command calls the effect: its file if it is one of the session's, else its id.
+    /// Name of the effect in a command: its file if it belongs to the session, else its id.
     pub(super) fn effect_word(&self, id: &str) -> PathBuf {
         match self.session.own.iter().any(|own| own == id) {
             true => effect_file(&self.folder, id),

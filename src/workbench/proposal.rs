@@ -40,7 +40,7 @@ pub struct Designed {
 }
 
 impl Bench {
-    /// Searches a formula for what the model as given leaves unexplained, and keeps what was found.
+    /// Searches a formula for what the given model leaves unexplained, and stores the result.
     pub(super) fn propose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let (key, model, [search, test], with) = {
             let inner = self.lock();
@@ -56,7 +56,7 @@ impl Bench {
         Ok(())
     }
 
-    /// What a search for a formula found, as `greylag propose --json` writes it; `null` if there was none.
+    /// Result of the search for a formula, as `greylag propose --json` writes it; `null` without a search.
     pub fn proposal(&self) -> Value {
         let inner = self.lock();
         let key = inner.key(Work::Proposal.word(), &[]);

@@ -34,7 +34,7 @@ impl Inner {
             (None, Some(place)) => self.session.logs[place].role,
             (None, None) => self.session.usual_role(&entry.name()),
         };
-        // what makes every figure wrong serves for nothing until its user has looked at it
+        // a log in doubt gets no role until the user has looked at it
         let role = if loaded.in_doubt() { Role::Unused } else { usual };
         let entry = LogEntry { role, ..entry };
         match before {

@@ -93,7 +93,7 @@ pub struct Opening {
     pub effects: Vec<String>,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// SHA-256 of their logs, by which they are known.
+    /// SHA-256 of the logs, which identifies them.
     #[serde(default)]
     pub sha256: Vec<String>,
     /// Normalised root mean square error of the model as given at `horizon_s`; NaN if no run gets there, or no model
@@ -105,7 +105,7 @@ pub struct Opening {
     pub horizon_s: f64,
 }
 
-/// How a flight went.
+/// Outcome of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -200,10 +200,10 @@ impl Session {
         }
     }
 
-    /// The session of `folder`; `None` if there is none yet.
+    /// The session in `folder`; `None` if there is no session yet.
     ///
     /// # Errors
-    /// The file cannot be read or is no session.
+    /// If the file cannot be read or is not a session.
     pub fn read(folder: &Path) -> Result<Option<Session>, WorkbenchError> {
         let path = folder.join(FILE);
         let text = match fs::read_to_string(&path) {
@@ -265,17 +265,17 @@ impl Session {
     }
 }
 
-/// A session's folder, which no other workbench may open as long as this is kept.
+/// Lock on a session's folder: no other workbench may open it while this value lives.
 pub struct Claim {
     /// The lock is given up when this is closed.
     _lock: File,
 }
 
 impl Claim {
-    /// Claims `folder`, which is made if there is none.
+    /// Locks `folder`, which is created if it does not exist.
     ///
     /// # Errors
-    /// Another workbench has it, or it cannot be made.
+    /// If another workbench holds it, or it cannot be created.
     pub fn of(folder: &Path) -> Result<Claim, WorkbenchError> {
         fs::create_dir_all(folder.join("logs")).map_err(|e| io(folder, e))?;
         let path = folder.join(".lock");

@@ -65,7 +65,7 @@ struct StepView {
     /// `fitted`, `fitting`, `failed` or `unfitted`.
     status: &'static str,
     error: Option<String>,
-    /// By equation error alone, as long as the fit is not done: errors on the flights held out.
+    /// Errors on the flights held out, by equation error alone until the fit is done.
     estimated: Option<Value>,
     story: Option<Value>,
     on_fit: Option<Value>,
@@ -117,7 +117,7 @@ pub struct RunRequest {
 /// A free run of each model.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeRun {
-    /// The runs: of the model as given, then as amended.
+    /// The runs of the given model, then those of the amended one.
     pub runs: Vec<OneRun>,
 }
 

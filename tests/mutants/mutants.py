@@ -37,11 +37,12 @@ TARGETS = [
     ("src/physics/airframe.rs", ["impl Envelope"]),
     ("src/control/cem/rollout.rs", ["slewed"]),
 ]
-# Programs of tests: none of them depends on the clock of the wall.
-PROGRAMS = [
-    "flight_pilot", "flight_controllers", "link_client", "link_setpoints", "link_vehicle", "link_routing",
-    "link_mutation", "link_controllers", "airframe_files", "model_monitor",
-]
+# Programs of tests with their modules: none of them depends on the clock of the wall.
+PROGRAMS = {
+    "flight": ["pilot", "controllers", "monitor"],
+    "link": ["client", "controllers", "mutation", "routing", "setpoints", "vehicle"],
+    "physics": ["airframe_files"],
+}
 CARGO = ["--ignore-rust-version", "--no-default-features", "--features", "sitl"]
 # A hang: so many times the processor time of the plain run, and some seconds. A test that waits uses no processor
 # time: it is stopped after some time on the clock of the wall, long because the machine may be busy.
@@ -308,7 +309,8 @@ def cover(options):
         listed = subprocess.run([program, "--list", "--format", "terse"], cwd=tree, capture_output=True, check=True)
         for name in re.findall(r"^(.*): test$", listed.stdout.decode(), re.M):
             test = f"{label} {name}"
-            if not re.search(options.tests, test):
+            modules = PROGRAMS.get(label)
+            if modules and name.split("::")[0] not in modules or not re.search(options.tests, test):
                 continue
             record = known.get((of, test))
             if record is None:

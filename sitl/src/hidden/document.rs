@@ -328,7 +328,7 @@ impl<'a> Document<'a> {
         self.function(Axis::Pitch, "thrust-line-offset", &product(&[value(arm), sum(&whole)]))
     }
 
-    /// Lets the aerodynamics read what the effects make of a deflection.
+    /// Makes the aerodynamics read the deflection after the effects.
     fn write_deflection(&mut self, surface: Surface) -> Done {
         let mut name = self.passed_name(surface, self.passed);
         let mut functions = String::new();

@@ -1,4 +1,4 @@
-//! Which property of an aircraft commands which surface: found by trying all.
+//! Finds which property of an aircraft commands which surface by trying all candidates.
 //!
 //! Commands are what the aircraft's systems read and nothing of them writes. Each is commanded in full, to both sides where its domain
 //! has two (a negative command to flaps may give no number), while the aircraft stands still in its state, for as long as lags,
@@ -23,13 +23,13 @@ use roles::{Tried, choose};
 const FRAMES: usize = 2000;
 /// Frames without movement after which it is at rest: longer than any delay of an actuator.
 const AT_REST: usize = 60;
-/// Movement that is none, as a share of what moved so far.
+/// Relative movement below which a surface counts as still.
 const STILL: f64 = 1e-9;
 /// Airspeed at which commands are tried, m/s: any at which the air has a pressure will do.
 const AIRSPEED_FPS: f64 = 150.0;
 /// Moments of the air, body axes, lbf ft.
 const MOMENTS: [&str; 3] = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "moments/n-aero-lbsft"];
-/// Lengths by which they are compared.
+/// Reference lengths that make moments comparable.
 const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"];
 
 /// Result of the discovery of an aircraft's properties.
@@ -167,7 +167,7 @@ impl Bench {
         Ok(last)
     }
 
-    /// What `command` does in full; `None` of one that does nothing, or is not there.
+    /// Motion caused by full `command`; `None` if it causes none or does not exist.
     fn attempt(&mut self, command: &str) -> Result<Option<Tried>, PlantError> {
         let Some(node) = look(&self.fdm, command) else { return Ok(None) };
         let Some(none) = self.at(Some(node), 0.0)? else { return Ok(None) };

@@ -6,12 +6,6 @@ use super::{Inputs, Plant, PlantError, Start, Truth, jsbsim};
 /// Newtons per pound of force, and newton metres per foot pound.
 const LBF: f64 = 4.448_221_615_260_5;
 const FT_LBF: f64 = LBF * 0.3048;
-/// Steps in which surfaces come to rest at their command: 20 s of steps of 10 ms.
-const STEPS: usize = 2000;
-/// Steps without movement after which they are at rest.
-const AT_REST: usize = 50;
-/// Movement in one step that is none, rad.
-const STILL_RAD: f64 = 1e-12;
 
 /// Aerodynamic force and moment on an aircraft in a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +94,7 @@ impl Plant {
         })
     }
 
-    /// What `work` finds while the aircraft is held in `start` and only its systems and engines move.
+    /// Result of `work` while the aircraft is held in `start` and only its systems and engines run.
     fn held_in<T>(
         &mut self,
         start: &Start,
@@ -162,26 +156,10 @@ impl Plant {
         self.reset(start)?;
         // Filters keep the step for which they were laid out; nothing else moves in so short a one.
         self.fdm.set_dt(STILL_S);
-        let found = self.held(inputs);
+        let held = self.come_to_rest(inputs, "holding a state");
+        let found = held.and_then(|_| self.loads_now());
         self.fdm.set_dt(self.options.step_s);
         found
-    }
-
-    fn held(&mut self, inputs: &Inputs) -> Result<Loads, PlantError> {
-        let (mut last, mut at_rest) = ([f64::INFINITY; 3], 0);
-        for _ in 0..STEPS {
-            self.nodes.command(&mut self.fdm, inputs).map_err(jsbsim("writing the commands"))?;
-            self.fdm.run().map_err(jsbsim("holding a state"))?;
-            let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
-            let now = [truth.aileron_rad, truth.elevator_rad, truth.rudder_rad];
-            let moved = now.iter().zip(&last).any(|(a, b)| (a - b).abs() >= STILL_RAD);
-            at_rest = if moved { 0 } else { at_rest + 1 };
-            if at_rest == AT_REST {
-                break;
-            }
-            last = now;
-        }
-        self.loads_now()
     }
 
     fn loads_now(&mut self) -> Result<Loads, PlantError> {

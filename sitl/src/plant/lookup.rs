@@ -4,7 +4,7 @@ use jsbsim::{Fdm, NodeId};
 
 use super::PlantError;
 
-/// A property of a loaded aircraft, if it has it.
+/// A property of a loaded aircraft; `None` if the aircraft lacks it.
 pub(super) fn look(fdm: &Fdm, name: &str) -> Option<NodeId> {
     fdm.node(name).ok().flatten()
 }

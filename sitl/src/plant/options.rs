@@ -35,7 +35,7 @@ pub struct PlantOptions {
     pub start: Start,
     /// Length of one step, s: [`DT_S`](super::DT_S) unless something else is needed. JSBSim lays
     /// out the actuators' filters for the step when it loads the aircraft, so another step is
-    /// another aircraft by a little (`sitl/tests/plant_step.rs` measures it).
+    /// another aircraft by a little (`sitl/tests/plant/step.rs` measures it).
     pub step_s: f64,
 }
 

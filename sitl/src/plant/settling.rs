@@ -9,7 +9,7 @@ pub(super) const STILL_S: f64 = 1e-12;
 const TRANSIT_S: f64 = 60.0;
 /// Time without a change of the air's loads after which they have reached it, s.
 const AT_REST_S: f64 = 0.5;
-/// Change of a load in one frame that is none, in parts of it.
+/// Relative change of a load per frame below which it counts as constant.
 const UNCHANGED: f64 = 1e-9;
 /// Forces (lbf) and moments (lbf ft) of the air, body axes.
 const LOADS: [&str; 6] = [

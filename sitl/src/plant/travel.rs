@@ -8,9 +8,9 @@ const STEPS: usize = 2000;
 /// Steps without movement after which a surface counts as being at its stop: half a second, longer
 /// than any delay of an actuator.
 const AT_REST: usize = 50;
-/// Movement in one step that is none, rad.
+/// Movement per step below which a surface counts as still, rad.
 const STILL_RAD: f64 = 1e-12;
-/// A smaller travel is none, rad.
+/// Travel below which a surface counts as fixed, rad.
 const LEAST_RAD: f64 = 1e-3;
 /// A travel that differs by less from [`FULL_DEFLECTION_RAD`] is that one, rad: an actuator's
 /// filter stops short of its end by rounding.
@@ -126,10 +126,19 @@ impl Plant {
     fn rest(&mut self, inputs: &Inputs) -> Result<[f64; 3], PlantError> {
         // Filters keep the step for which they were laid out; nothing else moves in so short a one.
         self.fdm.set_dt(super::settling::STILL_S);
+        self.come_to_rest(inputs, "measuring the travel of the surfaces")
+    }
+
+    /// Aileron, elevator and rudder after they have come to rest at `inputs`, rad, in steps of the present length.
+    pub(super) fn come_to_rest(
+        &mut self,
+        inputs: &Inputs,
+        doing: &'static str,
+    ) -> Result<[f64; 3], PlantError> {
         let (mut last, mut at_rest) = ([f64::INFINITY; 3], 0);
         for _ in 0..STEPS {
             self.nodes.command(&mut self.fdm, inputs).map_err(jsbsim("writing the commands"))?;
-            self.fdm.run().map_err(jsbsim("measuring the travel of the surfaces"))?;
+            self.fdm.run().map_err(jsbsim(doing))?;
             let truth = self.nodes.truth(&mut self.fdm).map_err(jsbsim("reading the state"))?;
             let now = [truth.aileron_rad, truth.elevator_rad, truth.rudder_rad];
             let moved = now.iter().zip(&last).any(|(a, b)| (a - b).abs() >= STILL_RAD);
@@ -143,7 +152,7 @@ impl Plant {
     }
 }
 
-/// A deflection, without the rounding by which a filter stops short of its end.
+/// A deflection without the rounding error with which a filter stops short of its end.
 fn rounded(deflection: f64) -> f64 {
     if (deflection.abs() - FULL_DEFLECTION_RAD).abs() < ROUNDING_RAD {
         return FULL_DEFLECTION_RAD.copysign(deflection);

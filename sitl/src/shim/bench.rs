@@ -83,7 +83,7 @@ impl Bench {
     /// Flies one step.
     ///
     /// # Errors
-    /// If the plant cannot go on.
+    /// If the plant cannot be stepped.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         if let Some(answer) = self.newest.take() {
             self.inputs = answer.inputs;

@@ -31,7 +31,7 @@ impl Faults {
         self.drops.random::<f64>() < self.rule.drop_probability
     }
 
-    /// How late the next frame is beyond the constant delay.
+    /// Random delay of the next frame beyond the constant delay.
     pub fn lateness(&mut self) -> Duration {
         let jitter = self.delays.random::<f64>() * self.rule.jitter_ms;
         let late = self.delays.random::<f64>() < self.rule.late_probability;

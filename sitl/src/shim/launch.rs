@@ -11,7 +11,7 @@ const LAUNCH_THROTTLE: f64 = 0.1;
 const EQUATOR_M: f64 = 6_378_137.0;
 const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
 
-/// Where the aircraft is on its way into the air.
+/// Phase of the launch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Stand,
@@ -30,13 +30,13 @@ pub struct Launcher {
     at_once: Launch,
     step_s: f64,
     phase: Phase,
-    /// The state at the start, as JSBSim has it.
+    /// The start state in JSBSim.
     released: Truth,
     shown: Truth,
 }
 
 impl Launcher {
-    /// The aircraft on its stand, or in flight when launched at once.
+    /// The aircraft on its stand, or in flight if it is launched immediately.
     ///
     /// # Errors
     /// If the aircraft cannot be loaded or cannot be flown from `start`.
@@ -103,10 +103,10 @@ impl Launcher {
         wanted
     }
 
-    /// Goes one step on.
+    /// Advances one step.
     ///
     /// # Errors
-    /// If the plant cannot go on.
+    /// If the plant cannot be stepped.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Truth, PlantError> {
         self.phase = match self.phase {
             Phase::Stand => Phase::Stand,
@@ -134,7 +134,7 @@ impl Launcher {
     fn pulled(&self, share: f64, pull: f64) -> Truth {
         let released = self.released;
         let velocity = released.velocity_ned_mps.map(|v| v * share);
-        // From the release back: the way at constant acceleration is half speed times time.
+        // Distance before the release: at constant acceleration half the speed times the time.
         let way = released.velocity_ned_mps.map(|v| 0.5 * v * PULL_S * (share * share - 1.0));
         let (north_m, east_m) = metres_per_degree(released.latitude_deg);
         let attitude = [released.roll_rad, released.pitch_rad, released.yaw_rad];

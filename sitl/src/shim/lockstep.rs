@@ -44,7 +44,7 @@ pub fn fly(
     }
 }
 
-/// When a frame is to be sent, and what has come of it so far.
+/// Time at which a frame is due, and the answer so far.
 struct Asking {
     since: Instant,
     next: Instant,

@@ -138,7 +138,7 @@ pub struct FrameFaults {
     pub jitter_ms: f64,
     /// A frame comes late by `late_ms` more with this probability, 0..1.
     pub late_probability: f64,
-    /// How late such a frame is, ms of wall time.
+    /// Delay of such a frame, ms of wall time.
     pub late_ms: f64,
 }
 
@@ -171,13 +171,13 @@ pub struct ShimOptions {
     pub personality: Option<Personality>,
     /// Parameters of the played stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
-    /// Names of a parameter file that the played stack does not have: they are said, and have no effect.
+    /// Names in the parameter file that the played stack lacks: they are printed and have no effect.
     pub unplayed: Vec<String>,
     /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
     pub px4: Option<Px4Options>,
     /// Be the simulator of ArduPilot SITL instead; `None` speaks to a companion.
     pub ardupilot: Option<ArdupilotOptions>,
-    /// What the vehicle's clock shows at the start, s: near a wrap of a counter, to fly across it.
+    /// Initial value of the vehicle's clock, s. A value just below a counter's overflow tests the overflow in flight.
     pub clock_start_s: f64,
 }
 

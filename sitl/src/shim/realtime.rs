@@ -26,7 +26,7 @@ const STALE_US: u64 = 500_000;
 const LOOKS: [Duration; 2] = [Duration::from_micros(100), Duration::from_millis(1)];
 /// An answer within this time is punctual.
 const PUNCTUAL: Duration = Duration::from_millis(4);
-/// So many arrivals are taken at one look; a flood waits in the kernel.
+/// Largest number of packets taken per poll; a flood waits in the kernel.
 const ARRIVALS: usize = 500;
 /// Sending times that are remembered, frames.
 const SENT: usize = 64;

@@ -34,11 +34,11 @@ pub enum Event {
     Resumed,
     /// The played flight controller has changed its mode.
     Mode(String),
-    /// Something of a run against PX4.
+    /// Event of a run against PX4.
     Px4(Px4Event),
-    /// Something of a run against ArduPilot.
+    /// Event of a run against ArduPilot.
     Ardupilot(ArdupilotEvent),
-    /// The clock was so late that it was set anew, by so much.
+    /// The clock lagged too far and was advanced by this time.
     Skipped(Duration),
 }
 

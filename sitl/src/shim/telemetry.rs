@@ -11,7 +11,7 @@ use crate::plant::{Stops, Travel, Truth};
 /// Simulated time from one frame to the next, µs.
 pub const FRAME_US: u64 = 10_000;
 
-/// Gas constant of dry air, J/(kg K), as the standard atmosphere has it.
+/// Gas constant of dry air in the standard atmosphere, J/(kg K).
 const AIR: f64 = 287.053;
 
 /// Heartbeat of the simulator: MAV_TYPE_FIXED_WING, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE.

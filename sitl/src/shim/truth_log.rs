@@ -91,7 +91,7 @@ impl TruthLog {
         self.check(written)
     }
 
-    /// Writes out what is still held back.
+    /// Writes the buffered rows.
     pub fn finish(&mut self) -> Result<(), ShimError> {
         let written = self.file.flush();
         self.check(written)

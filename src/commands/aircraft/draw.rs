@@ -12,7 +12,7 @@ use crate::model::GreyBox;
 use crate::model::population::{Character, Drawn, Population, TRAITS};
 use crate::num::statistics::quantile;
 
-/// Models of the aircraft that the program ships, whose place among the draws is said.
+/// Models of the shipped aircraft, which are placed among the draws by default.
 const SHIPPED: [&str; 5] = [
     "params/x8/jsbsim.toml",
     "params/aerosonde/jsbsim.toml",
@@ -20,7 +20,7 @@ const SHIPPED: [&str; 5] = [
     "params/c172p-flaps/jsbsim.toml",
     "params/a430/prior.toml",
 ];
-/// An aircraft lies among the draws where each of its numbers lies between these quantiles of theirs.
+/// Quantiles of the draws between which every number of an aircraft must lie for the aircraft to count as covered.
 const INSIDE: [f64; 2] = [0.005, 0.995];
 
 /// Options of `greylag aircraft draw`.
@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Show the first draws one by one, so many.
     #[arg(long, value_name = "N", default_value_t = 0)]
     show: usize,
-    /// Models whose place among the draws is said [default: those of the shipped aircraft].
+    /// Models to place among the draws [default: those of the shipped aircraft].
     #[arg(long = "model", value_name = "FILE", num_args = 1..)]
     models: Vec<PathBuf>,
     /// Folder to write each draw's airframe.toml and model.toml to, in a folder of its number.

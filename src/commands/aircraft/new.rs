@@ -13,7 +13,7 @@ use crate::model::plausible::Size;
 use crate::model::textbook::{Measures, Tail};
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// Airspeed of the envelope's end in parts of the cruise airspeed, at least.
+/// Smallest airspeed at the envelope's end, as a multiple of the cruise airspeed.
 const LEAST_ABOVE_CRUISE: f64 = 1.1;
 /// Static thrust by default, as a share of the weight.
 const THRUST: f64 = 0.5;
@@ -92,7 +92,7 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     Ok(super::check::status(&found))
 }
 
-/// The airframe whose envelope ends where level flight does.
+/// The airframe with its envelope limited to the airspeeds of level flight.
 fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = scratch.path().join("model.toml");

@@ -1,4 +1,4 @@
-//! Where `greylag amend` reads and writes: the model, its airframe, what was done.
+//! Files that `greylag amend` reads and writes: the model, its airframe, the results.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ pub fn hashed(paths: &[PathBuf]) -> Result<Vec<Hashed>> {
     paths.iter().map(one).collect()
 }
 
-/// Where things are read and written.
+/// Paths of the inputs and outputs.
 pub struct Places {
     original: Original,
     folder: PathBuf,
@@ -52,7 +52,7 @@ impl Places {
         self.folder.join(MODEL)
     }
 
-    /// Writes the model and what was done; what was written reads back to the bit.
+    /// Writes the model and the results. The model reads back to the bit.
     pub fn write(
         &self,
         before: &GreyBox,
@@ -62,7 +62,7 @@ impl Places {
     ) -> Result<()> {
         for (name, text) in document::files(&self.original, before, amended, logs)? {
             let path = self.folder.join(name);
-            // airframe and effects may stand there already, as where a model is amended again
+            // airframe and effects may exist already if a model is amended again
             if !holds(&path, &text) {
                 files::write(&path, &text, overwrite)?;
             }

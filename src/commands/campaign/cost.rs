@@ -12,11 +12,11 @@ use crate::num::statistics::quantile;
 pub struct Cost {
     /// Time of a core, s.
     pub core_seconds: f64,
-    /// How it is known.
+    /// Source of the figure.
     pub from: Source,
 }
 
-/// How a cost is known.
+/// Source of a cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The median of this many cells.

@@ -60,7 +60,7 @@ enum Launch {
 /// Number of attempts at a cell whose exit status allows a later attempt.
 const ATTEMPTS: usize = 20;
 
-/// Runs what was asked for.
+/// Runs the chosen variant.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (plan, store) = arguments.which.open()?;
     if let Some(name) = &arguments.cell {

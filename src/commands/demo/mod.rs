@@ -181,7 +181,7 @@ fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(
     flown
 }
 
-/// What the planner saw, flown `again` from the recording; the flight is reported even if that cannot be shown.
+/// Candidates of the planner, replayed from the recording with `again`. Without them the flight is still reported.
 fn sights(
     folder: &Path,
     mut again: Companion,

@@ -16,7 +16,7 @@ use crate::model::population::{Drawn, Population};
 use crate::num::statistics::quantile;
 use crate::sim::attitudes::{self, Minute};
 
-/// What `--any` flies.
+/// Options of `--any`.
 #[derive(clap::Args)]
 pub(super) struct AnyArguments {
     /// Distribution that --any draws from.
@@ -123,7 +123,7 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a controller of this kind may know.
+/// Models from which a controller of this kind may be designed.
 fn knowledge(kind: ControllerKind) -> &'static [Knowledge] {
     match kind.needs() {
         Needs::Gains => &[Knowledge::Nothing],

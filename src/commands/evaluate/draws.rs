@@ -69,7 +69,7 @@ pub(super) fn over_draws(
     Ok(ExitCode::SUCCESS)
 }
 
-/// How each controller fared from draw to draw.
+/// Results of each controller over the draws.
 fn draws_table(flown: &[Robustness]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -24,7 +24,7 @@ pub struct Entry {
     pub findings: Vec<Note>,
 }
 
-/// A finding as it is noted.
+/// A finding in the ledger's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Note {
     /// Time of the finding, s.

@@ -13,7 +13,7 @@ pub enum Budget {
     Paper,
 }
 
-/// How the policy is found, by name.
+/// Name of the training algorithm of the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Algorithm {
     /// The gradient of the reward through the model, then critics of the policy found.

@@ -59,7 +59,7 @@ pub struct Arguments {
     /// Rounds of flights planned through the model learned so far [default: the budget's].
     #[arg(long, conflicts_with = "logs", value_parser = clap::value_parser!(u32).range(0..=20))]
     rounds: Option<u32>,
-    /// How the policy is found.
+    /// Training algorithm of the policy.
     #[arg(long, default_value = "analytic", value_enum)]
     algorithm: Algorithm,
     /// How much work: quick, standard (minutes of two cores) or paper (the paper's numbers).

@@ -32,7 +32,7 @@ pub struct Recent {
     pub policy: PathBuf,
     /// Paths of the logs.
     pub logs: Vec<PathBuf>,
-    /// Part of all samples that they make up.
+    /// Share of these logs among all samples.
     pub share: f64,
 }
 
@@ -49,9 +49,9 @@ pub struct Inputs<'a> {
     pub rounds: u32,
     /// Coefficients of the prior that are learned; none leaves it frozen.
     pub trainable: &'a [String],
-    /// Whether nothing is taken from their widths.
+    /// Whether the widths of the coefficients are ignored.
     pub from_scratch: bool,
-    /// How the policy is found.
+    /// Training algorithm of the policy.
     pub algorithm: Algorithm,
     /// Amount of computing work.
     pub budget: Budget,
@@ -68,7 +68,7 @@ pub struct Stage {
     pub line: Vec<OsString>,
 }
 
-/// A command line that is put together.
+/// A command line under construction.
 struct Line(Vec<OsString>);
 
 impl Line {

@@ -30,7 +30,7 @@ const HORIZONS: [usize; 4] = [1, 10, 100, 500];
 /// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
-/// How the training went so far, for its report.
+/// History of the training for its report.
 const HISTORY: &str = "history.json";
 /// File name of the report.
 const REPORT: &str = "training.html";
@@ -113,7 +113,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// How coefficients are learned along, by name.
+/// Name of the way in which coefficients are trained with the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Joint {
     Gradient,

@@ -163,10 +163,10 @@ impl FlightArguments {
     }
 }
 
-/// A part of all samples, as an option has it.
+/// Parses the value of an option that is a share of all samples.
 ///
 /// # Errors
-/// If it is no number above 0 and at most 1.
+/// If it is not a number above 0 and at most 1.
 pub fn share(text: &str) -> Result<f64, String> {
     let share = text.parse().ok().filter(|share| *share > 0.0 && *share <= 1.0);
     share.ok_or_else(|| "give a number above 0, at most 1".into())
@@ -175,7 +175,7 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// A sample: state, measured controls, altitude (m).
 type Row = (State, Controls, f64);
 
-/// What must be known of a flight that was sampled more slowly than the model steps.
+/// Warning for a flight that was sampled more slowly than the model steps.
 ///
 /// # Errors
 /// If it was sampled too slowly.

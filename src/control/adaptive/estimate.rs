@@ -1,4 +1,4 @@
-//! What one axis of an unknown aircraft does to its controls: control power, damping and stiffness, estimated in flight.
+//! Control power, damping and stiffness of one axis of an unknown aircraft, estimated in flight.
 //!
 //! Recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark, "Adaptive Control",
 //! 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂, each side differentiated and low-passed alike, so that what is
@@ -14,7 +14,7 @@ const SERVO: [f64; 2] = [25.0, 40.0];
 const NOISE: f64 = 4.0;
 /// Error of the regression as a share of what is seen: servos and delays are not those assumed.
 const SHARE: f64 = 0.2;
-/// How fast what is known gets old, 1/s.
+/// Forgetting rate of the estimate, 1/s.
 const AGEING: f64 = 1e-3;
 
 /// Power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
@@ -37,7 +37,7 @@ pub(super) struct Estimate {
     filters: Option<[[f64; 4]; 2]>,
 }
 
-/// What one axis shows at an instant.
+/// Measurements of one axis at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     /// Rate, rad/s, and the command that was in force, −1..1, positive for positive rates.

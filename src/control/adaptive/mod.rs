@@ -13,7 +13,7 @@ use greylag_model::STEP;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 
-/// What is believed of the roll axis before anything was seen: twice the median power, since too little gain loses less.
+/// Prior of the roll axis: twice the median control power, because a gain that is too low costs less than one too high.
 const ROLL: Prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
 /// The same of the pitch axis.
 const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], least: 10.0 };
@@ -43,7 +43,7 @@ const NOSE_DOWN: f64 = 0.15;
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
-/// What is believed of the aircraft at its cruise airspeed. The powers are those that act within a tenth of a second: a
+/// Estimate of the aircraft at its cruise airspeed. The control powers are those that act within a tenth of a second: a
 /// slow servo and a delay look like missing power, so that they lie below the aerodynamic ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Belief {
@@ -122,7 +122,7 @@ impl Adaptive {
         }
     }
 
-    /// What it believes of the aircraft by now.
+    /// The present estimate of the aircraft.
     pub fn belief(&self) -> Belief {
         let time = self.cruise / STANDARD_GRAVITY;
         let [roll, pitch] = [0, 1].map(|k| self.axes[k].estimate.theta);
@@ -208,7 +208,7 @@ impl Controller for Adaptive {
         self.axes[0].estimate.see(&seen_of(state.p, before.aileron, 0.0));
         self.axes[1].estimate.see(&seen_of(state.q, -before.elevator, self.incidence));
 
-        // the airspeed asked for is held as far as it is not slower than a cruise: nothing is known of the stall
+        // airspeeds below cruise are raised to it, because the stall is unknown
         let asked = state.airspeed / target.airspeed.max(self.cruise);
         let wanted = wanted(target, speed);
         let [reference, rates] = self.follow([state.roll, state.pitch], wanted);

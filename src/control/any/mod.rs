@@ -18,7 +18,7 @@ const ROUNDING: f64 = 0.35;
 const INTEGRAL_MOST: f64 = 0.5;
 const SPEED_INTEGRAL_MOST: f64 = 2.0;
 
-/// What the policy remembers.
+/// Memory of the policy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Memory {
     hidden: [f64; HIDDEN],
@@ -44,7 +44,7 @@ impl AnyPolicy {
     /// The policy that the program ships, for the aircraft that `airframe` describes.
     ///
     /// # Errors
-    /// If the shipped file is none of this policy's.
+    /// If the shipped file does not hold such a policy.
     pub fn new(airframe: &Airframe) -> Result<AnyPolicy, SetupError> {
         Ok(AnyPolicy {
             network: network::shipped()?,
@@ -54,7 +54,7 @@ impl AnyPolicy {
         })
     }
 
-    /// What the network sees, in the order in which it was trained, and the memory a step on.
+    /// Inputs of the network, in the order of its training, and the memory after this step.
     fn see(&self, seen: &Observation, target: &Target) -> ([f64; INPUTS], Memory) {
         let (s, u, mut memory) = (&seen.state, &seen.previous[0], self.memory);
         let time = self.cruise / STANDARD_GRAVITY;

@@ -6,7 +6,7 @@ use safetensors::{Dtype, SafeTensors};
 
 use crate::SetupError;
 
-/// What the network sees.
+/// Number of inputs of the network.
 pub(super) const INPUTS: usize = 24;
 /// Its memory.
 pub(super) const HIDDEN: usize = 32;

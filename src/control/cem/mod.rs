@@ -347,7 +347,7 @@ impl Controller for Cem {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // a plan begins anew from what is seen; the base has integrals
+        // planning restarts from the observation, but the base controller has integrators
         if let (None, Some(base)) = (&self.last, &mut self.base) {
             base.lqi.overruled(by);
         }

@@ -139,7 +139,7 @@ impl Monitor {
             frame.actuators.rudder,
         ];
         for (k, watch) in self.watches.iter_mut().enumerate() {
-            // Differences of rates are means over the step, forces are of its end.
+            // Differenced rates are means over the step; forces are values at its end.
             let expected =
                 if k < 3 { predicted[k] } else { 0.5 * (predicted[k] + before.predicted[k]) };
             let residual = measured[k] - expected;
@@ -186,8 +186,8 @@ mod tests {
         .unwrap()
     }
 
-    /// A flight of `truth` for so many seconds, watched with the model: `commanded` are the surfaces that are reported,
-    /// of time and trim; `acting` makes of them those that act.
+    /// Warnings of the monitor in a flight of the model `truth`. `commanded` gives the reported surfaces from time, state
+    /// and trim; `acting` gives the surfaces that act on the aircraft from the reported ones and the trim.
     fn warnings(
         seconds: f64,
         truth: &GreyBox,
@@ -233,7 +233,7 @@ mod tests {
         found
     }
 
-    /// Surfaces of a flight that is flown: a simple law holds level flight and follows a slow doublet of pitch.
+    /// Surfaces of a simple control law that holds level flight and follows a slow doublet in pitch.
     fn flown(at: f64, state: &State, trim: Controls) -> Controls {
         let wanted = 0.04 + if at % 8.0 < 4.0 { 0.06 } else { -0.06 };
         let elevator = trim.elevator + 0.8 * (state.pitch - wanted) + 0.15 * state.q;

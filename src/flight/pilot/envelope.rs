@@ -7,8 +7,8 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::Command;
 
 impl Pilot {
-    /// Limits every command to the envelope by the predictions of `limiter`. Where a flight controller is commanded
-    /// attitudes, only its own protection applies.
+    /// Limits every command to the envelope with the predictions of `limiter`. While attitudes are commanded to a flight
+    /// controller, only that controller's own protection applies.
     pub fn protect_with(&mut self, mut limiter: EnvelopeLimiter) {
         limiter.keep_to(&self.config.envelope);
         self.envelope = Some(limiter);

@@ -124,7 +124,7 @@ pub struct Pilot {
     monitor: Option<Monitor>,
     /// The envelope limiter, where there is a model for its predictions.
     envelope: Option<EnvelopeLimiter>,
-    /// The last command of a controller, where it was not flown as it was given.
+    /// The last command of a controller, if a limit or check changed it before it was flown.
     overruled: Option<Overruled>,
 }
 

@@ -257,7 +257,7 @@ impl Control {
     }
 
     fn say(&self, event: Event) {
-        // nobody may be reading the events; control does not wait
+        // there may be no reader of the events; control does not wait
         let _ = self.events.try_send(event);
     }
 

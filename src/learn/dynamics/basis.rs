@@ -124,7 +124,7 @@ impl Basis {
     /// The coordinates of the coefficients `names` of `model` over `tracks`.
     ///
     /// # Errors
-    /// If the model has none of a name, or it cannot be trained.
+    /// If the model lacks a coefficient, or one cannot be trained.
     pub fn new(
         model: &GreyBox,
         names: &[String],

@@ -1,4 +1,4 @@
-//! The model folder that a training writes: `model.toml`, its airframe, `residual.safetensors`.
+//! The model folder that training writes: `model.toml`, its airframe, `residual.safetensors`.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use crate::dynamics::basis::JXZ;
 use greylag_model::residual::{Origin, fingerprint};
 use greylag_model::{GreyBox, Integrator};
 
-/// A model cannot be written.
+/// Why a model cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// A file cannot be read or written.
@@ -21,7 +21,7 @@ pub enum ExportError {
         why: std::io::Error,
     },
     /// The prior's file has changed since it was read.
-    #[error("cannot write a model after {path}: {why}; give the prior's file as it was", path = path.display())]
+    #[error("cannot write a model after {path}: {why}; give the prior's file unchanged", path = path.display())]
     Prior {
         /// Path of the prior's file.
         path: PathBuf,
@@ -37,7 +37,7 @@ pub const AIRFRAME: &str = "airframe.toml";
 /// The residual network.
 pub const RESIDUAL: &str = "residual.safetensors";
 
-/// Texts of a model file.
+/// Texts written into a model file.
 #[derive(Clone, Copy, Debug)]
 pub struct Text<'a> {
     /// Training data in one sentence.
@@ -55,7 +55,7 @@ pub struct Text<'a> {
 pub fn save(
     model: &GreyBox,
     prior: &Path,
-    said: Text,
+    words: Text,
     origin: &Origin,
     folder: &Path,
 ) -> Result<(), ExportError> {
@@ -77,12 +77,12 @@ pub fn save(
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         own.push((name, bytes));
     }
-    // one that is learned on keeps its name
+    // a model that is trained further keeps its name
     let base = model.name.strip_suffix("-learned").unwrap_or(&model.name);
     let name: String = format!("{base}-learned").chars().take(64).collect();
     let mut set = |key: &str, value: &str| table.insert(key.into(), value.into());
     set("name", &name);
-    set("description", said.about);
+    set("description", words.about);
     set("airframe", AIRFRAME);
     let scheme = match model.integrator {
         Integrator::Rk4 => "rk4",
@@ -94,7 +94,7 @@ pub fn save(
         let names = own.iter().map(|(name, _)| toml::Value::from(name.as_str())).collect();
         table.insert("effect_files".into(), toml::Value::Array(names));
     }
-    for name in said.trained {
+    for name in words.trained {
         write_trained(&mut table, model, name, origin)
             .ok_or_else(|| wrong(format!("it has no {name}")))?;
     }
@@ -113,7 +113,7 @@ pub fn save(
     write(MODEL, text.as_bytes())
 }
 
-/// Writes the coefficient `name` of `model` into the model file's `table`; `None` if that has no such entry.
+/// Writes the coefficient `name` of `model` into the model file's `table`; `None` if the table has no such entry.
 fn write_trained(
     table: &mut toml::Table,
     model: &GreyBox,
@@ -137,7 +137,7 @@ fn write_trained(
     Some(())
 }
 
-/// Provenance in a residual's file: a training of `model` on `data` (SHA-256, hexadecimal).
+/// Provenance for the residual's file: `model` trained on `data` (SHA-256, hexadecimal).
 pub fn origin(model: &GreyBox, data: &str, seed: u64) -> Origin {
     Origin {
         schema: Origin::SCHEMA.into(),

@@ -64,7 +64,7 @@ impl fmt::Display for Faults {
     }
 }
 
-/// Plausible body rates, rad/s: 2000 °/s, the full scale of common gyroscopes, is 35.
+/// Plausible body rates, rad/s. The full scale of common gyroscopes, 2000 °/s, is 35 rad/s.
 const RATE: RangeInclusive<f64> = -40.0..=40.0;
 /// Plausible airspeed, m/s: an aircraft of this kind never reaches 150; a little below zero is sensor noise.
 const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
@@ -76,14 +76,14 @@ const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
 const FORCE: RangeInclusive<f64> = -500.0..=500.0;
 /// Plausible normalised deflection, with room for noise.
 const DEFLECTION: RangeInclusive<f64> = -1.5..=1.5;
-/// Plausible travel of a surface to each side, rad: it moves, by a right angle at most.
+/// Plausible travel of a surface to each side, rad: more than zero, at most a right angle.
 const TRAVEL: RangeInclusive<f64> = 0.001..=1.6;
 /// Plausible throttle position, with room for noise.
 const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
 /// Plausible rate of the normalised deflection, 1/s: the actuator's own limit is far below.
 const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
 
-// A range contains no NaN, so each of these is false for one.
+// A range does not contain NaN, so each check below is false for NaN.
 
 /// Whether body rates, rad/s, are plausible.
 pub fn rates(values: [f64; 3]) -> bool {

@@ -291,7 +291,7 @@ fn battery() -> MavMessage {
     })
 }
 
-/// The landed state: armed counts as in air, since there is no weight-on-wheels sensor.
+/// `MAV_LANDED_STATE`: an armed aircraft counts as in air, because there is no weight-on-wheels sensor.
 fn landed(status: &Status) -> MavLandedState {
     match (status.vehicle_alive, status.armed) {
         (_, true) => MavLandedState::MAV_LANDED_STATE_IN_AIR,

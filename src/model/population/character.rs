@@ -1,4 +1,4 @@
-//! How an aircraft flies, in numbers without a unit: what may be compared between a toy and an airliner.
+//! Dimensionless flight characteristics, comparable between a toy and an airliner.
 
 use nalgebra::Matrix2;
 

@@ -21,7 +21,7 @@ const CRUISE_LIFT: f64 = 0.47;
 const V_TAIL_ROLL: f64 = 4.0;
 const SOURCE: &str = "drawn";
 
-/// What balances and steers a drawn aircraft.
+/// Layout of a drawn aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// Tailplane, fin, rudder.
@@ -51,17 +51,17 @@ impl Layout {
 pub struct Drawn {
     /// Its place among the draws of its seed.
     pub number: u64,
-    /// What balances it.
+    /// Its layout.
     pub layout: Layout,
     /// Static margin, parts of the chord.
     pub static_margin: f64,
     /// Delay between a command and the surface's answer, servo aside, s.
     pub delay_s: f64,
-    /// Its measures, which a user could take.
+    /// Its measures, as a user could take them.
     pub measures: Measures,
     /// The aircraft as it is.
     pub exact: GreyBox,
-    /// What a textbook says of the measures.
+    /// The textbook model made from the measures.
     pub textbook: GreyBox,
     /// Texts of the exact model's airframe file and model file.
     pub files: [String; 2],

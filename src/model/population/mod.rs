@@ -1,4 +1,4 @@
-//! A distribution of fixed-wing aircraft: draws with their exact models and with what a textbook would say of them.
+//! A distribution of fixed-wing aircraft. Each draw has an exact model and the textbook model of its measures.
 
 mod character;
 mod draw;
@@ -15,7 +15,7 @@ pub use draw::{DrawError, Drawn, Layout};
 /// The least and the most of a number.
 type Range = [f64; 2];
 
-/// A distribution of aircraft, from its file (`params/any/aircraft.toml`), whose comments say what each number is.
+/// A distribution of aircraft, read from `params/any/aircraft.toml`. Comments in that file explain each number.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Population {

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Induced drag as the square of angle of attack.
+/// Induced drag proportional to the square of the angle of attack.
 pub struct DragAlpha2;
 
 impl Effect for DragAlpha2 {

@@ -7,7 +7,7 @@
 //! They apply wherever a model is stepped: free runs, imagined flights, the planner (which assumes surfaces and
 //! throttle at rest before, since it does not observe the acting deflections). In trim only the dead zone would
 //! matter, and trim neglects it; the linear model, and thus the design of the LQI, neglects all. The LQI's integrators
-//! compensate their constant part; the cost of a lag or delay is measured in `tests/effects_lqi.rs`.
+//! compensate their constant part; the cost of a lag or delay is measured in `tests/model/effects_lqi.rs`.
 
 use crate::Controls;
 use crate::actuators::LAGS;

@@ -77,7 +77,7 @@ fn link(d: &Diagnosis, sentence: &str) -> Option<Link> {
     Some(Link { anchor: suspects::ANCHOR.into(), option: of.id.clone() })
 }
 
-/// A channel's name from its symbol; the symbol itself where it is none.
+/// A channel's name from its symbol; an unknown symbol is returned unchanged.
 pub(crate) fn channel_of(symbol: &str) -> String {
     let id = ChannelId::ALL.into_iter().find(|id| id.symbol() == symbol);
     id.map_or_else(|| symbol.to_string(), channel_name)
@@ -143,7 +143,7 @@ fn cell(channel: &ChannelResult, variable: RegimeVariable) -> GridCell {
     if share.is_nan() || share < BLANK {
         return GridCell { text: String::new(), weight: 0.0 };
     }
-    // What is left of a channel that is explained anyway stays pale.
+    // A channel that is explained stays pale.
     let left = channel.unexplained_fraction;
     let importance = if left.is_finite() { (left / 0.1).clamp(0.0, 1.0) } else { 0.0 };
     GridCell { text: percent(share), weight: share * importance }

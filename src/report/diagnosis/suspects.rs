@@ -9,13 +9,13 @@ use crate::{
 };
 use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis};
 
-/// Where sentences on an effect lead to.
+/// Anchor of the figure to which sentences about an effect link.
 pub(crate) const ANCHOR: &str = "effect";
-/// Candidates under their thresholds that are drawn; the table has all.
+/// Number of candidates below their thresholds in the figure; the table lists all.
 const BELOW: usize = 8;
-/// Candidates that are not asserted whose curves are drawn.
+/// Number of candidates whose curves are drawn although they are not asserted.
 const CURVES: usize = 3;
-/// Points drawn of the measured scatter.
+/// Largest number of measured points in a plot.
 const POINTS: usize = 1500;
 
 pub(crate) fn ranking(d: &Diagnosis) -> Section {
@@ -52,9 +52,9 @@ pub(crate) fn ranking(d: &Diagnosis) -> Section {
     }
     let note = "Evidence is the smaller of what the candidate gains in fit, less a penalty for its \
                 parameters, and how surely its coefficients differ from zero over independent \
-                stretches of flight. What chance reaches was found in nulls, drawn so that \
-                they lack nothing. A candidate above it is refused where it does not hold on stretches that \
-                the fit did not see, leaves what is physically possible, or the flights disagree.";
+                stretches of flight. The threshold is what chance reaches on \
+                resampled flights that lack nothing. A candidate above it is refused if it does not hold on stretches \
+                that the fit did not use, if it is physically impossible, or if the flights disagree.";
     let figure = Evidence { title: "Evidence against chance".into(), groups };
     Section::new("Suspects", note, vec![Figure::Evidence(figure)])
 }
@@ -69,7 +69,7 @@ fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> 
         0 => (format!("Asserted: {}", found.id), String::new()),
         _ => (
             format!("Asserted: {} or a look-alike", found.id),
-            "These data cannot tell them apart; what to fly does.".to_string(),
+            "These data cannot distinguish them; the section What to fly next names flights that can.".to_string(),
         ),
     };
     let plain = |c: &Candidate| EvidenceRow { detail: detail(c).join("; "), ..row(c) };

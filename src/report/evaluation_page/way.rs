@@ -11,7 +11,7 @@ use greylag_sim::summary::Spread;
 /// Number of controllers that get a colour each; with more, lines are wide.
 const COLOURS: usize = 4;
 
-/// The sections; none of an evaluation that was not measured.
+/// The sections; empty if the evaluation was not measured.
 pub(super) fn sections(report: &EvaluationReport) -> Vec<Section> {
     let measured =
         report.evaluations.iter().any(|e| e.groups.iter().any(|g| !g.measures.is_empty()));

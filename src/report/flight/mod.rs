@@ -40,7 +40,7 @@ pub struct FlightReport<'a> {
     pub timing: Option<LoopTiming>,
     /// Events of the flight, in time order.
     pub events: Vec<Event>,
-    /// How well the model predicts this flight; `None` when they were not compared.
+    /// Prediction errors of the model on this flight; `None` if they were not computed.
     pub comparison: Option<Comparison>,
     /// Insight into the planner at some ticks; empty if no planner flew.
     pub sights: Vec<Sight>,
@@ -108,7 +108,7 @@ impl Difficulty {
     }
 }
 
-/// Something that happened at an instant.
+/// An event at an instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// When, s, on the flight's clock.

@@ -158,7 +158,7 @@ fn air_data(report: &FlightReport) -> Section {
 fn surfaces(report: &FlightReport) -> Section {
     let pair = |title: &str, unit: &str, acting: Vec<f64>, command: Vec<f64>| {
         let series = vec![
-            // What acts follows its command closely: drawn over it, so that both are seen.
+            // The acting deflection follows its command closely and is drawn over it, so that both are visible.
             Series::new("commanded", Style::Command, command),
             Series::new("acting", Style::Actual, acting),
         ];

@@ -1,4 +1,4 @@
-//! What happened on the way to each target of a recorded flight, and how it kept to the envelope.
+//! Step responses to the targets of a recorded flight, and time outside the envelope.
 
 use crate::flight::verdict::signed;
 use crate::flight::{EnvelopeFlown, FlightReport, Segment};
@@ -81,7 +81,7 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     all
 }
 
-/// How the flight kept to its envelope, in a part of a sentence.
+/// Clause about the time outside the envelope.
 pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     let of = |value: f64, limit: f64, unit: &str| {
         let stated =

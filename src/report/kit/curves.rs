@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use crate::Series;
-use crate::kit::html::{compact, escape};
+use crate::kit::html::compact;
+use crate::kit::xy::plotted;
 
 /// Lines over one horizontal quantity.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -18,7 +19,7 @@ pub struct Curves {
     /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// The lines; one value for each horizontal one, what the scale has no height for is a gap.
+    /// The lines, with one value per abscissa. A value outside the domain of the scale leaves a gap.
     pub series: Vec<Series>,
     /// Shaded ranges around lines, such as the least and the most of several seeds.
     pub ranges: Vec<Range>,
@@ -41,11 +42,6 @@ pub struct Range {
 
 impl Curves {
     pub(crate) fn html(&self, index: usize) -> String {
-        let title = escape(&self.title);
-        format!(
-            "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
-             <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
-             aria-label=\"{title}\"></div></figure>\n"
-        )
+        plotted(&self.title, index)
     }
 }

@@ -23,7 +23,7 @@ pub struct EvidenceGroup {
     pub title: String,
     /// A sentence on it; may be empty.
     pub note: String,
-    /// How its bars are drawn.
+    /// Style of its bars.
     pub style: Style,
     /// The things, top to bottom.
     pub rows: Vec<EvidenceRow>,

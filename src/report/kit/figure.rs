@@ -45,21 +45,21 @@ pub enum Figure {
     Grid(Grid),
 }
 
-/// How a verdict came out.
+/// Outcome of a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The goal was reached.
     Reached,
-    /// Something that was asked for was missed.
+    /// A requirement was missed.
     Missed,
-    /// Nothing was asked for, or it cannot be determined.
+    /// There is no requirement, or it cannot be judged.
     Open,
 }
 
 /// Verdict in one sentence, with the details behind it.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// How it came out; shown as a word as well as a colour.
+    /// Its outcome, shown as a word as well as a colour.
     pub outcome: Outcome,
     /// The verdict as one sentence.
     pub sentence: String,

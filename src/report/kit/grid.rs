@@ -31,7 +31,7 @@ pub struct GridRow {
 pub struct GridCell {
     /// Text of the cell; may be empty.
     pub text: String,
-    /// How strongly it is coloured, 0..1.
+    /// Intensity of the colour, 0..1.
     pub weight: f64,
 }
 

@@ -35,7 +35,7 @@ pub struct Page {
 pub struct Section {
     /// The heading; empty for a section without one.
     pub title: String,
-    /// A sentence or two under the heading: what is shown, by which definition.
+    /// One or two sentences under the heading: what is shown and how it is defined.
     pub note: String,
     /// The figures, in order.
     pub figures: Vec<Figure>,

@@ -41,7 +41,7 @@ pub struct Row {
     pub cells: Vec<String>,
     /// Start and end, s, of the time it speaks of: its first cell then zooms the time figures there.
     pub span_s: Option<[f64; 2]>,
-    /// Name by which a link of the page finds the row.
+    /// Anchor for links to the row.
     pub anchor: Option<String>,
     /// The anchor that its first cell leads to.
     pub link: Option<String>,

@@ -36,7 +36,7 @@ pub struct Panel {
     pub title: String,
     /// Unit of the values, empty when they have none.
     pub unit: String,
-    /// How values become heights.
+    /// Scale of the vertical axis.
     pub scale: Scale,
     /// Lines, in drawing order.
     pub series: Vec<Series>,
@@ -60,7 +60,7 @@ impl Panel {
     }
 }
 
-/// How values become heights.
+/// Scale of the vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {

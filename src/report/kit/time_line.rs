@@ -13,11 +13,11 @@ const PANEL_PX: f64 = 84.0;
 const NARROW_PX: f64 = 330.0;
 const WIDE_PX: f64 = 800.0;
 const LETTER_PX: f64 = 8.0;
-/// A state is drawn at least so wide, percent: what is short is seen.
+/// Smallest width of a state, percent, so that short states stay visible.
 const SEEN: f64 = 0.6;
-/// Levels of a panel, about.
+/// Approximate number of levels in a panel.
 const LEVELS: f64 = 3.0;
-/// Points of a line at most: more than a screen has.
+/// Largest number of points of a line, more than a screen resolves.
 const POINTS: usize = 800;
 
 /// States and lines over time.
@@ -42,7 +42,7 @@ pub struct TimeLine {
 pub struct States {
     /// Name of the party whose states these are.
     pub label: String,
-    /// The states, in order of time; between two may be nothing.
+    /// The states, in order of time, with or without gaps.
     pub spans: Vec<Span>,
 }
 
@@ -105,7 +105,7 @@ impl Tone {
 }
 
 impl TimeLine {
-    /// The figure as HTML; its width is that of its place. Nothing of a span without length.
+    /// The figure as HTML, as wide as its container; empty if the time span has no length.
     pub fn html(&self) -> String {
         if self.span_s[1] <= self.span_s[0] {
             return String::new();
@@ -326,7 +326,7 @@ mod tests {
     fn states_stand_where_their_time_is_and_are_read_out() {
         let html = time_line().html();
         assert!(html.contains("x=\"0.000%\" width=\"50.000%\""), "{html}");
-        // too short to be seen, drawn as wide as can be seen, its word left to the title
+        // too short to be visible: drawn with the smallest width, its word in the title only
         assert!(html.contains("x=\"50.000%\" width=\"0.600%\""), "{html}");
         assert!(
             html.contains("OFF&lt;BOARD from 0.0 to 30.0 s, HOLD from 30.0 to 30.0 s\""),

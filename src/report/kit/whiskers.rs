@@ -30,7 +30,7 @@ pub struct Whiskers {
 pub struct Whisker {
     /// Name of the value.
     pub label: String,
-    /// How it is drawn.
+    /// Style of the mark.
     pub style: Style,
     /// The value, in the figure's unit; NaN if there is none.
     pub value: f64,

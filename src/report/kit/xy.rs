@@ -44,7 +44,7 @@ pub struct XySeries {
     pub label: String,
     /// Meaning of the series, which sets its colour.
     pub style: Style,
-    /// How it is drawn.
+    /// Style of the mark.
     pub mark: XyMark,
     /// Horizontal values; a pair with a value that is not finite breaks a path.
     #[serde(serialize_with = "compact")]
@@ -54,7 +54,7 @@ pub struct XySeries {
     pub y: Vec<f64>,
 }
 
-/// How points are drawn.
+/// Style of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum XyMark {
@@ -72,11 +72,16 @@ pub enum XyMark {
 
 impl XyFigure {
     pub(crate) fn html(&self, index: usize) -> String {
-        let title = escape(&self.title);
-        format!(
-            "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
-             <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
-             aria-label=\"{title}\"></div></figure>\n"
-        )
+        plotted(&self.title, index)
     }
+}
+
+/// The frame of a figure that the page's script draws.
+pub(super) fn plotted(title: &str, index: usize) -> String {
+    let title = escape(title);
+    format!(
+        "<figure class=\"panel xy\"><figcaption><h3>{title}</h3></figcaption>\
+         <div class=\"plot\" data-figure=\"{index}\" tabindex=\"0\" role=\"img\" \
+         aria-label=\"{title}\"></div></figure>\n"
+    )
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Time before the first fault, s: a real controller is found and engaged meanwhile.
 pub const FIRST_S: f64 = 12.0;
-/// Time by which the last fault has ended, s.
+/// Time at which the last fault has ended, s.
 pub const LAST_S: f64 = 42.0;
 
 /// Kinds of fault.

@@ -39,7 +39,7 @@ pub struct Nearest {
     pub distance: f64,
     /// Time of the minimum, s.
     pub at_s: f64,
-    /// That flight, reduced if it violates the rule.
+    /// The flight of that distance, reduced if it violates the rule.
     pub scenario: Option<Scenario>,
 }
 
@@ -81,7 +81,7 @@ fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
 }
 
 /// Flies `flights` flights with companions of `factory` at the `counterparts`, steering towards violations of
-/// `rules`; `heard` is called with the numbers of flights and violations so far, and can cancel the search.
+/// `rules`. `progress` receives the numbers of flights and violations so far and can cancel the search.
 ///
 /// # Errors
 ///
@@ -91,7 +91,7 @@ pub fn search(
     counterparts: &[Counterpart],
     flights: u64,
     seed: u64,
-    heard: &mut dyn FnMut(u64, usize) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(u64, usize) -> ControlFlow<()>,
 ) -> Result<Vec<Nearest>, FaultsError> {
     let rules = policies(&factory.envelope());
     let begin = |rule: &Policy| Nearest {
@@ -130,7 +130,7 @@ pub fn search(
             }
         }
         flown += together;
-        if heard(flown, all.iter().filter(|n| n.broken > 0).count()).is_break() {
+        if progress(flown, all.iter().filter(|n| n.broken > 0).count()).is_break() {
             break;
         }
     }

@@ -18,9 +18,9 @@ pub enum Formula<S> {
     All(Vec<Formula<S>>),
     /// Disjunction: one of them holds.
     Any(Vec<Formula<S>>),
-    /// Eventually: it holds at some sample of the next so many seconds.
+    /// Eventually: the formula holds at some sample within this time from now, s.
     Eventually(f64, Box<Formula<S>>),
-    /// Once: it has held at some sample of the last so many seconds.
+    /// Once: the formula has held at some sample within this past time, s.
     Once(f64, Box<Formula<S>>),
     /// Rise: it holds now and did not at the previous sample.
     Rises(Box<Formula<S>>),

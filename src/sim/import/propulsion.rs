@@ -9,11 +9,11 @@ use greylag_num::{Grid, least_squares};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Fraction of a channel's variation that is reported when it is left.
-const WORTH_SAYING: f64 = 0.02;
+const REPORTED_FROM: f64 = 0.02;
 /// Throttle before and after the step that measures the engine's lag.
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
 /// Fraction of that step above which the response is reported not to be a first-order lag.
-const LAG_WORTH_SAYING: f64 = 0.1;
+const LAG_REPORTED_FROM: f64 = 0.1;
 /// Observation time of the step response, s.
 const STEP_S: f64 = 20.0;
 /// Mean, amplitude and frequency (rad/s) of the throttle sine that validates the lag, and its duration, s.
@@ -78,7 +78,7 @@ impl Subject<'_> {
         let left = (missed.sum::<f64>() / thrusts.len() as f64).sqrt();
         let most = thrusts.iter().fold(1e-9_f64, |most, t| most.max(t.abs()));
         let table = self.thrust_table()?;
-        if table.is_none() && left > WORTH_SAYING * most {
+        if table.is_none() && left > REPORTED_FROM * most {
             left_out.push(format!(
                 "the thrust is a polynomial in the model; {left:.1} N (rms) of up to {most:.0} N are left out"
             ));
@@ -150,7 +150,7 @@ impl Subject<'_> {
             ));
             return Ok(None);
         }
-        if left > LAG_WORTH_SAYING {
+        if left > LAG_REPORTED_FROM {
             left_out.push(format!(
                 "the thrust lags by {lag:.2} s in the model; its answer to a step of the throttle is off by {:.0} % of the \
                  step (rms)",

@@ -8,15 +8,15 @@ use greylag_report::{Span, States, Style, TimeLine, Tone, TraceLine, Traces};
 use greylag_sim::faults::policies::Sample;
 use greylag_sim::faults::{ControllerMode, Fault};
 
-/// Time before and after what happens first that is shown large, s.
+/// Time before and after the first event in the close-up, s.
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
 /// A decision older than this is no longer in force, s.
 const STALE_S: f64 = 0.2;
-/// A moment, such as a request, is drawn as long as this, s.
+/// Drawn length of an instantaneous event, such as a request, s.
 const MOMENT_S: f64 = 0.1;
 
-/// A state at a step: its name and kind; nothing where there is none.
+/// Name and kind of a state at a step; `None` without a state.
 type Seen = Option<(String, Tone)>;
 
 impl Flown {
@@ -33,7 +33,7 @@ impl Flown {
         }
     }
 
-    /// The seconds around what happens first; nothing if nothing does.
+    /// Close-up around the first event; `None` without one.
     pub(super) fn close_up(&self) -> Option<TimeLine> {
         let first_s = self.first_s()?;
         let from = (first_s - BEFORE_S).max(0.0);
@@ -42,7 +42,7 @@ impl Flown {
         Some(TimeLine { title, span_s, states: self.states(), ..TimeLine::default() })
     }
 
-    /// When the first fault, or else the first request, comes, s.
+    /// Time of the first fault, or else of the first request, s.
     pub(super) fn first_s(&self) -> Option<f64> {
         let faults = self.scenario.faults.iter().map(|f| f.from_s).reduce(f64::min);
         faults.or(self.scenario.asked.iter().map(|a| a.at_s).reduce(f64::min))
@@ -171,7 +171,7 @@ fn owner(s: &Sample, stack: &str) -> Seen {
         (true, true) if s.confirmed => ("the companion's".into(), Tone::Asked),
         (true, false) if s.confirmed => (format!("taken by {stack}"), Tone::Begins),
         (true, _) => ("asked for".into(), Tone::Begins),
-        // of a companion that is dead, or has been: nobody has asked the one that runs
+        // the companion is dead, or was restarted and has not been requested to fly
         (false, true) if s.shown.is_none() || !s.asked => ("nobody's".into(), Tone::Wrong),
         (false, true) => ("let go".into(), Tone::Begins),
         (false, false) => (format!("{stack}'s"), Tone::Safe),

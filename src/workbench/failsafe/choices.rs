@@ -3,7 +3,7 @@
 use greylag_control::{ControllerKind, Pace};
 use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 
-/// Nothing goes wrong, or is asked for.
+/// Choice of no fault, or of no request.
 pub(super) const NOTHING: &str = "none";
 /// The client arms and asks for OFFBOARD once more.
 pub(super) const AGAIN: &str = "again";

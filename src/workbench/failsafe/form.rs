@@ -78,7 +78,7 @@ pub(super) struct Form {
     values: Vec<(&'static str, String)>,
 }
 
-/// A choice that is none.
+/// An invalid choice.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{why}")]
 pub(super) struct Wrong {
@@ -119,7 +119,7 @@ impl Form {
     /// The scenario and the controller.
     ///
     /// # Errors
-    /// The first choice that is none.
+    /// The first invalid choice.
     pub fn chosen(&self) -> Result<Chosen, Wrong> {
         let counterpart: Counterpart = self.named("counterpart", "flight controller")?;
         let controller = self.controller()?;
@@ -265,7 +265,7 @@ fn bound_radio() -> ControllerSetting {
 /// The velocity of the air over the ground, north-east-down, m/s, of a wind that comes from a direction.
 fn wind(speed_mps: f64, from_deg: f64) -> [f64; 3] {
     let (sin, cos) = from_deg.to_radians().sin_cos();
-    // to a millimetre a second, and no −0, which would stand in the file
+    // to a millimetre a second, without −0, which would appear in the file
     [-speed_mps * cos, -speed_mps * sin, 0.0].map(|v| (v * 1e3).round() / 1e3 + 0.0)
 }
 
@@ -384,7 +384,7 @@ mod tests {
         assert!(wrong.why.contains("from 0 to 100 %"), "{wrong}");
         let wrong = chosen(&[("colour", "red")]).unwrap_err();
         assert!(wrong.why.contains("no choice \"colour\"") && wrong.why.contains("counterpart"));
-        // nobody is there whom a station could ask
+        // there is no autopilot that a station could ask
         let station = [("counterpart", "sitl"), ("request", "take-over")];
         assert!(chosen(&station).unwrap_err().why.contains("choose PX4 or ArduPilot"));
         // what is not used is not looked at

@@ -20,7 +20,7 @@ const LATER_S: f64 = 2.0;
 /// A loss of altitude that the sentence mentions, m.
 const MUCH_M: f64 = 30.0;
 
-/// Something after which something may change.
+/// A cause of later changes.
 struct Cause {
     at_s: f64,
     words: String,
@@ -122,7 +122,7 @@ impl Flown {
         all
     }
 
-    /// What changes from one step to the next: what the companion does, then what its flight controller does.
+    /// Changes from one step to the next: first of the companion, then of its flight controller.
     fn change(&self, before: &Sample, now: &Sample) -> [Option<String>; 2] {
         let counterpart = self.scenario.counterpart;
         let companion = match (before.shown, now.shown) {
@@ -285,7 +285,7 @@ impl Flown {
         }
     }
 
-    /// How it stands, as a class of the style sheet: a rule broken or the aircraft lost, nobody flying it, well.
+    /// Class of the style sheet for the state of the flight: rule broken or aircraft lost, uncontrolled, or well.
     pub(super) fn standing(&self) -> &'static str {
         let bad = |f: &Found| matches!(f.finding, Finding::Crash | Finding::Panic);
         let broken = self.judged.iter().flatten().any(|(distance, _)| *distance < 0.0);

@@ -286,7 +286,7 @@ struct Tail {
 }
 
 impl Tail {
-    /// The rows that came since the last look; none as long as there is no file.
+    /// Rows that were added since the last call; empty while there is no file.
     fn rows(&mut self, log: &Path) -> Result<Vec<greylag_logs::Sample>, WorkbenchError> {
         let mut file = match File::open(log) {
             Ok(file) => file,

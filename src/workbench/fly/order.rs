@@ -93,7 +93,7 @@ impl Order {
     /// menu is written to `folder`, the session's, first.
     ///
     /// # Errors
-    /// A word is none that the simulator knows, or the schedule cannot be written.
+    /// If the simulator does not know an option, or the schedule cannot be written.
     pub fn words(
         &self,
         folder: &Path,

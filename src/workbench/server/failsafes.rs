@@ -5,7 +5,7 @@ use axum::response::Response;
 
 use super::Shared;
 
-/// The page for the choices of the address; one that is none is answered 422.
+/// The page for the choices in the address. An invalid choice is answered with 422.
 #[cfg(feature = "sitl")]
 pub async fn page(
     State(shared): State<Shared>,

@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use super::Shared;
 use super::routes::failure;
 
-/// What a page may load: this program's own files, nothing from elsewhere, nothing written into the page.
+/// Content security policy: a page may load only this program's own files, no inline scripts.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
                       img-src 'self' data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
@@ -30,7 +30,7 @@ pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -
     safe(answer)
 }
 
-/// How a request shows its token.
+/// Place of the token in a request.
 enum Entry {
     /// By the cookie, or a header.
     Known,

@@ -73,7 +73,7 @@ pub fn serve(
         let shout = events.clone();
         let on_event = move |event: Event| {
             if let Ok(text) = serde_json::to_string(&event) {
-                // nobody listens as long as no page is open
+                // without an open page there is no receiver
                 let _ = shout.send(text.into());
             }
         };

@@ -115,7 +115,7 @@ pub async fn free_run(State(shared): State<Shared>, Json(request): Json<RunReque
     aside(shared, move |bench| bench.free_run(request)).await
 }
 
-/// A change, answered with the session as it is then.
+/// Makes a change and answers with the session after it.
 pub async fn act(State(shared): State<Shared>, Json(request): Json<Request>) -> Response {
     aside(shared, move |bench| {
         bench.act(request)?;
@@ -131,7 +131,7 @@ pub struct Sent {
     revision: u64,
 }
 
-/// A log, answered with the session as it is then.
+/// Takes a log and answers with the session after it.
 pub async fn take(
     State(shared): State<Shared>,
     Query(sent): Query<Sent>,
@@ -159,7 +159,7 @@ fn too_large(name: &str) -> Response {
     failure(StatusCode::PAYLOAD_TOO_LARGE, &why)
 }
 
-/// An event by which a page looks at the state again; without a revision it may be of any.
+/// An event that makes a page fetch the state again; without a revision in any case.
 fn changed(revision: Option<u64>) -> Arc<str> {
     json!({ "event": "changed", "revision": revision }).to_string().into()
 }
@@ -169,7 +169,7 @@ pub async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
     let later = BroadcastStream::new(shared.events.subscribe());
-    // the session may be held by whoever changes it; other requests go on meanwhile
+    // a change may hold the session; other requests are served meanwhile
     let revision = tokio::task::spawn_blocking(move || shared.bench.revision()).await;
     let first = tokio_stream::once(changed(revision.ok()));
     // what a page that lags has missed may be a change

@@ -7,7 +7,7 @@ use crate::aircraft;
 
 /// Names by what the aircraft's files do with them.
 pub(super) struct Names {
-    /// Properties that the systems read and none of them writes: commands, and more.
+    /// Properties that the systems read but do not write: the commands and others.
     pub commands: Vec<String>,
     /// Properties that the aerodynamic functions read.
     pub read: Vec<String>,

@@ -9,7 +9,7 @@ use crate::shim::link::Address;
 /// A change of state of a run against ArduPilot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ArdupilotEvent {
-    /// Nobody has sent a servo packet yet.
+    /// Waiting for the first servo packet.
     Waiting(Address, Home),
     /// The first servo packet of ArduPilot has arrived.
     Connected {

@@ -316,10 +316,10 @@ impl Run<'_> {
     }
 }
 
-/// How an ArduPilot is met.
+/// How a packet of ArduPilot relates to the known client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meeting {
-    /// Nobody was there before it, or another.
+    /// The first client, or another client than before.
     New,
     /// ArduPilot was started again on the same port.
     Again,

@@ -35,7 +35,7 @@ pub struct PwmRangeError {
 }
 
 impl PwmRange {
-    /// 1000, 1500 and 2000 µs, by which ArduPilot's own aircraft are flown.
+    /// 1000, 1500 and 2000 µs, as for ArduPilot's own simulated aircraft.
     pub const STANDARD: PwmRange = PwmRange { low_us: 1000, neutral_us: 1500, high_us: 2000 };
 
     /// What `pwm_us` commands: −1..1 of a surface, 0..1 of a throttle, beyond that outside the

@@ -2,7 +2,7 @@
 //!
 //! Wire order is by falling size of the field's type, declaration order within a size, extension
 //! fields last. Identifiers, CRC_EXTRA and orders were read off pymavlink 2.4.50
-//! (`ardupilotmega`, MAVLink 2) and are held by `tests/shim_codec.rs`.
+//! (`ardupilotmega`, MAVLink 2) and are held by `tests/shim/codec.rs`.
 
 use super::field::{Field, Reader, Writer};
 

@@ -1,9 +1,9 @@
-//! Finds the frames in what arrives, whatever else arrives with them.
+//! Finds MAVLink frames among other received bytes.
 
 use super::frame::{Frame, MAGIC_1, MAGIC_2, Version, checksum};
 use super::messages::crc_extra;
 
-/// Finds frames in datagrams or in a stream; counts what is none.
+/// Finds frames in datagrams or in a stream and counts all other bytes.
 #[derive(Clone, Debug, Default)]
 pub struct Parser {
     held: Vec<u8>,
@@ -20,7 +20,7 @@ enum Front {
     Unknown(usize),
     /// The beginning of what may become a frame.
     Unfinished,
-    /// Nothing that begins a frame.
+    /// Bytes that begin no frame.
     Garbage,
 }
 

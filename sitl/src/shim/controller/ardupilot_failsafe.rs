@@ -9,10 +9,10 @@ use super::parameters::Table;
 const COUNTED_S: f64 = 0.2;
 /// Long failures are looked for at 3 Hz.
 const LOOK_EVERY: u64 = 33;
-/// FS_SHORT_TIMEOUT: a ground station heard within this is back, s.
+/// FS_SHORT_TIMEOUT: a ground station whose heartbeat is younger than this is connected, s.
 const BACK_S: f64 = 1.5;
 
-/// What has failed.
+/// Active failures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Failed {
     #[default]
@@ -25,7 +25,7 @@ enum Failed {
     Station,
 }
 
-/// What is seen at a step.
+/// Inputs of the failsafes at a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     /// Steps so far, and the time, µs.
@@ -39,7 +39,7 @@ pub(super) struct Seen {
     pub(super) station_s: Option<f64>,
 }
 
-/// What a failsafe does.
+/// Action of a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Act {
     /// The mode to go to; none where it stays.
@@ -97,7 +97,7 @@ impl Failsafes {
         }
     }
 
-    /// What is looked for more seldom.
+    /// Checks that run at a lower rate.
     fn look(&mut self, seen: &Seen, receiver: bool, parameters: &Table) -> Option<Act> {
         let timeout = parameters.get("FS_LONG_TIMEOUT");
         let since = match self.failed {

@@ -124,13 +124,13 @@ impl FlightController {
         }
     }
 
-    /// FTP as a controller answers it that has no files: NAK, "unknown command".
+    /// FTP of a controller without files: NAK, "unknown command".
     pub(super) fn refuse_file(&mut self, frame: &Frame, m: &FileTransferProtocol) {
         const ACK: u8 = 128;
         const NAK: u8 = 129;
         const UNKNOWN_COMMAND: u8 = 7;
         let [low, high, session, opcode, ..] = m.payload[0];
-        // An answer is not to be answered.
+        // An answer gets no answer.
         if matches!(opcode, ACK | NAK) {
             return;
         }

@@ -22,7 +22,7 @@ const LEVEL_RAD: f64 = 0.0685;
 const X8_TRAVEL: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Bank up to which a turn is coordinated, rad.
 const COORDINATED: f64 = 80.0 * std::f64::consts::PI / 180.0;
-/// PX4 takes less of larger rate errors into the integral, and none of this one, rad/s.
+/// Rate error at which PX4's integrator stops, rad/s; smaller errors are weighted down towards it.
 const NOT_INTEGRATED: f64 = 400.0 * std::f64::consts::PI / 180.0;
 
 /// An axis: time constant of the attitude, s; largest rate, rad/s; torque of a rate error, of its integral with its
@@ -197,7 +197,7 @@ impl Law {
     }
 }
 
-/// Roll and pitch, rad, of a quaternion NED→FRD; `None` for one that is none.
+/// Roll and pitch, rad, of a quaternion NED→FRD; `None` if it is not a rotation.
 pub(super) fn roll_and_pitch(q: [f32; 4]) -> Option<[f64; 2]> {
     let q = q.map(f64::from);
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -189,7 +189,7 @@ impl FlightController {
         })
     }
 
-    /// Measures, and appends to `out` what is to be sent now.
+    /// Samples the sensors and appends the frames due now to `out`.
     pub fn show(&mut self, out: &mut Vec<u8>) {
         let (frame, measured) = self.flight.measure();
         (self.now_us, self.measured) = (frame.time_us, measured);
@@ -231,7 +231,7 @@ impl FlightController {
     /// Flies one step with the commands received so far.
     ///
     /// # Errors
-    /// If the plant cannot go on.
+    /// If the plant cannot be stepped.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         self.watch();
         self.commanded = self.command();
@@ -550,7 +550,7 @@ impl FlightController {
         act.mode.map(|mode| (mode, act.words))
     }
 
-    /// What ArduPilot's failsafes look at.
+    /// Inputs of ArduPilot's failsafes.
     fn seen(&self) -> Seen {
         let age = |at: u64| (self.now_us - at) as f64 * 1e-6;
         Seen {

@@ -73,7 +73,7 @@ const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("AIRSPEED_CRUISE", 20.0, REAL),
 ];
 
-/// What a stack has.
+/// Parameters of a flight stack.
 fn rows(personality: Personality) -> &'static [(&'static str, f64, u8)] {
     match personality {
         Personality::Px4 => &PX4,

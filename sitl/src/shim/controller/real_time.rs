@@ -15,7 +15,7 @@ use crate::shim::telemetry::FRAME_US;
 const PERIOD: Duration = Duration::from_micros(FRAME_US);
 /// A cycle that begins later than this is late.
 const LATE: Duration = Duration::from_millis(2);
-/// A clock that is further behind than this is set anew.
+/// A clock that lags by more than this is reset.
 const HOPELESS: Duration = Duration::from_millis(100);
 /// How often the link is looked at.
 const LOOK: Duration = Duration::from_micros(500);

@@ -39,7 +39,7 @@ impl Streams {
     /// The streams of an aircraft so equipped.
     pub(super) fn new(equipment: Equipment) -> Self {
         let row = |id, interval_us| Row { id, interval_us, due_us: 0 };
-        // The rates of a telemetry port that nobody has asked for more.
+        // Default rates of a telemetry port.
         let rows = [
             row(31, None),
             row(105, None),

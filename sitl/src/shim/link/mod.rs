@@ -1,4 +1,4 @@
-//! The road to the companion: bytes out, bytes in, whatever happens to the peer.
+//! The link to the companion: bytes out, bytes in, also while the peer is gone.
 
 mod address;
 mod serial;
@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_millis(10);
 /// Whether `receive` waits for bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
-    /// Up to some ten milliseconds: lockstep, where nothing else is to be done.
+    /// Waits up to some ten milliseconds: in lockstep there is nothing else to do.
     Patient,
     /// Not at all: real time, where the clock must not slip.
     Never,
@@ -46,7 +46,7 @@ pub enum LinkError {
         /// The address as written.
         address: Address,
     },
-    /// A serial port or pseudo-terminal that cannot be had.
+    /// A serial port or pseudo-terminal cannot be opened.
     #[error("cannot open {address}: {source}; {remedy}")]
     Serial {
         /// The address as written.
@@ -89,10 +89,10 @@ impl LinkError {
     }
 }
 
-/// Something that arrived, or a change of the road itself.
+/// Received data, or a change of the link itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival<'a> {
-    /// Nothing within the wait.
+    /// Nothing arrived within the wait.
     Nothing,
     /// One datagram from this sender.
     Datagram(&'a [u8], SocketAddr),
@@ -116,7 +116,7 @@ pub enum Link {
 }
 
 impl Link {
-    /// Opens `address`. A peer that is not there yet is no error; a port that cannot be had is one.
+    /// Opens `address`. A missing peer is not an error; a port that cannot be opened is.
     pub fn open(address: &Address, wait: Wait) -> Result<Self, LinkError> {
         Ok(match address.transport {
             Transport::UdpIn | Transport::UdpOut => Link::Udp(UdpLink::open(address, wait)?),
@@ -134,7 +134,7 @@ impl Link {
         }
     }
 
-    /// The only sender of datagrams that is listened to, once there is one.
+    /// The sender whose datagrams are accepted, once it is known.
     pub fn peer(&self) -> Option<SocketAddr> {
         match self {
             Link::Udp(link) => link.peer(),
@@ -172,7 +172,7 @@ impl Link {
         match self {
             Link::Udp(link) => link.abandon(),
             Link::Tcp(link) => link.abandon(),
-            // A wire has one other end, whoever holds it.
+            // a serial wire has only one other end
             Link::Serial(_) => {}
         }
     }

@@ -30,7 +30,7 @@ pub struct SerialLink {
     port: Option<TTYPort>,
     /// The end of a batch that found no room; it must go first, or frames are torn.
     unsent: Vec<u8>,
-    /// Nobody holds the other end.
+    /// No process has the other end open.
     hung_up: bool,
     next_look: Instant,
     buffer: Box<[u8; 4096]>,

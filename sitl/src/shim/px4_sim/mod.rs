@@ -85,7 +85,7 @@ struct Run<'a> {
     sent: Instant,
 }
 
-/// Flies whoever connects until asked to stop or until the flight is over.
+/// Simulates for each client that connects until asked to stop or until the flight is over.
 pub(super) fn fly(
     link: Link,
     options: &ShimOptions,

@@ -13,7 +13,7 @@ use crate::shim::telemetry::quaternion;
 
 /// The random stream of these sensors.
 const STREAM: u64 = 4;
-/// Gas constant of dry air, J/(kg K), as the standard atmosphere has it.
+/// Gas constant of dry air in the standard atmosphere, J/(kg K).
 const AIR: f64 = 287.053;
 /// Sea-level density (kg/m³) and pressure (Pa) of the standard atmosphere.
 const SEA_LEVEL_DENSITY: f64 = 1.225;
@@ -66,7 +66,7 @@ impl Px4Noise {
         gps_velocity_mps: [0.0; 3],
     };
 
-    /// What PX4's own simulators have. Inertial: the noise densities of Gazebo's IMU plugin,
+    /// Noise of PX4's own simulators. Inertial: the noise densities of Gazebo's IMU plugin,
     /// 0.00186 m/s²/√Hz and 0.00018665 rad/s/√Hz, times √250 Hz; its wandering bias is left out.
     /// The others: PX4's modules sensor_mag_sim (0.02, 0.02, 0.03 gauss), sensor_baro_sim (1 Pa),
     /// sensor_airspeed_sim (0.01 hPa), sensor_gps_sim (0.2 m, 0.5 m; 0.06, 0.077, 0.158 m/s).
@@ -90,7 +90,7 @@ pub struct Sensors {
     /// Magnetic field, north-east-down, gauss.
     field: [f64; 3],
     random: ChaCha8Rng,
-    /// Last message, for fields that are not measured anew.
+    /// Last message, for fields that are not measured in this step.
     last: HilSensor,
 }
 

@@ -41,7 +41,7 @@ impl Ground {
     }
 }
 
-/// Seed of the targets that a training is judged by: none of those that policies are scored on.
+/// Seed of the targets that judge a training; policies are scored on other targets.
 const JUDGE_SEED: u64 = 2;
 
 /// Results of flights in JSBSim, where the policy was trained there.

@@ -37,7 +37,7 @@ struct Document<'a> {
     best: &'a Origin,
 }
 
-/// How a policy was found.
+/// Provenance of a policy.
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Method<'a> {
@@ -139,7 +139,7 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// Writes the policy as it is now, the best so far.
+    /// Writes the current policy, which is the best so far.
     fn save(
         &self,
         method: &Method,

@@ -32,7 +32,7 @@ const CERTAIN: f64 = 7.0;
 /// States before a sign is judged: its surface has moved both ways and been responded to, since one edge may coincide
 /// with one gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
-/// States after a pulse edge by which the response has appeared.
+/// Number of states after a pulse edge within which the response appears.
 const ANSWERED: usize = 7;
 /// Smallest gain that counts as a response: a model may be wrong, but not by a factor of ten.
 const ANSWER: f64 = 0.1;

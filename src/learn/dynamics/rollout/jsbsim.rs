@@ -51,7 +51,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         for step in (0..=self.steps()).rev() {
             let mut norms = [nothing(); 2];
             if step == 0 {
-                // the start is what was recorded; only what is remembered goes on
+                // the start state is recorded; only the memory depends on earlier steps
                 slope = nothing();
             } else {
                 let [error, prior, learned] = self.direct(step, trace, of);

@@ -63,8 +63,11 @@ impl Real {
             .or_else(|| self.thin_stream())
     }
 
-    /// ArduPlane tells its ground station by the system id alone, and that is the aircraft's own here: the heartbeats of
-    /// another component of it would hide that this companion is dead, and a radio's sticks would fly for good.
+    /// The refusal if another component of the aircraft's system sends heartbeats.
+    ///
+    /// ArduPlane identifies its ground station by the system id alone, and this companion uses the aircraft's own. Once the
+    /// companion is dead, heartbeats of another component would keep the ground station's failsafe from acting, and the
+    /// aircraft would stay on the radio's sticks.
     fn hidden_death(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);

@@ -1,0 +1,10 @@
+//! The MAVLink side of the simulator in lockstep.
+
+mod codec;
+mod lockstep;
+#[cfg(unix)]
+mod program;
+mod sensors;
+#[path = "../support/shim_companion.rs"]
+mod shim_companion;
+mod signs;

@@ -1,0 +1,110 @@
+//! `greylag compare` as a user runs it: sentences first, JSON, and bad logs named.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use crate::compare_support::{REALISTIC, fly};
+use greylag::logs::csv;
+
+fn greylag(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_greylag")).arg("compare").args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A log of `seconds` in `folder`.
+fn log(folder: &Path, name: &str, seed: u64, seconds: f64) -> String {
+    let path = folder.join(name);
+    csv::save(&fly(seed, seconds, REALISTIC), &path).unwrap();
+    path.to_str().unwrap().into()
+}
+
+#[test]
+fn two_models_on_two_logs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (log(folder.path(), "a.csv", 1, 40.0), log(folder.path(), "b.csv", 2, 40.0));
+    let json = folder.path().join("found.json");
+    let out = json.to_str().unwrap();
+    let arguments = [
+        "--model",
+        "params/x8/prior-as-printed.toml",
+        "--model",
+        "params/x8/jsbsim.toml",
+        "--log",
+        &a,
+        "--log",
+        &b,
+        "--horizon",
+        "1,3",
+        "--json",
+        out,
+    ];
+    let output = greylag(&arguments);
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{said}{}", text(&output.stderr));
+    println!("{said}");
+    // the difference comes first, then where each model fails
+    assert!(said.starts_with("On 2 flights the error at 3 s falls from "), "{said}");
+    let of_first = said.lines().skip_while(|l| *l != "A  prior-as-printed");
+    let first: Vec<&str> = of_first.take(3).collect();
+    assert!(first.iter().any(|s| s.contains("throttle") && s.contains("airspeed")), "{said}");
+    assert!(first.iter().any(|s| s.contains("aileron")), "{said}");
+    assert!(said.trim_end().lines().last().unwrap().starts_with("next: greylag "), "{said}");
+    let wide = said.lines().filter(|l| l.contains('─') && l.chars().count() > 100);
+    assert_eq!(wide.count(), 0, "{said}");
+    assert!(text(&output.stderr).contains("log 2 of 2"));
+    let found: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+    assert_eq!(found["schema"], "greylag.comparison/1");
+    assert_eq!(found["free_run"][1]["horizon_s"], 3.0);
+    assert_eq!(found["models"].as_array().unwrap().len(), 2);
+    assert_eq!(found["flights"][1]["name"], "b.csv");
+    // a program that reads it gets the JSON and nothing else; the model may stand in the environment
+    let piped = Command::new(env!("CARGO_BIN_EXE_greylag"))
+        .args(["compare", "--log", &a, "--horizon", "1", "--json", "-"])
+        .env("GREYLAG_MODEL", "params/x8/jsbsim.toml")
+        .output()
+        .unwrap();
+    let found: serde_json::Value = serde_json::from_slice(&piped.stdout).unwrap();
+    assert_eq!(found["models"][0]["name"], "jsbsim");
+    // nothing is written over without being told to
+    let again = greylag(&arguments);
+    assert!(!again.status.success() && text(&again.stderr).contains("--force"));
+    assert!(greylag(&[&arguments[..], &["--force"]].concat()).status.success());
+}
+
+#[test]
+fn a_bad_log_is_named_and_the_rest_is_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = log(folder.path(), "good.csv", 3, 15.0);
+    let bad = folder.path().join("bad.csv");
+    fs::write(&bad, "time_s,roll_rad\n0,0\n").unwrap();
+    let bad = bad.to_str().unwrap();
+    let model = ["--model", "params/x8/prior.toml"];
+    let output = greylag(&[&model[..], &["--log", bad, &good]].concat());
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("left out") && text(&output.stdout).contains("bad.csv"));
+    let output = greylag(&[&model[..], &["--log", bad]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("no log can be compared"));
+}
+
+#[test]
+fn what_is_missing_is_asked_for() {
+    let none = greylag(&["--model", "params/x8/prior.toml"]);
+    assert!(!none.status.success() && text(&none.stderr).contains("--log"));
+    let none = greylag(&["--log", "flight.csv"]);
+    assert!(!none.status.success() && text(&none.stderr).contains("--model"));
+    let gone = greylag(&["--model", "params/x8/prior.toml", "--log", "gone.csv"]);
+    assert!(!gone.status.success() && text(&gone.stderr).contains("gone.csv"));
+    let parked = tempfile::tempdir().unwrap();
+    let mut flight = fly(5, 10.0, REALISTIC);
+    flight.samples.iter_mut().for_each(|s| s.airspeed_mps *= 0.02);
+    let path = parked.path().join("parked.csv");
+    csv::save(&flight, &path).unwrap();
+    let output = greylag(&["--model", "params/x8/prior.toml", "--log", path.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("no flight"), "{}", text(&output.stderr));
+}

@@ -1,0 +1,118 @@
+//! Aircraft that nobody has modelled: draws from a distribution, and a controller that needs no model of them.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use greylag::control::adaptive::Adaptive;
+use greylag::control::{Controller, ControllerKind, build};
+use greylag::model::GreyBox;
+use greylag::model::population::{Character, Drawn, Population, TRAITS};
+use greylag::num::statistics::mean;
+use greylag::physics::atmosphere::STANDARD_GRAVITY;
+use greylag::sim::attitudes;
+
+fn params(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("params").join(path)
+}
+
+fn drawn(seed: u64, count: u64) -> Vec<Drawn> {
+    let population = Population::load(&params("any/aircraft.toml")).unwrap();
+    (0..count).map(|k| population.draw(seed, k).unwrap()).collect()
+}
+
+const WITHOUT_MODEL: [ControllerKind; 2] = [ControllerKind::Adaptive, ControllerKind::Any];
+
+/// The shipped aircraft had no part in the controllers' making: their envelopes, their integrators.
+#[test]
+fn aircraft_that_were_never_drawn_are_flown_without_their_models() {
+    let models =
+        ["x8/jsbsim.toml", "aerosonde/jsbsim.toml", "c172p/jsbsim.toml", "a430/prior.toml"];
+    for path in models {
+        let model = GreyBox::load(&params(path)).unwrap();
+        for kind in WITHOUT_MODEL {
+            let mut controller = build(kind, &model).unwrap();
+            let minute = attitudes::fly(&model, controller.as_mut(), 5, 0);
+            println!("{path}, {kind}: {minute:?}");
+            // 2 degrees is what the project asks of an aircraft that nobody has modelled
+            let kept = minute.lost_s.is_none() && minute.settled_deg < 2.0;
+            assert!(kept, "{path}, {kind}: {minute:?}");
+        }
+    }
+}
+
+#[test]
+fn most_drawn_aircraft_are_kept_and_the_same_seed_flies_the_same_flight() {
+    let all = drawn(11, 40);
+    for kind in WITHOUT_MODEL {
+        let fly = |d: &Drawn| {
+            let mut controller = build(kind, &d.exact).unwrap();
+            attitudes::fly(&d.exact, controller.as_mut(), 11, d.number)
+        };
+        let flown: Vec<_> = all.iter().map(fly).collect();
+        let lost = flown.iter().filter(|m| m.lost_s.is_some()).count();
+        println!("{kind}: {lost} of {} lost", flown.len());
+        // about 1 % of draws are lost (docs/validation/any-aircraft.md): more than 4 of 40 have a chance below 1 in 1000
+        assert!(lost <= 4, "{kind}: {flown:?}");
+        assert_eq!(flown[..3], all[..3].iter().map(fly).collect::<Vec<_>>());
+    }
+}
+
+/// What is believed of the roll power follows the truth from aircraft to aircraft. It is too low on the whole: to the
+/// regression a slow servo and a delay look like missing power.
+#[test]
+fn control_power_is_learned_in_flight() {
+    let place = TRAITS.iter().position(|t| t.name == "roll power").unwrap();
+    let (mut truths, mut beliefs) = (Vec::new(), Vec::new());
+    for d in drawn(12, 40) {
+        let time = d.exact.airframe.envelope.airspeed_cruise_mps / STANDARD_GRAVITY;
+        let mut adaptive = Adaptive::new(&d.exact.airframe);
+        if attitudes::fly(&d.exact, &mut adaptive, 12, d.number).lost_s.is_some() {
+            continue;
+        }
+        truths.push(Character::of(&d.exact).unwrap().values[place].ln());
+        beliefs.push((adaptive.belief().roll_power * time * time).ln());
+    }
+    let spread = |a: &[f64], b: &[f64]| -> f64 {
+        let (ma, mb) = (mean(a), mean(b));
+        a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum()
+    };
+    let correlation =
+        spread(&truths, &beliefs) / (spread(&truths, &truths) * spread(&beliefs, &beliefs)).sqrt();
+    println!("correlation of the logarithms: {correlation:.2}");
+    // a prior that is never left has none; 0.4 has a chance of 1 in 200 without any
+    assert!(correlation > 0.4, "{correlation}");
+}
+
+#[test]
+fn a_clone_and_a_reset_begin_anew() {
+    let model = GreyBox::load(&params("x8/jsbsim.toml")).unwrap();
+    let mut adaptive = Adaptive::new(&model.airframe);
+    let first = attitudes::fly(&model, &mut adaptive, 3, 1);
+    let mut again = adaptive.boxed_clone();
+    assert_eq!(attitudes::fly(&model, again.as_mut(), 3, 1), first);
+}
+
+#[test]
+fn the_commands_draw_write_and_evaluate() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_greylag")).args(arguments).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8(done.stdout).unwrap()
+    };
+    let out = folder.path().join("drawn");
+    let drawn =
+        run(&["aircraft", "draw", "--count", "30", "--show", "2", "--out", out.to_str().unwrap()]);
+    assert!(drawn.contains("static margin") && drawn.contains("Skywalker X8"), "{drawn}");
+    GreyBox::load(&out.join("29/model.toml")).unwrap();
+    let json = folder.path().join("any.json");
+    let json = json.to_str().unwrap();
+    let words = ["evaluate", "--any", "2", "--controller", "adaptive", "lqi", "--json", json];
+    let table = run(&words);
+    assert!(table.contains("own model") && table.contains("textbook"), "{table}");
+    let text = std::fs::read_to_string(json).unwrap();
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    // adaptive once, lqi from the own model and from the textbook
+    assert_eq!(document["flights"].as_array().unwrap().len(), 2 * 3);
+    assert_eq!(document["schema"], "greylag.any-aircraft/1");
+}

@@ -1,0 +1,18 @@
+//! Logs of all formats, as they are and as they should not be.
+
+mod command;
+#[cfg(feature = "sitl")]
+#[path = "../support/compare.rs"]
+mod compare_support;
+#[cfg(feature = "sitl")]
+mod comparison;
+mod formats;
+#[path = "../support/logs.rs"]
+mod logs_support;
+mod odd_files;
+mod odd_setups;
+#[cfg(feature = "sitl")]
+#[path = "../support/reconstruct.rs"]
+mod reconstruct_support;
+#[cfg(feature = "sitl")]
+mod screening;

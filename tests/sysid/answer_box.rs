@@ -1,0 +1,262 @@
+//! The answer box: the same numbers on screen, page and in JSON, and each of them recomputed from the flights.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::amend_support::{Manoeuvres, errors, fly, sensors};
+use greylag::logs::{self, csv};
+use greylag::model::GreyBox;
+use greylag::sysid::compare::free_run::{START_EVERY_S, from_moment};
+use greylag::sysid::flight_path::{ActuatorClock, Options, reconstruct};
+use greylag::sysid::weak_form::prepared::Prepared;
+use serde_json::Value;
+
+const MODEL: &str = "params/x8/jsbsim.toml";
+
+fn greylag(words: &[&str]) -> String {
+    let made = Command::new(env!("CARGO_BIN_EXE_greylag")).args(words).output().unwrap();
+    let said = String::from_utf8_lossy(&made.stderr);
+    assert!(matches!(made.status.code(), Some(0 | 3)), "{words:?}: {said}");
+    String::from_utf8(made.stdout).unwrap()
+}
+
+/// Three logs of an aircraft whose actuators lag by 50 ms, which the model does not know.
+fn logs_in(folder: &Path) -> Vec<PathBuf> {
+    let log = |k: u64| {
+        let flown = fly("actuator_lag=0.05", 25.0, Manoeuvres::Usual, 20 + k);
+        let path = folder.join(format!("flight-{k}.csv"));
+        csv::save(&sensors::spoil(&flown, &errors(20 + k), k), &path).unwrap();
+        path
+    };
+    (0..3).map(log).collect()
+}
+
+/// The error of free runs `horizon` (s) ahead over a log, added up here: every 3 s a run from the reconstructed state;
+/// root mean square over runs of the mean over states of (error / scale)², a diverged run counting as one. With it the
+/// root mean square of each state over the runs that did not diverge.
+fn recomputed(model: &GreyBox, log: &Path, reference: &GreyBox, horizon: f64) -> (f64, [f64; 8]) {
+    let read = logs::load(log, &logs::Options::default()).unwrap();
+    let options = Options::of("flight", reference, ActuatorClock::AsRecorded);
+    let flight = reconstruct(&read.flight, &options).unwrap();
+    let slowest = reference.airframe.envelope.flying_from_mps();
+    let prepared = Prepared::new(&flight, slowest).unwrap();
+    let scale = model.scale();
+    let (mut squares, mut runs, mut of_states, mut whole) = (0.0, 0.0, [0.0; 8], 0.0);
+    for segment in &prepared.segments {
+        let (mut start, ahead) = (0, (horizon / prepared.dt).round() as usize);
+        while start + ahead < segment.len() {
+            let end = &segment[start + ahead];
+            let path = from_moment(model, &prepared, segment[start].time_s, horizon).unwrap();
+            let (last, measured) = (path.time_s.len() - 1, end.state.to_array());
+            runs += 1.0;
+            if (path.time_s[last] - end.time_s).abs() < 0.5 * prepared.dt {
+                let mut own = 0.0;
+                for k in 0..8 {
+                    let mut off = path.states[k][last] - measured[k];
+                    if k == 0 {
+                        // roll 179° and −179° are 2° apart
+                        off = off.sin().atan2(off.cos());
+                    }
+                    own += (off / scale[k]).powi(2) / 8.0;
+                    of_states[k] += off * off;
+                }
+                squares += own.min(1.0);
+                whole += 1.0;
+            } else {
+                squares += 1.0;
+            }
+            start += (START_EVERY_S / prepared.dt).round() as usize;
+        }
+    }
+    ((squares / runs).sqrt(), of_states.map(|s: f64| (s / whole).sqrt()))
+}
+
+/// Every number of the sentences is one of the JSON, to the three figures that are printed, angles in degrees.
+fn all_in_json(answer: &Value) {
+    let mut known = Vec::new();
+    leaves(&answer["numbers"], &mut known);
+    let flights = answer["numbers"]["flights"].as_array().unwrap().len();
+    known.push(flights as f64);
+    for line in ["error", "effect", "left"] {
+        let text = answer[line].as_str().unwrap().replace('−', "-");
+        let words = text.split(|c: char| !(c.is_ascii_digit() || ".-+".contains(c)));
+        for word in words.map(|w| w.trim_end_matches('.')) {
+            // 95 is the level of the interval
+            let Some(said) = word.parse::<f64>().ok().filter(|x| *x != 95.0) else { continue };
+            let near = |x: &f64| {
+                // three figures, or a percentage to one
+                let least = match x.abs() {
+                    size if size > 9.9 => 0.51,
+                    size if size > 0.5 => 0.051,
+                    _ => 0.0,
+                };
+                [1.0, 1f64.to_degrees()]
+                    .iter()
+                    .any(|f| (f * x - said).abs() <= 5.1e-3 * said.abs() + least)
+            };
+            assert!(known.iter().any(near), "{said} of {text:?} is not in {answer}");
+        }
+    }
+}
+
+fn leaves(value: &Value, out: &mut Vec<f64>) {
+    match value {
+        Value::Number(n) => out.extend(n.as_f64()),
+        Value::Array(all) => all.iter().for_each(|v| leaves(v, out)),
+        Value::Object(all) => all.values().for_each(|v| leaves(v, out)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_number_of_the_box_is_recomputed_from_the_flights() {
+    let scratch = tempfile::tempdir().unwrap();
+    let logs = logs_in(scratch.path());
+    let log = |k: usize| logs[k].to_str().unwrap();
+    let out = scratch.path().join("amended");
+    let after = out.join("model.toml");
+    let amended = greylag(&[
+        "amend",
+        "--model",
+        MODEL,
+        "--log",
+        log(0),
+        log(1),
+        "--effect",
+        "actuator_lag",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let story: Value = serde_json::from_slice(&fs::read(out.join("amend.json")).unwrap()).unwrap();
+    assert!(amended.starts_with(story["answer"]["error"].as_str().unwrap()), "{amended}");
+    let last: Vec<&str> = amended.trim_end().lines().rev().take(2).collect();
+    assert!(last[0].starts_with("next: greylag diagnose --model "), "{last:?}");
+    assert!(last[1].starts_with("error at 5 s "), "{last:?}");
+    all_in_json(&story["answer"]);
+
+    // a third flight, which no fit has seen, by the command that sees the two models alone
+    let json = scratch.path().join("compared.json");
+    let page = scratch.path().join("compared.html");
+    let said = greylag(&[
+        "compare",
+        "--model",
+        MODEL,
+        after.to_str().unwrap(),
+        "--log",
+        log(2),
+        "--recorded-clock",
+        "--json",
+        json.to_str().unwrap(),
+        "--report",
+        page.to_str().unwrap(),
+    ]);
+    let compared: Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+    let answer = &compared["answer"];
+    let error = answer["error"].as_str().unwrap();
+    // the difference comes first, on screen and on the page
+    assert!(said.starts_with(error), "{said}");
+    let html = fs::read_to_string(&page).unwrap();
+    let at = |text: &str| html.find(text).unwrap_or_else(|| panic!("{text} is not on the page"));
+    assert!(at(error) < at("<h2>"), "the box stands first");
+    assert!(error.starts_with("On 1 flight not fitted the error at 5 s "), "{error}");
+    assert!(error.contains("by tuning") && error.contains("with actuator_lag"), "{error}");
+    assert!(
+        said.lines()
+            .all(|l| l.starts_with("next:") || !l.contains('─') || l.chars().count() <= 100)
+    );
+    all_in_json(answer);
+
+    let given = GreyBox::load(MODEL.as_ref()).unwrap();
+    let fitted = GreyBox::load(&after).unwrap();
+    let mut tuned = given.clone();
+    for p in story["tuned"].as_array().unwrap() {
+        assert!(tuned.set_coefficient(p["name"].as_str().unwrap(), p["value"].as_f64().unwrap()));
+    }
+    let numbers = &answer["numbers"];
+    let steps = numbers["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 3);
+    let mut before: Option<f64> = None;
+    let mut of_states = Vec::new();
+    for (step, model) in steps.iter().zip([&given, &tuned, &fitted]) {
+        let (error, states) = recomputed(model, &logs[2], &given, 5.0);
+        let told = step["error"].as_f64().unwrap();
+        // the same runs, added up in another order
+        assert!((told / error - 1.0).abs() < 1e-6, "{step}: {error}");
+        if let Some(before) = before {
+            let change: f64 = 100.0 * (error / before - 1.0);
+            assert!(
+                (step["change_percent"].as_f64().unwrap() - change).abs() < 1e-3,
+                "{step}: {change}"
+            );
+        }
+        before = Some(error);
+        of_states.push(states);
+    }
+    // what the effect changes in use, and what is left, state by state
+    let names = greylag::physics::State::NAMES;
+    let place =
+        |of: &Value| names.iter().position(|n| *n == of["state"].as_str().unwrap()).unwrap();
+    let close = |told: &Value, x: f64| {
+        assert!((told.as_f64().unwrap() / x - 1.0).abs() < 1e-6, "{told} {x}")
+    };
+    let used = &numbers["in_use"];
+    close(&used["before"], of_states[1][place(used)]);
+    close(&used["after"], of_states[2][place(used)]);
+    let left = &numbers["left"];
+    close(&left["rmse"], of_states[2][place(left)]);
+    // the coefficient is the one of the model file
+    let effect = &numbers["effects"][0];
+    let of_file =
+        fitted.coefficients().iter().find(|c| c.name.starts_with("actuator_lag.")).unwrap();
+    assert_eq!(effect["value"].as_f64().unwrap(), of_file.value);
+    assert_eq!(numbers["fitted_flights"], 0);
+
+    // a flight that was fitted is called so
+    let said = greylag(&["compare", "--model", MODEL, after.to_str().unwrap(), "--log", log(0)]);
+    assert!(said.starts_with("On 1 flight, fitted, the error"), "{said}");
+}
+
+#[test]
+fn a_diagnosis_begins_with_its_answer_and_ends_with_the_next_command() {
+    let scratch = tempfile::tempdir().unwrap();
+    let logs = logs_in(scratch.path());
+    let json = scratch.path().join("diagnosis.json");
+    let page = scratch.path().join("diagnosis.html");
+    let log = |k: usize| logs[k].to_str().unwrap();
+    let said = greylag(&[
+        "diagnose",
+        "--model",
+        MODEL,
+        "--log",
+        log(0),
+        log(1),
+        log(2),
+        "--json",
+        json.to_str().unwrap(),
+        "--report",
+        page.to_str().unwrap(),
+        "--nulls",
+        "20",
+    ]);
+    let told: Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+    let answer = &told["answer"];
+    assert!(said.starts_with(answer["error"].as_str().unwrap()), "{said}");
+    assert!(
+        answer["error"].as_str().unwrap().starts_with("On 3 flights, fitted, the error at 5 s")
+    );
+    all_in_json(answer);
+    let given = GreyBox::load(MODEL.as_ref()).unwrap();
+    let each = logs.iter().map(|log| recomputed(&given, log, &given, 5.0).0);
+    // flights of one length weigh alike
+    let error = (each.map(|e| e * e).sum::<f64>() / 3.0).sqrt();
+    let first = answer["numbers"]["steps"][0]["error"].as_f64().unwrap();
+    assert!((first / error - 1.0).abs() < 1e-6, "{first} {error}");
+    let last = said.trim_end().lines().last().unwrap();
+    assert!(last.starts_with("next: greylag "), "{last}");
+    let html = fs::read_to_string(&page).unwrap();
+    // the map shows the tuned model, and the one as given at a switch
+    let [tuned, given] =
+        ["data-option=\"tuned\"", "data-option=\"as given\""].map(|o| html.find(o));
+    assert!(tuned.unwrap() < given.unwrap());
+}

@@ -1,0 +1,136 @@
+//! An instrument that is installed or calibrated wrong is named as that, and no effect of the aircraft in its stead.
+
+use std::path::Path;
+
+use crate::diagnosis_support;
+use greylag::control::{self, ControllerKind};
+use greylag::manoeuvres::flights;
+use greylag::model::GreyBox;
+use greylag::num::stream::stream;
+use greylag::sim::flight_test::fly_within_bounds;
+use greylag::sim::installation::Installation;
+use greylag::sim::instruments::Instruments;
+use greylag::sysid::diagnose::{Detail, Diagnosis, Options, diagnose};
+use greylag::sysid::flight_path::reconstruction::Reconstruction;
+use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
+use greylag::sysid::progress::ignore_progress;
+use greylag_sitl::hidden::Hidden;
+use greylag_sitl::plant::PlantOptions;
+use rand_distr::{Distribution, StandardNormal};
+
+fn exact() -> GreyBox {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    GreyBox::load(&path).unwrap()
+}
+
+/// The reference model with every coefficient wrong by 15 % (standard deviation).
+fn wrong(seed: u64) -> GreyBox {
+    let mut model = exact();
+    let mut random = stream(seed, &[1]);
+    let mut off = |value: f64| {
+        let unit: f64 = StandardNormal.sample(&mut random);
+        value * (1.0 + 0.15 * unit.clamp(-2.0, 2.0))
+    };
+    let values: Vec<f64> = model.coefficients().iter().map(|c| off(c.value)).collect();
+    model.set_coefficients(&values);
+    model
+}
+
+/// Two flights of 50 s of an aircraft with `hidden`, logged by instruments that are noisy and `installed` so.
+fn flown(seed: u64, hidden: &[(&str, f64)], installed: &Installation) -> Vec<Reconstruction> {
+    let lqi = control::build(ControllerKind::Lqi, &exact()).unwrap();
+    let hidden: Vec<Hidden> =
+        hidden.iter().map(|(id, amount)| Hidden::new(id, *amount).unwrap()).collect();
+    let [pitch, _, all] = flights::training(seed);
+    let one = |(k, schedule): (usize, greylag::manoeuvres::Schedule)| {
+        let plant = PlantOptions { hidden: hidden.clone(), ..PlantOptions::default() };
+        let flown = fly_within_bounds(&plant, &*lqi, &schedule).unwrap();
+        let own = 10 * seed + k as u64;
+        let mut log = Instruments::drawn(own).log(&flown, &schedule.name, own);
+        installed.apply(&mut log);
+        let options = flight_path::Options {
+            gravity: 9.806,
+            actuators_clock: ActuatorClock::AsRecorded,
+            ..flight_path::Options::new(&log.name, exact().airframe.actuators)
+        };
+        reconstruct(&log, &options).unwrap()
+    };
+    [pitch, all].into_iter().enumerate().map(one).collect()
+}
+
+fn asked(seed: u64, hidden: &[(&str, f64)], installed: &Installation) -> Diagnosis {
+    let options = Options { detail: Detail::Lean, ..Options::default() };
+    let flights = flown(seed, hidden, installed);
+    for n in flights.iter().flat_map(|f| &f.nuisances) {
+        println!("{} {:.4} ± {:.4}", n.name, n.value, n.sd);
+    }
+    let found = diagnose(&wrong(seed), &flights, &options, &ignore_progress).unwrap();
+    println!("{:?} {:#?} {:#?}", found.verdict, found.sentences, found.notes);
+    diagnosis_support::agree(&found);
+    found
+}
+
+/// The error `name` of the kind `id` is asserted in the flights that excite it, `least` of the two; its value there is
+/// `truth` within `within` or within its own 95 % interval; a sentence names it, and no effect of the aircraft is asserted.
+fn named(found: &Diagnosis, [id, name]: [&str; 2], [truth, within]: [f64; 2], least: usize) {
+    let asserted: Vec<&str> =
+        found.effects.iter().filter(|c| c.asserted).map(|c| c.id.as_str()).collect();
+    assert!(asserted.is_empty(), "asserts {asserted:?}");
+    let of: Vec<_> = found.measurement.iter().filter(|m| m.name == name && m.asserted).collect();
+    assert!(of.len() >= least, "{name} in {} flights", of.len());
+    for m in of {
+        assert_eq!(m.id, id, "{m:?}");
+        let off = (m.value - truth).abs();
+        assert!(off < within.max(1.96 * m.sd), "{} {} for {truth}", m.flight, m.value);
+        assert!(3.0 * off < truth.abs(), "{} {} for {truth}", m.flight, m.value);
+    }
+    assert!(found.sentences.iter().any(|s| s.contains(id)), "{:?}", found.sentences);
+}
+
+#[test]
+fn a_vane_that_turns_too_far_is_no_induced_drag() {
+    let installed = Installation { vane_gain: [0.1, 0.0], ..Installation::TRUE };
+    named(&asked(4, &[], &installed), ["vane_gain", "alpha_gain"], [0.1, 0.02], 1);
+}
+
+#[test]
+fn a_gyro_that_shows_too_much_is_no_effect() {
+    let installed = Installation { gyro_gain: [0.05, 0.0, 0.0], ..Installation::TRUE };
+    named(&asked(5, &[], &installed), ["imu_gain", "gyro_gain_p"], [0.05, 0.01], 1);
+}
+
+#[test]
+fn a_pitot_that_lags_is_late() {
+    let installed = Installation { airspeed_lag: 0.15, ..Installation::TRUE };
+    named(&asked(6, &[], &installed), ["clock_skew", "skew_airspeed"], [0.15, 0.03], 2);
+}
+
+#[test]
+fn a_board_that_stands_askew_is_no_product_of_inertia() {
+    let pitched = 3.0_f64.to_radians();
+    let installed = Installation { tilt: [0.0, pitched, 0.0], ..Installation::TRUE };
+    named(&asked(7, &[], &installed), ["axes_askew", "askew_pitch"], [pitched, 0.01], 2);
+}
+
+#[test]
+fn instruments_without_errors_of_installation_have_none_said() {
+    for seed in [8, 9] {
+        let found = asked(seed, &[], &Installation::TRUE);
+        for m in &found.measurement {
+            let seldom =
+                ["vane_gain", "imu_gain", "airspeed_offset", "heading_offset", "axes_askew"];
+            assert!(!seldom.contains(&m.id.as_str()), "{m:?}");
+        }
+        assert!(found.effects.iter().all(|c| !c.asserted));
+    }
+}
+
+/// Both at once: the gain is taken out, the drag is found beside it.
+#[test]
+fn an_effect_of_the_aircraft_is_found_beside_an_instruments_error() {
+    let installed = Installation { gyro_gain: [0.05, 0.0, 0.0], ..Installation::TRUE };
+    let found = asked(10, &[("drag_alpha2", 0.6)], &installed);
+    let first = &found.effects[0];
+    assert!(first.asserted && first.id == "drag_alpha2", "{}", first.id);
+    assert!(found.measurement.iter().any(|m| m.asserted && m.name == "gyro_gain_p"));
+}

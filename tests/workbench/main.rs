@@ -1,0 +1,11 @@
+//! `greylag workbench` over real HTTP.
+#![cfg(feature = "sitl")]
+
+#[path = "../support/amend.rs"]
+mod amend_support;
+mod failsafes;
+mod own;
+#[path = "../support/reconstruct.rs"]
+mod reconstruct_support;
+mod session;
+mod workbench_support;
