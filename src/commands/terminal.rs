@@ -2,9 +2,9 @@
 
 use std::io::IsTerminal;
 
-use comfy_table::{
-    CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle,
-};
+#[cfg(feature = "study")]
+use comfy_table::ColumnConstraint;
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
 use crate::sysid::compare::Answer;
 
@@ -15,6 +15,7 @@ pub const NORMAL_95: f64 = 1.96;
 pub const WIDTH: u16 = 100;
 
 /// Letters up to which a name in the first column is never broken into lines.
+#[cfg(feature = "study")]
 const NAME: usize = 40;
 
 /// Lines above, under the header and below; a row a line.
@@ -36,6 +37,7 @@ pub fn table<const N: usize>(header: [&str; N], words: usize) -> Table {
 }
 
 /// `table` with the names of its first column whole, as long as they leave room for the others.
+#[cfg(feature = "study")]
 pub fn whole_names(mut table: Table) -> Table {
     let longest = table
         .row_iter()
