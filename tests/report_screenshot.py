@@ -39,6 +39,10 @@ PLOTS_WITHOUT_INK = """
   return ink < (map ? 2000 : 100);
 }).map(plot => plot.getAttribute('aria-label'))
 """
+# Rows whose text is broken into a letter a line.
+TALL = """[...document.querySelectorAll('tbody tr')].filter(r => r.checkVisibility()).filter(r =>
+  [...r.cells].some(c => c.textContent.length && c.textContent.length < 20 && c.clientHeight > 4.5 * parseFloat(getComputedStyle(c).lineHeight) && c.clientWidth < 60)).map(r => r.textContent.slice(0, 40))
+"""
 WINDOW = "document.getElementById('window').textContent"
 
 
@@ -142,6 +146,9 @@ def open_page(browser, page, width, theme):
     over = browser.value("document.documentElement.scrollWidth - innerWidth")
     if over > 0:
         found.append(f"the page is {over} px wider than the screen")
+    if not browser.value("[...document.querySelectorAll('.bar nav a')].every(a => a.checkVisibility())"):
+        found.append("the page's sections cannot be jumped to")
+    found += [f"a row taller than three lines: {row}" for row in browser.value(TALL)]
     return found
 
 
@@ -261,6 +268,8 @@ def try_mouse_and_keys(browser, zoomed_shot):
 def try_choices(browser):
     """Presses every button of every choice, and follows every link of the findings."""
     found = []
+    # what is folded is tried, too
+    browser.value("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     seen = "[...document.querySelectorAll('.choice')].map(c => [...c.querySelectorAll(':scope > .option')].filter(o => o.checkVisibility()).map(o => o.dataset.option))"
     if any(len(options) != 1 for options in browser.value(seen)):
         found.append("a choice does not show exactly one alternative")

@@ -139,6 +139,36 @@ def foreign_sockets(pid):
     return found
 
 
+CHOSEN = "document.querySelector('.grid button[aria-pressed=true]')?.dataset.channel"
+# Cells of the grid that stand outside of its pane, or under its neighbours.
+CUT = """(() => { const scroll = document.querySelector('#failing .scroll'); const box = scroll.getBoundingClientRect();
+return [...scroll.querySelectorAll('td, th')].filter(e => { const r = e.getBoundingClientRect(); return r.right > box.right + 1 || r.left < box.left - 1 || r.right > innerWidth; }).length; })()"""
+
+
+def where_the_tuned_model_fails(browser, acts_in):
+    """After a diagnosis the worst cell is the verdict's, at a switch the model as given is back; nothing is cut."""
+    found = []
+    wait(browser, "document.querySelector('[data-base=tuned][aria-pressed=true]')", 120, "where the tuned model fails")
+    if browser.value(CHOSEN) != acts_in:
+        found.append(f"the worst cell of the tuned model is in {browser.value(CHOSEN)}, the verdict is about {acts_in}")
+    r2 = "[...document.querySelectorAll('.grid td.fit')].map(e => e.textContent).join()"
+    tuned = browser.value(r2)
+    click(browser, "[data-base=given]")
+    wait(browser, "document.querySelector('[data-base=given][aria-pressed=true]')", 10, "the model as given")
+    if browser.value(r2) == tuned:
+        found.append("the switch to the model as given changes nothing")
+    click(browser, "[data-base=tuned]")
+    for width, height in SIZES.items():
+        browser.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width == 390)
+        time.sleep(0.3)
+        cut = browser.value(CUT)
+        if cut:
+            found.append(f"{cut} cells of the grid are cut at {width} px")
+    browser.call("Emulation.setDeviceMetricsOverride", width=1400, height=900, deviceScaleFactor=1, mobile=False)
+    time.sleep(0.3)
+    return found
+
+
 # Everything that a mouse can press and that is drawn.
 PRESSABLE = """
 [...document.querySelectorAll('a[href], button, input, select, textarea, summary')].filter(e => e.checkVisibility() && !e.disabled)
@@ -378,6 +408,7 @@ def walk(browser, bench, greylag, flights, folder, session):
     if not browser.value(whole):
         found.append("the curve of the first suspect is cut by its pane at 1400 x 900")
     acts_in = browser.value("document.querySelector('.suspect figcaption b').textContent.split(' ')[0]")
+    found += where_the_tuned_model_fails(browser, acts_in)
     click(browser, ".suspect input")
     begun = time.monotonic()
     wait(browser, "document.querySelector('.bars.estimated') || document.querySelector('.bars.amended')", 60, "the estimate")

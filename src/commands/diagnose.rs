@@ -15,7 +15,7 @@ use crate::commands::given;
 use crate::commands::intake::{Intake, LogArguments};
 use crate::commands::per_flight::PerFlightArguments;
 use crate::commands::status::IN_DOUBT;
-use crate::commands::terminal::{self, print_answer, print_summary};
+use crate::commands::terminal::{self, NORMAL_95, print_answer, print_summary};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::DiagnosisReport;
@@ -226,7 +226,7 @@ fn effects(diagnosis: &Diagnosis) -> Table {
             c.minimum_detectable.map_or("–".into(), |x| format!("from {}", number(x))),
         ]);
     }
-    table
+    terminal::whole_names(table)
 }
 
 fn estimate(c: &Candidate) -> String {
@@ -260,18 +260,19 @@ fn channels(diagnosis: &Diagnosis) -> Table {
 fn own(diagnosis: &Diagnosis) -> Option<Table> {
     let angles = diagnosis.measurement.iter().filter(|m| m.id == askew::ID).map(|m| {
         let [value, sd] = [m.value, m.sd].map(f64::to_degrees);
-        let estimate = format!("{} ± {} °", number(value), number(sd));
+        let estimate = format!("{} ± {} °", number(value), number(NORMAL_95 * sd));
         [m.flight.clone(), m.name.clone(), estimate, "–".into(), clear(m.asserted)]
     });
     let trims = diagnosis.trims.iter().map(|t| {
-        let estimate = |[value, sd]: [f64; 2]| format!("{} ± {}", number(value), number(sd));
+        let estimate =
+            |[value, sd]: [f64; 2]| format!("{} ± {}", number(value), number(NORMAL_95 * sd));
         let beside = t.beside_mean.map_or("–".into(), estimate);
         let own = estimate([t.value, t.sd]);
         [t.flight.clone(), t.name.clone(), own, beside, clear(t.asserted)]
     });
     let rows: Vec<_> = angles.chain(trims).collect();
     let mut table =
-        table(["flight", "constant", "estimate ± sd", "less the flights' mean", "asserted"]);
+        table(["flight", "constant", "estimate ± 95 %", "less the flights' mean", "asserted"]);
     table.add_rows(&rows);
     (!rows.is_empty()).then_some(table)
 }

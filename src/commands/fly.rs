@@ -30,6 +30,8 @@ use crate::flight::runtime::{
 use crate::link::address::Address;
 use crate::link::autopilot::Severity;
 use crate::link::vehicle::{Authority, Profile, Stack};
+#[cfg(feature = "demo")]
+use crate::logs::quoted;
 use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 use crate::physics::Airframe;
@@ -240,9 +242,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     watchdog::feed(flight.rounds.clone());
     announce(arguments, &model, &flight);
     show_events(&flight, &arguments.vehicle);
+    #[cfg(feature = "demo")]
+    let recorded = flight.recording.clone();
     let summary =
         flight.join().context("the control thread has died; the recording holds all up to then")?;
     println!("{summary}");
+    #[cfg(feature = "demo")]
+    recorded.iter().for_each(|folder| println!("next: greylag report {}", quoted(folder)));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -189,7 +189,7 @@ fn print_reconstruction(flight: &Reconstruction, output: &Path) {
     for n in &flight.nuisances {
         let moved = n.prior.map(|p| {
             let d = decimals(p.sd);
-            format!("prior {} ± {:.d$}, moved by {:.1} sd of it", p.value, p.sd, n.moved())
+            format!("prior {}, sd {:.d$}, moved by {:.1} of it", p.value, p.sd, n.moved())
         });
         let d = decimals(n.sd);
         let found = format!("{:<22} {:>11.d$} ± {:.d$} {}", n.name, n.value, n.sd, n.unit);

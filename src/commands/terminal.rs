@@ -2,22 +2,51 @@
 
 use std::io::IsTerminal;
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, ContentArrangement, Table};
+#[cfg(feature = "study")]
+use comfy_table::ColumnConstraint;
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
 use crate::sysid::compare::Answer;
 
+/// Half width of a 95 % interval in standard deviations: what ± means in every output.
+#[cfg(feature = "study")]
+pub const NORMAL_95: f64 = 1.96;
 /// Columns of a terminal that tables fit.
 pub const WIDTH: u16 = 100;
+
+/// Letters up to which a name in the first column is never broken into lines.
+#[cfg(feature = "study")]
+const NAME: usize = 40;
+
+/// Lines above, under the header and below; a row a line.
+const LINES: TableStyle = TableStyle::new()
+    .top_border(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// A table no wider than [`WIDTH`], whose columns from number `words` on hold numbers.
 pub fn table<const N: usize>(header: [&str; N], words: usize) -> Table {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table.load_style(LINES);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     table.set_header(header);
     for column in table.column_iter_mut().skip(words) {
         column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// `table` with the names of its first column whole, as long as they leave room for the others.
+#[cfg(feature = "study")]
+pub fn whole_names(mut table: Table) -> Table {
+    let longest = table
+        .row_iter()
+        .filter_map(|row| row.cell_iter().next())
+        .map(|c| c.content().chars().count());
+    if longest.max().is_some_and(|letters| letters <= NAME)
+        && let Some(column) = table.column_mut(0)
+    {
+        column.set_constraint(ColumnConstraint::ContentWidth);
     }
     table
 }

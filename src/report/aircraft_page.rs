@@ -46,7 +46,7 @@ impl AircraftReport<'_> {
             ),
             Section::new(
                 "Loops of the LQI",
-                "Factor on the loop's gain, phase and delay that it bears.",
+                "Change of the loop's gain, phase lag and delay that it bears.",
                 vec![Figure::Table(self.loops())],
             ),
             Section::new("Provenance", "", vec![Figure::Table(self.provenance())]).folded(),
@@ -77,6 +77,10 @@ impl AircraftReport<'_> {
                 number(v)
             )
         }));
+        details.push(format!(
+            "Next: fly it, then fit it: greylag amend --model {} --log FLIGHTS --tune-only --out FOLDER",
+            self.model_file
+        ));
         let flies = format!(
             "flies straight from {} to {} m/s",
             number(envelope.airspeed_min_mps),
@@ -144,16 +148,21 @@ impl AircraftReport<'_> {
         let columns = [
             ("Loop", Left),
             ("Crossover (rad/s)", Right),
-            ("Least gain", Right),
-            ("Most gain", Right),
+            ("Least gain (dB)", Right),
+            ("Most gain (dB)", Right),
             ("Phase (°)", Right),
             ("Delay (ms)", Right),
         ];
         let mut table = Table::new("Loops", &columns);
         for l in &self.check.loops {
-            let [least, most] = l.gain;
-            let cells = [l.crossover, least, most, l.phase.to_degrees(), 1e3 * l.delay].map(number);
-            table.push(std::iter::once(l.surface.to_string()).chain(cells));
+            let decibel = |x: f64| match x.is_finite() && x > 0.0 {
+                true => number(20.0 * x.log10()),
+                false => "any".into(),
+            };
+            let [least, most] = l.gain.map(decibel);
+            let [crossover, phase, delay] =
+                [l.crossover, l.phase.to_degrees(), 1e3 * l.delay].map(number);
+            table.push([l.surface.to_string(), crossover, least, most, phase, delay]);
         }
         table
     }

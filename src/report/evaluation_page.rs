@@ -1,12 +1,13 @@
 //! The page of an evaluation: scores beside the paper's, step responses, and the planners' candidates.
 
+pub(crate) mod answer;
 mod way;
 
 use super::Align::{Left, Right};
 use super::sight::{Sight, phases};
 use super::{
-    Band, Choice, ChoiceOption, Figure, Page, Panel, Scale, Section, Series, Style, Table,
-    TimeFigure, Whisker, Whiskers,
+    Band, Choice, ChoiceOption, Figure, Finding, Findings, Page, Panel, Scale, Section, Series,
+    Style, Table, TimeFigure, Whisker, Whiskers,
 };
 use crate::kit::numbers::number;
 use greylag_control::Target;
@@ -31,14 +32,28 @@ pub struct EvaluationReport<'a> {
 impl EvaluationReport<'_> {
     /// The page of the evaluation.
     pub fn page(&self) -> Page {
-        let mut sections = way::sections(self);
-        sections.extend([self.intervals(), self.scores()]);
+        let mut sections = vec![self.verdict(), self.intervals()];
         if !self.flights.is_empty() {
             sections.push(self.tracking());
             sections.extend(self.sight());
         }
+        sections.extend(way::sections(self));
+        sections.push(self.scores());
+        sections.retain(|s| !s.figures.is_empty());
         sections.push(self.provenance());
         Page { title: "Controllers".into(), subtitle: self.subtitle.clone(), sections }
+    }
+
+    /// The answer, before the figures.
+    fn verdict(&self) -> Section {
+        let plain = |sentence: String| Finding { sentence, link: None };
+        let mut lead: Vec<Finding> =
+            answer::sentences(self.evaluations).into_iter().map(plain).collect();
+        let rest = lead.split_off(lead.len().min(1));
+        match lead.is_empty() {
+            true => Section::default(),
+            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest })]),
+        }
     }
 
     fn groups(&self) -> Vec<&str> {
@@ -150,7 +165,7 @@ impl EvaluationReport<'_> {
         };
         let note =
             "Ten seconds from level flight towards the targets of the paper's Figures 7 to 9.";
-        Section::new("On the way", note, vec![Figure::Choice(choice)])
+        Section::new("Single flights", note, vec![Figure::Choice(choice)])
     }
 
     /// Section on the planners' rollouts on the way to the targets; `None` if no planner flew.
@@ -244,6 +259,27 @@ mod tests {
         let outcome = Outcome { settled_deg, settling_s: 0.5, cost, track };
         let names = [controller, "exact <model>"];
         Evaluation::measured(names, &courses(&rows, 16.67), &vec![outcome; 8], &limits)
+    }
+
+    #[test]
+    fn the_answer_names_the_best_and_whether_the_targets_tell_it_from_the_next() {
+        let answer = |errors: [f64; 2]| {
+            let [a, b] = errors;
+            answer::sentences(&[evaluated("hybrid", a), evaluated("lqi", b)])
+        };
+        let said = answer([0.25, 0.1]);
+        assert!(
+            said[0].starts_with(
+                "Best: lqi (exact <model>): settled error 0.100° on average over 8 targets"
+            ),
+            "{said:?}"
+        );
+        assert!(said[0].ends_with("; next hybrid (exact <model>) 0.250°."), "{said:?}");
+        assert!(said.iter().any(|s| s == "No target was lost."), "{said:?}");
+        assert!(said.iter().any(|s| s.starts_with("Envelope kept: lqi")), "{said:?}");
+        let alike = answer([0.1, 0.1]);
+        assert!(alike[0].contains("not told apart by these targets from"), "{alike:?}");
+        assert!(answer::sentences(&[]).is_empty());
     }
 
     /// Every controller is drawn with its interval and the paper's result. The page of a flight that ends early holds no

@@ -1,7 +1,9 @@
 //! The page of learning curves: how far trainings of policies came, over steps and over time.
 
 use super::Align::{Left, Right};
-use super::{Choice, ChoiceOption, Curves, Figure, Page, Section, Series, Style, Table};
+use super::{
+    Choice, ChoiceOption, Curves, Figure, Finding, Findings, Page, Section, Series, Style, Table,
+};
 use crate::kit::curves::Range;
 use crate::kit::numbers::{number, percent};
 use greylag_learn::policy::learning_curve::{CurvePoint, best, knee, spread};
@@ -82,12 +84,38 @@ impl LearningReport<'_> {
         self.provenance
             .iter()
             .for_each(|(item, value)| provenance.push([item.clone(), value.clone()]));
-        let sections = vec![
+        let mut sections = vec![
+            self.answer(),
             Section::new("Learning curves", note, vec![Figure::Choice(choice)]),
             Section::new("Where they came to", ends, vec![Figure::Table(self.table())]),
             Section::new("Provenance", "", vec![Figure::Table(provenance)]),
         ];
+        sections.retain(|s| !s.figures.is_empty());
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
+    }
+
+    /// What each training came to, in a sentence; the first in large type.
+    fn answer(&self) -> Section {
+        let all = self.trainings.iter().flat_map(|t| t.seeds.iter().map(move |s| (t, s)));
+        let said = all.filter_map(|(training, (seed, points))| {
+            let b = points[best(points)?];
+            let sentence = format!(
+                "{}, seed {seed}: settles within {}° (easy) and {}° (hard corners) and loses {} % of the targets, at its best \
+                 after {} steps.",
+                training.name,
+                number(b.easy_deg),
+                number(b.hard_deg),
+                percent(b.divergence_rate),
+                b.steps
+            );
+            Some(Finding { sentence, link: None })
+        });
+        let mut lead: Vec<Finding> = said.collect();
+        let rest = lead.split_off(lead.len().min(1));
+        match lead.is_empty() {
+            true => Section::default(),
+            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest })]),
+        }
     }
 
     fn figures(&self, label: &str, over: fn(&CurvePoint) -> f64) -> Vec<Figure> {

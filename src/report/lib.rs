@@ -46,6 +46,8 @@ pub use diagnosis::page::diagnosis_page;
 pub use effect_page::{EffectReport, facts as effect_facts};
 #[cfg(feature = "sitl")]
 pub use evaluation_page::EvaluationReport;
+#[cfg(feature = "sitl")]
+pub use evaluation_page::answer::sentences as evaluation_answer;
 pub use flight::{
     Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, Segment, SurfaceTravel,
 };

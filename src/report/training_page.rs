@@ -2,13 +2,14 @@
 
 use super::Align::{Left, Right};
 use super::{
-    Choice, ChoiceOption, Curves, Figure, HeatCell, HeatMap, Page, Section, Series, Style, Table,
-    XyFigure, XyMark, XySeries,
+    Choice, ChoiceOption, Curves, Figure, Finding, Findings, HeatCell, HeatMap, Page, Section,
+    Series, Style, Table, XyFigure, XyMark, XySeries,
 };
 use crate::kit::numbers::{number, percent};
 use greylag_learn::dynamics::residual_map::{Cell, ResidualMap};
 use greylag_learn::dynamics::score::Horizon;
 use greylag_learn::{Learned, Moment};
+use greylag_model::STEP;
 
 /// A trained model's story, with where it came from.
 #[derive(Clone, Debug)]
@@ -36,7 +37,7 @@ pub struct TrainingReport<'a> {
 impl TrainingReport<'_> {
     /// The page of the training.
     pub fn page(&self) -> Page {
-        let mut sections = vec![self.errors(), self.losses(), self.tracks()];
+        let mut sections = vec![self.answer(), self.errors(), self.losses(), self.tracks()];
         if let Some(residual_map) = self.residual {
             sections.extend([shares(residual_map), curves(residual_map), map(residual_map)]);
         }
@@ -44,6 +45,38 @@ impl TrainingReport<'_> {
         sections.push(self.provenance());
         sections.retain(|s| !s.figures.is_empty());
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
+    }
+
+    /// By how much the error changes, at the longest horizon and at the one before it.
+    fn answer(&self) -> Section {
+        let change = |(p, l): (&Horizon, &Horizon)| {
+            let by = 100.0 * (l.rms / p.rms - 1.0);
+            let verb = if by <= 0.0 { "falls" } else { "rises" };
+            let lost = match l.lost {
+                lost if lost > 0.0 => format!("; {} % of the runs are lost", percent(lost)),
+                _ => String::new(),
+            };
+            let sentence = format!(
+                "On flights not fitted the error at {} s {verb} from {} (prior) to {} (learned, {}{:.0} %){lost}.",
+                number(p.steps as f64 * STEP),
+                number(p.rms),
+                number(l.rms),
+                if by <= 0.0 { "−" } else { "+" },
+                by.abs()
+            );
+            Finding { sentence, link: None }
+        };
+        let both = self
+            .prior
+            .iter()
+            .zip(self.learned)
+            .filter(|(p, l)| p.rms.is_finite() && l.rms.is_finite());
+        let mut lead: Vec<Finding> = both.rev().take(2).map(change).collect();
+        let rest = lead.split_off(lead.len().min(1));
+        match lead.is_empty() {
+            true => Section::default(),
+            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest })]),
+        }
     }
 
     fn errors(&self) -> Section {

@@ -16,6 +16,7 @@ use super::key::fingerprint;
 use super::proposal::Designed;
 use super::reading::{InUse, Reading};
 use super::session::{Claim, LogEntry, Outcome, Role, Session};
+use super::tuned::Way;
 use greylag_logs as logs;
 use greylag_model::GreyBox;
 use greylag_sysid::amend::document::{Original, sha256};
@@ -73,7 +74,6 @@ pub(super) struct Inner {
     pub folder: PathBuf,
     pub session: Session,
     pub model: GreyBox,
-    /// Contents of the model's files as read.
     pub original: Original,
     /// The session's logs, in its order, or why one cannot be used.
     pub flights: Vec<Result<Arc<Loaded>, String>>,
@@ -247,23 +247,23 @@ impl Bench {
         })
     }
 
-    /// Comparison of the given and, if there is one, the amended model with the flights that are not locked; cached by key.
-    pub(super) fn comparison(&self) -> Result<Arc<Comparison>, WorkbenchError> {
-        let (key, models, flights) = {
+    /// Comparison of the models as they came about with the flights that are not locked; cached by key.
+    pub(super) fn comparison(&self) -> Result<(Vec<Way>, Arc<Comparison>), WorkbenchError> {
+        let (key, ways, models, flights) = {
             let inner = self.lock();
-            let shown = inner.shown();
+            let (shown, (ways, models)) = (inner.shown(), inner.ways());
             // an effect that has no model yet changes nothing
             let effects = if shown == "given" { &[] } else { &inner.session.effects[..] };
-            let key = inner.key("comparison", effects) + &shown;
+            let key = format!("{}{shown}{ways:?}", inner.key("comparison", effects));
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
-                return Ok(known.clone());
+                return Ok((ways, known.clone()));
             }
-            (key, inner.models(), inner.reconstructions(&inner.seen()))
+            (key, ways, models, inner.reconstructions(&inner.seen()))
         };
-        let options = compare::Options::default();
-        let made = Arc::new(compare(&models, &flights, &options, &ignore_progress)?);
+        let made = compare(&models, &flights, &compare::Options::default(), &ignore_progress)?;
+        let made = Arc::new(made);
         self.lock().comparison = Some((key, made.clone()));
-        Ok(made)
+        Ok((ways, made))
     }
 
     pub(super) fn result_file(&self, key: &str) -> PathBuf {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::tuned::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::weak_form::prepared::Prepared;
 
@@ -26,6 +27,8 @@ pub struct FlightData {
     pub window_s: Vec<Option<f64>>,
     /// Value of each regime variable in each window.
     pub regimes: BTreeMap<String, Vec<Option<f32>>>,
+    /// How each of the models came about.
+    pub ways: Vec<Way>,
     /// Channels by symbol: measured, then each model.
     pub channels: BTreeMap<&'static str, Vec<Vec<Option<f32>>>>,
 }
@@ -34,7 +37,12 @@ pub struct FlightData {
 const STATES: [&str; 8] = ["phi", "theta", "V", "p", "q", "r", "alpha", "beta"];
 
 /// A flight over time, number `k` of the comparison.
-pub(super) fn data(flight: &Prepared, comparison: &Comparison, k: usize) -> FlightData {
+pub(super) fn data(
+    flight: &Prepared,
+    comparison: &Comparison,
+    k: usize,
+    ways: Vec<Way>,
+) -> FlightData {
     let trace = &comparison.flights[k].trace;
     let every = trace.time_s.len().div_ceil(ROWS).max(1);
     let gap = |i: usize| trace.states[2][i].is_nan();
@@ -61,6 +69,7 @@ pub(super) fn data(flight: &Prepared, comparison: &Comparison, k: usize) -> Flig
         (word(*variable), values.collect())
     };
     FlightData {
+        ways,
         name: comparison.flights[k].name.clone(),
         time_s: kept.iter().map(|i| clock(trace.time_s[*i])).collect(),
         states: named(&trace.states, &kept),

@@ -123,7 +123,7 @@ impl Bench {
             Some(tuned) => tuned.clone(),
             None => {
                 let tuned = tune(&task.model, fit, &part(progress, [0.0, TUNING]))?;
-                self.lock().tuned = Some((task.tuned_key.clone(), tuned.clone()));
+                self.keep_tuned(task.tuned_key.clone(), tuned.clone());
                 tuned
             }
         };

@@ -227,7 +227,7 @@ impl Bench {
         if let (false, Ok(Divided { fit, .. })) = (there, divided)
             && let Ok(tuned) = tune(&model, &fit, &part(progress, [0.95, 1.0]))
         {
-            self.lock().tuned = Some((tuned_key, tuned));
+            self.keep_tuned(tuned_key, tuned);
         }
         Ok(())
     }

@@ -23,6 +23,7 @@ mod reading;
 mod roles;
 pub mod server;
 pub mod session;
+mod tuned;
 mod view;
 
 pub use act::{Act, Request};
@@ -34,4 +35,5 @@ pub use failsafe::{Answer, Failsafes};
 pub use fly::{Order, Part};
 pub use own::{Checked, check, grammar};
 pub use reading::Reading;
+pub use tuned::Way;
 pub use view::{FreeRun, RunRequest};

@@ -16,6 +16,7 @@ use super::jobs::{Job, TRIED, Work};
 use super::own::OwnView;
 use super::proposal::Designed;
 use super::session::{Flown, Opening, Role};
+use super::tuned::Way;
 use greylag_logs::Format;
 use greylag_logs::finding::Finding;
 use greylag_logs::info::Purpose;
@@ -98,6 +99,8 @@ struct StateView<'a> {
 #[derive(Serialize)]
 struct FailingView<'a> {
     flights: Vec<usize>,
+    /// How each of the models came about.
+    ways: Vec<Way>,
     models: &'a [ModelResult],
     notes: &'a [String],
 }
@@ -117,13 +120,15 @@ pub struct RunRequest {
 /// A free run of each model.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeRun {
-    /// The runs of the given model, then those of the amended one.
+    /// The runs of the models: as given, tuned, amended, as far as each is known.
     pub runs: Vec<OneRun>,
 }
 
 /// A free run of one model.
 #[derive(Clone, Debug, Serialize)]
 pub struct OneRun {
+    /// How the model came about.
+    pub way: Way,
     /// Name of the model.
     pub model: String,
     /// Time on the log's clock, s.
@@ -181,13 +186,14 @@ impl Bench {
     /// # Errors
     /// No flight can be compared.
     pub fn failing(&self) -> Result<Value, WorkbenchError> {
-        let comparison = self.comparison()?;
+        let (ways, comparison) = self.comparison()?;
         let inner = self.lock();
         let seen = inner.seen();
         let names = inner.names(&seen);
         let place = |f: &FlightResult| Some(seen[names.iter().position(|n| *n == f.name)?]);
         let view = FailingView {
             flights: comparison.flights.iter().filter_map(place).collect(),
+            ways,
             models: &comparison.models,
             notes: &comparison.notes,
         };
@@ -201,23 +207,23 @@ impl Bench {
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
         let flight = self.may_be_seen(place)?;
         let missing = WorkbenchError::NoFlight(place);
-        let (models, shared) = {
+        let ((ways, models), shared) = {
             let inner = self.lock();
             let seen = inner.seen();
             let k = seen.iter().position(|k| *k == place);
-            (inner.models(), k.map(|k| inner.names(&seen).swap_remove(k)))
+            (inner.ways(), k.map(|k| inner.names(&seen).swap_remove(k)))
         };
-        let (comparison, name) = match shared {
+        let ((ways, comparison), name) = match shared {
             Some(name) => (self.comparison()?, name),
             None => {
                 let flights = std::slice::from_ref(&flight.flight);
                 let made =
                     compare(&models, flights, &compare::Options::default(), &ignore_progress)?;
-                (Arc::new(made), flight.flight.name.clone())
+                ((ways, Arc::new(made)), flight.flight.name.clone())
             }
         };
         let k = comparison.flights.iter().position(|f| f.name == name).ok_or(missing)?;
-        Ok(data(&flight.prepared, &comparison, k))
+        Ok(data(&flight.prepared, &comparison, k, ways))
     }
 
     /// Free runs of the models from a moment of a flight.
@@ -226,17 +232,18 @@ impl Bench {
     /// The flight may not be seen, or is not flown at that moment.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
         let flight = self.may_be_seen(request.flight)?;
-        let models = self.lock().models();
+        let (ways, models) = self.lock().ways();
         let seconds = request.seconds.clamp(0.1, LONGEST_S);
-        let run = |model: &greylag_model::GreyBox| {
+        let run = |(way, model): (&Way, &greylag_model::GreyBox)| {
             let path = free_run::from_moment(model, &flight.prepared, request.time_s, seconds)?;
             Some(OneRun {
+                way: *way,
                 model: model.name.clone(),
                 time_s: path.time_s.clone(),
                 states: named(&path.states, &(0..path.time_s.len()).collect::<Vec<_>>()),
             })
         };
-        let runs = models.iter().map(run).collect::<Option<Vec<_>>>();
+        let runs = ways.iter().zip(&models).map(run).collect::<Option<Vec<_>>>();
         Ok(FreeRun { runs: runs.ok_or(WorkbenchError::NotFlown(request.time_s))? })
     }
 

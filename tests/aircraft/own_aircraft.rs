@@ -104,6 +104,7 @@ fn mass_span_area_and_logs_make_a_model_that_predicts_another_flight() {
     };
     let (a, b, other) = (log(1), log(2), log(3));
     let folder = scratch.path().join("own");
+    let begun = std::time::Instant::now();
     let made = greylag(&[
         "aircraft",
         "from-log",
@@ -139,6 +140,12 @@ fn mass_span_area_and_logs_make_a_model_that_predicts_another_flight() {
         found.to_str().unwrap(),
     ]);
     assert!(compared.status.success(), "{}", text(&compared.stderr));
+    // two commands: fit with pages, and compare. Five minutes are what a newcomer was promised
+    let minutes = begun.elapsed().as_secs_f64() / 60.0;
+    println!(
+        "mass, span, area and two logs of 60 s to a model judged by another flight: {minutes:.2} min"
+    );
+    assert!(minutes < 5.0, "{minutes} min");
     let numbers = json(&found)["answer"]["numbers"].clone();
     assert_eq!(numbers["fitted_flights"], 0, "{numbers}");
     // textbook estimates are off by tens of percent; a fit that halves their error has learned from the flights

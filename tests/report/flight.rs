@@ -149,8 +149,14 @@ fn the_first_sentence_says_how_the_envelope_was_kept() {
     (limits.airspeed_mps, limits.slew_per_s) = ([5.0, 45.0], 1e3);
     let mut report = report_synthetic::report(&flight);
     report.envelope = Some(EnvelopeFlown { limits, flying_from_mps: 6.0 });
-    let (outcome, sentence) = verdict(&report);
+    let (outcome, _) = verdict(&report);
     assert_eq!(outcome, Outcome::Missed);
+    // a line each on the page, all of them in the one line of a terminal
+    let (line, html) = (report.page_sentence(), report.page().render());
+    for part in ["Outside the envelope for 0.500 s (load factor 0.500 s)", "Latency"] {
+        assert!(html.contains(&format!("<li>{part}")), "{part}");
+    }
+    let sentence = line;
     for part in
         ["outside the envelope for 0.500 s (load factor 0.500 s)", "to 3.00 of 2.20", "latency"]
     {

@@ -72,6 +72,45 @@ fn recomputed(model: &GreyBox, log: &Path, reference: &GreyBox, horizon: f64) ->
     ((squares / runs).sqrt(), of_states.map(|s: f64| (s / whole).sqrt()))
 }
 
+/// The error 5 s ahead of holding the state, or of flying straight on, added up here as [`recomputed`] does.
+fn without_aerodynamics(log: &Path, reference: &GreyBox, straight: &str) -> f64 {
+    let read = logs::load(log, &logs::Options::default()).unwrap();
+    let options = Options::of("flight", reference, ActuatorClock::AsRecorded);
+    let flight = reconstruct(&read.flight, &options).unwrap();
+    let slowest = reference.airframe.envelope.flying_from_mps();
+    let prepared = Prepared::new(&flight, slowest).unwrap();
+    let scale = reference.scale();
+    let own = |held: &[f64; 8], measured: &[f64; 8]| -> f64 {
+        let of = |k: usize| {
+            let mut off = held[k] - measured[k];
+            if k == 0 {
+                off = off.sin().atan2(off.cos());
+            }
+            (off / scale[k]).powi(2) / 8.0
+        };
+        (0..8).map(of).sum()
+    };
+    let (mut squares, mut runs) = (0.0_f64, 0.0);
+    for segment in &prepared.segments {
+        let (mut start, ahead) = (0, (5.0 / prepared.dt).round() as usize);
+        while start + ahead < segment.len() {
+            let mut held = segment[start].state.to_array();
+            if straight == "fly straight on" {
+                held[3..6].fill(0.0);
+            }
+            // lost for good once it is off by as much as the scale
+            let each =
+                (start + 1..=start + ahead).map(|k| own(&held, &segment[k].state.to_array()));
+            let each: Vec<f64> = each.collect();
+            let lost = each.iter().any(|e| *e > 1.0);
+            squares += if lost { 1.0 } else { each[ahead - 1] };
+            runs += 1.0;
+            start += (START_EVERY_S / prepared.dt).round() as usize;
+        }
+    }
+    (squares / runs).sqrt()
+}
+
 /// Every number of the sentences is one of the JSON, to the three figures that are printed, angles in degrees.
 fn all_in_json(answer: &Value) {
     let mut known = Vec::new();
@@ -211,6 +250,27 @@ fn every_number_of_the_box_is_recomputed_from_the_flights() {
         fitted.coefficients().iter().find(|c| c.name.starts_with("actuator_lag.")).unwrap();
     assert_eq!(effect["value"].as_f64().unwrap(), of_file.value);
     assert_eq!(numbers["fitted_flights"], 0);
+    // its interval is the one that the amendment wrote
+    let written = story["parameters"].as_array().unwrap().iter();
+    let written = written.clone().find(|p| p["name"] == of_file.name.as_str()).unwrap();
+    assert_eq!(effect["ci95"], written["ci95"]);
+    // the change of all of it
+    let all = 100.0 * (before.unwrap() / recomputed(&given, &logs[2], &given, 5.0).0 - 1.0);
+    assert!((numbers["change_percent"].as_f64().unwrap() - all).abs() < 1e-3, "{numbers} {all}");
+
+    // one model alone stands beside the best forecast without aerodynamics
+    let json = scratch.path().join("alone.json");
+    let flags = ["--recorded-clock", "--json", json.to_str().unwrap()];
+    greylag(&[&["compare", "--model", MODEL, "--log", log(2)][..], &flags].concat());
+    let alone: Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+    all_in_json(&alone["answer"]);
+    let baseline = &alone["answer"]["numbers"]["baseline"];
+    let (name, told) = (baseline["name"].as_str().unwrap(), baseline["error"].as_f64().unwrap());
+    for forecast in ["hold the state", "fly straight on"] {
+        let error = without_aerodynamics(&logs[2], &given, forecast);
+        assert!(told <= error * (1.0 + 1e-9), "{baseline}: {forecast} {error}");
+        assert!(name != forecast || (told / error - 1.0).abs() < 1e-6, "{baseline} {error}");
+    }
 
     // a flight that was fitted is called so
     let said = greylag(&["compare", "--model", MODEL, after.to_str().unwrap(), "--log", log(0)]);

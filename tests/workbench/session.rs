@@ -121,7 +121,13 @@ fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
     assert!(after < 0.5 * before, "{before} to {after}");
     assert!(at_5_s(&step["on_fit"]["amended"]) < at_5_s(&step["on_fit"]["given"]));
     let (_, failing) = bench.get("/api/failing");
-    assert_eq!(failing["models"][1]["name"], "jsbsim+actuator_lag");
+    assert_eq!(failing["ways"], json!(["given", "tuned", "amended"]));
+    assert_eq!(failing["models"][2]["name"], "jsbsim+actuator_lag");
+    let (_, flight) = bench.get("/api/flight/0");
+    assert_eq!(flight["ways"], failing["ways"]);
+    // measured and three models, of which no two predict the same
+    let lift = flight["channels"]["L"].as_array().unwrap();
+    assert!(lift.len() == 4 && lift[1] != lift[2] && lift[2] != lift[3]);
 
     commands_are_understood(
         &state,
@@ -162,6 +168,9 @@ fn drop_see_tick_judge_save_and_go_on_after_a_kill() {
     assert_eq!(state["revision"], revision);
     assert_eq!(state["stack"][0]["status"], "fitted");
     assert_eq!(state["openings"].as_array().unwrap().len(), 1);
+    // where the tuned model fails is known again, not only where the given one does
+    let (_, again) = bench.get("/api/failing");
+    assert_eq!(again["models"][1], failing["models"][1]);
     assert_eq!(bench.act(json!({ "do": "undo" })).1["redo"], "actuator_lag");
     let (status, state) = bench.act(json!({ "do": "redo" }));
     assert_eq!((status, &state["stack"][0]["status"]), (200, &json!("fitted")));

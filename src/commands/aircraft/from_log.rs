@@ -53,6 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let measures = new::measures(common, folder, *span_m, *area_m2)?;
     let prior = folder.join("prior");
+    let made = !folder.exists();
     new::files(&prior, &measures.airframe(), &measures.model())?;
     let model = prior.join("model.toml");
     let fitted = folder.join("model.toml");
@@ -65,7 +66,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     line.extend(["--out".into(), folder.clone().into_os_string()]);
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
-    let status = crate::commands::amend::run(&amend)?;
+    let status = crate::commands::amend::run(&amend).inspect_err(|_| {
+        // so that the same line works once its mistake is mended
+        let _ = std::fs::remove_dir_all(if made { folder } else { &prior });
+    })?;
+    if !fitted.exists() {
+        println!("the estimate from size is in {}", prior.display());
+        return Ok(status);
+    }
     let page = folder.join("aircraft.html");
     let found = check::page(&fitted, &given::model(&fitted)?)?;
     files::write(&page, &found, Overwrite::Never)?;

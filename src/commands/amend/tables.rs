@@ -2,14 +2,14 @@
 
 use comfy_table::Table;
 
-use crate::commands::terminal::{print_answer, table};
+use crate::commands::terminal::{NORMAL_95, print_answer, table, whole_names};
 use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
 use crate::sysid::compare::{Answer, HorizonScore};
 
 /// The answer, errors, parameters, sentences, notes.
 pub fn print(story: &Amendment, answer: &Answer) {
     print_answer(answer);
-    println!("{}\n{}", error_table(story), parameter_table(&story.parameters));
+    println!("{}\n{}", error_table(story), whole_names(parameter_table(&story.parameters)));
     if story.flights.iter().any(|f| !f.own.is_empty()) {
         println!("{}", own_table(&story.flights));
     }
@@ -37,13 +37,15 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
 /// Constants estimated for each flight; angles in degrees.
 fn own_table(flights: &[FittedFlight]) -> Table {
     let mut table =
-        table(["flight", "its own", "value", "sd", "beside the flights' mean", "sd"], 1);
+        table(["flight", "its own", "value", "± 95 %", "beside the flights' mean", "± 95 %"], 1);
     for f in flights {
         for c in &f.own {
             let (factor, unit) = own_unit(c.name);
             let show = |x: f64| format!("{}{unit}", number(factor * x));
-            let [by, of] = c.beside_mean.map_or_else(|| ["–".into(), "–".into()], |b| b.map(show));
-            table.add_row([f.flight.clone(), c.name.into(), show(c.value), show(c.sd), by, of]);
+            let half = |sd: f64| show(NORMAL_95 * sd);
+            let beside = c.beside_mean.map(|[by, sd]| [show(by), half(sd)]);
+            let [by, of] = beside.unwrap_or_else(|| ["–".into(), "–".into()]);
+            table.add_row([f.flight.clone(), c.name.into(), show(c.value), half(c.sd), by, of]);
         }
     }
     table

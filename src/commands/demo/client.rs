@@ -28,9 +28,9 @@ pub struct View {
     pub airspeed: f64,
     /// Altitude of VFR_HUD, m.
     pub altitude: f64,
-    armed: bool,
-    mode: Option<Mode>,
-    accepted: Option<u32>,
+    pub(super) armed: bool,
+    pub(super) mode: Option<Mode>,
+    pub(super) accepted: Option<u32>,
 }
 
 /// A client connected to one companion.

@@ -1,17 +1,17 @@
 //! `greylag demo`: shim, companion and client in one program, over real sockets.
 
 mod client;
+mod indicator;
+mod live;
 mod schedule;
 
 use crate::report::Sight;
-use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use greylag_sitl::error_arguments::{FaultArgs, SensorArgs};
@@ -32,10 +32,12 @@ use crate::flight::recorder::Place;
 use crate::flight::runtime::{Companion, Flight, FlightOptions, Pace};
 use crate::link::address::Address;
 use crate::link::vehicle::{Sitl, Vehicle};
+use crate::logs::quoted;
 use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 use crate::report::FlightReport;
-use client::{Client, View};
+use client::Client;
+use live::Live;
 use schedule::Legs;
 
 /// FlightOptions of `greylag demo`.
@@ -131,6 +133,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let page = folder.join("report.html");
     files::write(&page, &report.page().render(), Overwrite::Never)?;
     println!("report: {}", page.display());
+    println!(
+        "next: greylag compare --model {} --log {}",
+        quoted(&arguments.model),
+        quoted(&folder.join("flight.csv"))
+    );
     Ok(verdict(&report, trouble.as_deref()))
 }
 
@@ -257,63 +264,6 @@ fn simulate(
         .name("shim".into())
         .spawn(move || shim::run(&options, &stop, &mut |_| ()))
         .context("starting the shim's thread")
-}
-
-/// One line per leg: rewritten while it is flown on a terminal, written once elsewhere.
-struct Live<'a> {
-    legs: &'a Legs,
-    terminal: bool,
-    leg: Option<usize>,
-    line: String,
-    shown: Duration,
-}
-
-impl Live<'_> {
-    fn begin(legs: &Legs) -> Live<'_> {
-        println!("   target roll/pitch     roll    pitch   error   airspeed  altitude");
-        Live {
-            legs,
-            terminal: std::io::stdout().is_terminal(),
-            leg: None,
-            line: String::new(),
-            shown: Duration::ZERO,
-        }
-    }
-
-    fn show(&mut self, leg: usize, seconds: f64, view: &View) {
-        if self.leg != Some(leg) {
-            self.end();
-            (self.leg, self.shown) = (Some(leg), Duration::ZERO);
-        }
-        let now = Duration::from_secs_f64(seconds.clamp(0.0, self.legs.seconds));
-        let (roll, pitch) = (view.roll.to_degrees(), view.pitch.to_degrees());
-        let target = self.legs.legs[leg];
-        let error = 0.5 * ((roll - target.roll_deg).abs() + (pitch - target.pitch_deg).abs());
-        self.line = format!(
-            "{:>5.1} s {:>5.0}/{:>3.0} deg {:>8.2} {:>8.2} {:>7.3} {:>7.1} m/s {:>6.0} m",
-            seconds,
-            target.roll_deg,
-            target.pitch_deg,
-            roll,
-            pitch,
-            error,
-            view.airspeed,
-            view.altitude
-        );
-        if self.terminal && now >= self.shown {
-            self.shown = now + Duration::from_millis(100);
-            print!("\r{}", self.line);
-            // a terminal that cannot be written to is no reason to stop flying
-            let _ = std::io::stdout().flush();
-        }
-    }
-
-    fn end(&mut self) {
-        if self.leg.take().is_some() {
-            let start = if self.terminal { "\r" } else { "" };
-            println!("{start}{}", self.line);
-        }
-    }
 }
 
 /// Prints how each target was tracked and, where one was not, what this computer has to do with it.

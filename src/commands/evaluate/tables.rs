@@ -3,6 +3,7 @@
 use comfy_table::{ContentArrangement, Table};
 
 use crate::control::quality::{Measure, measure};
+use crate::report::evaluation_answer;
 use crate::sim::evaluation::{Evaluation, Score};
 use crate::sim::published::published;
 
@@ -28,7 +29,7 @@ const SHOWN: [&str; 13] = [
     "outside_s",
 ];
 
-/// Prints the tables and what their words mean.
+/// Prints the tables, what their words mean, and the answer.
 pub(super) fn print(evaluations: &[Evaluation]) {
     tables(evaluations).iter().for_each(|table| println!("{table}"));
     println!(
@@ -40,6 +41,9 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     println!(
         "envelope kept: load factor and angle of attack, 5 % beyond the airframe file's limits at most"
     );
+    // last, where it is seen first
+    println!();
+    evaluation_answer(evaluations).iter().for_each(|sentence| println!("{sentence}"));
 }
 
 pub(super) fn tables(evaluations: &[Evaluation]) -> Vec<Table> {

@@ -64,7 +64,12 @@ pub fn climb(
         };
         curve.add(point).with_context(context)?;
         let left = seconds / update as f64 * (recipe.updates - update) as f64;
-        println!("{:>8} {}  {:.0} min left", recipe.seed, point.line(), left / 60.0);
+        println!(
+            "{:>8} {}  {:.0} min left",
+            recipe.seed,
+            point.line().replace("NaN", "–"),
+            left / 60.0
+        );
         reward = 0.0;
         if stop.is_set() && update < recipe.updates {
             return Ok(None);

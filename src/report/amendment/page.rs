@@ -24,7 +24,7 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     });
     sections.push(added(a));
     sections.push(effects(a));
-    sections.push(Section::new("In words", "", vec![Figure::Findings(findings(a))]));
+    sections.push(in_words(a));
     sections.push(tables::tuned(&tuned(a)));
     sections.push(sensors(a).folded());
     sections.push(notes(a).folded());
@@ -34,14 +34,18 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     Page { title: report.title.clone(), subtitle, sections }
 }
 
-fn findings(a: &Amendment) -> Findings {
+/// What the answer does not say.
+fn in_words(a: &Amendment) -> Section {
     let finding = |s: &String| Finding { sentence: s.clone(), link: None };
-    let mut lead: Vec<Finding> = a.sentences.iter().take(LEADING).map(finding).collect();
-    if lead.is_empty() {
-        let sentence = "The amendment says nothing: the notes say why.".into();
-        lead.push(Finding { sentence, link: None });
+    let [lead, rest] = [
+        &a.sentences[..LEADING.min(a.sentences.len())],
+        &a.sentences[LEADING.min(a.sentences.len())..],
+    ]
+    .map(|some| some.iter().map(finding).collect::<Vec<_>>());
+    match lead.is_empty() {
+        true => Section::default(),
+        false => Section::new("In words", "", vec![Figure::Findings(Findings { lead, rest })]),
     }
-    Findings { lead, rest: a.sentences.iter().skip(LEADING).map(finding).collect() }
 }
 
 /// The errors at the horizons, model by model.

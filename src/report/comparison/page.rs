@@ -6,6 +6,7 @@ use crate::{
     AnswerBox, BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, Link, Page,
     Section, Series, Style,
 };
+use greylag_sysid::compare::answer::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
 /// Number of findings on the first model that are shown first.
@@ -21,16 +22,16 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     // of one model the question is where it fails, of several by how much they differ
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
-        _ => (vec![answer], Section::new("Where each fails", "", vec![words])),
+        _ => (vec![answer], Section::new("In words", "", vec![words])),
     };
     let mut sections = vec![Section::new("", "", first)];
-    sections.push(Section::new("Unexplained", UNEXPLAINED_NOTE, vec![unexplained(c)]));
+    sections.push(Section::new("Unexplained", &unexplained_note(c), vec![unexplained(c)]));
     sections.push(Section::new("Error growth", &growth_note(c), growth(c)));
-    sections.extend(traces::section(c));
     sections.push(later);
     sections.push(regimes::regimes(c));
     sections.push(regimes::maps(c));
-    sections.push(tables::summary(c));
+    sections.extend(traces::section(c));
+    sections.push(tables::summary(c).folded());
     sections.push(tables::baselines(c).folded());
     sections.push(tables::nuisances(c).folded());
     sections.push(tables::notes(c).folded());
@@ -53,6 +54,19 @@ pub(crate) fn short_section(c: &Comparison) -> Section {
 
 const UNEXPLAINED_NOTE: &str = "Share of each channel's variation that is neither explained by \
      the model nor by the sensors' noise. Over 100 % the model is worse than a constant.";
+
+/// The note on what is unexplained; where tuning came before the effects, what of the bars it alone takes away.
+fn unexplained_note(c: &Comparison) -> String {
+    let tuned = c.answer.numbers.steps.iter().any(|step| step.way == Way::Tuned);
+    match (tuned, &c.models[..]) {
+        (true, [given, after]) => format!(
+            "{UNEXPLAINED_NOTE} “{}” is the model as given: much of its bars is wrong coefficients, which tuning alone \
+             takes away; “{}” is tuned and has what was added.",
+            given.name, after.name
+        ),
+        _ => UNEXPLAINED_NOTE.into(),
+    }
+}
 
 fn subtitle(c: &Comparison) -> String {
     let names = |all: Vec<&str>| all.join(", ");

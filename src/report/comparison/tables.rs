@@ -127,10 +127,10 @@ fn by_state(c: &Comparison, horizon_s: f64) -> Option<ChoiceOption> {
             ("NRMSE", Align::Right),
         ],
     );
-    for (name, scores) in c.free_runs() {
+    for (name, scores) in c.models.iter().map(|m| (&m.name, &m.free_run)) {
         let at = scores.iter().find(|s| s.horizon_s == horizon_s);
         for state in at.iter().flat_map(|s| &s.states) {
-            let mut row = vec![name.to_owned()];
+            let mut row = vec![name.clone()];
             row.extend(state_cells(state));
             row.push(number(state.rmse_scaled));
             table.push(row);
@@ -174,7 +174,7 @@ fn nuisance_row(flight: &str, n: &NuisanceResult) -> Vec<String> {
     let (value, half) = (factor * n.value, factor * NORMAL_95 * n.sd);
     vec![
         flight.to_string(),
-        n.name.replace('_', " "),
+        n.name.to_string(),
         number(value),
         interval(value - half, value + half),
         unit.to_string(),

@@ -16,6 +16,9 @@ const LEADING: usize = 2;
 /// Share below which a cell of the map stays blank.
 const BLANK: f64 = 0.05;
 
+/// Words of the sentences on sensors, one a flight.
+const SENSORS: &str = ": errors of the sensors and the wind";
+
 /// The page of `report`: the verdict first, then the evidence for it.
 pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     let d = report.diagnosis;
@@ -35,7 +38,7 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     sections.push(suspects::agreement(d));
     sections.push(later);
     sections.push(proof::chance(d));
-    sections.extend(report.held_out.map(proof::before_and_after));
+    sections.extend(report.held_out.map(proof::stated));
     sections.push(tables::advice(d));
     sections.push(tables::unseen(d).folded());
     sections.push(tables::tuned(&d.tuned));
@@ -61,12 +64,14 @@ fn subtitle(report: &DiagnosisReport) -> String {
 
 fn findings(d: &Diagnosis) -> Findings {
     let finding = |s: &String| Finding { sentence: s.clone(), link: link(d, s) };
-    let mut lead: Vec<Finding> = d.sentences.iter().take(LEADING).map(finding).collect();
+    // the sensors' errors have a table of their own
+    let said = || d.sentences.iter().filter(|s| !s.contains(SENSORS));
+    let mut lead: Vec<Finding> = said().take(LEADING).map(finding).collect();
     if lead.is_empty() {
         let sentence = "The diagnosis says nothing: the notes say why.".into();
         lead.push(Finding { sentence, link: None });
     }
-    Findings { lead, rest: d.sentences.iter().skip(LEADING).map(finding).collect() }
+    Findings { lead, rest: said().skip(LEADING).map(finding).collect() }
 }
 
 /// The way to the curve of the effect that `sentence` names.

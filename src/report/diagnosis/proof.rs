@@ -78,10 +78,16 @@ fn decoys(d: &Diagnosis) -> Table {
     table
 }
 
+/// [`before_and_after`] with the fall of the error in a sentence, for a page whose answer is about other flights.
+pub(crate) fn stated(c: &Comparison) -> Section {
+    let mut section = before_and_after(c);
+    section.figures.insert(0, Figure::Findings(statement(c)));
+    section
+}
+
 /// Free runs and what is unexplained on flights that no fit has seen, model by model.
 pub(crate) fn before_and_after(c: &Comparison) -> Section {
-    let mut figures = vec![Figure::Findings(statement(c))];
-    figures.extend(growth(c));
+    let mut figures = growth(c);
     figures.push(unexplained(c));
     // The table by horizon; state by state is for the comparison's own page.
     figures.extend(summary(c).figures.into_iter().take(1));

@@ -52,7 +52,7 @@ pub(crate) fn tuned(tuned: &[Tuned]) -> Section {
     sorted.sort_by(|a, b| pull(b).total_cmp(&pull(a)));
     let figure = Whiskers {
         title: "Prior to tuned".into(),
-        unit: "in standard deviations of the prior".into(),
+        unit: "in standard deviations of the prior; ± in the text is 95 %".into(),
         scale: crate::Scale::Linear,
         lines: vec![-2.0, 0.0, 2.0],
         legend: "dashed: the prior and ± 2".into(),
@@ -100,7 +100,7 @@ pub(crate) fn measurement(d: &Diagnosis) -> Section {
         let (value, half) = (factor * m.value, factor * NORMAL_95 * m.sd);
         table.push([
             m.flight.clone(),
-            if m.name == m.id { m.name.replace('_', " ") } else { format!("{}: {}", m.id, m.name) },
+            if m.name == m.id { m.name.clone() } else { format!("{}: {}", m.id, m.name) },
             number(value),
             interval(value - half, value + half),
             unit.to_string(),

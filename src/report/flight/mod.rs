@@ -155,9 +155,9 @@ impl FlightReport<'_> {
         Some(self.segments.iter().map(of).collect())
     }
 
-    /// Verdict on the flight in one sentence, which leads the page.
+    /// Verdict on the flight in one line.
     pub fn page_sentence(&self) -> String {
-        verdict::verdict(self).sentence
+        verdict::sentence(self)
     }
 
     /// The page of the flight.

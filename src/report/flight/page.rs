@@ -17,8 +17,9 @@ const MARKED_EVENTS: usize = 40;
 
 pub(crate) fn page(report: &FlightReport) -> Page {
     let mut sections = vec![Section::verdict(verdict(report))];
+    sections.push(attitude(report));
     sections.extend(quality::section(report));
-    sections.extend([attitude(report), air_data(report), surfaces(report)]);
+    sections.extend([air_data(report), surfaces(report)]);
     sections.extend(report.timing.as_ref().map(|t| loop_timing(report, t)));
     if !report.segments.is_empty() {
         sections.push(targets::section(report));
@@ -65,6 +66,14 @@ fn marks(report: &FlightReport) -> Vec<Mark> {
     timed.map(|(i, e)| Mark { time_s: e.time_s, label: (i + 1).to_string() }).collect()
 }
 
+/// What the numbered marks above the plots are.
+fn marked(report: &FlightReport) -> &'static str {
+    match report.events.len() {
+        1..=MARKED_EVENTS => " The numbers above the plots are the events listed at the end.",
+        _ => "",
+    }
+}
+
 fn attitude(report: &FlightReport) -> Section {
     let roll = (column(report, |s| s.attitude_rad[0]), column(report, |s| s.roll_target_rad));
     let pitch = (column(report, |s| s.attitude_rad[1]), column(report, |s| s.pitch_target_rad));
@@ -79,7 +88,8 @@ fn attitude(report: &FlightReport) -> Section {
         "Attitude",
         &format!(
             "Attitude against command, and the size of their difference on a scale of decades. \
-             The band and the line mark the tolerance, {tolerance}."
+             The band and the line mark the tolerance, {tolerance}.{}",
+            marked(report)
         ),
         vec![Figure::Time(time_figure(report, panels))],
     )

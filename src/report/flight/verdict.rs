@@ -1,4 +1,4 @@
-//! The verdict on a flight in one sentence, with the measurements behind it.
+//! The verdict on a flight in a sentence, with the measurements behind it.
 
 use crate::flight::quality::{clause, kept, most};
 use crate::flight::{Difficulty, FlightReport, Segment};
@@ -19,38 +19,67 @@ pub(crate) fn duration_s(samples: &[Sample]) -> f64 {
     }
 }
 
+/// What the verdict says first, and beside it, each in parts of sentences.
+struct Parts {
+    first: Vec<String>,
+    beside: Vec<String>,
+}
+
+impl Parts {
+    fn of(report: &FlightReport) -> Parts {
+        let (tracked, all) = (report.tracked(), report.segments.len());
+        let mut first = vec![match all {
+            0 => format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)),
+            _ => format!("Tracked {tracked} of {all} targets"),
+        }];
+        first.extend(settled_by_difficulty(&report.segments));
+        first.push(match report.timing.as_ref().map(LoopTiming::late) {
+            None => "loop timing was not recorded".into(),
+            Some(0) => "no late cycle".into(),
+            Some(1) => "1 late cycle".into(),
+            Some(n) => format!("{n} late cycles"),
+        });
+        let envelope =
+            report.envelope.map(|e| clause(&kept(&report.flight.samples, &e), &e.limits));
+        let timed = report.timing.as_ref().filter(|_| report.envelope.is_some());
+        let latency = timed.map(|timing| {
+            let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
+            format!("latency {} ms, {} ms at p99.9", number(p50), number(p999))
+        });
+        Parts {
+            first,
+            beside: [envelope, on_the_way(report), latency].into_iter().flatten().collect(),
+        }
+    }
+}
+
+/// The verdict in one line.
+pub(crate) fn sentence(report: &FlightReport) -> String {
+    let Parts { first, beside } = Parts::of(report);
+    format!("{}.", first.into_iter().chain(beside).collect::<Vec<_>>().join("; "))
+}
+
 pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let late = report.timing.as_ref().map(LoopTiming::late);
-    let mut parts = Vec::new();
-    if all == 0 {
-        parts.push(format!("Flew {:.1} s without a target", duration_s(&report.flight.samples)));
-    } else {
-        parts.push(format!("Tracked {tracked} of {all} targets"));
-    }
-    let envelope = report.envelope.map(|e| (kept(&report.flight.samples, &e), e.limits));
-    parts.extend(envelope.map(|(kept, limits)| clause(&kept, &limits)));
-    parts.extend(on_the_way(report));
-    parts.extend(settled_by_difficulty(&report.segments));
-    let timed = report.timing.as_ref().filter(|_| report.envelope.is_some());
-    parts.extend(timed.map(|timing| {
-        let [p50, p999] = timing.percentiles_us([0.5, 0.999]).map(|us| us / 1e3);
-        format!("latency {} ms, {} ms at p99.9", number(p50), number(p999))
-    }));
-    parts.push(match late {
-        None => "loop timing was not recorded".into(),
-        Some(0) => "no late cycle".into(),
-        Some(1) => "1 late cycle".into(),
-        Some(n) => format!("{n} late cycles"),
-    });
+    let kept = report.envelope.map(|e| kept(&report.flight.samples, &e).kept);
     let outcome = match (all, late) {
         _ if tracked < all => Outcome::Missed,
-        _ if envelope.is_some_and(|(kept, _)| !kept.kept) => Outcome::Missed,
+        _ if kept == Some(false) => Outcome::Missed,
         (_, Some(1..)) => Outcome::Missed,
         (0, _) | (_, None) => Outcome::Open,
         _ => Outcome::Reached,
     };
-    Verdict { outcome, sentence: format!("{}.", parts.join("; ")), details: details(report) }
+    let Parts { first, beside } = Parts::of(report);
+    let beside = beside.iter().map(|part| capital(part) + ".");
+    let details = not_tracked(report).into_iter().chain(beside).chain(details(report)).collect();
+    Verdict { outcome, sentence: format!("{}.", first.join("; ")), details }
+}
+
+/// The text with a capital letter first.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The worst integral of error and overshoot, where the flight was measured.
@@ -75,7 +104,7 @@ fn settled_by_difficulty(segments: &[Segment]) -> Option<String> {
 }
 
 fn details(report: &FlightReport) -> Vec<String> {
-    let mut details = not_tracked(report);
+    let mut details = Vec::new();
     if !report.segments.is_empty() {
         let tolerance = degrees(report.tolerance_rad);
         details.push(format!(

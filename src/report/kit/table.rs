@@ -4,6 +4,8 @@ use crate::kit::html::escape;
 
 /// Letters above which a text of the last column is broken into lines of some width.
 const LONG: usize = 28;
+/// Columns above which cells are broken into lines, so that the table fits a screen.
+const WIDE: usize = 9;
 
 /// A table of text with column heads.
 #[derive(Clone, Debug, Default)]
@@ -75,13 +77,15 @@ impl Table {
             .map(|(i, c)| format!("<th scope=\"col\"{}>{}</th>", class(i), escape(&c.title)))
             .collect();
         let last = |row: &Row| row.cells.last().map_or(0, |text| text.chars().count());
-        let long = if self.rows.iter().map(last).max().unwrap_or(0) > LONG {
-            " class=\"long\""
-        } else {
-            ""
+        let long = self.rows.iter().map(last).max().unwrap_or(0) > LONG;
+        let class_of_all = match (long, self.columns.len() > WIDE) {
+            (true, true) => " class=\"long wide\"",
+            (true, false) => " class=\"long\"",
+            (false, true) => " class=\"wide\"",
+            (false, false) => "",
         };
         let mut html = format!(
-            "<div class=\"table\" tabindex=\"0\"><table{long}><caption>{}</caption>\
+            "<div class=\"table\" tabindex=\"0\"><table{class_of_all}><caption>{}</caption>\
              <thead><tr>{head}</tr></thead>\n<tbody>\n",
             escape(&self.caption)
         );

@@ -1,34 +1,27 @@
 //! An amendment in sentences.
 
 use super::conventions::Tried;
-use super::judge::{judged, judged_at};
+use super::judge::judged;
 use super::result::Amendment;
 use crate::per_flight::PerFlight;
 
-/// The amendment in sentences: the change of the error, the conventions, and the outcome for every effect.
+/// The amendment in sentences beside its answer: the conventions, and what was refused.
 pub fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
-    let (given, before, after) =
-        (judged(&story.given), judged(&story.before), judged(&story.after));
+    let (before, after) = (judged(&story.before), judged(&story.after));
     let joined = story.effects.iter().filter(|e| e.joined);
     let kept: Vec<&str> = joined.map(|e| e.id.as_str()).collect();
-    if let (Some(given), Some(before), Some(after)) = (given, before, after) {
+    let taken = story.conventions.iter().filter(|t| t.kept);
+    let taken: Vec<String> =
+        taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to)).collect();
+    // tuning and effects alone are what the answer says
+    if let (Some(before), Some(after), false) = (before, after, taken.is_empty()) {
+        let joined = kept.iter().map(|id| (*id).to_owned());
         all.push(format!(
-            "On flights that the fit did not see, {} once the coefficients are tuned ({given:.5} to \
-             {before:.5} of the reference scale, free runs of {} s).",
-            change(given, before),
-            judged_at(&story.given).unwrap_or_default()
+            "With {} as well {} ({before:.5} to {after:.5}).",
+            joined.chain(taken).collect::<Vec<_>>().join(" and "),
+            change(before, after)
         ));
-        if !kept.is_empty() {
-            let joined = kept.iter().map(|id| (*id).to_owned());
-            let taken = story.conventions.iter().filter(|t| t.kept);
-            let taken = taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to));
-            all.push(format!(
-                "With {} as well {} ({before:.5} to {after:.5}).",
-                joined.chain(taken).collect::<Vec<_>>().join(" and "),
-                change(before, after)
-            ));
-        }
     }
     for Tried { convention, from, to, error: [a, b], closer, kept } in &story.conventions {
         let key = convention.key().join(".");

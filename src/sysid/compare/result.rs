@@ -44,12 +44,6 @@ pub struct Document<'a> {
 }
 
 impl Comparison {
-    /// The free-run errors of the models, then those of the forecasts, each with its name.
-    pub fn free_runs(&self) -> impl Iterator<Item = (&str, &[HorizonScore])> {
-        let models = self.models.iter().map(|m| (m.name.as_str(), m.free_run.as_slice()));
-        models.chain(self.forecasts.iter().map(|f| (f.name, f.free_run.as_slice())))
-    }
-
     /// The comparison as the JSON document.
     pub fn document(&self) -> Document<'_> {
         let first = self.models.first();

@@ -5,7 +5,10 @@ import { SYMBOL, command, complain, dots, draw, el, ink, line, percent, post, sh
 const VARIABLES = ["alpha", "beta", "airspeed", "throttle", "p", "q", "r", "aileron", "elevator", "aileron_rate", "elevator_rate", "altitude", "time"];
 const STATES = { V: ["V", "m/s"], alpha: ["α", "°"], beta: ["β", "°"], p: ["p", "°/s"], q: ["q", "°/s"], r: ["r", "°/s"], phi: ["φ", "°"], theta: ["θ", "°"] };
 const RUN_S = 5;
-const pick = { channel: null, variable: null, window: null, run: null, at: null, every: false };
+const pick = { base: "tuned", channel: null, variable: null, window: null, run: null, at: null, every: false };
+const WORD = { given: "as given", tuned: "tuned" };
+const narrow = matchMedia("(max-width: 640px)");
+narrow.addEventListener("change", () => parts && bench?.failing && grid());
 let parts = null;
 let bench = null;
 
@@ -20,8 +23,9 @@ export function failing(of) {
   }
   if (!parts) {
     parts = build();
-    body.replaceChildren(parts.grid, parts.finding, parts.where, parts.tools, parts.states, parts.command);
+    body.replaceChildren(parts.base, parts.grid, parts.finding, parts.where, parts.tools, parts.states, parts.command);
   }
+  switcher();
   grid();
   parts.command.replaceChildren(...[command(state.commands.compare)].filter(Boolean));
 }
@@ -33,7 +37,8 @@ function welcome() {
     ["3", "Tick a suspect", "the model is fitted with it; the error falls on a flight held out, tuning and effect apart"],
     ["4", "Judge, save, fly", "test flights stay unseen until then; the saved model is the command line's"]];
   return [el("ol", { class: "welcome" }, steps.map(([k, what, why]) => el("li", {}, el("b", {}, what), ` – ${why}`))),
-    picture(), el("p", { class: "note" }, "No log at hand? ", el("code", {}, "greylag mystery --seed 3 --out mystery"), " flies three flights with a hidden effect, two more to judge by, and writes the model that lacks it: drop mystery/train-*.csv and mystery/test-*.csv here.")];
+    el("figure", {}, picture(), el("figcaption", {}, "What a diagnosis shows: dots are what the tuned model leaves of the drag, the line is the missing effect.")),
+    el("p", { class: "note" }, "No log at hand? These two fly flights with a hidden effect, and open them with the model that lacks it: ", el("code", {}, "greylag mystery --seed 3 --out mystery && greylag workbench mystery/*.csv --model mystery/model.toml"))];
 }
 /** A picture of a diagnosis: what the model leaves over a variable, and the effect through it. */
 function picture() {
@@ -48,6 +53,10 @@ function picture() {
     add("circle", { cx: 160 + 150 * x, cy: 130 - 105 * x * x - 16 * (noise - Math.floor(noise) - 0.5), r: 2, class: "dot" });
   }
   add("path", { d: "M10 25 Q160 235 310 25", class: "curve" });
+  for (const [x, y, anchor, words] of [[160, 147, "middle", "sideslip β"], [6, 10, "start", "drag that the model lacks, N"]]) {
+    add("text", { x, y, "text-anchor": anchor });
+    svg.lastChild.textContent = words;
+  }
   return svg;
 }
 
@@ -57,7 +66,7 @@ function build() {
     const caption = el("figcaption");
     return { figure: el("figure", {}, caption, plot), plot, caption };
   };
-  const made = { grid: el("div", { class: "scroll" }), finding: el("p", { class: "finding" }), command: el("div"), map: el("figure", {}), time: figure("time", "tall"), residual: figure("residual"), variable: figure("variable"), bins: figure("bins", "square") };
+  const made = { base: el("div", { class: "tools", role: "group", "aria-label": "Model" }), grid: el("div", { class: "scroll" }), finding: el("p", { class: "finding" }), command: el("div"), map: el("figure", {}), time: figure("time", "tall"), residual: figure("residual"), variable: figure("variable"), bins: figure("bins", "square") };
   made.where = el("div", { class: "where" },
     el("div", {}, made.time.figure, made.residual.figure, made.variable.figure), el("div", {}, made.bins.figure, made.map));
   made.at = el("input", { type: "number", step: "0.1", "aria-label": "Start of the free run, s", onchange: () => fly(+made.at.value) });
@@ -69,6 +78,26 @@ function build() {
   return made;
 }
 
+// ---- which model ----
+
+/** The model that is shown before the effects: tuned as soon as that is known, as given if the reader asks for it. */
+const way = (ways) => (ways.includes("tuned") && pick.base !== "given" ? "tuned" : "given");
+/** Of a list with one entry a model: that model's, and the amended one's if there is one. */
+const two = (list, ways) => [list[ways.indexOf(way(ways))], list[ways.indexOf("amended")]];
+const models = () => two(bench.failing.models, bench.failing.ways).filter(Boolean);
+const word = () => WORD[way(bench.failing.ways)];
+const with_effects = () => `with ${bench.state.stack.map((s) => s.id).join(" + ") || "the effects"}`;
+function switcher() {
+  const { ways } = bench.failing;
+  const now = way(ways);
+  const inside = parts.base.contains(document.activeElement);
+  const press = (to) => { pick.base = to; pick.by_hand = false; switcher(); pressed_cell(); };
+  const why = { tuned: "its own coefficients fitted: what is left is for a missing effect to explain", given: ways.includes("tuned") ? "what tuning takes away was wrong coefficients, no missing effect" : "as its file has it; Diagnose tunes it first" };
+  const button = (to) => el("button", { type: "button", "data-base": to, "aria-pressed": to === now ? "true" : "false", disabled: !ways.includes(to), onclick: () => press(to) }, WORD[to]);
+  parts.base.replaceChildren(el("b", {}, "Model"), button("tuned"), button("given"), el("span", { class: "muted" }, why[now]));
+  if (inside) parts.base.querySelector("[aria-pressed=true]").focus();
+}
+
 // ---- the grid ----
 
 const share = (channel) => (channel?.unexplained_fraction == null ? null : 1 - channel.unexplained_fraction);
@@ -76,25 +105,34 @@ function cells(channel) {
   return Object.fromEntries(channel.bins.map((b) => [b.variable, b]));
 }
 function grid() {
-  const { models } = bench.failing;
-  const [before, after] = models;
+  const [before, after] = models();
   const channels = before.channels.filter((c) => "DLYlmn".includes(c.channel));
   const shown = channels.length ? channels : before.channels;
   const most = Math.max(...shown.map((c) => Math.min(1, c.unexplained_fraction ?? 0)), 1e-9);
   if (!pick.by_hand || !shown.some((c) => c.channel === pick.channel)) start(shown);
-  const head = el("tr", {}, el("th", { scope: "col" }, "Channel"), el("th", { scope: "col", class: "number", title: "share of the channel's variance beyond noise that the model as given explains" }, "R²"),
-    after && el("th", { scope: "col", class: "number", title: "the same with the accepted effects" }, "R² after"),
-    VARIABLES.map((v) => el("th", { scope: "col", class: "number" }, el("abbr", { title: name(shown, v) }, SYMBOL[v]))));
-  const rows = shown.map((c) => {
-    const own = cells(c);
-    const size = Math.sqrt(Math.min(1, (c.unexplained_fraction ?? 0) / most));
-    const two = after?.channels.find((x) => x.channel === c.channel);
-    return el("tr", {}, el("th", { scope: "row" }, c.name), el("td", { class: "fit" }, r2(share(c))), after && el("td", { class: "fit" }, r2(share(two))),
-      VARIABLES.map((v) => el("td", {}, own[v] && cell(c, own[v], size))));
-  });
-  const symbols = VARIABLES.filter((v) => shown.some((c) => cells(c)[v])).map((v) => `${SYMBOL[v]} ${name(shown, v)}`).join(", ");
-  parts.grid.replaceChildren(el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows)), el("p", { class: "note" }, `Numbers: how much of what is left goes with each variable, %. ${symbols}.`));
+  const size = (c) => Math.sqrt(Math.min(1, (c.unexplained_fraction ?? 0) / most));
+  const fits = [["R²", `share of the channel's variance beyond noise that the model explains, ${word()}`, (c) => r2(share(c))],
+    after && ["R² after", `the same ${with_effects()}`, (c) => r2(share(after.channels.find((x) => x.channel === c.channel)))]].filter(Boolean);
+  const used = VARIABLES.filter((v) => shown.some((c) => cells(c)[v]));
+  const one = (c, v) => el("td", {}, cells(c)[v] && cell(c, cells(c)[v], size(c)));
+  const table = narrow.matches ? turned(shown, fits, used, one) : upright(shown, fits, one);
+  const symbols = used.map((v) => `${SYMBOL[v]} ${name(shown, v)}`).join(", ");
+  parts.grid.replaceChildren(table, el("p", { class: "note" }, `R²: what the model explains, ${word()}${after ? `; after: ${with_effects()}` : ""}. Numbers: how much of what is left goes with each variable, %. ${narrow.matches ? "" : `${symbols}.`}`));
   finding();
+}
+/** A row a channel. */
+function upright(shown, fits, one) {
+  const head = el("tr", {}, el("th", { scope: "col" }, "Channel"), fits.map(([sign, title]) => el("th", { scope: "col", class: "number", title }, sign)),
+    VARIABLES.map((v) => el("th", { scope: "col", class: "number" }, el("abbr", { title: name(shown, v) }, SYMBOL[v]))));
+  const rows = shown.map((c) => el("tr", {}, el("th", { scope: "row" }, c.name), fits.map(([, , of]) => el("td", { class: "fit" }, of(c))), VARIABLES.map((v) => one(c, v))));
+  return el("table", { class: "grid" }, el("thead", {}, head), el("tbody", {}, rows));
+}
+/** A column a channel, for a screen too narrow for a column a variable. */
+function turned(shown, fits, used, one) {
+  const head = el("tr", {}, el("td"), shown.map((c) => el("th", { scope: "col" }, c.name)));
+  const top = fits.map(([sign, title, of]) => el("tr", {}, el("th", { scope: "row", title }, sign), shown.map((c) => el("td", { class: "fit" }, of(c)))));
+  const rows = used.map((v) => el("tr", {}, el("th", { scope: "row" }, name(shown, v)), shown.map((c) => one(c, v))));
+  return el("table", { class: "grid turned" }, el("thead", {}, head), el("tbody", {}, top, rows));
 }
 const r2 = (v) => (v == null ? "–" : v > 0.9995 ? "1.000" : v < -9.995 ? "under −9" : show(v, v >= 0.995 ? 4 : 3));
 const name = (channels, v) => channels.flatMap((c) => c.bins).find((b) => b.variable === v)?.name ?? v;
@@ -121,7 +159,7 @@ function pressed_cell() {
 }
 /** The channel and the variable that an effect acts in stand chosen: its own plots follow the tick. */
 export function follow(effect) {
-  const channels = bench?.failing?.models[0].channels;
+  const channels = bench?.failing && models()[0].channels;
   const channel = effect && channels?.find((c) => c.channel === (effect.curve?.channel ?? effect.channels[0]));
   if (!channel) return;
   const named = channel.bins.find((b) => VARIABLES.includes(b.variable) && effect.curve?.variable.startsWith(b.name));
@@ -138,14 +176,14 @@ function start(channels) {
 }
 const chosen = (model) => model?.channels.find((c) => c.channel === pick.channel);
 const over = (channel) => channel?.bins.find((b) => b.variable === pick.variable);
-/** The bin in which the model as given is off most. */
+/** The bin in which the model is off most before the effects. */
 function worst() {
-  const bins = over(chosen(bench.failing.models[0]))?.bins ?? [];
+  const bins = over(chosen(models()[0]))?.bins ?? [];
   const supported = bins.filter((b) => b.supported);
   return (supported.length ? supported : bins).reduce((a, b) => (a && Math.abs(a.mean) >= Math.abs(b.mean) ? a : b), null);
 }
 function finding() {
-  const channel = chosen(bench.failing.models[0]);
+  const channel = chosen(models()[0]);
   parts.finding.textContent = capital(channel?.worst_regime ?? "");
 }
 
@@ -212,10 +250,10 @@ function zoom(window) {
 }
 /** Marks the cells whose failing seconds the brushed window holds. */
 function brush() {
-  const { flight, failing: found } = bench;
+  const { flight } = bench;
   for (const button of parts.grid.querySelectorAll("button")) {
     let [inside, all] = [0, 0];
-    const channel = found.models[0].channels.find((c) => c.channel === button.dataset.channel);
+    const channel = models()[0].channels.find((c) => c.channel === button.dataset.channel);
     const values = flight?.regimes[button.dataset.variable];
     const bins = channel?.bins.find((b) => b.variable === button.dataset.variable)?.bins.filter((b) => b.supported) ?? [];
     const bin = bins.reduce((a, b) => (a && Math.abs(a.mean) >= Math.abs(b.mean) ? a : b), null);
@@ -252,14 +290,15 @@ function time() {
   const { flight } = bench;
   if (!flight) return;
   const list = flight.channels[symbol(pick.channel)];
-  const channel = chosen(bench.failing.models[0]);
+  const channel = chosen(models()[0]);
   if (!list || !channel) return;
-  const [measured, before, after] = list;
+  const [measured, ...predicted] = list;
+  const [before, after] = two(predicted, flight.ways);
   const spans = lit();
   const inside = (i) => !pick.window || (flight.window_s[i] >= pick.window[0] && flight.window_s[i] <= pick.window[1]);
   const x = flight.window_s;
   parts.time.caption.replaceChildren(el("b", {}, `${capital(channel.name)} (${channel.unit}), ${flight.name}`), key("measured", "measured"),
-    key("before", "before", quality(measured, before, inside)), ...(after ? [key("after", "after", quality(measured, after, inside))] : []));
+    key("before", word(), quality(measured, before, inside)), ...(after ? [key("after", with_effects(), quality(measured, after, inside))] : []));
   const lines = [{}, line("before", 1.6), ...(after ? [line("after", 1.6)] : []), line("measured", 1.1)];
   draw(parts.time.plot, clock(lines, spans), [x, before, ...(after ? [after] : []), measured]);
   const rest = (model) => measured.map((m, i) => (m == null || model[i] == null ? null : m - model[i]));
@@ -276,14 +315,14 @@ function time() {
 
 /** Mean residual over α and β, by each model on one scale. */
 function maps() {
-  const all = bench.failing.models.map((m) => chosen(m)?.map).filter((m) => m?.cells.length);
+  const all = models().map((m) => chosen(m)?.map).filter((m) => m?.cells.length);
   if (!all.length) return parts.map.replaceChildren();
-  const unit = chosen(bench.failing.models[0]).unit;
+  const unit = chosen(models()[0]).unit;
   const sizes = (only) => all.flatMap((m) => m.cells).filter((c) => c.supported || !only).map((c) => Math.abs(c.mean));
   const limit = Math.max(...sizes(true), 0) || Math.max(...sizes(false), 1e-12);
   const one = (map, k) => {
-    const canvas = el("canvas", { role: "img", "aria-label": `mean residual over α and β, ${k ? "after" : "before"}` });
-    return [el("div", {}, canvas, k ? "after" : "before"), () => paint(canvas, map, limit)];
+    const canvas = el("canvas", { role: "img", "aria-label": `mean residual over α and β, ${k ? with_effects() : word()}` });
+    return [el("div", {}, canvas, k ? with_effects() : word()), () => paint(canvas, map, limit)];
   };
   const made = all.map(one);
   parts.map.replaceChildren(el("figcaption", {}, el("b", {}, `Residual over α (across) and β (up), to ±${show(limit)} ${unit}`)), el("div", { class: "map" }, made.map(([node]) => node)));
@@ -327,7 +366,7 @@ const symbol = (channel) => ({ V: "V̇", alpha: "α̇", beta: "β̇" })[channel]
 /** Mean residual over the variable, with its interval. */
 function bins(channel, variable) {
   if (!variable) return;
-  const both = bench.failing.models.map((m) => over(chosen(m))?.bins ?? []);
+  const both = models().map((m) => over(chosen(m))?.bins ?? []);
   parts.bins.caption.replaceChildren(el("b", {}, `Residual (${channel.unit}) over ${variable.name}${variable.unit ? ` (${variable.unit})` : ""}`));
   const tables = both.map((list) => [list.map((b) => b.center), list.map((b) => b.mean)]);
   const joined = tables.length > 1 ? uPlot.join(tables) : tables[0];
@@ -383,14 +422,15 @@ function states() {
   // a window around the run shows it; the whole flight would hide it
   const around = pick.window ?? (pick.at == null ? null : [pick.at - 3, pick.at + RUN_S + 3]);
   const spans = lit();
+  const flown = pick.run ? two(pick.run, pick.run.map((r) => r.way)).filter(Boolean) : [];
   names.forEach((n, k) => {
     const [caption, plot] = parts.states.children[k].children;
     const [sign, unit] = STATES[n];
-    const tables = [[flight.time_s.map((t, i) => t ?? between(flight.time_s, i)), flight.states[n]], ...(pick.run ?? []).map((r) => [r.time_s, r.states[n]])];
+    const tables = [[flight.time_s.map((t, i) => t ?? between(flight.time_s, i)), flight.states[n]], ...flown.map((r) => [r.time_s, r.states[n]])];
     const data = tables.length > 1 ? uPlot.join(tables) : tables[0];
     const [x, measured, ...models] = data;
     const lines = models.map((_, i) => line(i ? "after" : "before", 2));
-    caption.replaceChildren(el("b", {}, `${sign} (${unit})`), ...(k === 0 && pick.run ? [key("measured", "measured"), key("before", "before"), ...(pick.run.length > 1 ? [key("after", "after")] : [])] : []));
+    caption.replaceChildren(el("b", {}, `${sign} (${unit})`), ...(k === 0 && flown.length ? [key("measured", "measured"), key("before", word()), ...(flown.length > 1 ? [key("after", with_effects())] : [])] : []));
     const options = clock([{}, ...lines, line("measured", 1.2)], spans);
     options.scales.x.range = (u, low, high) => around ?? [low, high];
     draw(plot, options, [x, ...models, measured]);

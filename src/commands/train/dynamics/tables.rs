@@ -44,10 +44,14 @@ pub(super) fn shares(residual_map: &ResidualMap) -> Table {
 pub(super) fn coefficients(learned: &[Learned]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(["coefficient", "prior", "learned", "true"]);
+    // of a real aircraft nobody knows the truth
+    let known = learned.iter().any(|l| l.truth.is_some());
+    let columns = if known { 4 } else { 3 };
+    table.set_header(["coefficient", "prior", "learned", "true"].iter().take(columns));
     for Learned { name, start, value, truth } in learned {
         let truth = truth.map_or("-".into(), |t| format!("{t:.5}"));
-        table.add_row([name.clone(), format!("{start:.5}"), format!("{value:.5}"), truth]);
+        let row = [name.clone(), format!("{start:.5}"), format!("{value:.5}"), truth];
+        table.add_row(row.into_iter().take(columns));
     }
     table
 }

@@ -85,7 +85,7 @@ function intervalChart(host, data) {
     note.textContent = `${where}: ${show(b.mean[i])}${half} ${data.unit}, ${counted(b.samples[i])}`;
   };
   const u = new uPlot({
-    ...size(host), padding: [0.5 * rem(), 0.6 * rem(), 0, 0], legend: { show: false },
+    ...size(host), padding: [0.5 * rem(), rem(), 0, 0], legend: { show: false },
     cursor: { y: false, x: false, drag: { x: false, y: false }, points: { show: false } },
     scales: { x: { time: false, range: () => xr }, y: { range: () => yr } },
     axes: [
@@ -174,7 +174,7 @@ function heatChart(host, data) {
   };
   const ends = (edges) => [edges[0] ?? 0, edges[edges.length - 1] ?? 1];
   const u = new uPlot({
-    ...size(host), padding: [0.5 * rem(), 0.6 * rem(), 0, 0], legend: { show: false },
+    ...size(host), padding: [0.5 * rem(), rem(), 0, 0], legend: { show: false },
     cursor: { y: false, x: false, drag: { x: false, y: false }, points: { show: false } },
     scales: { x: { time: false, range: () => ends(xe) }, y: { range: () => ends(ye) } },
     axes: [
@@ -227,7 +227,7 @@ function curvesChart(host, data) {
     outputs[i].textContent = k == null || k < 0 ? "" : show(s.values[k]) || "no data";
   });
   const u = new uPlot({
-    ...size(host), padding: [0.5 * rem(), 0.6 * rem(), 0, 0], legend: { show: false },
+    ...size(host), padding: [0.5 * rem(), rem(), 0, 0], legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
     scales: { x: { time: false, range: (u, a, b) => [Math.min(0, a), b] }, y: { ...(data.linear ? {} : { distr: 3, log: 10 }), range: () => yr } },
     axes: [

@@ -34,7 +34,7 @@ function timeChart(host, figure, track, panel, last) {
   });
   const options = {
     ...size(host),
-    padding: [figure.marks.length ? 1.1 * rem() : 0.5 * rem(), 0.6 * rem(), 0, 0],
+    padding: [figure.marks.length ? 1.1 * rem() : 0.5 * rem(), rem(), 0, 0],
     legend: { show: false },
     cursor: {
       y: false, sync: { key: sync.key, scales: ["x", null] },
@@ -91,7 +91,7 @@ function histogramChart(host, data) {
     });
   });
   return new uPlot({
-    ...size(host), padding: [0.5 * rem(), 0.6 * rem(), 0, 0], legend: { show: false },
+    ...size(host), padding: [0.5 * rem(), rem(), 0, 0], legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
     scales: {
       x: { time: false, distr: 3, log: 10, range: () => [edges[0], edges[edges.length - 1]] },
@@ -197,7 +197,7 @@ function xyChart(host, data) {
     return shown[i];
   });
   const u = new uPlot({
-    ...size(host), padding: [0.5 * rem(), 0.6 * rem(), 0, 0], legend: { show: false },
+    ...size(host), padding: [0.5 * rem(), rem(), 0, 0], legend: { show: false },
     cursor: { drag: { x: true, y: true, dist: 4 }, points: { show: false } },
     scales: {
       x: { time: false, range: (u, a, b) => (a === xr[0] && b === xr[1] ? xr : [a, b]) },

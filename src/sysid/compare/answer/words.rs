@@ -75,18 +75,26 @@ pub fn effect(n: &Numbers) -> String {
 
 fn one(e: &Decisive) -> String {
     let unit = if e.unit.is_empty() { String::new() } else { format!(" {}", e.unit) };
-    let [low, high] = e.ci95.map(number);
+    let [value, low, high] = alike(e.value, e.ci95);
     let what = lower(e.description.trim_end_matches('.'));
-    let mut text = format!(
-        "{} ({what}): {} = {} (95 %: {low} to {high}){unit}.",
-        e.id,
-        e.coefficient,
-        number(e.value)
-    );
+    let mut text =
+        format!("{} ({what}): {} = {value} (95 %: {low} to {high}){unit}.", e.id, e.coefficient);
     if !e.alike.is_empty() {
         text += &format!(" These flights cannot tell it from {}.", e.alike.join(" or "));
     }
     text
+}
+
+/// A value and the ends of its interval to one number of places, that of two digits of the interval's width, so that
+/// none of them looks rounder than it is.
+fn alike(value: f64, ci95: [f64; 2]) -> [String; 3] {
+    let width = ci95[1] - ci95[0];
+    let places = (1.0 - width.log10().floor()).max(0.0);
+    let all = [value, ci95[0], ci95[1]];
+    match width > 0.0 && places <= 6.0 && all.iter().all(|x| x.abs() < 1e6) {
+        true => all.map(|x| format!("{x:.0$}", places as usize).replace('-', "−")),
+        false => all.map(number),
+    }
 }
 
 fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {

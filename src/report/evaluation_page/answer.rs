@@ -1,0 +1,84 @@
+//! The answer of an evaluation: which controller tracks best and by how much, where each is worst, what it costs.
+
+use super::label;
+use crate::kit::numbers::number;
+use greylag_sim::evaluation::{Evaluation, Score};
+
+/// Group over which controllers are ranked, where it was flown.
+const ALL: &str = "all";
+
+/// The sentences of the answer, the first of them the ranking; none if nothing was flown.
+pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
+    let Some(group) = ranked_over(evaluations) else { return Vec::new() };
+    let mut ranked: Vec<(&Evaluation, &Score)> =
+        evaluations.iter().filter_map(|e| Some((e, e.score(&group)?))).collect();
+    ranked.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
+    let Some((best, rest)) = ranked.split_first() else { return Vec::new() };
+    let mut all = vec![ranking(*best, rest)];
+    let measured = ranked.iter().any(|(_, score)| score.kept_rate.is_finite());
+    if measured {
+        all.push(format!("Envelope kept: {}.", each(&ranked, |s| percent(s.kept_rate))));
+    }
+    all.push(match ranked.iter().all(|(_, s)| s.divergence_rate == 0.0) {
+        true => "No target was lost.".into(),
+        false => format!(
+            "Targets lost (over 10° off): {}.",
+            each(&ranked, |s| percent(s.divergence_rate))
+        ),
+    });
+    all.extend(weakest(best.0));
+    all
+}
+
+/// "all" where Table II of the paper was flown, else the group with most targets.
+fn ranked_over(evaluations: &[Evaluation]) -> Option<String> {
+    let groups = &evaluations.first()?.groups;
+    let most = groups.iter().max_by_key(|score| score.count)?;
+    let all = groups.iter().find(|score| score.targets == ALL);
+    Some(all.unwrap_or(most).targets.clone())
+}
+
+fn ranking((best, score): (&Evaluation, &Score), rest: &[(&Evaluation, &Score)]) -> String {
+    let [low, high] = score.mean_ci95_deg.map(number);
+    let targets = match score.count {
+        1 => "1 target".into(),
+        n => format!("{n} targets"),
+    };
+    let mut text = format!(
+        "{}{}: settled error {}° on average over {targets} (95 %: {low} to {high}°)",
+        if rest.is_empty() { "" } else { "Best: " },
+        label(best),
+        number(score.mean_deg)
+    );
+    if let Some(((next, other), others)) = rest.split_first() {
+        let apart = other.mean_ci95_deg[0] > score.mean_ci95_deg[1];
+        let than = if apart { "next" } else { "not told apart by these targets from" };
+        text += &format!("; {than} {} {}°", label(next), number(other.mean_deg));
+        others.iter().for_each(|(e, s)| text += &format!(", {} {}°", label(e), number(s.mean_deg)));
+    }
+    text + "."
+}
+
+fn each(ranked: &[(&Evaluation, &Score)], of: impl Fn(&Score) -> String) -> String {
+    let said: Vec<String> =
+        ranked.iter().map(|(e, score)| format!("{} {}", label(e), of(score))).collect();
+    said.join(", ")
+}
+
+/// The group in which the best one is worst, of several.
+fn weakest(best: &Evaluation) -> Option<String> {
+    let groups = || best.groups.iter().filter(|s| s.targets != ALL);
+    let worst = groups().max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;
+    (groups().count() > 1).then(|| {
+        format!(
+            "{} is worst on {}: {}° on one target.",
+            label(best),
+            worst.targets.replace('_', " "),
+            number(worst.max_deg)
+        )
+    })
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", number(100.0 * share))
+}
