@@ -158,6 +158,8 @@ fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
     if log.flown_s() == 0.0 && purpose.missing.is_empty() {
         purpose.missing.push("a flight".into());
     }
+    let mut seen = std::collections::BTreeSet::new();
+    purpose.missing.retain(|column| seen.insert(column.clone()));
     let moments = purpose.name != INCIDENCE;
     for channel in log.channels.iter().filter(|_| moments) {
         let slow = channel.columns.iter().filter_map(|c| Some((c, assess::too_slow(channel, c)?)));

@@ -123,6 +123,18 @@ fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'stati
     })
 }
 
+/// Bank and pitch within which a surface's direction is judged, rad, and the pitch and yaw rate, rad/s.
+const TAME: [f64; 2] = [1.3, 0.7];
+const TAME_RATE: f64 = 3.0;
+
+/// Whether the aircraft does not tumble: what is unknown counts as tame.
+fn tame(s: &Sample) -> bool {
+    let beyond = |x: f64, limit: f64| x.abs() > limit;
+    let attitude = (0..2).any(|i| beyond(s.attitude_rad[i], TAME[i]));
+    let rates = (1..3).any(|i| beyond(s.rates_radps[i], TAME_RATE));
+    !attitude && !rates
+}
+
 /// The partial correlation of the angular acceleration about `axis` with the last regressor.
 fn polarity(
     rows: &[Sample],
@@ -132,7 +144,7 @@ fn polarity(
 ) -> Option<f64> {
     let equations: Vec<(Vec<f64>, f64)> = windows(rows, WINDOW_S)
         .into_iter()
-        .filter(|w| w.iter().all(|s| s.airspeed_mps > flies.from_mps))
+        .filter(|w| w.iter().all(|s| s.airspeed_mps > flies.from_mps && tame(s)))
         .map(|w| {
             let time = w[w.len() - 1].time_s - w[0].time_s;
             (regressors(w), change(w, |s| s.rates_radps[axis]) / time)
