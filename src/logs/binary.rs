@@ -49,7 +49,7 @@ pub(super) fn read(
         };
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
     }
-    let kept = kept(&table, path, o, to, &mut findings)?;
+    let kept = kept(&mut table, path, o, to, &mut findings)?;
     drop(std::mem::take(&mut table.rows));
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
     findings.extend(table.notes.iter().map(Finding::note));
@@ -191,19 +191,21 @@ fn flow_angles(format: Format, o: &Options) -> FlowAngles {
 
 /// The rows that make the flight; an error or a finding where too few are usable.
 fn kept(
-    table: &table::Table,
+    table: &mut table::Table,
     path: &Path,
     o: &Options,
     to: Use,
     findings: &mut Vec<Finding>,
 ) -> Result<rows::Rows, LogError> {
-    let kept = usable(&table.rows);
     if !table.missing.is_empty() {
         return Ok(visible(&table.rows));
     }
-    let Some(first) = kept.refused(o.tolerance) else { return Ok(kept) };
-    let (dropped, rows, hint) = (kept.dropped, kept.total, hint(findings));
-    let (path, reasons) = (path.to_owned(), kept.reasons());
+    let counted = usable(&table.rows).counted(&table.rows);
+    let Some(first) = counted.refused(o.tolerance) else {
+        return Ok(usable(&table.rows).taken(std::mem::take(&mut table.rows)));
+    };
+    let (dropped, rows, hint) = (counted.dropped, counted.total, hint(findings));
+    let (path, reasons) = (path.to_owned(), counted.reasons());
     let error = LogError::Unusable { path, dropped, rows, reasons, first, hint };
     if to == Use::Compute {
         return Err(error);
@@ -212,15 +214,13 @@ fn kept(
     Ok(visible(&table.rows))
 }
 
-/// The rows fit to compute with.
+/// The judge of rows fit to compute with.
 fn usable(samples: &[Sample]) -> rows::Rows {
     let hangs = samples.iter().any(|s| s.airspeed_mps.is_nan());
-    let mut kept = match hangs {
+    match hangs {
         true => rows::Rows::with_sparse_columns_of(samples),
         false => rows::Rows::default(),
-    };
-    samples.iter().enumerate().for_each(|(i, sample)| kept.take(i + 1, Some(*sample)));
-    kept
+    }
 }
 
 /// The rows fit to be looked at.

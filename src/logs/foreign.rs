@@ -38,8 +38,14 @@ const KNOWN: [(&[u8], &str); 11] = [
     (b"%PDF", "it is a PDF document"),
 ];
 
+/// Zeros that no log begins with.
+const EMPTY: usize = 256;
+
 /// What a file that begins with `start` is; `None` if it is nothing known.
 pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
+    if start.len() >= EMPTY && start.iter().all(|b| *b == 0) {
+        return Some("its beginning is all zeros: the copy or the logger did not finish");
+    }
     let text = start.trim_ascii_start();
     let known = KNOWN.iter().find(|(magic, _)| text.starts_with(magic)).map(|(_, what)| *what);
     known.or_else(|| frames_without_times(start).then_some(
@@ -86,6 +92,7 @@ mod tests {
         assert!(ros.contains("ROS 1 bag") && ros.contains("CSV"), "{ros}");
         assert!(kind(b"\n{\"time\": 0}\n").unwrap().contains("JSON"));
         assert_eq!(kind(b"\x89PNG\r\n"), None);
+        assert!(kind(&[0; 4096]).unwrap().contains("zeros"));
     }
 
     #[test]

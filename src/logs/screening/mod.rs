@@ -14,6 +14,8 @@ mod force;
 mod relation;
 mod surfaces;
 
+use std::borrow::Cow;
+
 use super::Sample;
 use super::finding::{Cure, Finding, Severity};
 use super::lag;
@@ -56,18 +58,26 @@ fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     let rows = if flies_at_all { flown } else { rows };
     let mut out = angles::check(rows, flies_at_all);
     out.extend(force::check(rows));
-    let axes_are_right = out.is_empty();
+    let flown_s = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
+    let axes_are_right = out.is_empty() && !(flies_at_all && flown_s < flies.shortest_s);
     out.extend(air::check(rows, flown));
     out.extend(surfaces::check(rows, axes_are_right, flies));
     out
 }
 
-/// The rows in flight.
-fn in_flight(rows: &[Sample], flies: &Flying) -> Vec<Sample> {
+/// The rows in flight; not copied where they lie side by side.
+fn in_flight<'a>(rows: &'a [Sample], flies: &Flying) -> Cow<'a, [Sample]> {
     let phases = phases::phases(rows, flies);
     let flights: Vec<_> = phases.iter().filter(|p| p.kind == PhaseKind::Flight).collect();
-    let flies = |s: &&Sample| flights.iter().any(|p| (p.from_s..=p.to_s).contains(&s.time_s));
-    rows.iter().filter(flies).copied().collect()
+    let flies = |s: &Sample| flights.iter().any(|p| (p.from_s..=p.to_s).contains(&s.time_s));
+    let (Some(first), Some(last)) = (rows.iter().position(flies), rows.iter().rposition(flies))
+    else {
+        return Cow::Borrowed(&[]);
+    };
+    match rows[first..=last].iter().all(flies) {
+        true => Cow::Borrowed(&rows[first..=last]),
+        false => Cow::Owned(rows.iter().filter(|s| flies(s)).copied().collect()),
+    }
 }
 
 /// Whether there is a flight, and one that is long enough.

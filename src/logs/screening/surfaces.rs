@@ -1,7 +1,7 @@
 //! Surfaces and throttle: units, and whether they move the aircraft in their own direction.
 
 use super::cured;
-use super::relation::{change, mean, partial_correlation, quantile, values, windows};
+use super::relation::{change, mean, partial_correlation, quantile, tame, values, windows};
 use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
@@ -121,18 +121,6 @@ fn moving(rows: &[Sample], columns: [(&'static str, Get); 2]) -> Option<(&'stati
         let all = values(rows, *get);
         2 * all.len() > rows.len() && all.iter().any(|x| *x != all[0])
     })
-}
-
-/// Bank and pitch within which a surface's direction is judged, rad, and the pitch and yaw rate, rad/s.
-const TAME: [f64; 2] = [1.3, 0.7];
-const TAME_RATE: f64 = 3.0;
-
-/// Whether the aircraft does not tumble: what is unknown counts as tame.
-fn tame(s: &Sample) -> bool {
-    let beyond = |x: f64, limit: f64| x.abs() > limit;
-    let attitude = (0..2).any(|i| beyond(s.attitude_rad[i], TAME[i]));
-    let rates = (1..3).any(|i| beyond(s.rates_radps[i], TAME_RATE));
-    !attitude && !rates
 }
 
 /// The partial correlation of the angular acceleration about `axis` with the last regressor.
