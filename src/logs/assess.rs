@@ -38,8 +38,8 @@ pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
 
-/// Findings about the channels: interpolated samples, and spikes.
-pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
+/// Findings about the channels: interpolated samples, and spikes of a log with a flight.
+pub(super) fn channels(channels: &[Channel], rows: &[Sample], flies: &Flying) -> Vec<Finding> {
     let lines = |wrong: bool| -> Vec<String> {
         let lines = channels.iter().filter(|c| c.quality.interpolated);
         let of = lines.filter(|c| c.columns.iter().any(|x| too_slow(c, x).is_some()) == wrong);
@@ -62,7 +62,9 @@ pub(super) fn channels(channels: &[Channel]) -> Vec<Finding> {
     if !slow.is_empty() {
         out.push(Finding::warning(text(&slow)));
     }
-    let spiky = channels.iter().filter(|c| c.quality.spikes > 0);
+    // On the ground a gust, or the wash of the propeller, is no spike.
+    let flies = phases::phases(rows, flies).iter().any(|p| p.kind == PhaseKind::Flight);
+    let spiky = channels.iter().filter(|c| flies && c.quality.spikes > 0);
     out.extend(spiky.map(|c| {
         let quality = &c.quality;
         Finding::warning(format!(

@@ -23,7 +23,7 @@ pub(super) fn read(
     to: Use,
 ) -> Result<Log, LogError> {
     let vehicle = vehicle::vehicle(format, &topics);
-    let hovers = hovers(vehicle.as_ref(), format, &topics);
+    let mut hovers = hovers(vehicle.as_ref(), format, &topics, o.flies.sustained_s);
     let mut findings = refused(vehicle.as_ref(), path, to)?;
     let no_wings = !findings.is_empty();
     let rules = o.mapping.rules(format, &topics);
@@ -34,20 +34,22 @@ pub(super) fn read(
     findings
         .extend(lacking(&table, &topics, path, to).map(|f| f.into_iter().filter(|_| !no_wings))?);
     findings.extend(std::mem::take(&mut table.findings));
+    let end = table.rows.last().map_or(0.0, |row| row.time_s);
     findings.extend(grounded(&mut table.rows, &hovers, vehicle.as_ref()));
+    hovers.iter_mut().for_each(|hover| hover.1 = hover.1.min(end));
     findings.extend(assess::freeze(&mut table.rows, &table.channels, &o.flies));
     table.rows.retain(|row| !assess::hangs(row, &table.channels));
     table.notes.extend(derive::apply(&mut table.rows, &o.mapping));
     findings.extend(topics.findings);
     if !no_wings {
-        findings.extend(assess::channels(&table.channels));
+        findings.extend(assess::channels(&table.channels, &table.rows, &o.flies));
         let found = match table.rows.is_empty() && !hovers.is_empty() {
             true => vec![Finding::problem(NEVER_ON_WINGS)],
             false => screening::screen(&table.rows, &o.flies),
         };
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
     }
-    let kept = kept(&table, path, o, to, &mut findings)?;
+    let kept = kept(&mut table, path, o, to, &mut findings)?;
     drop(std::mem::take(&mut table.rows));
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
     findings.extend(table.notes.iter().map(Finding::note));
@@ -92,12 +94,30 @@ fn lacking(
     path: &Path,
     to: Use,
 ) -> Result<Vec<Finding>, LogError> {
-    let errors = table.missing.iter().map(|missing| missing_column(path, topics, missing));
-    let one = |error: LogError| match to {
-        Use::Compute => Err(error),
-        Use::Look => Ok(Finding::problem(error.to_string())),
-    };
-    errors.map(one).collect()
+    match (&table.missing[..], to) {
+        ([], _) => Ok(Vec::new()),
+        ([first, ..], Use::Compute) => Err(missing_column(path, topics, first)),
+        ([one], _) => Ok(vec![Finding::problem(missing_column(path, topics, one).to_string())]),
+        (several, _) => {
+            // Columns of one remedy stand together.
+            let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+            for missing in several {
+                let (remedy, column) = (would_fill(topics, missing), either(missing));
+                match groups.iter_mut().find(|(r, _)| *r == remedy) {
+                    Some((_, columns)) => columns.push(column),
+                    None => groups.push((remedy, vec![column])),
+                }
+            }
+            let list: Vec<String> =
+                groups.iter().map(|(r, columns)| format!("{}: {r}", columns.join(", "))).collect();
+            Ok(vec![Finding::problem(format!(
+                "flight log {} has nothing for column {}; or name other sources in a mapping (--mapping); {}",
+                path.display(),
+                list.join("; "),
+                holds(topics)
+            ))])
+        }
+    }
 }
 
 /// Takes out the rows in which the vehicle did not fly on its wings alone.
@@ -121,6 +141,11 @@ fn grounded(
     }
 }
 
+/// Whether a factor turns degrees into radians.
+fn near_degree(gain: f64) -> bool {
+    (gain.abs() / 1_f64.to_radians() - 1.0).abs() < 0.01
+}
+
 /// A finding whose cure names the topic and the factor that the reader uses in place of the table's column.
 fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     let Some(cure) = &finding.cure else { return finding };
@@ -128,6 +153,13 @@ fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     let own = o.mapping.get(&cure.column).is_some();
     let Some(rule) = rule.filter(|_| !own) else { return finding };
     let Some((field, gain)) = rule.factor() else { return finding };
+    if near_degree(gain) && near_degree(cure.scale) {
+        let text = format!(
+            "{} is beyond 57° for more than a twentieth of the flight ({}.{field}, which the reader takes for degrees): no flow that a model of an aircraft on its wings describes",
+            cure.column, rule.topic
+        );
+        return Finding::warning(text);
+    }
     let scale = gain * cure.scale;
     let better = format!(
         "read it with --mapping FILE, in which [columns] has {} = {{ from = \"{}.{field}\", scale = {scale} }}",
@@ -137,9 +169,14 @@ fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
 }
 
 /// When a VTOL did not fly on its wings alone.
-fn hovers(vehicle: Option<&Vehicle>, format: Format, topics: &Topics) -> Vec<(f64, f64)> {
+fn hovers(
+    vehicle: Option<&Vehicle>,
+    format: Format,
+    topics: &Topics,
+    shortest_s: f64,
+) -> Vec<(f64, f64)> {
     match vehicle.map(|v| v.kind) {
-        Some(Kind::Vtol) => vehicle::hovers(format, topics),
+        Some(Kind::Vtol) => vehicle::joined(vehicle::hovers(format, topics), shortest_s),
         _ => Vec::new(),
     }
 }
@@ -154,19 +191,21 @@ fn flow_angles(format: Format, o: &Options) -> FlowAngles {
 
 /// The rows that make the flight; an error or a finding where too few are usable.
 fn kept(
-    table: &table::Table,
+    table: &mut table::Table,
     path: &Path,
     o: &Options,
     to: Use,
     findings: &mut Vec<Finding>,
 ) -> Result<rows::Rows, LogError> {
-    let kept = usable(&table.rows);
     if !table.missing.is_empty() {
         return Ok(visible(&table.rows));
     }
-    let Some(first) = kept.refused(o.tolerance) else { return Ok(kept) };
-    let (dropped, rows, hint) = (kept.dropped, kept.total, hint(findings));
-    let (path, reasons) = (path.to_owned(), kept.reasons());
+    let counted = usable(&table.rows).counted(&table.rows);
+    let Some(first) = counted.refused(o.tolerance) else {
+        return Ok(usable(&table.rows).taken(std::mem::take(&mut table.rows)));
+    };
+    let (dropped, rows, hint) = (counted.dropped, counted.total, hint(findings));
+    let (path, reasons) = (path.to_owned(), counted.reasons());
     let error = LogError::Unusable { path, dropped, rows, reasons, first, hint };
     if to == Use::Compute {
         return Err(error);
@@ -175,15 +214,13 @@ fn kept(
     Ok(visible(&table.rows))
 }
 
-/// The rows fit to compute with.
+/// The judge of rows fit to compute with.
 fn usable(samples: &[Sample]) -> rows::Rows {
     let hangs = samples.iter().any(|s| s.airspeed_mps.is_nan());
-    let mut kept = match hangs {
+    match hangs {
         true => rows::Rows::with_sparse_columns_of(samples),
         false => rows::Rows::default(),
-    };
-    samples.iter().enumerate().for_each(|(i, sample)| kept.take(i + 1, Some(*sample)));
-    kept
+    }
 }
 
 /// The rows fit to be looked at.
@@ -195,6 +232,34 @@ fn visible(samples: &[Sample]) -> rows::Rows {
 
 fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> LogError {
     let or = missing.or.map(|p| format!(" (or of `{p}`)")).unwrap_or_default();
+    let remedy = format!(
+        "{}{or}, or name another source in a mapping (--mapping); {}",
+        would_fill(topics, missing),
+        holds(topics)
+    );
+    LogError::Missing { path: path.to_owned(), column: missing.column, remedy }
+}
+
+/// The column with the one that would do as well.
+fn either(missing: &table::Missing) -> String {
+    match missing.or {
+        Some(or) => format!("`{}` (or `{or}`)", missing.column),
+        None => format!("`{}`", missing.column),
+    }
+}
+
+/// What a log must hold for the column.
+fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
+    match (missing.looked_for.is_empty(), topics.naming) {
+        (true, Naming::Sender) if missing.or.is_some() => "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves".to_owned(),
+        (true, Naming::Sender) => "record ATTITUDE, VFR_HUD and GLOBAL_POSITION_INT".to_owned(),
+        (true, _) => "no topic of this format is known for it".to_owned(),
+        (false, _) => format!("log {}", missing.looked_for.join(" or ")),
+    }
+}
+
+/// What the log holds, in words.
+fn holds(topics: &Topics) -> String {
     let mut has: Vec<&str> = topics.counts.keys().map(|(name, _)| name.as_str()).collect();
     has.dedup();
     let has = match has.len() {
@@ -202,14 +267,5 @@ fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> Log
         1..=40 => has.join(", "),
         n => format!("{n} topics, the first of them {}", has[..40].join(", ")),
     };
-    let looked = match (missing.looked_for.is_empty(), topics.naming) {
-        (true, Naming::Sender) => format!(
-            "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves{or}"
-        ),
-        (true, _) => "no topic of this format is known for it".to_owned(),
-        (false, _) => format!("log {}{or}", missing.looked_for.join(" or ")),
-    };
-    let remedy =
-        format!("{looked}, or name another source in a mapping (--mapping); the file holds {has}");
-    LogError::Missing { path: path.to_owned(), column: missing.column, remedy }
+    format!("the file holds {has}")
 }

@@ -21,9 +21,9 @@ use super::ulog::damage;
 use super::window::Window;
 
 /// Length of a record's header: two magic bytes and the type.
-const HEADER: usize = 3;
+pub(super) const HEADER: usize = 3;
 /// The type of the record that declares types, its length, and that of its texts.
-const FMT: u8 = 128;
+pub(super) const FMT: u8 = 128;
 const FMT_LEN: usize = 89;
 /// The longest record; its length has one byte.
 const LONGEST: usize = 255;
@@ -42,7 +42,8 @@ struct Declared {
     wanted: bool,
 }
 
-fn size(letter: u8) -> Option<usize> {
+/// Size of format `letter`, bytes.
+pub(super) fn size(letter: u8) -> Option<usize> {
     Some(match letter {
         b'b' | b'B' | b'M' => 1,
         b'h' | b'H' | b'c' | b'C' | b'g' => 2,
@@ -134,7 +135,7 @@ pub(super) fn read<'a>(
     let mut window = Window::new(source);
     let mut reader = Reader::default();
     let cut = loop {
-        let view = window.view(LONGEST);
+        let view = window.view(LONGEST + DATAFLASH_MAGIC.len());
         let kind = match view {
             [a, b, kind, ..] if [*a, *b] == DATAFLASH_MAGIC => Some(*kind),
             rest if rest.len() < HEADER => {
@@ -154,6 +155,13 @@ pub(super) fn read<'a>(
         let Some(body) = view.get(HEADER..len) else {
             break view.len();
         };
+        // A record that lost or gained a byte ends where no other one begins, and its numbers are not its own.
+        let next = &view[len..view.len().min(len + DATAFLASH_MAGIC.len())];
+        if kind != FMT && !DATAFLASH_MAGIC.starts_with(next) {
+            reader.damaged();
+            window.skip(1);
+            continue;
+        }
         reader.in_step = true;
         reader.record(kind, body, wanted);
         window.skip(len);

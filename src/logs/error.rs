@@ -22,10 +22,12 @@ pub enum LogError {
         path: PathBuf,
     },
     /// The file is none of the formats.
-    #[error("{} is no flight log: it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or a MAVLink .tlog", path.display())]
+    #[error("{} is no flight log: {what}", path.display())]
     Foreign {
         /// Path of the file.
         path: PathBuf,
+        /// What it is instead, and what to give.
+        what: &'static str,
     },
     /// The file has no flight of that number.
     #[error("flight log {} holds {there} flights: there is no #{asked} in it", path.display())]

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::{dataflash_text, foreign};
+
 /// Format of a flight log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -10,7 +12,7 @@ pub enum Format {
     Csv,
     /// ULog of the PX4 logger (`.ulg`).
     Ulog,
-    /// DataFlash log of ArduPilot (`.bin`).
+    /// DataFlash log of ArduPilot (`.bin`, or `.log` in text).
     Dataflash,
     /// Telemetry log of MAVLink frames (`.tlog`).
     Tlog,
@@ -37,6 +39,12 @@ impl Format {
             return Some(Format::Tlog);
         }
         let start = &bytes[..bytes.len().min(4096)];
+        if dataflash_text::begins(start) {
+            return Some(Format::Dataflash);
+        }
+        if foreign::kind(start).is_some() {
+            return None;
+        }
         let header = start.split(|b| *b == b'\n').next().unwrap_or_default();
         let text =
             !header.is_empty() && header.iter().all(|b| *b >= b' ' || *b == b'\t' || *b == b'\r');

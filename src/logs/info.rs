@@ -87,6 +87,7 @@ impl Info {
         let phases = phases::phases(samples, &log.flies);
         let flown =
             phases.iter().filter(|p| p.kind == PhaseKind::Flight).map(|p| p.to_s - p.from_s);
+        let flight_s = flown.fold(0.0, |sum, x| sum + x);
         Info {
             schema: "greylag.log-info/1",
             name: log.flight.name.clone(),
@@ -97,14 +98,14 @@ impl Info {
             to_s: times.last().copied().unwrap_or(0.0),
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
             gaps: gaps.collect(),
-            flight_s: flown.fold(0.0, |sum, x| sum + x),
+            flight_s,
             phases,
             vehicle: log.vehicle.clone(),
             hovers: log.hovers.clone(),
             life: log.life.clone(),
             sources: log.sources.clone(),
             channels: log.channels.clone(),
-            purposes: purposes(log).into_iter().map(|p| weighed(log, p)).collect(),
+            purposes: purposes(log).into_iter().map(|p| weighed(log, flight_s, p)).collect(),
             topics: log.topics.clone(),
             findings: rudder(log).into_iter().chain(log.findings.iter().cloned()).collect(),
         }
@@ -155,7 +156,7 @@ fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
 }
 
 /// The purpose with its obstacles besides absent columns: no wings, no flight, slow channels.
-fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
+fn weighed(log: &Log, flight_s: f64, mut purpose: Purpose) -> Purpose {
     let wings = log.vehicle.as_ref().is_none_or(|v| v.refusal().is_none());
     if !wings {
         purpose.missing = vec!["wings".into()];
@@ -165,9 +166,11 @@ fn weighed(log: &Log, mut purpose: Purpose) -> Purpose {
         purpose.missing = vec!["a flight on its wings".into()];
         return purpose;
     }
-    if log.flown_s() == 0.0 && purpose.missing.is_empty() {
+    if flight_s == 0.0 && purpose.missing.is_empty() {
         purpose.missing.push("a flight".into());
     }
+    let mut seen = std::collections::BTreeSet::new();
+    purpose.missing.retain(|column| seen.insert(column.clone()));
     let moments = purpose.name != INCIDENCE;
     for channel in log.channels.iter().filter(|_| moments) {
         let slow = channel.columns.iter().filter_map(|c| Some((c, assess::too_slow(channel, c)?)));

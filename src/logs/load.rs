@@ -6,10 +6,12 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::csv::Tolerance;
+use super::dataflash_text::Binary;
 use super::door::{self, Opened};
 use super::error::LogError;
 use super::finding::{Finding, Severity};
-use super::format::Format;
+use super::foreign;
+use super::format::{DATAFLASH_MAGIC, Format};
 use super::mapping::Mapping;
 use super::phases::{self, Flying, PhaseKind};
 use super::quality::Quality;
@@ -170,6 +172,9 @@ fn said_of(log: &Result<Log, LogError>) -> String {
 
 /// The log with the longest flight, with the others in its findings; else the first error.
 fn longest(mut all: Vec<Result<Log, LogError>>) -> Result<Log, LogError> {
+    if all.len() == 1 {
+        return all.swap_remove(0);
+    }
     let said: Vec<String> = all.iter().map(said_of).collect();
     let flown = |log: &Result<Log, LogError>| log.as_ref().map_or(-1.0, Log::flown_s);
     let best = (0..all.len()).rev().max_by(|a, b| flown(&all[*a]).total_cmp(&flown(&all[*b])));
@@ -203,6 +208,9 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
     Ok(vec![all.swap_remove(number - 1)])
 }
 
+/// Said of a file that is nothing known.
+const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, or a MAVLink .tlog";
+
 /// Reads the flights of the log `source`, which begins with `start`.
 fn read(
     start: &[u8],
@@ -217,7 +225,8 @@ fn read(
     }
     let narrowed = door::narrowed(start);
     let Some(format) = Format::of(narrowed.as_deref().unwrap_or(start)) else {
-        return Err(LogError::Foreign { path: path.to_owned() });
+        let what = foreign::kind(start).unwrap_or(NONE_OF_THEM);
+        return Err(LogError::Foreign { path: path.to_owned(), what });
     };
     if format == Format::Csv {
         let mut bytes = Vec::new();
@@ -226,17 +235,25 @@ fn read(
         return text::read(&bytes, path, options, to);
     }
     let wanted = |topic: &str| options.mapping.wants(format, topic);
+    let mut text_log;
     let (lives, window): (Vec<Topics>, _) = match format {
         Format::Ulog => {
             let fields = |topic: &str, field: &str| options.mapping.wants_of_px4(topic, field);
             let (topics, window) = ulog::read(&mut source, &fields);
             (vec![topics], window)
         }
+        Format::Dataflash if !start.starts_with(&DATAFLASH_MAGIC) => {
+            text_log = Binary::new(&mut source);
+            dataflash::read(&mut text_log, &wanted)
+        }
         Format::Dataflash => dataflash::read(&mut source, &wanted),
         _ => tlog::read(&mut source, &wanted),
     };
     if let Some(error) = window.failure() {
         return Err(failed(error));
+    }
+    if format == Format::Dataflash && lives.iter().all(Topics::of_sdlog2) {
+        return Err(LogError::Foreign { path: path.to_owned(), what: foreign::SDLOG2 });
     }
     let several = lives.len() > 1;
     let one = |(k, topics): (usize, Topics)| {

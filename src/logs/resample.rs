@@ -1,5 +1,7 @@
 //! A channel read at any time: interpolated, held, its angles unwrapped.
 
+use std::borrow::Cow;
+use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 
 use super::Sample;
@@ -12,10 +14,12 @@ pub(super) const SAME_S: f64 = 1e-6;
 /// A track made ready to be read at any time.
 pub(super) struct Reader<'a> {
     times: &'a [f64],
-    series: Vec<Vec<f64>>,
+    series: Cow<'a, [Vec<f64>]>,
     /// The longest time that it is carried over, s.
     limit: f64,
     to: Target,
+    /// Where the last row's time was found.
+    last: Cell<usize>,
 }
 
 /// Destination of a track's series.
@@ -29,32 +33,33 @@ impl<'a> Reader<'a> {
     pub(super) fn new(
         rule: &Rule,
         times: &'a [f64],
-        series: &[Vec<f64>],
+        series: &'a [Vec<f64>],
         limit: f64,
     ) -> Option<Reader<'a>> {
-        let mut series = series.to_vec();
+        let mut series = Cow::Borrowed(series);
         let to = match &rule.fill {
             Fill::Quaternion(_) => {
-                one_sided(&mut series);
+                one_sided(series.to_mut());
                 Target::Attitude
             }
             Fill::Sum { .. } | Fill::Tilt { .. } | Fill::Density { .. } => {
                 let column = rule.columns()[0];
                 let wraps = is_wrapped(column) && is_angle(&series[0], column);
                 if wraps {
-                    unwrap(&mut series[0]);
+                    unwrap(&mut series.to_mut()[0]);
                 }
                 let place = COLUMNS[index(column)?].2;
                 Target::Column { place, held: is_held(column), wraps }
             }
         };
-        Some(Reader { times, series, limit, to })
+        Some(Reader { times, series, limit, to, last: Cell::new(0) })
     }
 
     /// Fills the row's columns at the row's time.
     pub(super) fn put(&self, row: &mut Sample) {
         let (times, limit) = (self.times, self.limit);
-        let at = At::new(row.time_s, times);
+        let at = At::near(row.time_s, times, self.last.get());
+        self.last.set(at.after);
         match &self.to {
             Target::Attitude => {
                 let q = [0, 1, 2, 3].map(|k| at.between(&self.series[k], times, limit));
@@ -97,6 +102,9 @@ fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     ])
 }
 
+/// Samples that are looked at one by one before a place is searched for.
+const STEPS: usize = 8;
+
 /// Position of a time among a channel's times.
 #[derive(Clone, Copy)]
 struct At {
@@ -106,8 +114,13 @@ struct At {
 }
 
 impl At {
-    fn new(t: f64, times: &[f64]) -> At {
-        At { t, after: times.partition_point(|x| *x <= t + SAME_S) }
+    /// The place of `t`, looked for from a `place` before it first: rows mostly come in order.
+    fn near(t: f64, times: &[f64], place: usize) -> At {
+        let passed = |x: &f64| *x <= t + SAME_S;
+        let ahead = times.get(place..).unwrap_or_default();
+        let follows = place == 0 || times.get(place - 1).is_some_and(passed);
+        let step = ahead.iter().take(STEPS).position(|x| !passed(x)).filter(|_| follows);
+        At { t, after: step.map_or_else(|| times.partition_point(passed), |k| place + k) }
     }
 
     fn held(self, values: &[f64], times: &[f64], limit: f64) -> f64 {

@@ -78,13 +78,45 @@ impl Rows {
 
     /// Takes row `number`; `None` is a row that could not be read.
     pub fn take(&mut self, number: usize, sample: Option<Sample>) {
+        let last = self.samples.last().map(|last| last.time_s);
+        if let Some(sample) = self.judged(number, sample, last) {
+            self.samples.push(sample);
+        }
+    }
+
+    /// Counts the rows that it would take, without taking them.
+    pub fn counted(mut self, rows: &[Sample]) -> Rows {
+        let mut last = None;
+        for (i, row) in rows.iter().enumerate() {
+            last = self.judged(i + 1, Some(*row), last).map(|row| row.time_s).or(last);
+        }
+        self
+    }
+
+    /// Takes the usable ones of the rows in their own memory: of a long log there is room for one table.
+    pub fn taken(mut self, mut rows: Vec<Sample>) -> Rows {
+        let mut kept = 0_usize;
+        for i in 0..rows.len() {
+            let last = kept.checked_sub(1).map(|k| rows[k].time_s);
+            if let Some(row) = self.judged(i + 1, Some(rows[i]), last) {
+                rows[kept] = row;
+                kept += 1;
+            }
+        }
+        rows.truncate(kept);
+        Rows { samples: rows, ..self }
+    }
+
+    /// Row `number` if it is usable after one of the time `last`; counts it.
+    fn judged(&mut self, number: usize, row: Option<Sample>, last: Option<f64>) -> Option<Sample> {
         self.total += 1;
-        let Some(sample) = sample.map(at_rest) else {
-            return self.drop(number, Reason::Unreadable);
-        };
-        match self.fault(&sample) {
-            None => self.samples.push(sample),
-            Some(reason) => self.drop(number, reason),
+        let row = row.map(at_rest);
+        match row.map_or(Some(Reason::Unreadable), |row| self.fault(&row, last)) {
+            None => row,
+            Some(reason) => {
+                self.drop(number, reason);
+                None
+            }
         }
     }
 
@@ -120,8 +152,8 @@ impl Rows {
         said.map(|((_, text), count)| format!("{count} {text}")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Why a sample cannot be used after those that were taken.
-    fn fault(&self, s: &Sample) -> Option<Reason> {
+    /// Why a sample cannot be used after one of the time `last`.
+    fn fault(&self, s: &Sample, last: Option<f64>) -> Option<Reason> {
         let missing = NEEDED
             .iter()
             .zip(self.sparse)
@@ -131,7 +163,7 @@ impl Rows {
             || s.attitude_rad[0].abs() > pi
             || s.attitude_rad[1].abs() > pi / 2.0
             || s.airspeed_mps < 0.0;
-        let late = self.samples.last().is_some_and(|last| s.time_s <= last.time_s);
+        let late = last.is_some_and(|last| s.time_s <= last);
         [
             (missing, Reason::Incomplete),
             (impossible, Reason::Impossible),

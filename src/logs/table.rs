@@ -9,6 +9,8 @@
 //! in the row that follows each of its samples only: rows filled by interpolation would count as
 //! measurements that nobody made. The other rows stay empty, or hold where a row needs a value.
 
+use std::borrow::Cow;
+
 use super::Sample;
 use super::columns::{COLUMNS, EITHER, NEEDED, index};
 use super::finding::Finding;
@@ -46,16 +48,16 @@ const MEASURED: [&str; 9] = [
 ];
 
 /// A rule with its data.
-struct Track {
+struct Track<'a> {
     rule: Rule,
     origin: String,
-    times: Vec<f64>,
+    times: Cow<'a, [f64]>,
     series: Vec<Vec<f64>>,
     finite_share: f64,
     rate_hz: f64,
 }
 
-impl Track {
+impl Track<'_> {
     /// Whether it shows one and the same value all the time.
     fn is_dead(&self) -> bool {
         self.series.iter().all(|s| s.iter().all(|x| *x == s[0]))
@@ -130,7 +132,7 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
     let missing: Vec<Missing> = alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect();
     let of = |column: &str| tracks.iter().find(|t| t.rule.columns().contains(&column));
     let base = [of("roll_rad"), of("p_radps")].into_iter().flatten().max_by_key(|t| t.times.len());
-    let base = base.map(|t| t.times.clone()).unwrap_or_default();
+    let base = base.map(|t| t.times.to_vec()).unwrap_or_default();
     let mut rows: Vec<Sample> =
         base.iter().map(|t| Sample { time_s: *t, ..Sample::default() }).collect();
     let period = period_s(&base);
@@ -144,7 +146,7 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
         }
     }
     if !sparse.is_empty() {
-        let slow = |(t, _): &(&Track, Vec<bool>)| {
+        let slow = |(t, _): &(&Track<'_>, Vec<bool>)| {
             format!("{} ({:.1} Hz)", t.rule.columns().join(", "), t.rate_hz)
         };
         let slow: Vec<String> = sparse.iter().map(slow).collect();
@@ -177,12 +179,16 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
 }
 
 /// For each column the best rule that has data.
-fn choose(topics: &Topics, rules: &[Rule], choice: &Choice) -> (Vec<Track>, Vec<Finding>) {
-    let (mut chosen, mut findings): (Vec<Track>, Vec<Finding>) = (Vec::new(), Vec::new());
+fn choose<'a>(
+    topics: &'a Topics,
+    rules: &[Rule],
+    choice: &Choice,
+) -> (Vec<Track<'a>>, Vec<Finding>) {
+    let (mut chosen, mut findings): (Vec<Track<'a>>, Vec<Finding>) = (Vec::new(), Vec::new());
     for rule in rules {
         let Some(track) = track(topics, rule, choice.instance(rule)) else { continue };
-        let same = |t: &&mut Track| t.rule.columns()[0] == rule.columns()[0];
-        let filled = |t: &Track| t.rule.columns().iter().any(|c| rule.columns().contains(c));
+        let same = |t: &&mut Track<'a>| t.rule.columns()[0] == rule.columns()[0];
+        let filled = |t: &Track<'a>| t.rule.columns().iter().any(|c| rule.columns().contains(c));
         let taken = chosen.iter().any(filled);
         match chosen.iter_mut().find(same) {
             // An attitude from angles gives way whole, and never mixes with one from a quaternion.
@@ -214,19 +220,11 @@ fn choose(topics: &Topics, rules: &[Rule], choice: &Choice) -> (Vec<Track>, Vec<
 }
 
 /// The data of a rule: finite values at increasing times.
-fn track(topics: &Topics, rule: &Rule, instance: Option<u16>) -> Option<Track> {
+fn track<'a>(topics: &'a Topics, rule: &Rule, instance: Option<u16>) -> Option<Track<'a>> {
     let instance = instance?;
     let topic = topics.topics.get(&(rule.topic.clone(), instance))?;
     let all = rule.series(topic)?;
-    let mut times = Vec::with_capacity(topic.time_s.len());
-    let mut series = vec![Vec::with_capacity(topic.time_s.len()); all.len()];
-    for (i, t) in topic.time_s.iter().enumerate() {
-        let increasing = times.last().is_none_or(|last| t > last);
-        if t.is_finite() && increasing && all.iter().all(|s| s[i].is_finite()) {
-            times.push(*t);
-            series.iter_mut().zip(&all).for_each(|(to, from)| to.push(from[i]));
-        }
-    }
+    let (times, series) = cleaned(&topic.time_s, all);
     if times.is_empty() {
         return None;
     }
@@ -240,17 +238,36 @@ fn track(topics: &Topics, rule: &Rule, instance: Option<u16>) -> Option<Track> {
     Some(Track { rule: rule.clone(), origin, times, series, finite_share, rate_hz })
 }
 
-fn fill(rows: &mut [Sample], track: &Track) {
+/// Times that increase with finite values; the topic's own where they do so already.
+fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>, Vec<Vec<f64>>) {
+    let increasing = all_times.windows(2).all(|w| w[0] < w[1]);
+    let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
+    if increasing && finite(all_times) && all.iter().all(|s| finite(s)) {
+        return (Cow::Borrowed(all_times), all);
+    }
+    let mut times = Vec::with_capacity(all_times.len());
+    let mut series = vec![Vec::with_capacity(all_times.len()); all.len()];
+    for (i, t) in all_times.iter().enumerate() {
+        let increasing = times.last().is_none_or(|last| t > last);
+        if t.is_finite() && increasing && all.iter().all(|s| s[i].is_finite()) {
+            times.push(*t);
+            series.iter_mut().zip(&all).for_each(|(to, from)| to.push(from[i]));
+        }
+    }
+    (Cow::Owned(times), series)
+}
+
+fn fill(rows: &mut [Sample], track: &Track<'_>) {
     let Some(reader) = track.reader() else { return };
     rows.iter_mut().for_each(|row| reader.put(row));
 }
 
 /// Fills the rows that follow the samples of `track`, rows `period` (s) apart; `true` for each row
 /// that is filled.
-fn fill_sparse(rows: &mut [Sample], track: &Track, period: f64) -> Vec<bool> {
+fn fill_sparse(rows: &mut [Sample], track: &Track<'_>, period: f64) -> Vec<bool> {
     let mut fresh = vec![false; rows.len()];
     let Some(reader) = track.reader() else { return fresh };
-    for t in &track.times {
+    for t in track.times.iter() {
         // At or after the sample, where the next one is waited for.
         let next = rows.partition_point(|row| row.time_s < t - SAME_S);
         if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
@@ -262,7 +279,7 @@ fn fill_sparse(rows: &mut [Sample], track: &Track, period: f64) -> Vec<bool> {
 }
 
 /// Holds what every row needs in the rows of `track` that are not `fresh`.
-fn hold(rows: &mut [Sample], track: &Track, fresh: &[bool]) {
+fn hold(rows: &mut [Sample], track: &Track<'_>, fresh: &[bool]) {
     if !track.rule.columns().iter().any(|c| NEEDED.contains(c)) {
         return;
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::columns::COLUMNS;
+use super::columns::{COLUMNS, EITHER};
 use super::csv::{self, CsvError, Raw, Tolerance};
 use super::error::LogError;
 use super::finding::Finding;
@@ -42,19 +42,25 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     let missing = std::mem::take(&mut raw.missing);
     let lacking = !missing.is_empty();
     let mut findings: Vec<Finding> = Vec::new();
-    for source in missing {
+    let timeless = missing.iter().any(|m| matches!(m, CsvError::Column { column: "time_s", .. }));
+    let several = missing.len() > 1;
+    if several && to == Use::Look {
+        findings.push(lacks(path, &missing, &raw.unknown_columns));
+    } else if let Some(first) = missing.into_iter().next() {
         if to == Use::Compute {
-            return Err(bare(source));
+            return Err(bare(first));
         }
-        findings.push(Finding::problem(source.to_string()));
+        findings.push(Finding::problem(first.to_string()));
     }
     let mut made = std::mem::take(&mut raw.notes);
     let channels = channels(&raw.rows, &options.mapping);
     findings.extend(assess::freeze(&mut raw.rows, &channels, &options.flies));
     raw.leave_out(|row| assess::hangs(row, &channels));
     made.extend(derive::apply(&mut raw.rows, &options.mapping));
-    findings.extend(assess::channels(&channels));
-    findings.extend(screening::screen(&raw.rows, &options.flies));
+    findings.extend(assess::channels(&channels, &raw.rows, &options.flies));
+    if !timeless {
+        findings.extend(screening::screen(&raw.rows, &options.flies));
+    }
     findings.extend(made.iter().map(Finding::note));
     let reading = if lacking {
         csv::keep_all(raw, path)
@@ -70,11 +76,12 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     if reading.cut_short {
         findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));
     }
-    if !reading.unknown_columns.is_empty() {
+    if !several && !reading.unknown_columns.is_empty() {
         let names = reading.unknown_columns.join(", ");
         findings.push(Finding::note(format!("columns that the log format does not name: {names}")));
     }
-    findings.extend(dropped(reading.dropped, &reading.dropped_rows));
+    // Without times every row is dropped, which is said by the missing column.
+    findings.extend(dropped(reading.dropped, &reading.dropped_rows).filter(|_| !timeless));
     let (sensors, notes) = (options.mapping.sensors().clone(), made);
     Ok(Log {
         format: Format::Csv,
@@ -90,6 +97,32 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         sources: Vec::new(),
         life: None,
     })
+}
+
+/// Names of columns that a finding lists.
+const SHOWN: usize = 40;
+
+/// The problem of a table that lacks several columns, with those that it has.
+fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
+    let either = |column: &str| EITHER.iter().find(|(command, _)| *command == column);
+    let named = missing.iter().filter_map(|error| match error {
+        CsvError::Column { column, .. } => Some(match either(column) {
+            Some((command, position)) => format!("`{command}` (or `{position}`)"),
+            None => format!("`{column}`"),
+        }),
+        _ => None,
+    });
+    let shown: Vec<&str> = unknown.iter().take(SHOWN).map(String::as_str).collect();
+    let more = if unknown.len() > SHOWN { " …" } else { "" };
+    let has = match shown.is_empty() {
+        true => String::new(),
+        false => format!("; other columns of it: {}{more}", shown.join(", ")),
+    };
+    Finding::problem(format!(
+        "flight log {} has no column {}: add them, in the units that their names end with, or name the file's own columns in a mapping (--mapping){has}",
+        path.display(),
+        named.collect::<Vec<_>>().join(", ")
+    ))
 }
 
 /// The columns of a CSV that hold anything.

@@ -110,6 +110,13 @@ impl Topics {
         Some((&topic.time_s, topic.field(field)?))
     }
 
+    /// Whether the records are those of sdlog2, the log of PX4 before ULog: of the form of DataFlash, one record for the
+    /// time of all.
+    pub fn of_sdlog2(&self) -> bool {
+        let has = |name: &str| self.counts.contains_key(&(name.to_owned(), 0));
+        self.topics.is_empty() && has("TIME") && has("STAT") && has("ATT")
+    }
+
     /// The last value of a parameter.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         self.parameters.get(name).copied()

@@ -116,10 +116,18 @@ fn ardupilot(topics: &Topics) -> Option<Vehicle> {
         return found(Kind::Vtol, "Q_ENABLE");
     }
     let firmware = topics.firmware.split_whitespace().next().unwrap_or_default();
+    // Only builds for helicopters have a swash plate, of the older name or of the newer one.
+    let swash = |name: &String| name.starts_with("H_SV") || name.starts_with("H_SW_");
+    let rotor = topics.parameters.keys().any(swash);
     match firmware {
-        "ArduPlane" => return found(Kind::FixedWing, "firmware ArduPlane"),
-        "ArduCopter" if !on("H_SW_TYPE") => return found(Kind::Multicopter, "firmware ArduCopter"),
-        "ArduRover" | "ArduSub" | "ArduCopter" | "Rover" => {
+        "ArduPlane" | "APM:Plane" => {
+            return found(Kind::FixedWing, format!("firmware {firmware}"));
+        }
+        "ArduCopter" | "APM:Copter" if !rotor => {
+            return found(Kind::Multicopter, format!("firmware {firmware}"));
+        }
+        "ArduRover" | "ArduSub" | "ArduCopter" | "Rover" | "APMrover2" | "APM:Rover"
+        | "APM:Copter" => {
             return found(Kind::Other, format!("firmware {firmware}"));
         }
         _ => {}
@@ -244,6 +252,12 @@ fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     merged(spans)
 }
 
+/// The hovers, those joined between which less than `shortest_s` remains: no flight on wings begins and ends so soon.
+pub(super) fn joined(hovers: Vec<(f64, f64)>, shortest_s: f64) -> Vec<(f64, f64)> {
+    let longer = hovers.into_iter().map(|(from, to)| (from, to + shortest_s)).collect();
+    merged(longer).into_iter().map(|(from, to)| (from, to - shortest_s)).collect()
+}
+
 /// Spans in order, those that touch joined.
 fn merged(mut spans: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     spans.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -296,10 +310,18 @@ mod tests {
     }
 
     #[test]
+    fn what_lies_between_two_hovers_is_flight_only_if_it_lasts() {
+        let hovers = vec![(0.0, 10.0), (10.3, 20.0), (60.0, f64::INFINITY)];
+        assert_eq!(joined(hovers, 2.0), [(0.0, 20.0), (60.0, f64::INFINITY)]);
+    }
+
+    #[test]
     fn a_copter_is_named_and_a_plane_is_not_refused() {
         let copter = Topics { firmware: "ArduCopter V4.5.7".into(), ..Topics::default() };
         let said = vehicle(Format::Dataflash, &copter).unwrap().refusal().unwrap();
         assert!(said.contains("multicopter") && said.contains("ArduCopter"), "{said}");
+        let old = Topics { firmware: "APM:Copter V3.4-dev (03e93cb6)".into(), ..Topics::default() };
+        assert_eq!(vehicle(Format::Dataflash, &old).unwrap().kind, Kind::Multicopter);
         let plane = Topics { firmware: "ArduPlane V4.6.0".into(), ..Topics::default() };
         assert_eq!(vehicle(Format::Dataflash, &plane).unwrap().refusal(), None);
     }

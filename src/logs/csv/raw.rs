@@ -24,7 +24,7 @@ pub(crate) struct Raw {
     left_out: BTreeSet<usize>,
     /// The needed columns that it lacks.
     pub missing: Vec<CsvError>,
-    pub(super) unknown_columns: Vec<String>,
+    pub(crate) unknown_columns: Vec<String>,
     pub(super) cut_short: bool,
     /// Notes on columns that were found under other names.
     pub notes: Vec<String>,

@@ -23,12 +23,12 @@ const CERTAIN: f64 = 0.8;
 /// Angle of attack that no aircraft exceeds for a twentieth of the time, rad.
 const VANE_LARGE: f64 = 1.0;
 
-/// Everything about the air.
-pub fn check(rows: &[Sample]) -> Vec<Finding> {
+/// Everything about the air; vanes turn as they like on the ground, so that they are judged by the rows `flown` only.
+pub fn check(rows: &[Sample], flown: &[Sample]) -> Vec<Finding> {
     let airspeed = airspeed(rows);
     let speed_is_right = airspeed.is_none();
     let mut out: Vec<Finding> = airspeed.into_iter().collect();
-    out.extend(vanes(rows));
+    out.extend(vanes(flown));
     out.extend(climb(rows, speed_is_right));
     out
 }

@@ -15,11 +15,37 @@ const WINDOW_S: f64 = 0.5;
 /// Correlation from which a relation is believed.
 const CERTAIN: f64 = 0.8;
 
-/// Units first; signs only where the units are right, for they are seen through sines.
-pub fn check(rows: &[Sample]) -> Vec<Finding> {
+/// Pitch below which roll follows p alone well enough for a statement on its scale, rad.
+const GENTLE: f64 = 0.5;
+
+/// Units first; signs only where the units are right, for they are seen through sines. Whether roll and p are of one
+/// scale is asked of flights only: on the ground both are noise.
+pub fn check(rows: &[Sample], flies: bool) -> Vec<Finding> {
     let windows = windows(rows, WINDOW_S);
     let units = units(rows, &windows);
-    if units.is_empty() { signs(&windows) } else { units }
+    if !units.is_empty() {
+        return units;
+    }
+    let mut out = signs(&windows);
+    out.extend(scale(&windows).filter(|_| flies));
+    out
+}
+
+/// Roll against p in gentle flight, where both should be of one scale.
+fn scale(windows: &[&[Sample]]) -> Option<Finding> {
+    let gentle = |w: &&&[Sample]| {
+        w.iter().all(|s| s.attitude_rad[1].is_nan() || s.attitude_rad[1].abs() < GENTLE)
+    };
+    let pairs = windows.iter().filter(gentle).map(|w| {
+        let roll = change(w, |s| s.attitude_rad[0]);
+        (integral(w, |s| s.rates_radps[0]), roll - TAU * (roll / TAU).round())
+    });
+    let r = through_origin(pairs).filter(|r| r.correlation > CERTAIN)?.slope;
+    (!near(r, 1.0, 0.4)).then(|| {
+        Finding::warning(format!(
+            "roll changes {r:.2} times as much as p says: one of them is wrongly scaled or delayed"
+        ))
+    })
 }
 
 fn units(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
@@ -55,11 +81,6 @@ fn units(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
     }
     if rates {
         out.push(cured(format!("p, q, r look like degrees a second, not radians a second (99 % of |p| below {rate:.1})"), "p_radps", 0.0174533).with("; q_radps and r_radps likewise"));
-    }
-    if let Some(r) = ratio.filter(|r| !angles && !rates && !near(*r, 1.0, 0.4)) {
-        out.push(Finding::warning(format!(
-            "roll changes {r:.2} times as much as p says: one of them is wrongly scaled or delayed"
-        )));
     }
     out
 }

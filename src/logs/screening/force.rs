@@ -1,7 +1,7 @@
 //! Accelerometers: unit and sign of each axis.
 
 use super::cured;
-use super::relation::{change, mean, quantile, values, windows, with_intercept};
+use super::relation::{change, mean, quantile, tame, values, windows, with_intercept};
 use crate::Sample;
 use crate::finding::Finding;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
@@ -43,7 +43,8 @@ fn unit(middle: f64) -> Option<(&'static str, f64)> {
 }
 
 fn vertical(rows: &[Sample]) -> Option<Finding> {
-    let z = quantile(&values(rows, |s| s.specific_force_mps2[2]), 0.5).filter(|z| *z > 5.0)?;
+    let level = |s: &Sample| if tame(s) { s.specific_force_mps2[2] } else { f64::NAN };
+    let z = quantile(&values(rows, level), 0.5).filter(|z| *z > 5.0)?;
     let left = turns_left(rows);
     Some(if left {
         Finding::problem(

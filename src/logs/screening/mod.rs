@@ -14,6 +14,8 @@ mod force;
 mod relation;
 mod surfaces;
 
+use std::borrow::Cow;
+
 use super::Sample;
 use super::finding::{Cure, Finding, Severity};
 use super::lag;
@@ -32,7 +34,11 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
         let flown = in_flight(rows, flies);
         let of = |rows: &[Sample]| checks(rows, &in_flight(rows, flies), flies);
         out = cure::tried(checks(rows, &flown, flies), rows, of);
-        out.extend(dead::check(rows));
+        let dead = dead::check(rows);
+        // What stands on the ground may show one value, in a simulation exactly one.
+        out.extend(
+            dead.into_iter().filter(|f| !flown.is_empty() || f.text.starts_with("airspeed")),
+        );
         out.extend(dead::commands(&flown));
         let right = out.iter().all(|f| f.severity != Severity::Problem);
         if right {
@@ -48,21 +54,30 @@ fn checks(rows: &[Sample], flown: &[Sample], flies: &Flying) -> Vec<Finding> {
     if let Some(clock) = clock::check(rows) {
         return vec![clock];
     }
-    let rows = if flown.len() >= ENOUGH { flown } else { rows };
-    let mut out = angles::check(rows);
+    let flies_at_all = flown.len() >= ENOUGH;
+    let rows = if flies_at_all { flown } else { rows };
+    let mut out = angles::check(rows, flies_at_all);
     out.extend(force::check(rows));
-    let axes_are_right = out.is_empty();
-    out.extend(air::check(rows));
+    let flown_s = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
+    let axes_are_right = out.is_empty() && !(flies_at_all && flown_s < flies.shortest_s);
+    out.extend(air::check(rows, flown));
     out.extend(surfaces::check(rows, axes_are_right, flies));
     out
 }
 
-/// The rows in flight.
-fn in_flight(rows: &[Sample], flies: &Flying) -> Vec<Sample> {
+/// The rows in flight; not copied where they lie side by side.
+fn in_flight<'a>(rows: &'a [Sample], flies: &Flying) -> Cow<'a, [Sample]> {
     let phases = phases::phases(rows, flies);
     let flights: Vec<_> = phases.iter().filter(|p| p.kind == PhaseKind::Flight).collect();
-    let flies = |s: &&Sample| flights.iter().any(|p| (p.from_s..=p.to_s).contains(&s.time_s));
-    rows.iter().filter(flies).copied().collect()
+    let flies = |s: &Sample| flights.iter().any(|p| (p.from_s..=p.to_s).contains(&s.time_s));
+    let (Some(first), Some(last)) = (rows.iter().position(flies), rows.iter().rposition(flies))
+    else {
+        return Cow::Borrowed(&[]);
+    };
+    match rows[first..=last].iter().all(flies) {
+        true => Cow::Borrowed(&rows[first..=last]),
+        false => Cow::Owned(rows.iter().filter(|s| flies(s)).copied().collect()),
+    }
 }
 
 /// Whether there is a flight, and one that is long enough.
@@ -70,7 +85,7 @@ fn flight(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let flights: Vec<_> =
         phases::phases(rows, flies).into_iter().filter(|p| p.kind == PhaseKind::Flight).collect();
     if flights.is_empty() {
-        let fastest = relation::values(rows, |s| s.airspeed_mps).into_iter().fold(0.0, f64::max);
+        let fastest = relation::values(rows, |s| s.airspeed_mps).into_iter().reduce(f64::max)?;
         return Some(Finding::problem(format!(
             "there is no flight in this log: airspeed never stays above {:.3} m/s for {:.1} s (largest value {fastest:.1} m/s); give a log with a flight, check the airspeed channel, or name the aircraft's model, whose envelope says from when on it flies, or state [flight] from_mps and shortest_s in a mapping",
             flies.from_mps, flies.sustained_s

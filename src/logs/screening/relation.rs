@@ -15,6 +15,18 @@ pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
     rows.iter().map(get).filter(|x| x.is_finite()).collect()
 }
 
+/// Bank and pitch within which directions are judged, rad, and the pitch and yaw rate, rad/s.
+const TAME: [f64; 2] = [1.3, 0.7];
+const TAME_RATE: f64 = 3.0;
+
+/// Whether the aircraft does not tumble: what is unknown counts as tame.
+pub fn tame(s: &Sample) -> bool {
+    let beyond = |x: f64, limit: f64| x.abs() > limit;
+    let attitude = (0..2).any(|i| beyond(s.attitude_rad[i], TAME[i]));
+    let rates = (1..3).any(|i| beyond(s.rates_radps[i], TAME_RATE));
+    !attitude && !rates
+}
+
 /// Quantile `q` of the values; `None` for fewer than [`super::ENOUGH`].
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     (values.len() >= super::ENOUGH).then(|| statistics::quantile(values, q))

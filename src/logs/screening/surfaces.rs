@@ -1,7 +1,7 @@
 //! Surfaces and throttle: units, and whether they move the aircraft in their own direction.
 
 use super::cured;
-use super::relation::{change, mean, partial_correlation, quantile, values, windows};
+use super::relation::{change, mean, partial_correlation, quantile, tame, values, windows};
 use crate::Sample;
 use crate::finding::Finding;
 use crate::phases::Flying;
@@ -132,7 +132,7 @@ fn polarity(
 ) -> Option<f64> {
     let equations: Vec<(Vec<f64>, f64)> = windows(rows, WINDOW_S)
         .into_iter()
-        .filter(|w| w.iter().all(|s| s.airspeed_mps > flies.from_mps))
+        .filter(|w| w.iter().all(|s| s.airspeed_mps > flies.from_mps && tame(s)))
         .map(|w| {
             let time = w[w.len() - 1].time_s - w[0].time_s;
             (regressors(w), change(w, |s| s.rates_radps[axis]) / time)

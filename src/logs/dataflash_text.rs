@@ -1,0 +1,153 @@
+//! The text form of a DataFlash log (`.log`), read through the binary one.
+//!
+//! Mission Planner and older ground stations save what a card holds as lines `NAME, value, …`, which FMT lines declare
+//! as in the binary file. Each line becomes the record that it was made of. Lines that fit no declaration become a byte
+//! that the reader counts as damage.
+
+use std::collections::HashMap;
+use std::io::{self, BufRead, BufReader, Read};
+
+use super::dataflash::{FMT, HEADER, size};
+use super::format::DATAFLASH_MAGIC;
+
+/// Lines that may stand before the first declaration: the firmware, the board, free memory.
+const HEAD: usize = 20;
+/// The longest line that is looked at, bytes.
+const LONGEST: u64 = 4096;
+
+/// Whether a file that begins with `start` is a DataFlash log in text.
+pub(super) fn begins(start: &[u8]) -> bool {
+    start.split(|b| *b == b'\n').take(HEAD).any(|line| {
+        let mut fields = line.split(|b| *b == b',').map(<[u8]>::trim_ascii);
+        fields.next() == Some(b"FMT") && fields.next() == Some(b"128")
+    })
+}
+
+/// A text log as the bytes of the binary one.
+pub(super) struct Binary<'a> {
+    lines: BufReader<&'a mut dyn Read>,
+    /// Type and format letters of each name.
+    declared: HashMap<String, (u8, String)>,
+    /// The line before the declarations that names the firmware.
+    firmware: Option<String>,
+    bytes: Vec<u8>,
+    from: usize,
+}
+
+impl<'a> Binary<'a> {
+    /// The log in `source`.
+    pub fn new(source: &'a mut dyn Read) -> Self {
+        let (lines, declared) = (BufReader::new(source), HashMap::new());
+        Binary { lines, declared, firmware: None, bytes: Vec::new(), from: 0 }
+    }
+
+    /// The bytes of the next line; `false` at the end.
+    fn next(&mut self) -> io::Result<bool> {
+        let mut line = Vec::new();
+        if self.lines.by_ref().take(LONGEST).read_until(b'\n', &mut line)? == 0 {
+            return Ok(false);
+        }
+        let line = String::from_utf8_lossy(&line);
+        let line = line.trim();
+        let mut fields = line.split(',').map(str::trim);
+        let name = fields.next().unwrap_or_default();
+        if name == "FMT" {
+            let bytes = self.declaration(line);
+            self.bytes.extend(bytes.unwrap_or_else(|| vec![0]));
+            return Ok(true);
+        }
+        match self.declared.get(name) {
+            Some((kind, letters)) => {
+                let values: Vec<&str> = fields.collect();
+                self.bytes.extend(record(*kind, letters, &values).unwrap_or_else(|| vec![0]));
+            }
+            None if self.declared.is_empty() => {
+                if line.contains("Ardu") || line.contains("APM:") {
+                    self.firmware = Some(line.to_owned());
+                }
+            }
+            None if line.is_empty() => {}
+            None => self.bytes.push(0),
+        }
+        Ok(true)
+    }
+
+    /// The record of `FMT, type, length, name, letters, label, …`, and the firmware's once there is one for texts.
+    fn declaration(&mut self, line: &str) -> Option<Vec<u8>> {
+        let mut fields = line.splitn(6, ',').map(str::trim).skip(1);
+        let (kind, _, name) = (fields.next()?, fields.next()?, fields.next()?);
+        let (letters, labels) = (fields.next()?, fields.next().unwrap_or_default());
+        let kind: u8 = kind.parse().ok()?;
+        let body: usize = letters.bytes().map(size).sum::<Option<usize>>()?;
+        let len = u8::try_from(HEADER + body).ok()?;
+        let labels: Vec<&str> = labels.split(',').map(str::trim).collect();
+        let fixed = |text: &str, width: usize| {
+            let mut bytes = text.as_bytes().to_vec();
+            bytes.resize(width, 0);
+            bytes
+        };
+        let mut out = [&DATAFLASH_MAGIC[..], &[FMT, kind, len]].concat();
+        out.extend([fixed(name, 4), fixed(letters, 16), fixed(&labels.join(","), 64)].concat());
+        if kind != FMT {
+            self.declared.entry(name.to_owned()).or_insert((kind, letters.to_owned()));
+        }
+        if name == "MSG"
+            && let Some(firmware) = self.firmware.take()
+        {
+            let values = vec![firmware.as_str(); letters.len()];
+            out.extend(record(kind, letters, &values).unwrap_or_default());
+        }
+        Some(out)
+    }
+}
+
+impl Read for Binary<'_> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        while self.from == self.bytes.len() {
+            self.bytes.clear();
+            self.from = 0;
+            if !self.next()? {
+                return Ok(0);
+            }
+        }
+        let count = to.len().min(self.bytes.len() - self.from);
+        to[..count].copy_from_slice(&self.bytes[self.from..self.from + count]);
+        self.from += count;
+        Ok(count)
+    }
+}
+
+/// The record of a line's values; `None` if there are too few.
+fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
+    let mut out = [&DATAFLASH_MAGIC[..], &[kind]].concat();
+    let last = letters.len().checked_sub(1)?;
+    for (i, letter) in letters.bytes().enumerate() {
+        // A text may hold commas.
+        let rest = if i == last && b"nNZ".contains(&letter) { values.len() } else { i + 1 };
+        let text = values.get(i..rest)?.join(",");
+        let x: f64 = text.trim().parse().unwrap_or(0.0);
+        match letter {
+            b'b' => out.extend((x as i8).to_le_bytes()),
+            b'B' | b'M' => out.push(x as u8),
+            b'h' => out.extend((x as i16).to_le_bytes()),
+            b'H' => out.extend((x as u16).to_le_bytes()),
+            b'c' => out.extend(((x * 100.0).round() as i16).to_le_bytes()),
+            b'C' => out.extend(((x * 100.0).round() as u16).to_le_bytes()),
+            b'i' => out.extend((x as i32).to_le_bytes()),
+            b'I' => out.extend((x as u32).to_le_bytes()),
+            b'e' => out.extend(((x * 100.0).round() as i32).to_le_bytes()),
+            b'E' => out.extend(((x * 100.0).round() as u32).to_le_bytes()),
+            b'L' => out.extend(((x * 1e7).round() as i32).to_le_bytes()),
+            b'f' => out.extend((x as f32).to_le_bytes()),
+            b'd' => out.extend(x.to_le_bytes()),
+            b'q' => out.extend((x as i64).to_le_bytes()),
+            b'Q' => out.extend((x as u64).to_le_bytes()),
+            _ => {
+                let mut bytes = text.trim().as_bytes().to_vec();
+                bytes.resize(size(letter)?, 0);
+                out.extend(bytes);
+            }
+        }
+    }
+    Some(out)
+}

@@ -1,0 +1,109 @@
+//! What a file is that is none of the log formats, by how it begins, and what its owner can do.
+
+use super::format::MAVLINK_MARKERS;
+
+/// First bytes of files that people bring, with what each is and what to give instead.
+const KNOWN: [(&[u8], &str); 11] = [
+    (
+        b"#ROSBAG V",
+        "it is a ROS 1 bag, of which no topic is read: write its topics to one CSV, a row for each time",
+    ),
+    (
+        b"\x89MCAP0\r\n",
+        "it is a ROS 2 bag (MCAP), of which no topic is read: write its topics to one CSV, a row for each time",
+    ),
+    (
+        b"SQLite format 3\0",
+        "it is an SQLite database, such as a ROS 2 bag (.db3), of which no topic is read: write its topics to one CSV, a row for each time",
+    ),
+    (
+        b"MATLAB 5.0 MAT-file",
+        "it is a MATLAB file: write its signals to one CSV, a row for each time (writetimetable)",
+    ),
+    (
+        b"\x89HDF\r\n",
+        "it is an HDF5 file (MATLAB 7.3 writes such): write its signals to one CSV, a row for each time",
+    ),
+    (
+        b"H Product:Blackbox",
+        "it is a blackbox log of Betaflight or iNav: blackbox_decode makes a CSV of it",
+    ),
+    (b"PK\x03\x04", "it is a ZIP archive: unpack it and give the log in it"),
+    (b"{", "it is JSON: write its numbers to one CSV, a row for each time"),
+    (b"[", "it is JSON: write its numbers to one CSV, a row for each time"),
+    (
+        b"<",
+        "it is XML or HTML; the .log file of Paparazzi only declares messages, whose values stand in the .data file beside it: write them to one CSV, a row for each time",
+    ),
+    (b"%PDF", "it is a PDF document"),
+];
+
+/// Zeros that no log begins with.
+const EMPTY: usize = 256;
+
+/// What a file that begins with `start` is; `None` if it is nothing known.
+pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
+    if start.len() >= EMPTY && start.iter().all(|b| *b == 0) {
+        return Some("its beginning is all zeros: the copy or the logger did not finish");
+    }
+    let text = start.trim_ascii_start();
+    let known = KNOWN.iter().find(|(magic, _)| text.starts_with(magic)).map(|(_, what)| *what);
+    known.or_else(|| frames_without_times(start).then_some(
+        "it is a stream of MAVLink frames without their times, such as the mav.tlog.raw of MAVProxy: give the .tlog that was recorded beside it",
+    ))
+}
+
+/// What PX4 wrote before ULog: records as of a DataFlash log, but of other meaning.
+pub(super) const SDLOG2: &str = "it is a log of PX4 from before ULog (sdlog2, .px4log), whose records have no times of their own: sdlog2_dump.py of that PX4 makes a CSV of it";
+
+/// Frames in a row that show a stream.
+const IN_A_ROW: usize = 3;
+
+/// Whether frames of MAVLink follow one another, perhaps after the end of a cut one.
+fn frames_without_times(start: &[u8]) -> bool {
+    let follow = |from: usize| {
+        let mut at = from;
+        for _ in 0..IN_A_ROW {
+            let Some(len) = frame(&start[at.min(start.len())..]) else { return false };
+            at += len;
+        }
+        true
+    };
+    (0..start.len().min(300)).any(follow)
+}
+
+/// Length of the frame at the beginning of `bytes`, by its header.
+fn frame(bytes: &[u8]) -> Option<usize> {
+    let [marker, payload, flags, ..] = bytes else { return None };
+    let signature = if flags & 1 == 1 { 13 } else { 0 };
+    MAVLINK_MARKERS.contains(marker).then(|| match marker {
+        0xFE => 8 + usize::from(*payload),
+        _ => 12 + usize::from(*payload) + signature,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_people_bring_is_named() {
+        let ros = kind(b"#ROSBAG V2.0\n").unwrap();
+        assert!(ros.contains("ROS 1 bag") && ros.contains("CSV"), "{ros}");
+        assert!(kind(b"\n{\"time\": 0}\n").unwrap().contains("JSON"));
+        assert_eq!(kind(b"\x89PNG\r\n"), None);
+        assert!(kind(&[0; 4096]).unwrap().contains("zeros"));
+    }
+
+    #[test]
+    fn a_telemetry_stream_without_times_is_known_even_if_it_begins_within_a_frame() {
+        let frame = |payload: u8| {
+            let mut frame = vec![0xFE, payload, 0, 1, 1, 0];
+            frame.extend(vec![7; usize::from(payload) + 2]);
+            frame
+        };
+        let stream = [vec![3; 20], frame(9), frame(28), frame(9)].concat();
+        assert!(kind(&stream).unwrap().contains("without their times"));
+        assert_eq!(kind(&[vec![3; 20], frame(9), vec![3; 40]].concat()), None);
+    }
+}
