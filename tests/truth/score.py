@@ -104,7 +104,7 @@ def of(some, all_of):
     if not n:
         return "-"
     low, high = wilson(len(some), n)
-    return f"{len(some)} of {n} ({100 * len(some) / n:.0f} %, {100 * low:.0f} to {100 * high:.0f})"
+    return f"{len(some)} of {n} ({100 * len(some) / n:.0f} %, {100 * max(low, 0.0):.0f} to {100 * high:.0f})"
 
 
 def wrongly_installed(records):
