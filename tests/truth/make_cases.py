@@ -2,8 +2,10 @@
 
     python tests/truth/make_cases.py --truth continuous --seed 1 --effects all --nulls 20 --out cases
     python tests/truth/make_cases.py --truth continuous --seed 1 --formulas 24 --nulls 20 --out cases
+    python tests/truth/make_cases.py --truth official --seed 1 --effects all --nulls 20 --installed 1 --out cases
 
-The second command hides formulas of `formulas.py` in place of effects, for `greylag propose`. Every case is a folder
+The second command hides formulas of `formulas.py` in place of effects, for `greylag propose`. The third draws an error of
+installation or calibration (`installed.py`) for each case. Every case is a folder
 with model.toml, airframe.toml, train-1..3.csv, test-1..2.csv and truth.json. All of it follows from the seed.
 """
 
@@ -19,9 +21,11 @@ import numpy as np
 
 import formulas
 import hidden
+import installed
 import manoeuvres
 import model_file
 import sensors
+from pilot import PERIOD
 
 AIRFRAME = Path(__file__).resolve().parents[2] / "params" / "x8" / "airframe.toml"
 ROLL_MAX, PITCH_MAX = np.radians(85.0), np.radians(60.0)
@@ -51,7 +55,7 @@ def truth_of(name):
     return partial(official.fly, integrators=integrators), official.STEP
 
 
-def fly_within_bounds(fly, case, seed, flight, effect, amount, duration):
+def fly_within_bounds(fly, case, seed, flight, effect, amount, duration, gust=0.0):
     """Truth, commands, and what was drawn; gentler where the aircraft leaves the bounds."""
     random = hidden.random_of(seed, case, *flight.encode(), 1)
     speed, course, heading = random.uniform(0.0, WIND_MAX), *random.uniform(0.0, 2.0 * np.pi, 2)
@@ -59,16 +63,19 @@ def fly_within_bounds(fly, case, seed, flight, effect, amount, duration):
     scale = 1.0
     for _ in range(7):
         plan = manoeuvres.plan_of(flight, hidden.random_of(seed, case, *flight.encode(), 2), scale, duration)
-        rows, commands = fly(plan, effect, amount, wind, heading)
+        blows = wind
+        if gust:
+            blows = installed.gusty(wind, gust, len(plan), PERIOD, hidden.random_of(seed, case, *flight.encode(), 7))
+        rows, commands = fly(plan, effect, amount, blows, heading)
         if np.isfinite(rows).all() and (np.abs(rows[:, :2]) < (ROLL_MAX, PITCH_MAX)).all():
             return rows, commands, {"wind_ned_mps": wind.tolist(), "scale": scale}
         scale *= GENTLER
     raise Lost(f"{case}, {flight}: the aircraft leaves its bounds; hide less of {effect}")
 
 
-def flown(fly, case, seed, effect, amount, duration):
+def flown(fly, case, seed, effect, amount, duration, gust=0.0):
     """Every flight of a case: truth, commands, what was drawn."""
-    return {f: fly_within_bounds(fly, case, seed, f, effect, amount, duration) for f in manoeuvres.FLIGHTS}
+    return {f: fly_within_bounds(fly, case, seed, f, effect, amount, duration, gust) for f in manoeuvres.FLIGHTS}
 
 
 def flown_with_formula(fly, draw, case, seed, duration, strength):
@@ -83,12 +90,18 @@ def flown_with_formula(fly, draw, case, seed, duration, strength):
     raise Lost(f"{case}: none of {DRAWS} formulas can be flown")
 
 
-def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0):
+def make_case(folder, kind, case, seed, effect, options, duration, wrong, strength=1.0, errors_at_once=0):
     """Writes one case; `effect` is an id, one of `DRAWN` for a formula that is drawn, or None."""
     (fly, step), folder = truth_of(kind), folder / case
     folder.mkdir(parents=True)
     record = {"case": case, "truth": kind, "seed": seed, "hidden": effect, "amount": 0.0, "duration_s": duration}
     record.update(sensors=asdict(options), wrong=wrong, flights={})
+    erring = hidden.random_of(seed, case, 8)
+    kinds = erring.choice(installed.KINDS, min(errors_at_once, len(installed.KINDS)), replace=False)
+    wrongly = installed.drawn([str(k) for k in kinds], erring)
+    gust = wrongly.get("gusts", {}).get("size", 0.0)
+    if wrongly:
+        record["installed"] = wrongly
     if effect in DRAWN:
         formula, flights, lost = flown_with_formula(fly, DRAWN[effect], case, seed, duration, strength)
         record.update(hidden=formula.text(), amount=formula.amount, formula=formula.record(), strength=strength)
@@ -97,10 +110,12 @@ def make_case(folder, kind, case, seed, effect, options, duration, wrong, streng
     else:
         if effect:
             record["amount"] = hidden.amplitude(effect, kind.split("-")[0], hidden.random_of(seed, case, 3))
-        flights = flown(fly, case, seed, effect, record["amount"], duration)
+        flights = flown(fly, case, seed, effect, record["amount"], duration, gust)
     for flight, (rows, commands, drawn) in flights.items():
         random = hidden.random_of(seed, case, *flight.encode(), 4)
+        rows = installed.seen(rows, step, wrongly)
         names, table, errors = sensors.log(rows, step, commands, manoeuvres.SETTLE, options, random)
+        table = installed.frozen(names, table, wrongly, hidden.random_of(seed, case, *flight.encode(), 9))
         sensors.write(folder / f"{flight}.csv", names, table)
         record["flights"][flight] = {**drawn, "errors": errors}
     parts = model_file.coefficients(effect, hidden.random_of(seed, case, 5), wrong)
@@ -141,6 +156,7 @@ def arguments():
     p.add_argument("--held", default="", help="slower sensors, held in between: airspeed=25,velocity=10")
     p.add_argument("--missing", default="", help="sensor groups that are not logged: vanes,actuators")
     p.add_argument("--drift", type=float, default=0.0, help="drift of the gyros' biases, rad/s²; warm: 1.5e-5")
+    p.add_argument("--installed", type=int, default=0, help="errors of installation drawn for each case")
     p.add_argument("--duration", type=float, default=manoeuvres.FLIGHT, help="length of each flight, s")
     p.add_argument("--out", type=Path, required=True, help="folder of the cases; each must be new")
     return p.parse_args()
@@ -156,13 +172,15 @@ def main():
         sys.exit(f"no sensor group {', '.join(unknown)}; there are {', '.join(sensors.GROUPS)}")
     if (a.formulas or a.lagged) and a.truth != "continuous":
         sys.exit("--formulas, --lagged: only the continuous truth can hide formulas")
+    if a.installed and (a.truth == "continuous" or a.formulas or a.lagged):
+        sys.exit("--installed: only the official truths fly through gusts, and they hide no formulas")
     effects = a.effects if a.effects is not None else "" if a.formulas or a.lagged else "all"
     cases = [(f"{a.truth}-null-{k:02}", None) for k in range(a.nulls)]
     cases += [(f"{a.truth}-{effect}", effect) for effect in chosen(effects)]
     cases += [(f"{a.truth}-formula-{k:02}", FORMULA) for k in range(a.formulas)]
     cases += [(f"{a.truth}-lagged-{k:02}", LAGGED) for k in range(a.lagged)]
     for case, effect in cases:
-        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong, a.strength)
+        make_case(a.out, a.truth, case, a.seed, effect, options, a.duration, a.wrong, a.strength, a.installed)
         print(a.out / case, flush=True)
 
 

@@ -264,10 +264,12 @@ SEEN = (
 
 
 def fly(wanted, effect, amount, wind, heading, integrators="default"):
-    """Truth (a row a step of 1/400 s) and commands of a plan, flown in a steady wind (NED, m/s)."""
+    """Truth (a row a step of 1/400 s) and commands of a plan, flown in a wind (NED, m/s), steady or one for each command."""
     sim = simulator(effect, amount)
     integrate_by(sim, integrators)
-    start(sim, wind, heading)
+    winds = np.broadcast_to(wind, (len(wanted), 3)) / FOOT
+    start(sim, winds[0] * FOOT, heading)
+    blow = [sim.get_property_manager().get_node(f"atmosphere/wind-{axis}-fps") for axis in ("north", "east", "down")]
     nodes = [sim.get_property_manager().get_node(name) for name, _ in SEEN]
     units = np.array([unit for _, unit in SEEN])
     units[9:12] /= sim["inertia/mass-slugs"] * POUND / FOOT
@@ -280,6 +282,9 @@ def fly(wanted, effect, amount, wind, heading, integrators="default"):
         commands[k], memory = command(seen, tuple(target), memory)
         for node, value in zip(to, commands[k].tolist()):
             node.set_double_value(value)
+        if np.ndim(wind) == 2:
+            for node, value in zip(blow, winds[k].tolist()):
+                node.set_double_value(value)
         for _ in range(PER_COMMAND):
             truth[row] = [get() for get in read]
             row += 1

@@ -11,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import installed
 import scoring
 from hidden import PARAMETERS
 
@@ -29,6 +30,8 @@ def diagnose(greylag, case, nulls):
     record = {"greylag": str(greylag), "folder": str(case)}
     record |= {"case": truth["case"], "truth": truth["truth"], "seed": truth["seed"], "hidden": truth["hidden"]}
     record.update(amount=truth["amount"], sensors=truth["sensors"], exit=done.returncode)
+    if "installed" in truth:
+        record["installed"] = truth["installed"]
     if said is None:
         return {**record, "verdict": "failed", "why": done.stderr[-600:], "asserted": [], "ranked": []}
     return {**record, **digest(said)}
@@ -46,10 +49,18 @@ def digest(said):
         "evidence": [[e["evidence"], e["threshold"]] for e in effects[:5]],
         "alike": {e["id"]: e["indistinguishable_from"] for e in effects[:5] if e["indistinguishable_from"]},
         "measured": sorted({m["id"] for m in said["measurement"] if m["asserted"]}),
+        "errors": sorted({m["id"] for m in said["measurement"] if m["asserted"] and of_installation(m)}),
+        "first": said["sentences"][0] if said["sentences"] else "",
+        "free_runs": [[s["way"], s["error"]] for s in said["answer"]["numbers"]["steps"]],
         "remainder": said.get("learnable_remainder"),
         "version": said.get("version"),
         "settings": said.get("settings"),
     }
+
+
+def of_installation(m):
+    """Whether a constant of a flight is an error of installation: of delays those beyond two samples."""
+    return m["id"] in installed.NAMED.values() and (m["id"] != "clock_skew" or abs(m["value"]) > installed.LATE)
 
 
 def line(r):
@@ -85,6 +96,54 @@ def table(records):
         )
         rows.append(f"| {kind} | {rate:g} | " + " | ".join(map(str, counts)) + " |")
     return "\n".join(rows)
+
+
+def of(some, all_of):
+    """A count with its share and interval."""
+    n = len(all_of)
+    if not n:
+        return "-"
+    low, high = wilson(len(some), n)
+    return f"{len(some)} of {n} ({100 * len(some) / n:.0f} %, {100 * max(low, 0.0):.0f} to {100 * high:.0f})"
+
+
+def wrongly_installed(records):
+    """What is said of cases with errors of installation, as Markdown."""
+    rows = [
+        "| truth | errors at once | no effect: an effect asserted | no effect: something is missing | error named | effect and error: both named | effect ranked first | something wrong asserted |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    own = [r for r in records if r.get("installed")]
+    named = lambda r: {installed.NAMED[k] for k in r["installed"] if k in installed.NAMED} <= set(r["errors"])  # noqa: E731
+    for kind, count in sorted({(r["truth"], len(r["installed"])) for r in own}):
+        some = [r for r in own if (r["truth"], len(r["installed"])) == (kind, count)]
+        nulls, effects = [r for r in some if not r["hidden"]], [r for r in some if r["hidden"]]
+        nameable = [r for r in some if set(r["installed"]) & set(installed.NAMED)]
+        both = [r for r in nameable if r["hidden"]]
+        cells = (
+            of([r for r in nulls if r["asserted"]], nulls),
+            of([r for r in nulls if r["verdict"] in ("effect", "unexplained")], nulls),
+            of([r for r in nameable if named(r)], nameable),
+            of([r for r in both if named(r) and r["hidden"] in r["asserted"]], both),
+            of([r for r in effects if r["ranked"][:1] == [r["hidden"]]], effects),
+            of([r for r in effects if wrong(r)], effects),
+        )
+        rows.append(f"| {kind} | {count} | " + " | ".join(cells) + " |")
+    rows += ["", "| error | cases | named | an effect asserted wrongly | verdicts without an effect |", "|---|---|---|---|---|"]
+    for kind in installed.KINDS:
+        some = [r for r in own if list(r["installed"]) == [kind]]
+        verdicts = [r["verdict"] for r in some if not r["hidden"]]
+        counts = ", ".join(f"{v} {verdicts.count(v)}" for v in sorted(set(verdicts)))
+        told = sum(named(r) for r in some) if kind in installed.NAMED else "no name"
+        rows.append(f"| {kind} | {len(some)} | {told} | {sum(bool(wrong(r)) for r in some)} | {counts or '-'} |")
+    return "\n".join(rows) if own else ""
+
+
+def tables(records):
+    """All tables of the records: of sensors as they should be, and of wrong ones."""
+    clean = [r for r in records if not r.get("installed")]
+    parts = [table(clean), coverage(clean)] if clean else []
+    return "\n\n".join([*parts, wrongly_installed(records)]).strip()
 
 
 def intervals(records):
@@ -137,13 +196,13 @@ def main():
     a = p.parse_args()
     if a.table:
         records = scoring.recorded(a.table)
-        print(table(records) + "\n\n" + coverage(records))
+        print(tables(records))
         return
     cases = scoring.folders(p, a)
     before = answered(a.jsonl, a.greylag) if a.resume else {}
     judge = lambda case: before.get(str(case)) or diagnose(a.greylag, case, a.nulls)  # noqa: E731
     records = scoring.score(cases, a, judge, line, before)
-    print("\n" + table(records) + "\n\n" + coverage(records))
+    print("\n" + tables(records))
     if a.strict and any(wrong(r) or r["verdict"] == "failed" for r in records):
         sys.exit(1)
 
