@@ -7,6 +7,7 @@ mod compare_support;
 #[cfg(feature = "sitl")]
 mod comparison;
 mod formats;
+mod found_public;
 #[path = "../support/logs.rs"]
 mod logs_support;
 mod odd_files;

@@ -1,12 +1,10 @@
 //! What logs of public repositories showed, in small: each test is a file's defect or kind, made here.
 
-mod logs_support;
-
 use std::path::Path;
 
+use crate::logs_support::*;
 use greylag::logs::vehicle::Kind;
 use greylag::logs::{Flight, Format, Log, LogError, Options, Sample, inspect, parse};
-use logs_support::*;
 
 fn said(log: &Log) -> String {
     log.findings.iter().map(|f| format!("{f}\n")).collect()
