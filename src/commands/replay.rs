@@ -37,7 +37,7 @@ pub struct Arguments {
 /// Options on what flew, where it differs from the recording's own statement.
 #[derive(Args, Debug)]
 pub struct FlownArguments {
-    /// Controller that flew [default: as recorded, else lqi].
+    /// Controller that flew [default: as recorded, else hybrid-ilqr].
     #[arg(long, value_name = "NAME", value_parser = choices::controller())]
     controller: Option<ControllerKind>,
     /// Model that it was designed from [default: as recorded].
