@@ -48,6 +48,8 @@ pub(super) struct Approach {
 impl Approach {
     /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder adverse yaw goes into
     /// pitch, which the load factor may not be left to correct: it rolls slowly, and the roll yields before the pitch does.
+    /// Its values were chosen on steps of the Skywalker X8, those with a rudder on steps of the Aerosonde (`results/flight-quality.txt` holds
+    /// others).
     pub fn of(model: &GreyBox, full: f64) -> Approach {
         if model.has_rudder() {
             let rates = [full, MOST[1]];
@@ -311,6 +313,20 @@ mod tests {
     fn a_bank_that_the_load_factor_cannot_hold_lowers_the_nose() {
         let path = follow([1.3, 0.0], [-0.8, 2.1], 300);
         assert!(path[299].attitude[1] < -0.1, "{:?}", path[299]);
+    }
+
+    #[test]
+    fn the_nose_comes_up_before_a_steep_bank() {
+        let dive = Point { attitude: [-0.95, -0.47], rates: [0.0; 2] };
+        let load = [-0.8, 2.1];
+        let task = |target| Task { turn: G0 / 30.0, target, load, approach: &SLOW };
+        let steep = task([1.0, 0.49]);
+        let first = steep.choose(&dive, First::NONE);
+        assert!(first.ticks > 0 && first.part < 1.0, "{first:?}");
+        assert!(steep.cost(&dive, first) < 0.9 * steep.cost(&dive, First::NONE));
+        // it is kept while it is flown, and nothing is put off where the bank takes no load factor
+        assert_eq!(steep.choose(&dive, first), first);
+        assert_eq!(task([0.3, 0.49]).choose(&dive, First::NONE), First::NONE);
     }
 
     #[test]
