@@ -96,7 +96,7 @@ fn shim() -> &'static Path {
         let mut cargo = Command::new(env!("CARGO"));
         cargo
             .args(["test", "--no-run", "--quiet", "--ignore-rust-version", "--workspace"])
-            .args(["--test", "shim_program", "--features", "greylag/sitl", "--target-dir"])
+            .args(["--test", "shim", "--features", "greylag/sitl", "--target-dir"])
             .arg(profile_folder().parent().unwrap())
             .current_dir(env!("CARGO_MANIFEST_DIR"));
         if cfg!(feature = "learn") {

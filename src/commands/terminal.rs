@@ -73,6 +73,23 @@ pub fn painted(text: &str, tone: Tone) -> String {
     }
 }
 
+/// `text` in lines of at most [`WIDTH`] characters, broken between words; a longer word keeps a line of its own.
+pub fn broken(text: &str) -> String {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let line = lines.last_mut().map_or(0, |line| line.chars().count());
+        if line > 0 && line + 1 + word.chars().count() > usize::from(WIDTH) {
+            lines.push(format!("  {word}"));
+        } else if let Some(last) = lines.last_mut() {
+            if line > 0 {
+                last.push(' ');
+            }
+            last.push_str(word);
+        }
+    }
+    lines.join("\n")
+}
+
 /// Prints the answer box, before any other output of a command.
 pub fn print_answer(answer: &Answer) {
     let tone = match answer.numbers.change_percent {
@@ -91,5 +108,19 @@ pub fn print_summary(answer: &Answer) {
     println!("\n{}", answer.summary());
     if !answer.next.is_empty() {
         println!("next: {}", answer.next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_broken_between_words() {
+        let text = "a word ".repeat(40);
+        let out = broken(text.trim());
+        assert!(out.lines().count() == 3 && out.lines().all(|line| line.chars().count() <= 100));
+        assert_eq!(out.replace("\n  ", " "), text.trim());
+        assert_eq!(broken("short"), "short");
     }
 }

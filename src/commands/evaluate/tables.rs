@@ -2,6 +2,7 @@
 
 use comfy_table::{ContentArrangement, Table};
 
+use crate::commands::terminal::broken;
 use crate::control::quality::{Measure, measure};
 use crate::report::evaluation_answer;
 use crate::sim::evaluation::{Evaluation, Score};
@@ -43,7 +44,7 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     );
     // last, where it is seen first
     println!();
-    evaluation_answer(evaluations).iter().for_each(|sentence| println!("{sentence}"));
+    evaluation_answer(evaluations).iter().for_each(|sentence| println!("{}", broken(sentence)));
 }
 
 pub(super) fn tables(evaluations: &[Evaluation]) -> Vec<Table> {
