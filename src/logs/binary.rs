@@ -43,10 +43,7 @@ pub(super) fn read(
     findings.extend(topics.findings);
     if !no_wings {
         findings.extend(assess::channels(&table.channels, &table.rows, &o.flies));
-        let found = match table.rows.is_empty() && !hovers.is_empty() {
-            true => vec![Finding::problem(NEVER_ON_WINGS)],
-            false => screening::screen(&table.rows, &o.flies),
-        };
+        let found = on_wings(&table.rows, &hovers, o);
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
     }
     let kept = kept(&mut table, path, o, to, &mut findings)?;
@@ -74,6 +71,14 @@ pub(super) fn read(
         sources: table.sources,
         life: topics.life,
     })
+}
+
+/// Findings on the rows that are flown on wings, beside the `hovers` (start and end, s).
+fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], o: &Options) -> Vec<Finding> {
+    match rows.is_empty() && !hovers.is_empty() {
+        true => vec![Finding::problem(NEVER_ON_WINGS)],
+        false => screening::screen(rows, &o.flies),
+    }
 }
 
 /// Error text for a log that holds hover only.
