@@ -38,7 +38,6 @@ pub(super) fn read(
 }
 
 fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Log, LogError> {
-    let bare = |error: CsvError| LogError::Csv { error, hint: String::new() };
     let missing = std::mem::take(&mut raw.missing);
     let lacking = !missing.is_empty();
     let mut findings: Vec<Finding> = Vec::new();
@@ -48,7 +47,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         findings.push(lacks(path, &missing, &raw.unknown_columns));
     } else if let Some(first) = missing.into_iter().next() {
         if to == Use::Compute {
-            return Err(bare(first));
+            return Err(LogError::Csv { error: first, hint: String::new() });
         }
         findings.push(Finding::problem(first.to_string()));
     }
