@@ -74,6 +74,7 @@ pub fn painted(text: &str, tone: Tone) -> String {
 }
 
 /// `text` in lines of at most [`WIDTH`] characters, broken between words; a longer word keeps a line of its own.
+#[cfg(any(feature = "demo", test))]
 pub fn broken(text: &str) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
