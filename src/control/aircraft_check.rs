@@ -3,9 +3,10 @@
 
 use serde::Serialize;
 
+pub use crate::authority::Authority;
 use crate::lqi::{self, LoopMargins, MarginsError, Weights};
 use crate::{ControllerKind, build};
-use greylag_model::modes::{Mode, modes, rates};
+use greylag_model::modes::{Mode, modes};
 use greylag_model::{GreyBox, Trim, TrimError};
 
 /// Number of airspeeds in the trim table.
@@ -34,17 +35,6 @@ pub struct Level {
     pub throttle: f64,
     /// Flight-path angle above the horizon, rad: zero in level flight, negative in a descent.
     pub path: f64,
-}
-
-/// Control authority at full travel, in level flight at the cruise airspeed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Authority {
-    /// Steady roll rate, rad/s.
-    pub roll_rate: f64,
-    /// Initial pitching acceleration, rad/s².
-    pub pitch_acceleration: f64,
-    /// Yawing acceleration by the rudder, rad/s²; `None` without a rudder.
-    pub yaw_acceleration: Option<f64>,
 }
 
 /// The recommended controller, with the smallest delay margin of its loops.
@@ -103,7 +93,7 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
         modes: modes(model, cruise, altitude)?,
         level_up_to: fastest_level(model),
         controller: advised(model)?,
-        authority: authority(model, &trim, altitude),
+        authority: Authority::at(model, &trim, altitude),
         loops: lqi::margins(model, cruise, &Weights::DEFAULT)?,
         findings: Vec::new(),
     };
@@ -152,27 +142,6 @@ fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Level> {
     let elevator = model.airframe.actuators.elevator.travel.part(trim.controls.elevator);
     let (alpha, throttle) = (trim.state.alpha, trim.controls.throttle);
     Some(Level { airspeed, alpha, elevator, throttle, path: trim.path() })
-}
-
-/// Steady roll rate with full aileron in level flight at the cruise airspeed, rad/s; `None` without level flight there.
-pub(crate) fn roll_rate(model: &GreyBox) -> Option<f64> {
-    let altitude = model.airframe.reference.altitude;
-    let trim = Trim::level(model, model.airframe.envelope.airspeed_cruise_mps, altitude).ok()?;
-    let rate = authority(model, &trim, altitude).roll_rate;
-    (rate.is_finite() && rate > 0.0).then_some(rate)
-}
-
-fn authority(model: &GreyBox, trim: &Trim, altitude: f64) -> Authority {
-    let linear = rates(model, trim, altitude);
-    let figures = &model.airframe.actuators;
-    let full = |place: usize, column: usize, travel: f64| linear.b[(place, column)] * travel;
-    let rudder = figures.rudder.filter(|_| model.has_rudder());
-    Authority {
-        // rolling settles where damping meets the aileron
-        roll_rate: full(3, 0, figures.aileron.travel.smallest()) / -linear.a[(3, 3)],
-        pitch_acceleration: full(4, 1, figures.elevator.travel.smallest()),
-        yaw_acceleration: rudder.map(|rudder| full(5, 3, rudder.travel.smallest())),
-    }
 }
 
 /// Findings on straight flight at one airspeed.

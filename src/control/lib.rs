@@ -3,6 +3,7 @@
 pub mod adaptive;
 pub mod aircraft_check;
 pub mod any;
+mod authority;
 pub mod cem;
 mod disturbance;
 pub mod envelope;

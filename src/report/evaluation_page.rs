@@ -278,7 +278,7 @@ mod tests {
         assert!(said.iter().any(|s| s == "No target was lost."), "{said:?}");
         assert!(said.iter().any(|s| s.starts_with("Envelope kept: lqi")), "{said:?}");
         let alike = answer([0.1, 0.1]);
-        assert!(alike[0].contains("not told apart by these targets from"), "{alike:?}");
+        assert!(alike[0].contains("not distinguished by these targets from"), "{alike:?}");
         assert!(answer::sentences(&[]).is_empty());
     }
 

@@ -107,11 +107,11 @@ impl Point {
         Point { attitude: [s.roll, s.pitch], rates }
     }
 
-    /// Roll, pitch and yaw rates of the body in a coordinated turn along the path, rad/s.
-    pub fn body_rates(&self, airspeed: f64) -> [f64; 3] {
+    /// Roll, pitch and yaw rates of the body in a coordinated turn along the path, rad/s; `turn` is g / V, 1/s.
+    fn body_rates(&self, turn: f64) -> [f64; 3] {
         let [roll, pitch] = self.attitude;
         let (sin, cos) = roll.clamp(-STEEP, STEEP).sin_cos();
-        let r = G0 / airspeed * pitch.cos() * sin;
+        let r = turn * pitch.cos() * sin;
         let q = (self.rates[1] + r * sin) / cos;
         [self.rates[0] - pitch.tan() * (q * sin + r * cos), q, r]
     }
@@ -204,6 +204,8 @@ impl Task<'_> {
 #[derive(Clone, Debug)]
 pub(super) struct Course {
     points: Vec<Point>,
+    /// Roll, pitch and yaw rates of the body at each point, rad/s.
+    turning: Vec<[f64; 3]>,
     next: Option<Point>,
     first: First,
 }
@@ -211,7 +213,12 @@ pub(super) struct Course {
 impl Course {
     pub fn new() -> Course {
         let point = Point { attitude: [0.0; 2], rates: [0.0; 2] };
-        Course { points: vec![point; STEPS + 1], next: None, first: First::NONE }
+        Course {
+            points: vec![point; STEPS + 1],
+            turning: vec![[0.0; 3]; STEPS + 1],
+            next: None,
+            first: First::NONE,
+        }
     }
 
     /// Begins anew at the aircraft's attitude.
@@ -223,6 +230,11 @@ impl Course {
     /// The point after `step` steps.
     pub fn at(&self, step: usize) -> &Point {
         &self.points[step]
+    }
+
+    /// Roll, pitch and yaw rates of the body on the path after `step` steps, rad/s.
+    pub fn turning(&self, step: usize) -> [f64; 3] {
+        self.turning[step]
     }
 
     /// The target itself (roll and pitch, rad) in place of a path.
@@ -237,6 +249,7 @@ impl Course {
         self.first = task.choose(&now, self.first.later());
         for step in 0..=STEPS {
             self.points[step] = now;
+            self.turning[step] = now.body_rates(task.turn);
             if step == 1 {
                 self.next = Some(now);
             }
@@ -260,7 +273,7 @@ impl Course {
 }
 
 /// The angle within half a turn, rad.
-fn wrapped(x: f64) -> f64 {
+pub(super) fn wrapped(x: f64) -> f64 {
     (x + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0
 }
 
@@ -285,7 +298,7 @@ mod tests {
             course.towards(&state, target, load, &SLOW);
             let point = *course.at(1);
             [state.roll, state.pitch] = point.attitude;
-            [state.p, state.q, state.r] = point.body_rates(state.airspeed);
+            [state.p, state.q, state.r] = course.turning(1);
             out.push(point);
         }
         out

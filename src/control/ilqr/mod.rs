@@ -11,7 +11,7 @@ mod problem;
 mod settings;
 mod solve;
 
-use crate::aircraft_check::roll_rate;
+use crate::authority::Authority;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::envelope::Bounds;
 use crate::insight::{Insight, Path};
@@ -82,9 +82,7 @@ impl Ilqr {
             lqi,
             ahead: Ahead::new(STEPS, &model.airframe),
             disturbance: Disturbance::new(TIME_CONSTANT_S),
-            approach: roll_rate(model)
-                .filter(|_| settings.towards == Towards::Path)
-                .map(|full| Approach::of(model, full)),
+            approach: approach(model, settings.towards),
             course: Course::new(),
             waiting: 0,
             desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
@@ -99,6 +97,14 @@ impl Ilqr {
     ) -> Option<[Surfaces; N]> {
         self.command(seen, target);
         self.desk.plan.map(|plan| std::array::from_fn(|step| plan[step]))
+    }
+}
+
+/// How `model` approaches a target along a path; `None` if the plan follows the target itself.
+fn approach(model: &GreyBox, towards: Towards) -> Option<Approach> {
+    match towards {
+        Towards::Target => None,
+        Towards::Path => Some(Approach::of(model, Authority::roll_rate(model)?)),
     }
 }
 

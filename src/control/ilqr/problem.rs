@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::cost::{Cost, attitude, beyond, square};
-use super::course::{Approach, Course};
+use super::course::{Approach, Course, wrapped};
 use super::settings::Settings;
 use super::{STEPS, Surfaces};
 use crate::envelope::{Bounds, load_factor, load_factor_slopes};
@@ -218,10 +218,9 @@ impl Problem<'_> {
         let [mut p, mut q, mut r, _, beta] = self.goal.steady;
         let point = self.course.at(step);
         if self.approach.is_some() {
-            [p, q, r] = point.body_rates(self.seen.state.airspeed);
+            [p, q, r] = self.course.turning(step);
         }
-        let tau = std::f64::consts::TAU;
-        let turn = (s.roll - point.attitude[0] + tau / 2.0).rem_euclid(tau) - tau / 2.0;
+        let turn = wrapped(s.roll - point.attitude[0]);
         let of = self.settings;
         let incidence = match (&self.bounds, &of.envelope) {
             (Some(bounds), Some(barrier)) => beyond(s.alpha, bounds.alpha, barrier.alpha),

@@ -52,7 +52,7 @@ fn ranking((best, score): (&Evaluation, &Score), rest: &[(&Evaluation, &Score)])
     );
     if let Some(((next, other), others)) = rest.split_first() {
         let apart = other.mean_ci95_deg[0] > score.mean_ci95_deg[1];
-        let than = if apart { "next" } else { "not told apart by these targets from" };
+        let than = if apart { "next" } else { "not distinguished by these targets from" };
         text += &format!("; {than} {} {}°", label(next), number(other.mean_deg));
         others.iter().for_each(|(e, s)| text += &format!(", {} {}°", label(e), number(s.mean_deg)));
     }
