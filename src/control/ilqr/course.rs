@@ -336,7 +336,7 @@ mod tests {
         let steep = task([1.0, 0.49]);
         let first = steep.choose(&dive, First::NONE);
         assert!(first.ticks > 0 && first.part < 1.0, "{first:?}");
-        assert!(steep.cost(&dive, first) < 0.9 * steep.cost(&dive, First::NONE));
+        assert!(steep.cost(&dive, first) < BETTER * steep.cost(&dive, First::NONE));
         // it is kept while it is flown, and nothing is put off where the bank takes no load factor
         assert_eq!(steep.choose(&dive, first), first);
         assert_eq!(task([0.3, 0.49]).choose(&dive, First::NONE), First::NONE);
