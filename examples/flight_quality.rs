@@ -25,20 +25,25 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use greylag::control::envelope::Guarded;
+use greylag::control::envelope::{Bounds, Guarded};
 use greylag::control::ilqr::{Ilqr, Settings, Start, Towards};
 use greylag::control::lqi::Lqi;
 use greylag::control::policy::Agent;
+use greylag::control::quality::{Limits, Moment, Quality, Track, attitude_error_deg};
 use greylag::control::{Controller, ControllerKind, Observation, Source, Target, build};
 use greylag::model::GreyBox;
 use greylag::num::stream::stream;
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
+use greylag::sim::episode::settled_error_deg;
 use greylag_sitl::air::Turbulence;
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start as Begin, Truth};
 use rand::RngExt;
 
 const STEP: f64 = 0.01;
-const G: f64 = 9.806;
+/// Standard gravity, m/s².
+const G0: f64 = 9.80665;
+/// Settled error beyond which the aircraft counts as lost, degrees.
+const LOST_DEG: f64 = 10.0;
 /// Ticks of a flight from level, and of a step.
 const FLIGHT: usize = 1000;
 const SHORT: usize = 500;
@@ -89,21 +94,11 @@ fn options() -> Result<Options> {
     Ok(o)
 }
 
-/// Measures of one flight to one target.
-#[derive(Clone, Copy, Debug, Default)]
-struct Measures {
+/// One flight to one target.
+struct Measured {
+    /// Mean of the rms errors of roll and pitch over the last fifth, degrees.
     settled: f64,
-    to_one: f64,
-    overshoot: [f64; 2],
-    step: [f64; 2],
-    iae: f64,
-    travel: [f64; 3],
-    load: [f64; 2],
-    alpha: [f64; 2],
-    beta: f64,
-    slowest: f64,
-    lost: bool,
-    rms: f64,
+    quality: Quality,
 }
 
 /// An aircraft in JSBSim with commands on their way to it.
@@ -114,6 +109,7 @@ struct World {
     delay: usize,
     previous: [Command; 2],
     truth: Truth,
+    limits: Limits,
 }
 
 impl World {
@@ -138,6 +134,8 @@ impl World {
             delay: o.delay,
             previous: [Command::IDLE; 2],
             truth,
+            // the limiter's own least load factor, where the file states none
+            limits: Limits { load_factor: Bounds::of(airframe).load, ..Limits::of(airframe) },
         })
     }
 
@@ -192,7 +190,7 @@ impl World {
 /// One controller over what has to be flown.
 struct Flown {
     group: &'static str,
-    measures: Vec<Measures>,
+    flights: Vec<Measured>,
 }
 
 /// Appends a tick to the file of `trace=`.
@@ -214,7 +212,7 @@ fn note(o: &Options, name: &str, tick: usize, target: &Target, world: &World) ->
         t.r_radps.to_degrees(),
         t.airspeed_mps,
         t.alpha_rad.to_degrees(),
-        -t.specific_force_mps2[2] / G,
+        load_factor(t),
         c.aileron,
         c.elevator,
         c.throttle,
@@ -222,6 +220,11 @@ fn note(o: &Options, name: &str, tick: usize, target: &Target, world: &World) ->
     Ok(())
 }
 
+fn load_factor(t: &Truth) -> f64 {
+    -t.specific_force_mps2[2] / G0
+}
+
+/// Flies `ticks` to a target and measures them; the aircraft is lost where JSBSim fails or the attitude is still far off at the end.
 fn leg(
     o: &Options,
     world: &mut World,
@@ -229,64 +232,38 @@ fn leg(
     target: &Target,
     ticks: usize,
     times: &mut Vec<f64>,
-) -> Measures {
-    let mut m =
-        Measures { load: [9.0, -9.0], alpha: [9.0, -9.0], slowest: 1e3, ..Default::default() };
-    let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
-    let error = |t: &Truth| {
-        [
-            wrap((t.roll_rad - target.roll).to_degrees()),
-            wrap((t.pitch_rad - target.pitch).to_degrees()),
-        ]
+) -> Measured {
+    let mut track = Track {
+        moments: Vec::with_capacity(ticks + 1),
+        target: *target,
+        before: Some(world.previous[0]),
+        lost_s: 0.0,
     };
-    let first = error(&world.truth);
-    m.step = first.map(f64::abs);
-    let (mut settled, mut away) = ([0.0; 2], 0);
-    let last = ticks / 5;
     for tick in 0..ticks {
         let seen = world.see();
         let begun = Instant::now();
         let command = controller.command(&seen, target);
         times.push(begun.elapsed().as_secs_f64() * 1e3);
-        let before = world.previous[0];
-        for (sum, d) in m.travel.iter_mut().zip([
-            command.aileron - before.aileron,
-            command.elevator - before.elevator,
-            command.throttle - before.throttle,
-        ]) {
-            *sum += d.abs();
-        }
+        track.moments.push(Moment::new(&seen, load_factor(&world.truth), &command));
         if world.step(command).is_err() || !world.truth.roll_rad.is_finite() {
-            m.lost = true;
+            track.lost_s = (ticks - tick) as f64 * STEP;
             break;
         }
         if let Err(why) = note(o, controller.name(), tick, target, world) {
             eprintln!("trace: {why}");
         }
-        let t = &world.truth;
-        let e = error(t);
-        m.iae += (e[0].abs() + e[1].abs()) * STEP;
-        for axis in 0..2 {
-            m.overshoot[axis] = m.overshoot[axis].max(-e[axis] * first[axis].signum());
-        }
-        if e.iter().any(|e| e.abs() > 1.0) {
-            away = tick + 1;
-        }
-        if tick >= ticks - last {
-            settled = [settled[0] + e[0] * e[0], settled[1] + e[1] * e[1]];
-        }
-        let load = -t.specific_force_mps2[2] / G;
-        m.load = [m.load[0].min(load), m.load[1].max(load)];
-        let alpha = t.alpha_rad.to_degrees();
-        m.alpha = [m.alpha[0].min(alpha), m.alpha[1].max(alpha)];
-        m.beta = m.beta.max(t.beta_rad.abs().to_degrees());
-        m.slowest = m.slowest.min(t.airspeed_mps);
     }
-    m.to_one = away as f64 * STEP;
-    m.settled = 0.5 * ((settled[0] / last as f64).sqrt() + (settled[1] / last as f64).sqrt());
-    m.rms = m.settled;
-    m.lost |= m.settled > 10.0;
-    m
+    if track.lost_s == 0.0 {
+        let (seen, last) = (world.see(), world.previous[0]);
+        track.moments.push(Moment::new(&seen, load_factor(&world.truth), &last));
+    }
+    let end = track.moments.len().saturating_sub(ticks / 5);
+    let errors: Vec<[f64; 2]> =
+        track.moments[end..].iter().map(|m| attitude_error_deg(m.attitude, target)).collect();
+    let settled = settled_error_deg(&errors);
+    let mut quality = track.quality(&world.limits);
+    quality.lost |= settled > LOST_DEG;
+    Measured { settled, quality }
 }
 
 fn fly(
@@ -322,8 +299,8 @@ fn fly(
             controller.reset(number as u64);
             let m = leg(o, &mut world, controller, &target, FLIGHT, &mut times);
             match all.iter_mut().find(|f| f.group == group) {
-                Some(f) => f.measures.push(m),
-                None => all.push(Flown { group, measures: vec![m] }),
+                Some(f) => f.flights.push(m),
+                None => all.push(Flown { group, flights: vec![m] }),
             }
         }
     }
@@ -331,7 +308,7 @@ fn fly(
         let e = airframe.envelope;
         let cruise = e.airspeed_cruise_mps;
         let mut world = World::new(o, airframe, cruise)?;
-        let mut flown = Flown { group: "steps", measures: Vec::new() };
+        let mut flown = Flown { group: "steps", flights: Vec::new() };
         let mut rng = stream(o.seed.into(), &[1951]);
         for number in 0..o.steps {
             if number % ROW == 0 {
@@ -342,7 +319,7 @@ fn fly(
             let pitch = rng.random_range(e.pitch_min_deg..e.pitch_max_deg);
             let target =
                 Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: cruise };
-            flown.measures.push(leg(o, &mut world, controller, &target, SHORT, &mut times));
+            flown.flights.push(leg(o, &mut world, controller, &target, SHORT, &mut times));
         }
         all.push(flown);
     }
@@ -357,48 +334,46 @@ fn quantile(mut xs: Vec<f64>, q: f64) -> f64 {
     xs[((xs.len() - 1) as f64 * q).round() as usize]
 }
 
-fn print(name: &str, airframe: &Airframe, all: &[Flown], times: &[f64]) {
-    let most = airframe.envelope.load_factor_max;
-    let ms = [0.5, 0.99, 0.999].map(|q| quantile(times.to_vec(), q));
-    for Flown { group, measures } in all {
-        let of =
-            |f: &dyn Fn(&Measures) -> f64, q: f64| quantile(measures.iter().map(f).collect(), q);
+fn print(name: &str, all: &[Flown], times: &[f64]) {
+    let ms = [0.5, 0.999].map(|q| quantile(times.to_vec(), q));
+    for Flown { group, flights } in all {
+        let settled = |q: f64| quantile(flights.iter().map(|m| m.settled).collect(), q);
+        let of = |f: &dyn Fn(&Quality) -> f64, q: f64| {
+            quantile(flights.iter().map(|m| f(&m.quality)).collect(), q)
+        };
+        let count = |f: &dyn Fn(&Quality) -> bool| flights.iter().filter(|m| f(&m.quality)).count();
+        let integral = |q: &Quality| q.error_integral_deg_s;
         // the ranks between which the median of such a sample lies in 95 % (binomial, normal approximation)
-        let half = 0.98 / (measures.len() as f64).sqrt();
-        let interval = [0.5 - half, 0.5 + half].map(|q| of(&|m| m.iae, q.clamp(0.0, 1.0)));
-        let over = |axis: usize| of(&|m| m.overshoot[axis], 0.95);
-        let fits = |m: &Measures| (0..2).all(|a| m.overshoot[a] <= (0.03 * m.step[a]).max(1.0));
-        let fit = measures.iter().filter(|m| fits(m)).count() as f64 / measures.len() as f64;
-        let beyond = measures
-            .iter()
-            .filter(|m| m.load[1] > 1.05 * most || m.load[0] < -0.4 * 1.05 * most)
-            .count();
+        let half = 0.98 / (flights.len() as f64).sqrt();
+        let interval = [0.5 - half, 0.5 + half].map(|q| of(&integral, q.clamp(0.0, 1.0)));
+        let mean = flights.iter().map(|m| integral(&m.quality)).sum::<f64>() / flights.len() as f64;
         println!(
-            "{name:<34} {group:<8} {:>4} {:>7.3} {:>7.3} {:>5.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>4.0}% {:>6.2} {:>6.2} {:>5.2} {:>6.2} {:>6.2} {:>6} {:>6.1} {:>6.1} {:>5.1} {:>5.1} {:>5} {:>6.3} {:>6.3}",
-            measures.len(),
-            of(&|m| m.settled, 0.5),
-            of(&|m| m.settled, 1.0),
-            of(&|m| m.to_one, 0.5),
-            of(&|m| m.iae, 0.5),
+            "{name:<34} {group:<8} {:>4} {:>7.3} {:>7.3} {:>5.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>4.0}% {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>6.2} {:>6.2} {:>6} {:>6.1} {:>6.1} {:>5.1} {:>5.1} {:>5} {:>6.3} {:>6.3}",
+            flights.len(),
+            settled(0.5),
+            settled(1.0),
+            of(&|q| q.to_one_deg_s, 0.5),
+            of(&integral, 0.5),
             interval[0],
             interval[1],
-            measures.iter().map(|m| m.iae).sum::<f64>() / measures.len() as f64,
-            over(0),
-            over(1),
-            100.0 * fit,
-            of(&|m| m.travel[0], 0.5),
-            of(&|m| m.travel[1], 0.5),
-            of(&|m| m.travel[2], 0.5),
-            of(&|m| m.load[0], 0.0),
-            of(&|m| m.load[1], 1.0),
-            beyond,
-            of(&|m| m.alpha[0], 0.0),
-            of(&|m| m.alpha[1], 1.0),
-            of(&|m| m.beta, 1.0),
-            of(&|m| m.slowest, 0.0),
-            measures.iter().filter(|m| m.lost).count(),
+            mean,
+            of(&|q| q.overshoot_deg[0], 0.95),
+            of(&|q| q.overshoot_deg[1], 0.95),
+            100.0 * count(&Quality::overshoots_little) as f64 / flights.len() as f64,
+            of(&|q| q.travel.aileron, 0.5),
+            of(&|q| q.travel.elevator, 0.5),
+            of(&|q| q.travel.rudder, 0.5),
+            of(&|q| q.travel.throttle, 0.5),
+            of(&|q| q.load_factor[0], 0.0),
+            of(&|q| q.load_factor[1], 1.0),
+            count(&|q| !q.kept),
+            of(&|q| q.alpha_deg[0], 0.0),
+            of(&|q| q.alpha_deg[1], 1.0),
+            of(&|q| q.sideslip_deg, 1.0),
+            of(&|q| q.airspeed_mps[0], 0.0),
+            count(&|q| q.lost),
             ms[0],
-            ms[2],
+            ms[1],
         );
     }
 }
@@ -408,7 +383,7 @@ fn main() -> Result<()> {
     let model = GreyBox::load(&o.model)?;
     let agent = Agent::load(&o.policy, &model.airframe).ok();
     println!(
-        "{:<34} {:<8} {:>4} {:>7} {:>7} {:>5} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6}",
+        "{:<34} {:<8} {:>4} {:>7} {:>7} {:>5} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6} {:>5} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>5} {:>6} {:>6}",
         "controller",
         "group",
         "n",
@@ -424,6 +399,7 @@ fn main() -> Result<()> {
         "fit",
         "ail",
         "elev",
+        "rud",
         "thr",
         "nmin",
         "nmax",
@@ -439,7 +415,7 @@ fn main() -> Result<()> {
     for name in &o.names {
         let mut controller = entrant(name, &model, agent.as_ref())?;
         let (all, times) = fly(&o, &model.airframe, controller.as_mut())?;
-        print(name, &model.airframe, &all, &times);
+        print(name, &all, &times);
     }
     Ok(())
 }

@@ -7,6 +7,7 @@
 //! stays within its own; other callers use the plain ones, which are compiled once.
 
 use super::GreyBox;
+use super::calls::{Called, Forces};
 use super::grey_box::{Named, Term};
 use greylag_num::Real;
 use greylag_physics::effects::{Needs, Terms};
@@ -325,6 +326,7 @@ impl GreyBox {
 
     /// Linear acceleration (specific force plus gravity, body axes, m/s²) and angular acceleration
     /// (rad/s²).
+    #[inline(never)]
     pub fn accelerations<R: Real>(
         &self,
         state: &State<R>,
@@ -373,22 +375,23 @@ impl GreyBox {
         controls: &Controls<R>,
         altitude: f64,
     ) -> State<R> {
-        self.rate_inlined(state, controls, altitude)
+        self.rate_from(state, controls, altitude, Called)
     }
 
-    /// [`rate`](GreyBox::rate), inlined into the caller.
+    /// The same, from forces that are called or inlined.
     #[inline(always)]
-    pub(super) fn rate_inlined<R: Real>(
+    pub(super) fn rate_from<R: Real>(
         &self,
         state: &State<R>,
         controls: &Controls<R>,
         altitude: f64,
+        forces: impl Forces,
     ) -> State<R> {
         let air = self.air(state, altitude);
-        let (acceleration, spin) = self.accelerations_inlined(state, controls, &air);
+        let (acceleration, spin) = forces.accelerations(self, state, controls, &air);
         let rate = rigid_body::state_rate(state, &air, acceleration, spin);
         match &self.residual {
-            Some(residual) => rate.advance(&residual.rate(state, controls), 1.0),
+            Some(residual) => rate.advance(&forces.learned(residual, state, controls), 1.0),
             None => rate,
         }
     }

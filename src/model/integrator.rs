@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::GreyBox;
+use crate::calls::{Called, Forces, Inlined};
 use greylag_num::{Real, each};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
@@ -68,7 +69,7 @@ impl GreyBox {
         altitude: f64,
         memory: &mut Memory<R>,
     ) -> State<R> {
-        self.step_inlined(state, controls, altitude, memory)
+        self.step_from(state, controls, altitude, memory, Called)
     }
 
     /// [`step`](GreyBox::step), inlined into the caller, for kernels compiled for several instruction sets; elsewhere
@@ -81,14 +82,32 @@ impl GreyBox {
         altitude: f64,
         memory: &mut Memory<R>,
     ) -> State<R> {
+        self.step_from(state, controls, altitude, memory, Inlined)
+    }
+
+    #[inline(always)]
+    fn step_from<R: Real>(
+        &self,
+        state: &State<R>,
+        controls: &Controls<R>,
+        altitude: f64,
+        memory: &mut Memory<R>,
+        forces: impl Forces,
+    ) -> State<R> {
         match self.integrator {
-            Integrator::Rk4 => self.step_rk4(state, controls, altitude),
-            Integrator::Jsbsim => self.step_jsbsim(state, controls, altitude, memory),
+            Integrator::Rk4 => self.step_rk4(state, controls, altitude, forces),
+            Integrator::Jsbsim => self.step_jsbsim(state, controls, altitude, memory, forces),
         }
     }
 
     #[inline(always)]
-    fn step_rk4<R: Real>(&self, s: &State<R>, controls: &Controls<R>, altitude: f64) -> State<R> {
+    fn step_rk4<R: Real>(
+        &self,
+        s: &State<R>,
+        controls: &Controls<R>,
+        altitude: f64,
+        forces: impl Forces,
+    ) -> State<R> {
         let (mut at, mut next) = (*s, *s);
         // step to the next stage and weight in the final sum of each slope, s
         let stages = [
@@ -98,7 +117,7 @@ impl GreyBox {
             (0.0, STEP / 6.0),
         ];
         for (reach, weight) in stages {
-            let slope = self.rate_inlined(&at, controls, altitude);
+            let slope = self.rate_from(&at, controls, altitude, forces);
             at = s.advance(&slope, reach);
             next = next.advance(&slope, weight);
         }
@@ -112,12 +131,13 @@ impl GreyBox {
         controls: &Controls<R>,
         altitude: f64,
         memory: &mut Memory<R>,
+        forces: impl Forces,
     ) -> State<R> {
         let air = self.air(s, altitude);
-        let (mut acceleration, mut spin) = self.accelerations_inlined(s, controls, &air);
+        let (mut acceleration, mut spin) = forces.accelerations(self, s, controls, &air);
         if let Some(residual) = &self.residual {
             // this scheme uses accelerations only: the residual's φ̇ and θ̇ cannot enter it
-            let learned = residual.rate(s, controls);
+            let learned = forces.learned(residual, s, controls);
             let push = rigid_body::acceleration_of(s, &air, &learned);
             for (sum, part) in acceleration.iter_mut().zip(push) {
                 *sum += part;

@@ -1,6 +1,7 @@
 //! The grey-box model: physical effects, integrators, trim and linearisation.
 
 pub mod block;
+mod calls;
 pub mod data_envelope;
 pub mod derivatives;
 mod draw;
@@ -9,6 +10,7 @@ mod file;
 mod forces;
 mod grey_box;
 mod integrator;
+mod jacobian;
 mod join;
 pub mod known;
 mod linear;

@@ -3,9 +3,9 @@
 use nalgebra::{Complex, Matrix4, SMatrix};
 use serde::Serialize;
 
+use super::jacobian::jacobian;
+use super::linear::{inputs, matrices, split};
 use super::{GreyBox, Trim, TrimError};
-use greylag_num::Dual;
-use greylag_physics::{Controls, State};
 
 /// Indices of θ, V, q, α and of φ, p, r, β in the state of eq. (4).
 const LONGITUDINAL: [usize; 4] = [1, 2, 4, 6];
@@ -59,17 +59,12 @@ impl Mode {
 
 /// Linearises the rates of `model` about `trim` at `altitude` (m).
 pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
-    let (x, z) = (trim.state.to_array(), trim.controls);
-    let state = State::from_array(std::array::from_fn(|i| Dual::<12>::variable(x[i], i)));
-    let z = [z.aileron, z.elevator, z.throttle, z.rudder];
-    let [aileron, elevator, throttle, rudder] =
-        std::array::from_fn(|i| Dual::variable(z[i], 8 + i));
-    let controls = Controls { aileron, elevator, throttle, rudder, lagged: None };
-    let rate = model.rate(&state, &controls, altitude).to_array();
-    Rates {
-        a: SMatrix::from_fn(|i, j| rate[i].gradient[j]),
-        b: SMatrix::from_fn(|i, j| rate[i].gradient[8 + j]),
-    }
+    let (_, rows) = jacobian(&inputs(&trim.state, &trim.controls), |x| {
+        let (state, controls) = split(x);
+        model.rate(&state, &controls, altitude).to_array()
+    });
+    let (a, b) = matrices(rows);
+    Rates { a, b }
 }
 
 /// Modes of straight flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.

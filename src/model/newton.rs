@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use greylag_num::Dual;
+use super::jacobian::{Four, jacobian};
 
 /// Root of `f` near `start`; `None` if it does not converge in 60 damped steps.
 ///
@@ -11,17 +11,16 @@ use greylag_num::Dual;
 pub(super) fn solve<const N: usize>(
     start: [f64; N],
     largest: [f64; N],
-    f: impl Fn([Dual<N>; N]) -> [Dual<N>; N],
+    f: impl Fn([Four; N]) -> [Four; N],
 ) -> Option<[f64; N]> {
     let mut x = start;
     for _ in 0..60 {
-        let residual = f(std::array::from_fn(|i| Dual::variable(x[i], i)));
-        if residual.iter().all(|r| r.value.abs() < 1e-10) {
+        let (residual, slopes) = jacobian(&x, &f);
+        if residual.iter().all(|r| r.abs() < 1e-10) {
             return Some(x);
         }
-        let jacobian = DMatrix::from_fn(N, N, |i, j| residual[i].gradient[j]);
-        let value = DVector::from_fn(N, |i, _| residual[i].value);
-        let step = jacobian.lu().solve(&value)?;
+        let slopes = DMatrix::from_fn(N, N, |i, j| slopes[i][j]);
+        let step = slopes.lu().solve(&DVector::from_column_slice(&residual))?;
         let ratio = (0..N).map(|i| step[i].abs() / largest[i]).fold(1.0, f64::max);
         for i in 0..N {
             x[i] -= step[i] / ratio;

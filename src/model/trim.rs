@@ -1,8 +1,9 @@
 //! Trim: deflections that hold a steady flight condition.
 
 use super::GreyBox;
+use super::jacobian::Four;
 use super::newton;
-use greylag_num::{Dual, Real};
+use greylag_num::Real;
 use greylag_physics::{Controls, State};
 
 /// The descent at full throttle counts as powered flight only if its path is shallower than that at idle by this
@@ -50,7 +51,7 @@ impl Trim {
         if airspeed.is_nan() || airspeed <= 0.0 {
             return Err(failure(model, 0.0, 0.0, airspeed));
         }
-        let condition = |x: [Dual<3>; 3]| level_condition(x, airspeed);
+        let condition = |x: [Four; 3]| level_condition(x, airspeed);
         let from = |throttle: f64| {
             let x = newton::solve([0.03, 0.0, throttle], [0.1, 0.2, 0.5], |x| {
                 let (state, controls) = condition(x);
@@ -155,8 +156,8 @@ fn descent(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
 
 /// Straight flight at `airspeed` (m/s) and the given throttle. Unknowns: α, δe, θ.
 fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> Option<Trim> {
-    let condition = |[alpha, elevator, pitch]: [Dual<3>; 3]| {
-        let held = Dual::from_f64(throttle);
+    let condition = |[alpha, elevator, pitch]: [Four; 3]| {
+        let held = Four::from_f64(throttle);
         let (mut state, controls) = level_condition([alpha, elevator, held], airspeed);
         state.pitch = pitch;
         (state, controls)
@@ -227,7 +228,7 @@ fn solve_attitude(
         let (state, controls) = attitude_condition(x, roll, pitch, airspeed, sideways);
         let rate = model.rate(&state, &controls, altitude);
         let along = match thrust {
-            Thrust::Held(t) => x[7] - Dual::from_f64(t),
+            Thrust::Held(t) => x[7] - Four::from_f64(t),
             Thrust::From(_) => rate.airspeed,
         };
         [rate.roll, rate.pitch, rate.p, rate.q, rate.r, rate.alpha, rate.beta, along]

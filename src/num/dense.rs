@@ -315,7 +315,7 @@ impl Layer<'_> {
             let row = &self.weights[place..place + B];
             let mut j = 0;
             while j < B {
-                sum[j] = x.mul_add(R::from_f64(row[j].into()), sum[j]);
+                sum[j] = x.mul_add_constant(row[j].into(), sum[j]);
                 j += 1;
             }
             place += outputs;

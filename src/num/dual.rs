@@ -135,6 +135,19 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
         }
         Dual { value: T::where_less(a.value, b.value, then.value, otherwise.value), gradient }
     }
+    // a constant's own derivative is zero and need not be multiplied
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        Dual { value: self.value.scale(factor), gradient: each(self.gradient, |g| g.scale(factor)) }
+    }
+    #[inline(always)]
+    fn mul_add_constant(self, factor: f64, addend: Self) -> Self {
+        let mut gradient = addend.gradient;
+        for (sum, g) in gradient.iter_mut().zip(self.gradient) {
+            *sum = g.mul_add_constant(factor, *sum);
+        }
+        Dual { value: self.value.mul_add_constant(factor, addend.value), gradient }
+    }
 }
 
 #[cfg(test)]
@@ -146,7 +159,7 @@ mod tests {
         let (s, c) = (x * y).sin_cos();
         let a = s.atan2(c + R::from_f64(2.0)) + (x / y).exp() - (x * x + y * y).sqrt();
         let b = (x - y).abs() + x.min(y) * R::from_f64(3.0) + x.max(y) - s.asin();
-        a * b + (-y).clamp(-0.2, 0.3) + x.scale(0.5)
+        a * b + (-y).clamp(-0.2, 0.3) + x.scale(0.5) + (x * y).mul_add_constant(-0.7, y)
     }
 
     #[test]

@@ -60,6 +60,11 @@ pub trait Real:
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         self * factor + addend
     }
+    /// Multiply-add with a constant factor, `self · factor + addend`, rounded as [`mul_add`](Real::mul_add).
+    #[inline(always)]
+    fn mul_add_constant(self, factor: f64, addend: Self) -> Self {
+        self.mul_add(Self::from_f64(factor), addend)
+    }
     /// The constant zero.
     #[inline(always)]
     fn zero() -> Self {

@@ -267,6 +267,9 @@ fn check(mistakes: &[Mistake]) {
         if content(folder) != before {
             wrong.push(format!("{line}: files were changed"));
         }
+        if fs::remove_dir(folder.join("new")).is_ok() {
+            wrong.push(format!("{line}: an empty folder stays behind"));
+        }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -25,15 +25,28 @@ pub fn hashed(paths: &[PathBuf]) -> Result<Vec<Hashed>> {
 pub struct Places {
     original: Original,
     folder: PathBuf,
+    /// Whether this run made the folder.
+    made: bool,
+}
+
+impl Drop for Places {
+    /// A folder that this run made does not stay behind empty.
+    fn drop(&mut self) {
+        if self.made {
+            // fails where something was written, and nothing is lost otherwise
+            let _ = fs::remove_dir(&self.folder);
+        }
+    }
 }
 
 impl Places {
     /// Fails at once if something could not be written later, so that no long task is lost to it.
     pub fn new(original: &Path, folder: &Path, overwrite: Overwrite) -> Result<Places> {
+        let (read, made) = (Original::read(original)?, !folder.exists());
         fs::create_dir_all(folder).with_context(|| {
             format!("cannot make the folder {}; name another one", folder.display())
         })?;
-        let places = Places { original: Original::read(original)?, folder: folder.into() };
+        let places = Places { original: read, folder: folder.into(), made };
         let original = fs::canonicalize(original)?;
         if fs::canonicalize(places.model()).is_ok_and(|p| p == original) {
             bail!("{} is the model to start from; name another folder", places.model().display());

@@ -10,6 +10,7 @@ mod course;
 mod problem;
 mod settings;
 mod solve;
+mod transition;
 
 use crate::authority::Authority;
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
@@ -85,7 +86,12 @@ impl Ilqr {
             approach: approach(model, settings.towards),
             course: Course::new(),
             waiting: 0,
-            desk: Desk { solver: Solver::new(), plan: None, flown: Trajectory::new() },
+            desk: Desk {
+                solver: Solver::new(),
+                plan: None,
+                target: None,
+                flown: Trajectory::new(),
+            },
         }
     }
 
@@ -114,6 +120,8 @@ struct Desk {
     solver: Solver,
     /// The last tick's plan.
     plan: Option<[Surfaces; STEPS]>,
+    /// The last tick's target.
+    target: Option<Target>,
     flown: Trajectory,
 }
 
@@ -126,31 +134,41 @@ struct Starts<'a> {
 }
 
 impl Desk {
-    /// Runs this tick's iterations; `None` if no plan is finite.
-    fn improve(&mut self, problem: &Problem, starts: Starts) -> Option<[Surfaces; STEPS]> {
-        let (mut start, mut cost) = problem.follow(starts.lqi, &mut self.flown);
+    /// The last plan a step on, with its cost. Where there is none, or for another target, the cheapest of it, the LQI's
+    /// flight and the policy's in the model; `None` if none is finite.
+    fn begin(&mut self, problem: &Problem, starts: Starts) -> Option<([Surfaces; STEPS], f64)> {
+        let mut best = None;
         if let Some(last) = &self.plan {
             let mut shifted = *last;
             shifted.rotate_left(1);
             shifted[STEPS - 1] = shifted[STEPS - 2];
-            let found = problem.fly(&shifted, self.solver.spare());
-            // a comparison with NaN is false
-            if found < cost || !cost.is_finite() {
-                (start, cost) = (shifted, found);
-                self.solver.swap(&mut self.flown);
+            let cost = problem.fly(&shifted, &mut self.flown);
+            best = cost.is_finite().then_some((shifted, cost));
+        }
+        let known = best.is_some() && self.target == Some(*starts.target);
+        self.target = Some(*starts.target);
+        if known {
+            return best;
+        }
+        let Starts { lqi, actor, units, target } = starts;
+        let mut compete = |desk: &mut Desk, (plan, cost): ([Surfaces; STEPS], f64)| {
+            if cost.is_finite() && best.is_none_or(|(_, least)| cost < least) {
+                best = Some((plan, cost));
+                desk.solver.swap(&mut desk.flown);
             }
+        };
+        let found = problem.follow(lqi, self.solver.spare());
+        compete(self, found);
+        if let Some(actor) = actor {
+            let found = problem.follow_policy(actor, units, target, self.solver.spare());
+            compete(self, found);
         }
-        if let Some(actor) = starts.actor {
-            let Starts { units, target, .. } = starts;
-            let (plan, found) = problem.follow_policy(actor, units, target, self.solver.spare());
-            if found < cost || !cost.is_finite() {
-                (start, cost) = (plan, found);
-                self.solver.swap(&mut self.flown);
-            }
-        }
-        if !cost.is_finite() {
-            return None;
-        }
+        best
+    }
+
+    /// Runs this tick's iterations; `None` if no plan is finite.
+    fn improve(&mut self, problem: &Problem, starts: Starts) -> Option<[Surfaces; STEPS]> {
+        let (mut start, mut cost) = self.begin(problem, starts)?;
         for _ in 0..problem.settings.iterations {
             (start, cost) = self.solver.iterate(problem, start, cost, &mut self.flown);
         }

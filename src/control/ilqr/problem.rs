@@ -5,6 +5,7 @@ use nalgebra::{SMatrix, SVector};
 use super::cost::{Cost, attitude, beyond, square};
 use super::course::{Approach, Course, wrapped};
 use super::settings::Settings;
+use super::transition::{Filter, Transition};
 use super::{STEPS, Surfaces};
 use crate::envelope::{Bounds, load_factor, load_factor_slopes};
 use crate::lqi::{Ahead, Goal};
@@ -20,15 +21,13 @@ use greylag_physics::{Command, Controls, State};
 /// two last commanded deflections, rad.
 pub(super) const STATES: usize = 16;
 
-/// Indices of the deflections and of the last commanded ones.
-const SURFACES: [usize; 2] = [8, 12];
+/// Indices of the deflections, each followed by its filter's other states.
+pub(super) const SURFACES: [usize; 2] = [8, 12];
 
 /// A matrix over the states.
 pub(super) type Square = SMatrix<f64, STATES, STATES>;
 /// A vector over the states.
 pub(super) type Vector = SVector<f64, STATES>;
-/// Input matrix of aileron and elevator.
-pub(super) type Input = SMatrix<f64, STATES, 2>;
 
 /// Incidence (rad) above which it costs where the envelope sets no limit, and the excess that costs as much as the
 /// other scales.
@@ -261,7 +260,7 @@ impl Problem<'_> {
         &self,
         trajectory: &Trajectory,
         step: usize,
-        a: &Square,
+        transition: &Transition,
     ) -> Option<(Cost, Vector)> {
         let (from, to) = (&trajectory.states[step], &trajectory.states[step + 1]);
         let cost = self.load(from, to);
@@ -272,7 +271,7 @@ impl Problem<'_> {
         let mut slope = Vector::zeros();
         slope.as_mut_slice()[..8].copy_from_slice(&own);
         for (row, by) in next.into_iter().enumerate().filter(|(_, by)| *by != 0.0) {
-            slope += a.row(row).transpose() * by;
+            transition.add_row(row, by, &mut slope);
         }
         Some((cost, slope))
     }
@@ -301,34 +300,19 @@ impl Problem<'_> {
         1.0 / (self.settings.moves * self.settings.moves)
     }
 
-    /// One step, linear about the trajectory: δx₊ = a δx + b δu.
-    pub fn linear(&self, trajectory: &Trajectory, step: usize) -> (Square, Input) {
+    /// One step, linear about the trajectory.
+    pub fn linear(&self, trajectory: &Trajectory, step: usize) -> Transition {
         let figures = &self.model.airframe.actuators;
         let (state, controls) = (&trajectory.states[step], &trajectory.controls[step]);
         let linear = linearise_step(self.model, state, controls, self.seen.altitude);
-        let mut a = Square::zeros();
-        let mut b = Input::zeros();
-        a.fixed_view_mut::<8, 8>(0, 0).copy_from(&linear.a);
-        for (surface, at) in SURFACES.into_iter().enumerate() {
+        let mut aircraft = SMatrix::<f64, 8, 10>::zeros();
+        aircraft.fixed_columns_mut::<8>(0).copy_from(&linear.a);
+        aircraft.fixed_columns_mut::<2>(8).copy_from(&linear.b.fixed_columns::<2>(0));
+        let filters = std::array::from_fn(|surface| {
             let of = [&figures.aileron, &figures.elevator][surface];
-            let [b0, a1, a2] = of.filter;
             let [deflection, _, commanded, _] = trajectory.filters[step + 1][surface];
-            let unit = of.travel.slope(commanded);
-            a.fixed_view_mut::<8, 1>(0, at).copy_from(&linear.b.column(surface));
-            let (before, input, input_before) = (at + 1, at + 2, at + 3);
-            // a surface at its stop stays there
-            let free = of.travel.reaches(deflection);
-            if free {
-                a[(at, at)] = -a1;
-                a[(at, before)] = -a2;
-                a[(at, input)] = 2.0 * b0;
-                a[(at, input_before)] = b0;
-                b[(at, surface)] = b0 * unit;
-            }
-            a[(before, at)] = 1.0;
-            b[(input, surface)] = unit;
-            a[(input_before, input)] = 1.0;
-        }
-        (a, b)
+            Filter::new(of, deflection, commanded)
+        });
+        Transition { aircraft, filters }
     }
 }

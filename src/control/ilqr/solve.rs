@@ -75,15 +75,15 @@ impl Solver {
         let mut value = Square::from_diagonal(&curvature);
         let weight = problem.move_weight();
         for step in (0..STEPS).rev() {
-            let (a, b) = problem.linear(trajectory, step);
-            let va = value * a;
-            let vb = value * b;
-            let mut q_x: Vector = a.tr_mul(&slope);
-            let mut q_u: Vector2<f64> = b.tr_mul(&slope);
-            let mut q_xx: Square = a.tr_mul(&va);
-            let mut q_ux: Gain = b.tr_mul(&va);
-            let mut q_uu: Matrix2<f64> = b.tr_mul(&vb);
-            if let Some((cost, n)) = problem.load_terms(trajectory, step, &a) {
+            let transition = problem.linear(trajectory, step);
+            let va = transition.after(&value);
+            let vb = transition.after_commands(&value);
+            let mut q_x: Vector = transition.before(&slope);
+            let mut q_u: Vector2<f64> = transition.before_commands(&slope);
+            let mut q_xx: Square = transition.before(&va);
+            let mut q_ux: Gain = transition.before_commands(&va);
+            let mut q_uu: Matrix2<f64> = transition.before_commands(&vb);
+            if let Some((cost, n)) = problem.load_terms(trajectory, step, &transition) {
                 q_x += n * cost.slope;
                 q_xx.ger(cost.curvature, &n, &n, 1.0);
             }
