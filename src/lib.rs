@@ -96,6 +96,7 @@ pub use greylag_sim as sim;
 pub use greylag_learn as learn;
 
 // Many runs, resumable.
+#[cfg(feature = "study")]
 pub use greylag_campaign as campaign;
 
 // Pages.

@@ -4,6 +4,7 @@ mod aircraft;
 #[cfg(feature = "study")]
 mod amend;
 mod bar;
+#[cfg(feature = "study")]
 mod campaign;
 mod choices;
 pub mod controllers;
@@ -71,6 +72,7 @@ mod watchdog;
 #[cfg(feature = "study")]
 mod workbench;
 
+#[cfg(feature = "study")]
 use std::ffi::OsString;
 use std::io::IsTerminal;
 
@@ -78,11 +80,15 @@ use std::panic;
 use std::process::{self, ExitCode};
 use std::sync::LazyLock;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
+#[cfg(feature = "study")]
+use anyhow::bail;
 use clap::{Parser, Subcommand};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::prelude::*;
 
 use crate::sysid::progress::Cancelled;
+#[cfg(feature = "study")]
 use interruption::{Ended, Interruption};
 
 /// The version that `-V` prints: the package's, the commit that the program was built from, its features.
@@ -120,6 +126,7 @@ enum Command {
     #[cfg(feature = "study")]
     Amend(amend::Arguments),
     /// Run a campaign over priors, controllers and seeds; gather and tabulate it.
+    #[cfg(feature = "study")]
     Campaign(campaign::Arguments),
     /// Explore in JSBSim, to have flights to learn from.
     #[cfg(feature = "demo")]
@@ -213,19 +220,21 @@ pub fn main() -> ExitCode {
     let Arguments { command, verbose, quiet } = parse();
     bar::silence(quiet);
     let level = match (quiet, verbose) {
-        (true, _) => "error",
-        // warnings of the port of JSBSim on an aircraft's XML are repeated in our words
-        (_, 0) => "warn,jsbsim=off",
-        (_, 1) => "info",
-        (_, 2..) => "debug",
+        (true, _) => LevelFilter::ERROR,
+        (_, 0) => LevelFilter::WARN,
+        (_, 1) => LevelFilter::INFO,
+        (_, 2..) => LevelFilter::DEBUG,
     };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    // warnings of the port of JSBSim on an aircraft's XML are repeated in our words
+    let port = if level == LevelFilter::WARN { LevelFilter::OFF } else { level };
+    let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let filter =
+        asked.unwrap_or_else(|| Targets::new().with_default(level).with_target("jsbsim", port));
+    let lines = tracing_subscriber::fmt::layer()
         .without_time()
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(|| log_once::LogOnce)
-        .init();
+        .with_writer(|| log_once::LogOnce);
+    tracing_subscriber::registry().with(filter).with(lines).init();
     // a flight must continue when nobody reads its output
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
@@ -245,6 +254,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Aircraft(arguments) => aircraft::run(&arguments),
         #[cfg(feature = "study")]
         Command::Amend(arguments) => amend::run(&arguments),
+        #[cfg(feature = "study")]
         Command::Campaign(arguments) => campaign::run(&arguments),
         #[cfg(feature = "demo")]
         Command::Collect(arguments) => collect::run(&arguments),
@@ -291,12 +301,14 @@ fn run(command: Command) -> Result<ExitCode> {
 }
 
 /// The subcommand of a line that does not hold the program's name.
+#[cfg(feature = "study")]
 fn command_of(line: &[OsString]) -> Result<Command> {
     let words = std::iter::once(OsString::from("greylag")).chain(line.iter().cloned());
     Ok(Arguments::try_parse_from(words)?.command)
 }
 
 /// Refuses a line that is no stage of a learning and no cell of a campaign.
+#[cfg(feature = "study")]
 fn check_line(line: &[OsString]) -> Result<()> {
     match command_of(line)? {
         #[cfg(feature = "demo")]
@@ -308,6 +320,7 @@ fn check_line(line: &[OsString]) -> Result<()> {
 }
 
 /// Carries a stage of a learning or a cell of a campaign out, until `stop` is set.
+#[cfg(feature = "study")]
 #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {
     match command_of(line)? {

@@ -5,7 +5,7 @@
 //! [`FlightReport`] is the page of one flight, [`ComparisonReport`] that of models against flights,
 //! [`DiagnosisReport`] that of what a model lacks, [`AmendmentReport`] that of a model with it added, `TrainingReport`
 //! that of a model that was learned, `LearningReport` that of policies being learned, `EvaluationReport` that of controllers side by side,
-//! [`CampaignReport`] that of a campaign.
+//! `CampaignReport` that of a campaign.
 //! The plots are drawn in the reader's browser by uPlot
 //! 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`), which is embedded.
 //!
@@ -14,6 +14,7 @@
 mod aircraft_page;
 #[cfg(feature = "study")]
 mod amendment;
+#[cfg(feature = "study")]
 mod campaign_page;
 mod comparison;
 #[cfg(feature = "study")]
@@ -35,6 +36,7 @@ pub use aircraft_page::AircraftReport;
 pub use amendment::AmendmentReport;
 #[cfg(feature = "study")]
 pub use amendment::page::amendment_page;
+#[cfg(feature = "study")]
 pub use campaign_page::CampaignReport;
 pub use comparison::ComparisonReport;
 pub use comparison::page::comparison_page;
