@@ -208,7 +208,7 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
     Ok(vec![all.swap_remove(number - 1)])
 }
 
-/// Said of a file that is nothing known.
+/// Error text for a file of an unknown format.
 const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, or a MAVLink .tlog";
 
 /// Reads the flights of the log `source`, which begins with `start`.

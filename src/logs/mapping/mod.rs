@@ -153,7 +153,7 @@ impl Mapping {
         Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, board, flight, mixer: None })
     }
 
-    /// How the log's axes stand, if the mapping says so.
+    /// Orientation of the log's axes in the body, if the mapping has a section `[board]`.
     pub(super) fn board(&self) -> Option<&Board> {
         self.board.as_ref()
     }

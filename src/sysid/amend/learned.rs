@@ -1,21 +1,22 @@
-//! What a fit has learned of its flights and of the installation that they share, as the model's file keeps it.
+//! Constants that a fit has estimated for each flight and for the installation that the flights share, as written to the
+//! model's file.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::per_flight::PerFlight;
 use greylag_model::{FlightConstants, Known};
 
-/// Standard errors by which a mean over flights must exceed zero to be an installation's.
+/// A mean over flights is taken as a constant of the installation if it exceeds this many of its standard errors.
 const CLEAR: f64 = 2.0;
-/// Where the constants come from, as their source says.
+/// Source of the constants, as written to the model's file.
 const BY: &str = "greylag amend";
 
 /// A flight's constants with the standard deviations of its unknowns, in the order of [`Own::unknowns`].
 pub(super) struct Learned<'a> {
-    /// The flight.
+    /// Name of the flight, from its log file.
     pub name: &'a str,
-    /// Its constants.
+    /// Estimated constants of the flight.
     pub own: &'a Own,
-    /// Their standard deviations.
+    /// Standard deviations of the unknowns among them.
     pub sd: &'a [f64],
 }
 
