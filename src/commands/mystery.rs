@@ -117,7 +117,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
         turbulence: arguments.turbulence_severity,
         installed: Installation::TRUE,
     };
-    // written beside it first: the folder is there complete, or not at all
+    // written under another name first, so that the folder is either complete or absent
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
     let beside = beside.with_context(|| {
         format!("cannot make a folder in {}, so name another place with --out", parent.display())
@@ -293,7 +293,7 @@ fn open(folder: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints the answer beside the diagnosis.
+/// Prints the answer and the diagnosis for comparison.
 fn beside(answer: &Answer, said: &serde_json::Value) {
     let none = Vec::new();
     let effects = said["effects"].as_array().unwrap_or(&none);

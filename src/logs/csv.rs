@@ -31,7 +31,7 @@ pub enum CsvError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The text is no CSV.
+    /// The text is not a CSV table.
     #[error("flight log {path}: {source}: correct the row or cut the file before it")]
     Text {
         /// Path of the log.
@@ -78,7 +78,7 @@ pub struct Reading {
     pub dropped: usize,
     /// The numbers of the first of them, the header being row 1.
     pub dropped_rows: Vec<usize>,
-    /// Whether the file ends in the middle of a row, which is left out.
+    /// Whether the file ends in the middle of a row; that row is not read.
     pub cut_short: bool,
 }
 

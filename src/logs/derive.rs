@@ -1,4 +1,4 @@
-//! Columns that a log lacks, made from those it has, where a mapping asks for it.
+//! Columns that a log lacks, computed from those it has, if a mapping requests it.
 //!
 //! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions
 //! around a row; body rates are that of the turns from the row's attitude; the airspeed is the velocity over

@@ -26,7 +26,7 @@ pub enum LogError {
     Foreign {
         /// Path of the file.
         path: PathBuf,
-        /// What it is instead, and what to give.
+        /// Format of the file, and the file to give instead.
         what: &'static str,
     },
     /// The file has no flight of that number.
@@ -55,7 +55,7 @@ pub enum LogError {
         /// Probable wrong units, for the message; may be empty.
         hint: String,
     },
-    /// A needed column is filled by nothing in the file.
+    /// The file has no data for a required column.
     #[error("flight log {} has nothing for column `{column}`: {remedy}", path.display())]
     Missing {
         /// Path of the log.

@@ -1,4 +1,4 @@
-//! What a file is that is none of the log formats, by how it begins, and what its owner can do.
+//! Recognition of files that are not logs, by their first bytes, with advice to the user.
 
 use super::format::MAVLINK_MARKERS;
 
@@ -41,7 +41,7 @@ const KNOWN: [(&[u8], &str); 11] = [
 /// Zeros that no log begins with.
 const EMPTY: usize = 256;
 
-/// What a file that begins with `start` is; `None` if it is nothing known.
+/// Kind of the file that begins with `start`, in words; `None` if it is unknown.
 pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     if start.len() >= EMPTY && start.iter().all(|b| *b == 0) {
         return Some("its beginning is all zeros: the copy or the logger did not finish");

@@ -80,7 +80,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// What makes figures that are computed from it wrong, a line each; `None` if nothing was found.
+    /// Defects that falsify figures computed from the log, one a line; `None` if there are none.
     pub fn problems(&self) -> Option<String> {
         let problems = self.findings.iter().filter(|f| f.severity == Severity::Problem);
         let lines: Vec<&str> = problems.map(|f| f.text.as_str()).collect();
@@ -106,7 +106,7 @@ pub(super) enum Use {
 /// findings, not errors. Of several flights in it the longest is taken.
 ///
 /// # Errors
-/// The file cannot be read, or is no log.
+/// The file cannot be read, or is not a log.
 pub fn inspect(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Look)?)
 }

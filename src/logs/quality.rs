@@ -1,4 +1,4 @@
-//! How good the samples of a channel are: how often something new comes, what was made up, what hangs.
+//! Quality of a channel's samples: rate of new values, interpolated values, frozen values.
 //!
 //! A table that was brought to one clock shows a sample for every row, whoever made it. Between the samples of a slow
 //! sensor a straight line was drawn, or the last value was held: the second differences are zero, or all differences

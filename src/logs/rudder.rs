@@ -56,7 +56,7 @@ impl fmt::Display for RudderMotion {
     }
 }
 
-/// Standard deviation in flight of what the log has; `None` if it has too little.
+/// Standard deviation of the logged values in flight; `None` if there are too few.
 fn spread(rows: &[Sample], get: fn(&Sample) -> f64) -> Option<f64> {
     let flying = rows.iter().filter(|s| s.airspeed_mps > phases::Flying::default().from_mps);
     let values: Vec<f64> = flying.map(get).filter(|x| x.is_finite()).collect();

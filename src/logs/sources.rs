@@ -11,7 +11,7 @@ use super::finding::Finding;
 use super::mapping::rule::Rule;
 use super::topics::{Topic, Topics, period_s};
 
-/// An instance that the user asks for, of a topic: `--source airspeed=1`.
+/// Instance of a topic that the user requests: `--source airspeed=1`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Asked {
     /// Name of the topic.
@@ -71,7 +71,7 @@ pub struct Source {
 #[derive(Debug, Default)]
 pub(super) struct Choice {
     read: BTreeMap<String, u16>,
-    /// All instances of topics of which there are several.
+    /// All instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Findings about unusual choices.
     pub findings: Vec<Finding>,
@@ -150,7 +150,7 @@ fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
         format!("; {} moves too: --source {name}={other} reads it", others.join(", "))
     });
     let other = other.unwrap_or_default();
-    // That a second sensor is absent or dead is no matter as long as the first one is read.
+    // An absent or failed second sensor does not matter while the first one is read.
     let usual = sources.first().is_some_and(|s| s.read);
     match (asked, dead.is_empty() || usual) {
         (true, _) => {

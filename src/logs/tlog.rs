@@ -29,7 +29,7 @@ const SAME_CLOCK_S: f64 = 5.0;
 /// Wrap of `time_boot_ms`, of `time_usec` where it has 32 bits, s.
 const WRAP_MS_S: f64 = 4_294_967.296;
 
-/// How far back the time of a vehicle goes that has started again, s.
+/// Backward jump of a vehicle's time that counts as a restart, s.
 const BACK_S: f64 = 5.0;
 /// Number of attitudes from which a further system counts as another vehicle.
 const VEHICLE: usize = 50;

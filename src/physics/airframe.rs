@@ -419,12 +419,12 @@ pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     ))
 }
 
-/// Checks that a number is positive and at most `most`, the largest of any aircraft.
+/// Checks that a number is positive and at most `most`, the largest value of any aircraft.
 pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
     within(field, number, [most * 1e-9, most])
 }
 
-/// Checks that a number lies within the range of aircraft, both limits positive.
+/// Checks that a number lies between `least` and `most`, which are positive.
 pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));

@@ -17,7 +17,7 @@ pub const LEGS: usize = 12;
 const LEG: usize = 500;
 /// Steps at the end of each over which the settled error is taken: 1 s.
 const SETTLED: usize = 100;
-/// The largest roll and pitch that are asked for, degrees, where the airframe's envelope allows them.
+/// Largest commanded roll and pitch, degrees, if the airframe's envelope allows them.
 const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
 /// Purpose of the random stream.
 const ATTITUDES: u64 = 60;

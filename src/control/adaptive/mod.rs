@@ -36,7 +36,7 @@ const ROUNDING: f64 = 0.35;
 
 /// Throttle: at cruise; by parts of airspeed missing; its integral by V/g; by the sine of the pitch.
 const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
-/// The nose goes down from here to there, parts of the cruise airspeed, and so far, rad.
+/// Shares of the cruise airspeed between which the nose is lowered, by up to [`NOSE_DOWN`] (rad).
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
 /// Rudder by the yaw rate beyond that of a coordinated turn, V/g; and at most.
@@ -103,14 +103,13 @@ pub struct Adaptive {
     rudder: bool,
     reference: Option<[f64; 2]>,
     axes: [Axis; 2],
-    /// Stand-in for the change of incidence, rad.
+    /// Estimated change of the angle of attack, rad.
     incidence: f64,
     thrust: f64,
 }
 
 impl Adaptive {
-    /// A controller of the aircraft that `airframe` describes, of which it reads the cruise airspeed and whether there is a
-    /// rudder.
+    /// A controller of the aircraft of `airframe`, from which it takes the cruise airspeed and whether there is a rudder.
     pub fn new(airframe: &Airframe) -> Adaptive {
         Adaptive {
             cruise: airframe.envelope.airspeed_cruise_mps,

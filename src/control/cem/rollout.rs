@@ -125,7 +125,7 @@ impl Machine {
         out: &mut [Worth],
     ) {
         match self {
-            // SAFETY: `detect` has seen the processor's features
+            // SAFETY: `detect` has checked the processor's features
             #[cfg(target_arch = "x86_64")]
             Machine::Avx512(units) => unsafe { fly_avx512(scene, actions, blocks, out, units) },
             // SAFETY: as above
@@ -314,7 +314,7 @@ fn rollout<R: Packed>(
                 command.aileron = (command.aileron + base.aileron).clamp(-1.0, 1.0);
                 command.elevator = (command.elevator + base.elevator).clamp(-1.0, 1.0);
             }
-            // the base flies throttle and rudder: what is planned is attitude
+            // the base controller commands throttle and rudder: only aileron and elevator are planned
             command.throttle = base.throttle;
             command.rudder = base.rudder;
             command = slewed(command, &flight.previous[0], &scene.model.airframe);

@@ -51,7 +51,7 @@ pub struct Lqi {
     last: Option<Given>,
 }
 
-/// What a command was made of, to take it back where it was not flown.
+/// Parts of a command, from which the integrals are corrected if another command was flown.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// Roll and pitch of the aircraft, rad.

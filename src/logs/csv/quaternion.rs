@@ -51,7 +51,7 @@ pub(super) fn order(rows: &[Sample], quaternions: &[[f64; 4]]) -> Order {
     if misfit(Order::Xyzw) < misfit(Order::Wxyz) { Order::Xyzw } else { Order::Wxyz }
 }
 
-/// Fills roll, pitch and yaw; they stay NaN where the numbers are no rotation.
+/// Computes roll, pitch and yaw; they stay NaN where the four numbers are not a unit quaternion.
 pub(super) fn fill(rows: &mut [Sample], quaternions: &[[f64; 4]], order: Order) {
     for (row, q) in rows.iter_mut().zip(quaternions) {
         if let Some(turn) = turned(*q, order) {

@@ -42,7 +42,7 @@ use greylag_physics::sensors::CONSTANTS;
 use rule::Rule;
 use written::{Written, WrittenFlight, entry, over, thresholds, turn};
 
-/// The topic name by which a mapping means the columns of a CSV file.
+/// Topic name of the columns of a CSV file in a mapping.
 pub const TEXT: &str = "csv";
 
 /// Why a mapping file cannot be used.
@@ -94,7 +94,7 @@ pub struct Mapping {
     sensors: Sensors,
     /// Where the attitude comes from as a quaternion.
     quaternion: Option<Turn>,
-    /// How the log's axes stand.
+    /// Orientation of the log's axes in the body.
     board: Option<Board>,
     /// From when on the aircraft flies.
     flight: WrittenFlight,
@@ -117,7 +117,7 @@ impl Mapping {
     /// Reads a mapping file.
     ///
     /// # Errors
-    /// The file cannot be read, or is no mapping.
+    /// The file cannot be read, or is not a mapping.
     pub fn load(path: &Path) -> Result<Mapping, MappingError> {
         let text = greylag_physics::text_file::read(path)
             .map_err(|source| MappingError::File { path: path.to_owned(), source })?;
@@ -143,7 +143,7 @@ impl Mapping {
         over("derive.body_rates_over_s", body_rates_over_s).map_err(wrong)?;
         let mut sensors = written.sensors;
         if body_rates_over_s.is_some() {
-            // what is made from the attitude has no bias against it
+            // rates differentiated from the attitude have no bias relative to it
             let gyros = CONSTANTS.iter().filter(|(name, _)| name.starts_with("gyro_"));
             gyros.for_each(|(name, _)| sensors.hold(name, 0.0));
         }
@@ -158,7 +158,7 @@ impl Mapping {
         self.board.as_ref()
     }
 
-    /// From when on an aircraft flies of which `model` is known, the usual one if nothing is.
+    /// Criteria for flight: those of the `model` if it is known, else those of the mapping, else the default ones.
     pub fn flies(&self, model: Option<Flying>) -> Flying {
         let mut flies = model.unwrap_or_else(|| match self.flight.from_mps {
             Some(from) => Flying::from(from),
@@ -181,7 +181,7 @@ impl Mapping {
         self.body_rates_over_s
     }
 
-    /// The columns that are rates of change, each with the time over which it is taken, s.
+    /// The columns that are derivatives of others, each with the time span of its differentiation, s.
     pub(super) fn slopes(&self) -> impl Iterator<Item = (&str, f64)> {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
@@ -197,7 +197,7 @@ impl Mapping {
         }
     }
 
-    /// Whether a column that a log lacks is made from others.
+    /// Whether a column that a log lacks is computed from others.
     pub(super) fn makes(&self, column: &str) -> bool {
         match column {
             derive::AIRSPEED => self.sensors.wind().is_some() && self.get(column).is_none(),

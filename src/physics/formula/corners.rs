@@ -1,4 +1,4 @@
-//! Check that a formula is finite over the whole envelope of aircraft.
+//! Check that a formula is finite in all flight conditions of aircraft.
 
 use super::variable::Variable;
 use super::written::Written;

@@ -1,4 +1,4 @@
-//! The page of one diagnosis: what a model lacks, from the sentence to the proof.
+//! The page of one diagnosis: the missing effect, in sentences first, with the evidence below.
 
 use crate::comparison::page::channel_name;
 use crate::diagnosis::DiagnosisReport;
@@ -102,7 +102,7 @@ fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     Section::new("Where it fails", note, figures)
 }
 
-/// Channels over regime variables, of each model: the first one is seen at first.
+/// Residuals of the channels over regime variables, for each model; those of the first model are shown initially.
 fn maps(c: &Comparison) -> Option<Figure> {
     // one scale of importance for all, so that a switch does not change what a colour means
     let options: Vec<ChoiceOption> = c

@@ -58,7 +58,7 @@ pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> K
     all
 }
 
-/// The same without trims, which stand beside coefficients that have changed.
+/// The constants without trims, which are not valid with changed coefficients.
 fn without_trims(known: &Known) -> Known {
     let mut kept = known.clone();
     kept.flights.values_mut().for_each(|own| own.trims = None);
@@ -66,7 +66,7 @@ fn without_trims(known: &Known) -> Known {
     kept
 }
 
-/// What the `flights` have in common; `None` if nothing is clear of zero.
+/// Constants of the installation, the means over `flights`; `None` if none differs significantly from zero.
 fn installation(flights: &[Learned]) -> Option<FlightConstants> {
     let angles: Vec<_> = flights.iter().map(Learned::angles_deg).collect();
     let axes: [f64; 3] =

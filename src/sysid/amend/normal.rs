@@ -63,7 +63,7 @@ struct Side {
 /// The present model with the perturbed models of its derivatives.
 pub(super) struct Neighbourhood {
     pub model: GreyBox,
-    /// Constants estimated for each flight beside those of its sensors.
+    /// Constants estimated for each flight in addition to its sensor errors.
     pub asked: PerFlight,
     /// Acting deflections under the present model.
     pub acting: Acting,

@@ -61,7 +61,7 @@ impl Turning {
         }
     }
 
-    /// The changes at `alpha` and `beta` (rad): those of [`flow`] where no vane measures.
+    /// The changes at `alpha` and `beta` (rad): those of [`flow`] for an angle that no vane measures.
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {

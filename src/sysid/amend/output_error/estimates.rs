@@ -76,7 +76,7 @@ impl Search<'_> {
         names
     }
 
-    /// The fit as it stands, with intervals.
+    /// The present estimates of the fit, with intervals.
     /// Its model is `given`, without trims of flights.
     /// The coefficients `held` were undetermined.
     pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
@@ -134,7 +134,7 @@ impl Search<'_> {
         })
     }
 
-    /// What the model's file will know of the flights, `given` being the model before.
+    /// Constants of the flights to be written to the model's file; `given` is the model before the fit.
     fn known(&self, given: &GreyBox, sd: &[f64]) -> Known {
         let place = |k: usize| self.free.len() + k * self.of_flight();
         let numbered = self.flights.iter().enumerate();
