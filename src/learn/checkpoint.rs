@@ -47,7 +47,7 @@ pub enum CheckpointError {
         /// What is invalid in it.
         why: String,
     },
-    /// The checkpoint belongs to another training.
+    /// The checkpoint is that of another training.
     #[error(
         "the checkpoint is of a training with other options, another prior or other flights; give the same ones, or another --out"
     )]

@@ -27,7 +27,7 @@ pub struct FirstLook {
     pub id: &'static str,
     /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
     pub evidence: f64,
-    /// Evidence that the best candidate reaches by chance where nothing is missing.
+    /// Evidence that the best candidate reaches by chance if no effect is missing.
     pub threshold: f64,
 }
 

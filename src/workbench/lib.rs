@@ -1,4 +1,4 @@
-//! The workbench: flights, where a model fails, what it lacks and the amended model, in one session.
+//! The workbench: flights, a model's errors, its missing effects and the amended model, in one session.
 //!
 //! [`Bench`] is the session with what was worked out; it knows no network. [`server`] serves it to a browser on
 //! this machine. What is done here, the commands `compare --recorded-clock`, `diagnose` and `amend` do too, by the same

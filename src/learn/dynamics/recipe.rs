@@ -125,7 +125,7 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// What is invalid, if anything is.
+    /// Description of the first invalid setting, if there is one.
     pub fn fault(&self) -> Option<&'static str> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if self.steps.is_empty() || self.steps.iter().any(|n| !(1..=500).contains(n)) {

@@ -28,7 +28,7 @@ const ROUGH: f64 = 0.1;
 /// Smallest actuator delay that is corrected, samples: a smaller one is within the regression's own error.
 const CORRECTED: f64 = 0.25;
 
-/// Time scale from which a difference between path and measured attitude is no noise, s.
+/// Time scale above which a difference between path and measured attitude does not count as noise, s.
 const DISAGREEING: f64 = 4.0;
 
 /// Uncertainty of a flight controller's pitch and heading over a whole flight, rad: the board is levelled by hand,
