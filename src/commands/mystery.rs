@@ -22,7 +22,7 @@ use crate::sim::trial::{Subject, Trial};
 
 /// The file of the answer.
 const SEALED: &str = "answer.sealed";
-/// The diagnosis that is set beside it.
+/// File of the diagnosis that is compared with the answer.
 const DIAGNOSIS: &str = "diagnosis.json";
 /// The layout of the answer.
 const SCHEMA: &str = "greylag.mystery/1";
@@ -80,7 +80,7 @@ struct Answer {
     parameters: Vec<(String, f64)>,
 }
 
-/// Makes a mystery, or opens one.
+/// Writes a folder with a hidden effect, or reveals the effect of one.
 ///
 /// # Errors
 /// If the folder exists, the effect cannot be hidden or flown with, or there is no answer to open.
@@ -267,7 +267,7 @@ fn readme(out: &Path) -> String {
     )
 }
 
-/// Whether a folder holds an answer and no diagnosis to set beside it.
+/// Whether a folder has an answer and no diagnosis to compare it with.
 fn undiagnosed(folder: &Path) -> bool {
     folder.join(SEALED).exists() && !folder.join(DIAGNOSIS).exists()
 }

@@ -33,7 +33,7 @@ pub(super) fn real_hz(channel: &Channel) -> f64 {
     }
 }
 
-/// Whether a channel is too slow for a study, with the rate that is wanted, Hz.
+/// Whether a channel is sampled too slowly for a study, with the rate that is needed, Hz.
 pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
@@ -108,7 +108,7 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
     out
 }
 
-/// Columns without which a row is no sample, should they hang; the airspeed may be slow or stay out for a while.
+/// Columns whose frozen values make a row unusable; the airspeed may be slow or missing for a while.
 const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
 
 /// Whether the row lacks a required column because its channel is stuck.

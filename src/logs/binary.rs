@@ -92,7 +92,7 @@ fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Findin
     }
 }
 
-/// The needed columns that nothing fills; the first is an error where the log is to be computed with.
+/// Required columns without data. The first one is an error if the log is to be used in a computation.
 fn lacking(
     table: &table::Table,
     topics: &Topics,

@@ -46,7 +46,7 @@ pub enum CsvError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// What would fill the column.
+        /// Remedy, in words.
         remedy: String,
     },
     /// Too many rows cannot be used.
@@ -93,7 +93,7 @@ pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
     parse(&bytes, path, tolerance)
 }
 
-/// Reads a flight log from bytes; `path` is what errors call it.
+/// Reads a flight log from bytes; `path` appears in errors.
 ///
 /// # Errors
 /// As [`load`].

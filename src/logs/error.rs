@@ -34,7 +34,7 @@ pub enum LogError {
     Part {
         /// Path of the log.
         path: PathBuf,
-        /// The number asked for.
+        /// The requested number.
         asked: usize,
         /// How many there are.
         there: usize,
@@ -62,7 +62,7 @@ pub enum LogError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// What would fill the column.
+        /// Fields from which the column can be read.
         remedy: String,
     },
     /// Too many rows cannot be used.

@@ -2,7 +2,7 @@
 
 use super::format::MAVLINK_MARKERS;
 
-/// First bytes of files that people bring, with what each is and what to give instead.
+/// First bytes of common files that are not logs, with their kind and the file to give instead.
 const KNOWN: [(&[u8], &str); 11] = [
     (
         b"#ROSBAG V",
@@ -53,7 +53,7 @@ pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     ))
 }
 
-/// What PX4 wrote before ULog: records as of a DataFlash log, but of other meaning.
+/// PX4's format before ULog: records like those of a DataFlash log, with another meaning.
 pub(super) const SDLOG2: &str = "it is a log of PX4 from before ULog (sdlog2, .px4log), whose records have no times of their own: sdlog2_dump.py of that PX4 makes a CSV of it";
 
 /// Frames in a row that show a stream.

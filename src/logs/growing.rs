@@ -16,7 +16,7 @@ pub struct Growing {
 
 impl Growing {
     /// Adds `bytes` and returns the rows that are complete now and have a time, in the units of the format.
-    /// `path` is what errors call the log.
+    /// `path` appears in errors.
     ///
     /// # Errors
     /// The text is not a table.

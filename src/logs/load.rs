@@ -73,7 +73,7 @@ pub struct Log {
     pub vehicle: Option<Vehicle>,
     /// When it did not fly on its wings alone, s: left out.
     pub hovers: Vec<(f64, f64)>,
-    /// The instances of topics of which there are several.
+    /// Instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
@@ -122,7 +122,7 @@ pub fn inspect_all(path: &Path, options: &Options) -> Result<Vec<Log>, LogError>
 /// Reads a log, whatever its format. Of several flights in it the longest is taken; `FILE#2` names another.
 ///
 /// # Errors
-/// The file cannot be read, is no log, lacks a needed column, or has too many unusable rows.
+/// The file cannot be read, is not a log, lacks a required column, or has too many unusable rows.
 pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Compute)?)
 }
@@ -150,7 +150,7 @@ pub fn flights(path: &Path, options: &Options) -> Result<Vec<Log>, LogError> {
     Ok(logs)
 }
 
-/// Reads a log from bytes; `path` is what errors and the flight call it.
+/// Reads a log from bytes; `path` appears in errors and as the name of the flight.
 ///
 /// # Errors
 /// As [`load`].

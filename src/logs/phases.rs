@@ -45,7 +45,7 @@ const GAP_S: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PhaseKind {
-    /// The aircraft stands or rolls.
+    /// The aircraft is on the ground, at rest or rolling.
     Ground,
     /// The aircraft is airborne.
     Flight,

@@ -34,7 +34,7 @@ impl RudderMotion {
         sd(|s| s.rudder_cmd).filter(|sd| *sd > MOVES_PART).map(RudderMotion::Command)
     }
 
-    /// How far it moves, in parts of what counts as movement.
+    /// Standard deviation of the rudder relative to that which counts as movement.
     pub fn size(self) -> f64 {
         match self {
             RudderMotion::Deflection(sd) => sd / MOVES_RAD,

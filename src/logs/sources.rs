@@ -1,4 +1,4 @@
-//! The sources of a log: which instance of a topic is read, and what else there is.
+//! The sources of a log: the instance of each topic that is read, and the other instances.
 //!
 //! A vehicle may carry two pitots, a VTOL has one controller for its lift and one for its wings. The reader takes the
 //! first instance that moves, the one that the vehicle's type calls for before that, and reports its choice in a finding.
@@ -61,7 +61,7 @@ pub struct Source {
     pub from_s: f64,
     /// Time of the last one, s.
     pub to_s: f64,
-    /// Whether any of the fields that are wanted of it changes.
+    /// Whether any of its requested fields changes.
     pub moves: bool,
     /// Whether it is read.
     pub read: bool,
@@ -78,7 +78,7 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// Chooses for the topics of `rules`; what the user has `asked` for comes first.
+    /// Chooses an instance for each topic of `rules`; those that the user `asked` for take precedence.
     pub fn of(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Choice {
         let mut choice = Choice::default();
         let mut names: Vec<&str> = rules.iter().map(|r| r.topic.as_str()).collect();

@@ -34,7 +34,7 @@ const SLOW_HZ: f64 = 10.0;
 /// samples. Held values would repeat in a third of the rows, by which a reconstruction recognises
 /// them.
 const SPARSE: f64 = 0.65;
-/// Columns that are measurements of the path, not what drives it.
+/// Columns that measure the path, as opposed to inputs that drive it.
 const MEASURED: [&str; 9] = [
     "roll_rad",
     "pitch_rad",
@@ -100,7 +100,7 @@ pub(super) struct Table {
     pub notes: Vec<String>,
     /// Required columns without data.
     pub missing: Vec<Missing>,
-    /// The instances of topics of which there are several.
+    /// Instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Findings about unusual sources.
     pub findings: Vec<Finding>,

@@ -62,7 +62,7 @@ struct Reader {
     others: BTreeMap<u32, usize>,
 }
 
-/// Reads what `wanted` names; everything else is counted.
+/// Reads the messages that `wanted` names; all others are counted only.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,

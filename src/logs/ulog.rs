@@ -76,7 +76,7 @@ enum Place {
     Record(usize),
     /// A record that the file's end cuts.
     Cut,
-    /// Nothing that belongs there.
+    /// An invalid record.
     Damage,
 }
 

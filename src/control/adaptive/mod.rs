@@ -20,7 +20,7 @@ const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], 
 /// Lift slope −Z_α, in g/V: cruise at about half the lift of the stall makes it nearly the same for all.
 const LIFT_SLOPE: f64 = 9.0;
 
-/// Rate asked for by an error in roll and in pitch, 1/s.
+/// Gain from an error in roll and in pitch to the commanded rate, 1/s.
 const ATTITUDE: [f64; 2] = [3.0, 2.4];
 /// Bandwidth of the rate loops, 1/s.
 const RATE: f64 = 6.0;
@@ -134,7 +134,7 @@ impl Adaptive {
         }
     }
 
-    /// Moves the reference towards `wanted`; the reference with its rates, rad and rad/s.
+    /// Moves the reference towards `wanted`; returns the reference (rad) and its rates (rad/s).
     fn follow(&mut self, now: [f64; 2], wanted: [f64; 2]) -> [[f64; 2]; 2] {
         let mut reference = self.reference.unwrap_or(now);
         let mut rates = [0.0; 2];

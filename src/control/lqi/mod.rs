@@ -56,7 +56,7 @@ pub struct Lqi {
 struct Given {
     /// Roll and pitch of the aircraft, rad.
     attitude: [f64; 2],
-    /// What was added to the integrals, rad s.
+    /// Last change of the integrals, rad s.
     added: [f64; 2],
     /// Deflection of aileron and elevator by their own angle's reference, rad by rad.
     by_reference: [f64; 2],

@@ -74,7 +74,7 @@ impl Raw {
         for i in 1..times.len() {
             let whole = i - bounds[bounds.len() - 1] >= RECORDING && times.len() - i >= RECORDING;
             let goes_back = times[i] < times[i - 1] - back;
-            // A clock that is set goes back by some seconds; a recording begins where the one before began.
+            // A clock that is set jumps back by some seconds; a new recording starts again at the first time.
             let start = times[bounds[bounds.len() - 1]];
             let begins = times[i] < start + (BEGINS * (times[i - 1] - start)).max(back);
             let stays = || times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back);
@@ -203,7 +203,7 @@ enum Decimal {
     PointOrComma,
 }
 
-/// The number in a field; NaN of an empty one, `None` of what is neither a number nor a date.
+/// The number in a field; NaN if it is empty, `None` if it is neither a number nor a date.
 fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     let field = std::str::from_utf8(field).ok()?.trim();
     if field.is_empty() {
@@ -237,7 +237,7 @@ fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     targets
 }
 
-/// The needed columns that are not among `names`, each with what would satisfy it.
+/// The required columns that are not among `names`, each with the columns that would replace it.
 fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
     let has = |column: &str| {
         let name = mapping.get(column).map_or(column, |entry| &entry.field);

@@ -27,7 +27,7 @@ pub struct Board {
     to_body: Rotation3<f64>,
 }
 
-/// What axes α and β are of.
+/// Axes to which α and β refer.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 enum Airflow {

@@ -14,9 +14,9 @@ const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("f
 const FOOT: f64 = 0.3048;
 /// Window over which a climb is compared, s.
 const CLIMB_S: f64 = 2.0;
-/// Spread of the middle half of the ratios to the ground speed, over their median, beyond which wind speaks.
+/// Interquartile range of the ratios to the ground speed, relative to their median, above which they show wind.
 const GROUND_SPREAD: f64 = 0.25;
-/// Likewise of the ratios in turns, beyond which manoeuvres speak.
+/// The same for the ratios in turns; a larger range comes from manoeuvres.
 const TURN_SPREAD: f64 = 0.5;
 /// Correlation above which a relation is taken as certain.
 const CERTAIN: f64 = 0.8;

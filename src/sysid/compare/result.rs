@@ -159,7 +159,7 @@ pub struct GrowthPoint {
     pub rmse_scaled: f64,
     /// Median over runs of the scaled error; a diverged run counts with the bound.
     pub median_scaled: f64,
-    /// 90 % quantile over runs of the scaled error, likewise.
+    /// 90 % quantile over runs of the scaled error; a diverged run counts with the bound.
     pub p90_scaled: f64,
 }
 

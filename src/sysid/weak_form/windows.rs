@@ -27,7 +27,7 @@ pub struct Series {
     pub channel: ChannelId,
     /// Measured values, one for each window, in the channel's unit; NaN where the log has no specific force.
     pub measured: Vec<f64>,
-    /// Predicted values, likewise.
+    /// Predicted values at the same windows.
     pub predicted: Vec<f64>,
     /// Variance of measured − predicted due to sensor noise.
     pub noise_variance: f64,
