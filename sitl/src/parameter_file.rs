@@ -7,12 +7,12 @@ use crate::text_file;
 /// Why a parameter file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ParameterFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("the parameter file {path} {why}", path = path.display())]
     Read {
-        /// The file.
+        /// Path of the parameter file.
         path: PathBuf,
-        /// Why not.
+        /// Reason why it cannot be read.
         why: String,
     },
     /// A line is neither of the two forms.
@@ -21,11 +21,11 @@ pub enum ParameterFileError {
         path = path.display()
     )]
     Line {
-        /// The file.
+        /// Path of the parameter file.
         path: PathBuf,
         /// The number of the line, from 1.
         line: usize,
-        /// The line.
+        /// Content of the line.
         text: String,
     },
     /// No parameter in it is simulated.
@@ -34,9 +34,9 @@ pub enum ParameterFileError {
         path = path.display()
     )]
     Foreign {
-        /// The file.
+        /// Path of the parameter file.
         path: PathBuf,
-        /// The stack.
+        /// Name of the simulated flight stack.
         stack: String,
     },
 }

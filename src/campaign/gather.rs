@@ -12,7 +12,7 @@ use super::store::{Failure, Standing, Store, Times, whole};
 pub struct Gathered {
     /// The results, in the order of the cells.
     pub records: Vec<Record>,
-    /// Computing times in the order of the cells, where known: [`Times::cell`] names the record's cell.
+    /// Computing times of the cells for which they are known; [`Times::cell`] is the name of the cell.
     pub times: Vec<Times>,
     /// Failed cells, with the reasons.
     pub failed: Vec<(String, Failure)>,
@@ -104,7 +104,7 @@ impl Gathered {
     }
 }
 
-/// Writes a line for each of `lines`.
+/// Writes each of `lines` as one line of JSON.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -208,7 +208,7 @@ mod tests {
         let summary = &summaries(&planned_first.file, &all.records)[0];
         assert_eq!(summary.rows[1].ours.mean.value, 12.0);
         assert_eq!(summary.rows[1].runs[2].cell, "last/y/3");
-        // one level of an axis alone
+        // a table of the cells at one level of an axis
         let mut chosen = planned_first.file.clone();
         (chosen.tables[0].stage, chosen.tables[0].rows) = ("last kind=y".into(), Vec::new());
         let summary = &summaries(&chosen, &all.records)[0];
@@ -216,9 +216,9 @@ mod tests {
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
 
-        // what another machine has of cells that are not done here
+        // results from another machine for cells that are not finished here
         let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());
-        // one whose last bit a quick reader of decimals would change
+        // a value whose last bit an inexact parser of decimals would change
         elsewhere[1].metrics.insert("easy.mean_deg".to_owned(), 0.001_848_630_997_957_734_2);
         write_lines(&path, &elsewhere).unwrap();
         assert_eq!(read_lines(&path).unwrap(), elsewhere);
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(partly.missing, [absent[6].cell.as_str()]);
         assert_eq!(partly.records, all.records[..8]);
 
-        // another input makes other cells: nothing of the old ones is mixed in
+        // another input gives the cells another identity: the old results are stale
         std::fs::write(&input, "2").unwrap();
         let planned_again = planned(&input);
         finish(&store, &planned_again.cells[0], 0.0);

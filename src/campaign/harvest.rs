@@ -14,11 +14,11 @@ pub const SCORES: &str = "evaluation.json";
 const TRAINING: &str = "training.json";
 /// File of `greylag train policy` with its learning curve.
 const CURVE: &str = "curve.csv";
-/// Columns of a curve that are independent of the machine.
+/// Columns of a learning curve that do not depend on the speed of the machine.
 const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
 /// Suffixes of the files that later cells read.
 const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
-/// Excluded file: it holds times, or the state that only this cell resumes from.
+/// Files that are not hashed: they hold computing times, or state from which only the same cell resumes.
 const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 
 /// Output of a cell.
@@ -138,7 +138,7 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
     let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for row in reader.deserialize() {
         let row: BTreeMap<String, f64> = row.map_err(wrong)?;
-        // JSON has no number for what was not measured
+        // JSON has no NaN, which stands for a value that was not measured
         let finite = |x: &f64| x.is_finite();
         if !COLUMNS.iter().all(|column| row.get(*column).is_some_and(finite)) {
             continue;

@@ -103,7 +103,7 @@ impl Draft<'_> {
         let (mut words, mut after) = (Vec::new(), Vec::new());
         for word in self.stage.command.split_whitespace() {
             match self.level_of(word) {
-                // a level may stand for several words, or for none
+                // a level may be replaced by several words, or by none
                 Some(level) => {
                     for word in level.words.split_whitespace() {
                         words.push(self.word(word, &mut after)?);

@@ -201,7 +201,7 @@ fn write<T: Serialize>(path: &Path, document: &T) -> Result<(), CampaignError> {
     whole(path, line + "\n")
 }
 
-/// Writes a file beside its place and renames it.
+/// Writes a temporary file in the same folder and renames it to the final name.
 pub(super) fn whole(path: &Path, text: String) -> Result<(), CampaignError> {
     let part = path.with_extension(format!("part-{}", std::process::id()));
     let cannot = || CampaignError::io("cannot write", path);

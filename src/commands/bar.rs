@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::commands::status::INTERRUPTED;
 use crate::sysid::progress::{Cancelled, Stage, not_cancelled};
 
-/// Steps of a whole bar.
+/// Number of steps of a full progress bar.
 const STEPS: u64 = 1000;
 /// Time between looks of the bar's clock.
 const TICK: Duration = Duration::from_millis(200);
@@ -102,7 +102,7 @@ impl Bar {
     }
 }
 
-/// Shares of a bar: of the work, then of the report, if one is asked for.
+/// Shares of the progress bar: of the work, and of the report if one is requested.
 #[cfg(feature = "study")]
 pub fn shares(report: Option<&std::path::Path>) -> [[f64; 2]; 2] {
     let end = if report.is_some() { 0.9 } else { 1.0 };

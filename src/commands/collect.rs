@@ -43,7 +43,7 @@ pub struct Arguments {
     start: StartArguments,
 }
 
-/// Flies the episodes that are not there yet.
+/// Simulates the episodes that have no file yet.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(fly(arguments, &Interruption::watch()?)?.into())
 }

@@ -22,7 +22,7 @@ use crate::sysid::compare::{Answer, Comparison, HorizonScore, ModelResult, Optio
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// Short names of the models in the tables, in their order.
+/// Letters that identify the models in the tables.
 const LETTERS: std::ops::RangeInclusive<char> = 'A'..='Z';
 
 /// Options of `greylag compare`.
@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The answer with tuning and effect apart, if the second of two models was made of the first.
+/// The answer with the parts of tuning and of the effect, if the second of two models was made from the first.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,
@@ -116,7 +116,7 @@ fn traced(
     Ok(Some(origin.answer(comparison, &tuned, &arguments.logs.paths)))
 }
 
-/// None: a build without the study cannot read what an amendment wrote.
+/// `None`: a build without the feature `study` cannot read the files of an amendment.
 #[cfg(not(feature = "study"))]
 fn traced(
     _: &Arguments,
@@ -127,7 +127,8 @@ fn traced(
     Ok(None)
 }
 
-/// The answer with the command that comes next; tuning and effect apart where the second model was made of the first.
+/// The answer with the command to run next. The parts of tuning and of the effect are separate if the second model was
+/// made from the first.
 fn answer(
     arguments: &Arguments,
     models: &[GreyBox],
@@ -186,7 +187,7 @@ fn baselines(comparison: &Comparison) -> Option<String> {
     (!all.is_empty()).then_some(said)
 }
 
-/// Free-run errors in the units of a flight, of a model that knows flights also without that.
+/// Free-run errors in the units of each state. If a model's file has constants of the flights, also without them.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
         "", "s", "NRMSE", "lost", "roll °", "pitch °", "V m/s", "p °/s", "q °/s", "r °/s", "α °",
@@ -241,7 +242,7 @@ fn channel_table(models: &[ModelResult]) -> Table {
     table
 }
 
-/// Three significant figures; a dash for what is not known.
+/// Three significant figures; a dash for an unknown value.
 fn number(x: f64) -> String {
     match x {
         x if !x.is_finite() => "–".into(),

@@ -10,7 +10,7 @@ use crate::control::policy::{Agent, AgentError, Origin};
 use crate::control::{Controller, ControllerKind, Needs, Source, build};
 use crate::model::GreyBox;
 
-/// The policy that is flown where no other is named, trained in the default model.
+/// Folder of the default policy, which was trained in the default model.
 pub const POLICY: &str = "params/x8/learned/policy";
 
 /// The controller `kind` of `model`, with the policy in `folder` as [`policy`] finds it.
@@ -27,8 +27,10 @@ pub fn controller(
     Ok(build(kind, Source { model, agent: agent.as_ref(), changes })?)
 }
 
-/// The policy in `folder` for the controller `kind` of `model`; `None` where the controller uses none, or can do without
-/// one and `folder` is the default's, of another airframe. What is to be known of it goes to standard error.
+/// The policy in `folder` for the controller `kind` of `model`.
+///
+/// `None` if the controller uses no policy. `None` too if it can work without one, and `folder` is the default folder,
+/// whose policy belongs to another airframe. Notes on the policy are printed on standard error.
 ///
 /// # Errors
 /// If the policy cannot be used.

@@ -37,7 +37,7 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// Expected discrimination of each manoeuvre, as JSON; no value where the aircraft would leave its
+/// How well each manoeuvre distinguishes the effects, as JSON. There is no value where the aircraft would leave its
 /// bounds.
 #[derive(Serialize)]
 struct Document<'a> {
@@ -75,7 +75,7 @@ fn document<'a>(
     }
 }
 
-/// Flies the menu in both imagined aircraft, prints how well each manoeuvre distinguishes them, writes the best.
+/// Simulates each manoeuvre with both effects, prints how well it distinguishes them, and writes the best schedule.
 ///
 /// # Errors
 /// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two.
@@ -103,13 +103,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.write("greylag.design/1", &found, overwrite)?;
     let Some(Plan { manoeuvre, seconds, times, schedule }) = plan else {
         bail!(
-            "no manoeuvre of the menu tells {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
+            "no manoeuvre of the menu distinguishes {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
             a.id,
             b.id
         );
     };
     let words = format!(
-        "{}: {}\n{seconds:.1} s of it tell {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
+        "{}: {}\n{seconds:.1} s of it distinguish {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
         manoeuvre.name,
         manoeuvre.description,
         a.id,
@@ -147,7 +147,7 @@ fn suspects(arguments: &Arguments) -> Result<[Suspect; 2]> {
     Ok([suspect(0), suspect(1)])
 }
 
-/// Parses `id=1.0,2.0`.
+/// Parses the id of an effect with the values of its constants, `id=1.0,2.0`.
 fn read(text: &str) -> Result<(String, Vec<f64>)> {
     let wrong = || format!("--values {text}: write ID=VALUE,VALUE…, such as drag_alpha2=0.5");
     let (id, values) = text.split_once('=').with_context(wrong)?;

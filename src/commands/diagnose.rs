@@ -281,7 +281,7 @@ fn clear(asserted: bool) -> String {
     if asserted { "yes" } else { "" }.into()
 }
 
-/// Three significant figures; a dash for what is not known.
+/// Three significant figures; a dash for an unknown value.
 fn number(x: f64) -> String {
     match x {
         x if !x.is_finite() => "–".into(),

@@ -1,4 +1,4 @@
-//! Refusal of logs that hold the same flight: it would be counted twice, or judged by its own fit.
+//! Refusal of two logs of the same flight: it would be counted twice, or a fit would be judged by its own data.
 
 use std::path::{Path, PathBuf};
 

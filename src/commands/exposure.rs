@@ -29,7 +29,7 @@ pub fn check<'a>(
 /// Exposure that the user allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// Nothing beyond what is safe.
+    /// Safe options only.
     Nothing,
     /// Links that anybody may use.
     Insecure,

@@ -26,7 +26,7 @@ use crate::link::vehicle::{Authority, Profile, Real, Stack};
 use crate::physics::airframe::ActuatorFigures;
 use shown::{delay, latency, parameters};
 
-/// Writes a line; a reader that is gone is no error.
+/// Writes a line; a closed output is not an error.
 macro_rules! print_to {
     ($out:expr, $($words:tt)*) => {{
         let _ = writeln!($out, $($words)*);

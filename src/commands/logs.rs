@@ -277,7 +277,7 @@ fn print(info: &Info) {
     }
 }
 
-/// Prints the purposes of the log with what it lacks for each.
+/// Prints for each purpose what the log lacks.
 fn print_purposes(info: &Info) {
     println!("\nServes for");
     for purpose in &info.purposes {
@@ -291,7 +291,7 @@ fn print_purposes(info: &Info) {
     }
 }
 
-/// The instances of topics of which there are several.
+/// Instances of the topics that have several.
 fn print_sources(info: &Info) {
     if info.sources.is_empty() {
         return;

@@ -22,7 +22,7 @@ use crate::sim::trial::{Subject, Trial};
 
 /// The file of the answer.
 const SEALED: &str = "answer.sealed";
-/// The diagnosis that is set beside it.
+/// File of the diagnosis that is compared with the answer.
 const DIAGNOSIS: &str = "diagnosis.json";
 /// The layout of the answer.
 const SCHEMA: &str = "greylag.mystery/1";
@@ -80,7 +80,7 @@ struct Answer {
     parameters: Vec<(String, f64)>,
 }
 
-/// Makes a mystery, or opens one.
+/// Writes a folder with a hidden effect, or reveals the effect of one.
 ///
 /// # Errors
 /// If the folder exists, the effect cannot be hidden or flown with, or there is no answer to open.
@@ -117,7 +117,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
         turbulence: arguments.turbulence_severity,
         installed: Installation::TRUE,
     };
-    // written beside it first: the folder is there complete, or not at all
+    // written under another name first, so that the folder is either complete or absent
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
     let beside = beside.with_context(|| {
         format!("cannot make a folder in {}, so name another place with --out", parent.display())
@@ -267,7 +267,7 @@ fn readme(out: &Path) -> String {
     )
 }
 
-/// Whether a folder holds an answer and no diagnosis to set beside it.
+/// Whether a folder has an answer and no diagnosis to compare it with.
 fn undiagnosed(folder: &Path) -> bool {
     folder.join(SEALED).exists() && !folder.join(DIAGNOSIS).exists()
 }
@@ -293,7 +293,7 @@ fn open(folder: &Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints the answer beside the diagnosis.
+/// Prints the answer and the diagnosis for comparison.
 fn beside(answer: &Answer, said: &serde_json::Value) {
     let none = Vec::new();
     let effects = said["effects"].as_array().unwrap_or(&none);

@@ -1,4 +1,4 @@
-//! Free runs as a table: what a model predicts from every start of a flight.
+//! Free runs as a table: the predictions of a model from every start of a flight.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use crate::sysid::weak_form::prepared::Prepared;
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.96;
 
-/// A prediction beside what was measured.
+/// A predicted and a measured state.
 struct Row<'a> {
     model: &'a str,
     flight: String,
@@ -114,7 +114,7 @@ fn write_row(text: &mut String, row: &Row, all: &[Row], horizons_s: &[f64]) {
         count += 1.0;
     }
     let horizon = horizons_s[row.horizon];
-    // to a String nothing can fail
+    // writing to a String cannot fail
     let _ = write!(text, "{},{},{},{horizon}", row.model, row.flight, row.start_s);
     let bound = |x: f64| if x.is_finite() { format!("{x}") } else { String::new() };
     for ((x, measured), square) in row.predicted.iter().zip(&row.measured).zip(squares) {

@@ -25,7 +25,7 @@ pub fn shipped(path: &Path) -> PathBuf {
     if let Some(found) = places.find(|p| p.exists()) {
         return found;
     }
-    // what is in no place is missed where it was asked for, not in the cache
+    // a file that is found nowhere is reported with the path that was requested, not that in the cache
     if !path.strip_prefix(FOLDER).is_ok_and(|inside| PARAMS.contains(inside)) {
         return path.into();
     }

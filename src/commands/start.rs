@@ -7,9 +7,9 @@ use crate::model::GreyBox;
 use crate::physics::servos::Travels;
 use crate::sim::described::describe as describe_aircraft;
 
-/// The aircraft whose start is the paper's.
+/// The aircraft that starts under the conditions of the paper.
 const X8: &str = "x8";
-/// Share by which the travel of airframe and aircraft may differ: a file holds four digits of it.
+/// Relative difference accepted between the travel in the airframe file and in the simulator: files have four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 
 /// Where an episode begins.

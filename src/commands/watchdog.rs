@@ -15,7 +15,7 @@ pub fn feed(rounds: Arc<AtomicU64>) {
         loop {
             let now = rounds.load(Ordering::Relaxed);
             if last != Some(now) {
-                // without systemd's socket there is no watchdog
+                // no watchdog without systemd's socket
                 let _ = sd_notify::notify(&[NotifyState::Watchdog]);
             }
             last = Some(now);

@@ -1,4 +1,4 @@
-//! What the surfaces can do at full travel.
+//! Control authority: roll rates and accelerations at full travel of the surfaces.
 
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ impl Authority {
         let full = |place: usize, column: usize, travel: f64| linear.b[(place, column)] * travel;
         let rudder = figures.rudder.filter(|_| model.has_rudder());
         Authority {
-            // rolling settles where damping meets the aileron
+            // the roll rate is steady where damping balances the aileron
             roll_rate: full(3, 0, figures.aileron.travel.smallest()) / -linear.a[(3, 3)],
             pitch_acceleration: full(4, 1, figures.elevator.travel.smallest()),
             yaw_acceleration: rudder.map(|rudder| full(5, 3, rudder.travel.smallest())),

@@ -48,7 +48,7 @@ pub enum SetupError {
         "the policy for any aircraft cannot be read: {why}; train it again with params/any/train.py and build anew"
     )]
     Any {
-        /// What is wrong with it.
+        /// Description of the error.
         why: String,
     },
     /// The planner needs critics, and the policy has none.

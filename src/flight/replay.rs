@@ -252,7 +252,7 @@ impl Replayed<'_, '_> {
             Planned::None => Plan::None,
         };
         let decision = self.companion.pilot.decide(plan);
-        // A real controller's session models the actuators by what it has sent.
+        // The session of a flight controller models the actuators from the commands that it has sent.
         self.states.vehicle.answer(host, state.time, &decision.demand());
         self.outcome.ticks += 1;
         if !same(&decision.command, &recorded) {

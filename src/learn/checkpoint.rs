@@ -44,10 +44,10 @@ pub enum CheckpointError {
     Content {
         /// Path of the file.
         path: PathBuf,
-        /// What is invalid in it.
+        /// Description of the invalid content.
         why: String,
     },
-    /// The checkpoint belongs to another training.
+    /// The checkpoint is that of another training.
     #[error(
         "the checkpoint is of a training with other options, another prior or other flights; give the same ones, or another --out"
     )]
@@ -185,7 +185,7 @@ fn from_bytes(bytes: &[u8]) -> Result<Checkpoint, String> {
     })
 }
 
-/// Writes a complete file beside `path`, then renames it.
+/// Writes a temporary file in the same folder, then renames it to `path`.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -44,7 +44,7 @@ pub enum AddressError {
          tcpin:HOST:PORT, tcpout:HOST:PORT or serial:DEVICE:BAUD"
     )]
     Kind(String),
-    /// There is no host, or no port after it.
+    /// The host or the port is missing.
     #[error("address `{0}`: expected HOST:PORT after the kind, as in udpin:127.0.0.1:14550")]
     Parts(String),
     /// The port is not a number from 0 to 65535.

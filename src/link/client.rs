@@ -59,7 +59,7 @@ pub struct Now {
 ///
 /// - input: [`Clients::handle`] takes received bytes, [`Clients::welcome`] and [`Clients::forget`] take connections
 ///   that open and close;
-/// - time: [`Clients::poll`] queues what is due;
+/// - time: [`Clients::poll`] queues the messages that are due;
 /// - output: [`Clients::drain`] returns the queued frames;
 /// - queries: [`Clients::peers`], [`Clients::counts`], [`Clients::session_count`], [`Clients::identity`].
 ///

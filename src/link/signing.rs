@@ -109,7 +109,7 @@ impl Signer {
         let end = frame.len() - CHECKSUM;
         out.extend_from_slice(frame);
         out[from + 2] |= FLAG_SIGNED;
-        // The checksum is affine in what it covers: the change of it does not depend on the
+        // The checksum is affine in the bytes that it covers: its change does not depend on the
         // message's own extra byte, which is not known for every message.
         let change =
             calculate_crc(&frame[1..end], 0) ^ calculate_crc(&out[from + 1..from + end], 0);

@@ -208,7 +208,7 @@ impl Network {
         let thread = std::thread::Builder::new()
             .name("network".into())
             .spawn(move || {
-                // ends when asked to, or when the owner is gone
+                // ends on request, or when the owner no longer exists
                 let _ = runtime.block_on(stopped);
             })
             .map_err(TransportError::Thread)?;

@@ -30,7 +30,7 @@ pub struct Telemetry {
     pub time: Time,
     /// Order relative to the previous state.
     pub order: Order,
-    /// Faults: a part with a fault keeps its last valid value, or the neutral state's if there was none.
+    /// Invalid parts of the state. Such a part keeps its last valid value, or that of the neutral state if there was none.
     pub faults: Faults,
     /// The eight variables of flight.
     pub state: State,
@@ -38,7 +38,7 @@ pub struct Telemetry {
     pub incidence_sd: [f64; 2],
     /// Yaw angle ψ, rad.
     pub yaw: f64,
-    /// Time for which a simulator holds the body rates from this instant, s; 0 where they are sampled.
+    /// Hold time of the body rates, s: a simulator keeps them constant over its step. 0 for rates sampled at the instant.
     pub rate_hold_s: f64,
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
@@ -64,16 +64,16 @@ pub enum Order {
         /// Number of 10 ms frames lost before it.
         lost: u32,
     },
-    /// The same frame again, as a shim in lockstep repeats it without a reply: reply again, do not process it twice.
+    /// The previous frame again. A simulator in lockstep repeats it until it has a reply: reply, but do not process it.
     Repeated,
     /// A frame older than one delivered already: ignore it.
     Late,
 }
 
-/// The pilot's demand on the vehicle at a tick.
+/// What the companion demands of the vehicle at one control tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Actuator outputs.
+    /// Commanded actuator outputs.
     pub outputs: Outputs,
     /// Commanded roll and pitch, rad, for a controller that is commanded attitudes.
     pub attitude: [f64; 2],
@@ -81,7 +81,7 @@ pub struct Demand {
     pub fault: Option<Fault>,
 }
 
-/// A notice from the vehicle link to the pilot.
+/// A notice from the vehicle link to the companion's pilot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
     /// A text for the ground stations.
@@ -90,9 +90,9 @@ pub enum Notice {
     Engaged,
     /// Return of control authority was requested for this reason, and is not confirmed.
     Released(String),
-    /// The controller has control again, for this reason: do not engage until asked.
+    /// The flight controller has control again, for this reason. Do not engage again without a command.
     HandedBack(String),
-    /// The controller's system id, to be adopted.
+    /// System id of the flight controller, which the companion adopts as its own.
     System(u8),
 }
 
@@ -159,7 +159,7 @@ impl Vehicle {
         }
     }
 
-    /// Whether commands pass through a controller's channels, whose signs must be checked.
+    /// Whether the commands are surface deflections that a flight controller passes on: their signs must be checked.
     pub fn has_channels(&self) -> bool {
         match self {
             Vehicle::Sitl(_) => false,
@@ -167,12 +167,12 @@ impl Vehicle {
         }
     }
 
-    /// Whether the commanded surfaces are those that move, so that a recording may contain them.
+    /// Whether the companion commands the surfaces themselves, so that a recording may contain the commands as deflections.
     pub fn flies_surfaces(&self) -> bool {
         matches!(self, Vehicle::Sitl(_)) || self.has_channels()
     }
 
-    /// Whether the surfaces follow the commands now: a real controller's mode must have shown it.
+    /// Whether the surfaces follow the commands now. With a flight controller, its reported mode must confirm it.
     pub fn moves_surfaces(&self) -> bool {
         match self {
             Vehicle::Sitl(_) => true,
@@ -180,7 +180,7 @@ impl Vehicle {
         }
     }
 
-    /// Why the vehicle cannot be engaged now, if it cannot.
+    /// Reason why the vehicle cannot be engaged now; `None` if it can be.
     pub fn obstacle(&self) -> Option<String> {
         match self {
             Vehicle::Sitl(sitl) => sitl.obstacle(),

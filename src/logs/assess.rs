@@ -6,15 +6,15 @@ use super::finding::Finding;
 use super::load::Channel;
 use super::phases::{self, Flying, PhaseKind};
 
-/// Rate of the body rates and of the commands that a study wants, Hz.
+/// Sample rate of body rates and commands that a study needs, Hz.
 pub(super) const WANTED_HZ: f64 = 10.0;
 /// Below this part of it a log cannot serve: 10 Hz of a clock that is not quite even stays 10 Hz.
 const SLACK: f64 = 0.8;
-/// Rate of attitude that a study wants, and of the airspeed, Hz.
+/// Sample rate of attitude and airspeed that a study needs, Hz.
 const ATTITUDE_HZ: f64 = 5.0;
 const AIRSPEED_HZ: f64 = 1.0;
 
-/// The rate that a study wants of a column, Hz; `None` of one that may be slow.
+/// Sample rate of a column that a study needs, Hz; `None` for a column that may be slow.
 pub(super) fn wanted_hz(column: &str) -> Option<f64> {
     match column {
         "p_radps" | "q_radps" | "r_radps" => Some(WANTED_HZ),
@@ -33,7 +33,7 @@ pub(super) fn real_hz(channel: &Channel) -> f64 {
     }
 }
 
-/// Whether a channel is too slow for a study, with the rate that is wanted, Hz.
+/// Whether a channel is sampled too slowly for a study, with the rate that is needed, Hz.
 pub(super) fn too_slow(channel: &Channel, column: &str) -> Option<f64> {
     wanted_hz(column).filter(|wanted| real_hz(channel) < SLACK * wanted)
 }
@@ -62,7 +62,7 @@ pub(super) fn channels(channels: &[Channel], rows: &[Sample], flies: &Flying) ->
     if !slow.is_empty() {
         out.push(Finding::warning(text(&slow)));
     }
-    // On the ground a gust, or the wash of the propeller, is no spike.
+    // On the ground a gust or the propeller's slipstream may look like a spike.
     let flies = phases::phases(rows, flies).iter().any(|p| p.kind == PhaseKind::Flight);
     let spiky = channels.iter().filter(|c| flies && c.quality.spikes > 0);
     out.extend(spiky.map(|c| {
@@ -108,7 +108,7 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
     out
 }
 
-/// Columns without which a row is no sample, should they hang; the airspeed may be slow or stay out for a while.
+/// Columns whose frozen values make a row unusable; the airspeed may be slow or missing for a while.
 const OF_A_ROW: [&str; 5] = ["roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps"];
 
 /// Whether the row lacks a required column because its channel is stuck.

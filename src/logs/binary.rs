@@ -10,7 +10,7 @@ use super::topics::{Naming, Topics};
 use super::vehicle::{self, Kind, Vehicle};
 use super::{Flight, FlowAngles, Format, Sample, assess, derive, rows, screening, table};
 
-/// The log that `topics` make; `path` is what errors call it, `name` what the flight is called.
+/// The log made from `topics`. `path` appears in errors, `name` is the name of the flight.
 ///
 /// # Errors
 /// It lacks a needed column, has too many unusable rows, or is of a vehicle without wings.
@@ -28,7 +28,7 @@ pub(super) fn read(
     let no_wings = !findings.is_empty();
     let rules = o.mapping.rules(format, &topics);
     let mut table = table::build(&topics, &rules, &o.sources);
-    // A long log need not stand in memory twice.
+    // A long log must not be held in memory twice.
     topics.topics.clear();
     table.missing.retain(|missing| !o.mapping.makes(missing.column));
     findings
@@ -73,7 +73,7 @@ pub(super) fn read(
     })
 }
 
-/// Findings on the rows that are flown on wings, beside the `hovers` (start and end, s).
+/// Findings on the rows in wing-borne flight, that is outside of the `hovers` (start and end, s).
 fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], o: &Options) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
@@ -92,7 +92,7 @@ fn refused(vehicle: Option<&Vehicle>, path: &Path, to: Use) -> Result<Vec<Findin
     }
 }
 
-/// The needed columns that nothing fills; the first is an error where the log is to be computed with.
+/// Required columns without data. The first one is an error if the log is to be used in a computation.
 fn lacking(
     table: &table::Table,
     topics: &Topics,
@@ -104,7 +104,7 @@ fn lacking(
         ([first, ..], Use::Compute) => Err(missing_column(path, topics, first)),
         ([one], _) => Ok(vec![Finding::problem(missing_column(path, topics, one).to_string())]),
         (several, _) => {
-            // Columns of one remedy stand together.
+            // Columns with the same remedy are listed together.
             let mut groups: Vec<(String, Vec<String>)> = Vec::new();
             for missing in several {
                 let (remedy, column) = (would_fill(topics, missing), either(missing));
@@ -253,7 +253,7 @@ fn either(missing: &table::Missing) -> String {
     }
 }
 
-/// What a log must hold for the column.
+/// Content of a log that the column needs.
 fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     match (missing.looked_for.is_empty(), topics.naming) {
         (true, Naming::Sender) if missing.or.is_some() => "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves".to_owned(),
@@ -263,7 +263,7 @@ fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     }
 }
 
-/// What the log holds, in words.
+/// Content of the log, in words.
 fn holds(topics: &Topics) -> String {
     let mut has: Vec<&str> = topics.counts.keys().map(|(name, _)| name.as_str()).collect();
     has.dedup();

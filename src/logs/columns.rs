@@ -39,7 +39,7 @@ pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
     ("rate_hold_s", |s| s.rate_hold_s, |s| &mut s.rate_hold_s),
 ];
-/// Columns without which a file is no flight log.
+/// Columns that a flight log must have.
 pub(super) const NEEDED: [&str; 7] =
     ["time_s", "roll_rad", "pitch_rad", "p_radps", "q_radps", "r_radps", "airspeed_mps"];
 /// For each actuator the command or the position must be there.

@@ -31,7 +31,7 @@ pub enum CsvError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The text is no CSV.
+    /// The text is not a CSV table.
     #[error("flight log {path}: {source}: correct the row or cut the file before it")]
     Text {
         /// Path of the log.
@@ -46,7 +46,7 @@ pub enum CsvError {
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// What would fill the column.
+        /// Remedy, in words.
         remedy: String,
     },
     /// Too many rows cannot be used.
@@ -78,7 +78,7 @@ pub struct Reading {
     pub dropped: usize,
     /// The numbers of the first of them, the header being row 1.
     pub dropped_rows: Vec<usize>,
-    /// Whether the file ends in the middle of a row, which is left out.
+    /// Whether the file ends in the middle of a row; that row is not read.
     pub cut_short: bool,
 }
 
@@ -93,7 +93,7 @@ pub fn load(path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
     parse(&bytes, path, tolerance)
 }
 
-/// Reads a flight log from bytes; `path` is what errors call it.
+/// Reads a flight log from bytes; `path` appears in errors.
 ///
 /// # Errors
 /// As [`load`].

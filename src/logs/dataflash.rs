@@ -127,7 +127,7 @@ struct Reader {
     last_s: f64,
 }
 
-/// Reads what `wanted` names; everything else is counted.
+/// Reads the records that `wanted` names; all others are counted only.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,

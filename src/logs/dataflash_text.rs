@@ -10,7 +10,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use super::dataflash::{FMT, HEADER, size};
 use super::format::DATAFLASH_MAGIC;
 
-/// Lines that may stand before the first declaration: the firmware, the board, free memory.
+/// Number of lines allowed before the first declaration: firmware, board, free memory.
 const HEAD: usize = 20;
 /// The longest line that is looked at, bytes.
 const LONGEST: u64 = 4096;

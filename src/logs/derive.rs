@@ -1,8 +1,8 @@
-//! Columns that a log lacks, made from those it has, where a mapping asks for it.
+//! Columns that a log lacks, computed from those it has, if a mapping requests it.
 //!
 //! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions
 //! around a row; body rates are that of the turns from the row's attitude; the airspeed is the velocity over
-//! ground less a known wind. The window stands in the mapping. Nothing is made unasked.
+//! ground less a known wind. The mapping states the window. A column is derived only on request.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 

@@ -1,4 +1,4 @@
-//! The door of a log file: compression, text encoding, and which part of it is asked for.
+//! Opening of a log file: compression, text encoding, and the part that is requested.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -8,7 +8,7 @@ use flate2::read::MultiGzDecoder;
 
 /// First bytes of a gzip file.
 const GZIP: [u8; 2] = [0x1F, 0x8B];
-/// Number of bytes by which the format of a file is recognised.
+/// Number of bytes at the start of a file from which its format is recognised.
 pub(super) const LOOK: usize = 4096;
 
 /// A file opened, unpacked if it is compressed, with its first bytes read.
@@ -76,7 +76,7 @@ fn wide(start: &[u8]) -> Option<Wide> {
     if letters(1) { Some(Wide::Little) } else { letters(0).then_some(Wide::Big) }
 }
 
-/// Text in UTF-8 from text in UTF-16; `None` of what is not UTF-16.
+/// Converts UTF-16 text to UTF-8; `None` if it is not UTF-16.
 pub(super) fn narrowed(bytes: &[u8]) -> Option<Vec<u8>> {
     let wide = wide(bytes)?;
     let unit = |pair: &[u8]| match wide {

@@ -26,7 +26,7 @@ pub enum LogError {
     Foreign {
         /// Path of the file.
         path: PathBuf,
-        /// What it is instead, and what to give.
+        /// Format of the file, and the file to give instead.
         what: &'static str,
     },
     /// The file has no flight of that number.
@@ -34,7 +34,7 @@ pub enum LogError {
     Part {
         /// Path of the log.
         path: PathBuf,
-        /// The number asked for.
+        /// The requested number.
         asked: usize,
         /// How many there are.
         there: usize,
@@ -55,14 +55,14 @@ pub enum LogError {
         /// Probable wrong units, for the message; may be empty.
         hint: String,
     },
-    /// A needed column is filled by nothing in the file.
+    /// The file has no data for a required column.
     #[error("flight log {} has nothing for column `{column}`: {remedy}", path.display())]
     Missing {
         /// Path of the log.
         path: PathBuf,
         /// Name of the missing column.
         column: &'static str,
-        /// What would fill the column.
+        /// Fields from which the column can be read.
         remedy: String,
     },
     /// Too many rows cannot be used.

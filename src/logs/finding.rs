@@ -1,4 +1,4 @@
-//! Something about a log that its user should know.
+//! Findings: defects and peculiarities of a log, for its user.
 
 use serde::Serialize;
 
@@ -35,7 +35,7 @@ impl std::fmt::Display for Cure {
     }
 }
 
-/// Something about a log that its user should know.
+/// A defect or peculiarity of a log, for its user.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// How much it matters.

@@ -103,7 +103,7 @@ pub enum FlowAngles {
     Estimated,
 }
 
-/// A flight: samples in time order, with what is known about them as a whole.
+/// A flight: samples in time order, with the properties of the whole recording.
 ///
 /// Where only the rows matter, `Flight::from(samples)` or `..Flight::default()` fill in the rest.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
-//! What a file is that is none of the log formats, by how it begins, and what its owner can do.
+//! Recognition of files that are not logs, by their first bytes, with advice to the user.
 
 use super::format::MAVLINK_MARKERS;
 
-/// First bytes of files that people bring, with what each is and what to give instead.
+/// First bytes of common files that are not logs, with their kind and the file to give instead.
 const KNOWN: [(&[u8], &str); 11] = [
     (
         b"#ROSBAG V",
@@ -41,7 +41,7 @@ const KNOWN: [(&[u8], &str); 11] = [
 /// Zeros that no log begins with.
 const EMPTY: usize = 256;
 
-/// What a file that begins with `start` is; `None` if it is nothing known.
+/// Kind of the file that begins with `start`, in words; `None` if it is unknown.
 pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     if start.len() >= EMPTY && start.iter().all(|b| *b == 0) {
         return Some("its beginning is all zeros: the copy or the logger did not finish");
@@ -53,7 +53,7 @@ pub(super) fn kind(start: &[u8]) -> Option<&'static str> {
     ))
 }
 
-/// What PX4 wrote before ULog: records as of a DataFlash log, but of other meaning.
+/// PX4's format before ULog: records like those of a DataFlash log, with another meaning.
 pub(super) const SDLOG2: &str = "it is a log of PX4 from before ULog (sdlog2, .px4log), whose records have no times of their own: sdlog2_dump.py of that PX4 makes a CSV of it";
 
 /// Frames in a row that show a stream.

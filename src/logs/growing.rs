@@ -6,20 +6,20 @@ use super::csv::{self, CsvError};
 use super::flight::Sample;
 use super::mapping::Mapping;
 
-/// Buffer of a growing log for bytes that do not yet form a whole row.
+/// Buffer for the bytes of an incomplete last row of a growing log.
 #[derive(Clone, Debug, Default)]
 pub struct Growing {
-    /// The first line with its end; empty as long as it is not whole.
+    /// The header line with its line end; empty until it is complete.
     header: Vec<u8>,
     rest: Vec<u8>,
 }
 
 impl Growing {
-    /// Takes the `bytes` that were added; the rows that are whole now and have a time, in the units of the format.
-    /// `path` is what errors call the log.
+    /// Adds `bytes` and returns the rows that are complete now and have a time, in the units of the format.
+    /// `path` appears in errors.
     ///
     /// # Errors
-    /// The text is no table.
+    /// The text is not a table.
     pub fn take(&mut self, bytes: &[u8], path: &Path) -> Result<Vec<Sample>, CsvError> {
         self.rest.extend_from_slice(bytes);
         let Some(end) = self.rest.iter().rposition(|b| *b == b'\n').map(|at| at + 1) else {

@@ -42,7 +42,7 @@ pub struct Info {
     pub hovers: Vec<(f64, f64)>,
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
-    /// The instances of topics of which there are several.
+    /// Instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Channels that fill the table.
     pub channels: Vec<Channel>,

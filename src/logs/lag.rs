@@ -15,18 +15,18 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 const STEP_S: f64 = 0.05;
 /// Largest shift that is tried, s.
 const SHIFT_S: f64 = 3.0;
-/// Time over which a change is taken, s.
+/// Time span over which changes are computed, s.
 const OVER_S: f64 = 0.6;
 /// Shortest stretch that is evaluated, s.
 const SHORTEST_S: f64 = 12.0;
 /// Longest stretch that is evaluated, s: longer ones add no accuracy.
 const LONGEST_S: f64 = 300.0;
-/// Correlation from which a delay is believed, and by how much it must exceed that without a shift.
+/// Correlation above which a delay is taken as certain, and its smallest excess over the correlation without a shift.
 const CERTAIN: f64 = 0.7;
 const BETTER: f64 = 0.15;
 /// Delay from which it is named, s.
 const NAMED_S: f64 = 0.25;
-/// Delay beyond which what is computed is wrong, s.
+/// Delay above which the results of a study are wrong, s.
 const WRONG_S: f64 = 0.6;
 
 /// The delays that are large enough to be named.

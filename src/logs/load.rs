@@ -73,14 +73,14 @@ pub struct Log {
     pub vehicle: Option<Vehicle>,
     /// When it did not fly on its wings alone, s: left out.
     pub hovers: Vec<(f64, f64)>,
-    /// The instances of topics of which there are several.
+    /// Instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
 }
 
 impl Log {
-    /// What makes figures that are computed from it wrong, a line each; `None` if nothing was found.
+    /// Defects that falsify figures computed from the log, one a line; `None` if there are none.
     pub fn problems(&self) -> Option<String> {
         let problems = self.findings.iter().filter(|f| f.severity == Severity::Problem);
         let lines: Vec<&str> = problems.map(|f| f.text.as_str()).collect();
@@ -106,7 +106,7 @@ pub(super) enum Use {
 /// findings, not errors. Of several flights in it the longest is taken.
 ///
 /// # Errors
-/// The file cannot be read, or is no log.
+/// The file cannot be read, or is not a log.
 pub fn inspect(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Look)?)
 }
@@ -122,7 +122,7 @@ pub fn inspect_all(path: &Path, options: &Options) -> Result<Vec<Log>, LogError>
 /// Reads a log, whatever its format. Of several flights in it the longest is taken; `FILE#2` names another.
 ///
 /// # Errors
-/// The file cannot be read, is no log, lacks a needed column, or has too many unusable rows.
+/// The file cannot be read, is not a log, lacks a required column, or has too many unusable rows.
 pub fn load(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Compute)?)
 }
@@ -150,7 +150,7 @@ pub fn flights(path: &Path, options: &Options) -> Result<Vec<Log>, LogError> {
     Ok(logs)
 }
 
-/// Reads a log from bytes; `path` is what errors and the flight call it.
+/// Reads a log from bytes; `path` appears in errors and as the name of the flight.
 ///
 /// # Errors
 /// As [`load`].
@@ -208,7 +208,7 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
     Ok(vec![all.swap_remove(number - 1)])
 }
 
-/// Said of a file that is nothing known.
+/// Error text for a file of an unknown format.
 const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, or a MAVLink .tlog";
 
 /// Reads the flights of the log `source`, which begins with `start`.

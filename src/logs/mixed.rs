@@ -1,4 +1,4 @@
-//! Columns of the log format made of the columns of named surfaces and motors.
+//! Columns of the log format computed from the columns of named surfaces and motors.
 
 use super::columns::{COLUMNS, Place, index};
 use super::mapping::Mapping;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// What the flights of these logs are called: the file's name, or the whole path where two share it.
+/// Names of the flights of these logs: the file name, or the full path where two logs have the same file name.
 pub fn names<P: AsRef<Path>>(logs: &[P]) -> Vec<String> {
     let short = |path: &P| {
         let path = path.as_ref();

@@ -4,29 +4,29 @@ use serde::Serialize;
 
 use super::Sample;
 
-/// From when on an aircraft is taken to fly, and how much of it a study needs.
+/// Criteria for flight in a log, and the flight time that a study needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flying {
-    /// Airspeed above which it flies, m/s.
+    /// Airspeed above which the aircraft counts as flying, m/s.
     pub from_mps: f64,
-    /// How long it must stay above, s.
+    /// Time for which the airspeed must stay above `from_mps`, s.
     pub sustained_s: f64,
-    /// Flight below which a verdict would rest on too little, s.
+    /// Shortest flight that supports a verdict, s.
     pub shortest_s: f64,
 }
 
 impl Default for Flying {
-    /// For an aircraft that nothing is known of.
+    /// Criteria for an unknown aircraft.
     fn default() -> Flying {
         Flying { from_mps: 7.0, sustained_s: 2.0, shortest_s: 5.0 }
     }
 }
 
 impl Flying {
-    /// For an aircraft that flies from an airspeed on, m/s.
+    /// Criteria for an aircraft that flies above `airspeed`, m/s.
     ///
-    /// The times of its motions go with V/g (Froude's law), so that a slower aircraft needs less time. A
-    /// faster one gets no more than the usual.
+    /// The time constants of its motions scale with V/g (Froude scaling), so that a slower aircraft needs less time. The
+    /// times of a faster one are not longer than the default ones.
     pub fn from(airspeed: f64) -> Flying {
         let usual = Flying::default();
         let share = (airspeed / usual.from_mps).min(1.0);
@@ -38,20 +38,20 @@ impl Flying {
     }
 }
 
-/// A gap that splits the log, s, unless the log is slower than that.
+/// Shortest gap that splits a log, s; three sample periods if those are longer.
 const GAP_S: f64 = 0.1;
 
 /// Kind of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PhaseKind {
-    /// The aircraft stands or rolls.
+    /// The aircraft is on the ground, at rest or rolling.
     Ground,
     /// The aircraft is airborne.
     Flight,
 }
 
-/// A stretch of a log without gaps in which the aircraft does one thing.
+/// A stretch of a log without gaps, either on the ground or in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Phase {
     /// Kind of the phase.
@@ -77,7 +77,7 @@ pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
         if airspeed > flies.from_mps { PhaseKind::Flight } else { PhaseKind::Ground }
     };
     let mut raw: Vec<Phase> = Vec::new();
-    // an airspeed that comes more slowly than the rows holds until the next one
+    // airspeed sampled more slowly than the rows is held until its next sample
     let mut airspeed = f64::NAN;
     for row in rows.iter().filter(|s| s.time_s.is_finite()) {
         if row.airspeed_mps.is_finite() {
@@ -94,7 +94,7 @@ pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
             _ => raw.push(Phase { kind, from_s: row.time_s, to_s: row.time_s, rows: 1 }),
         }
     }
-    // What is too short takes the kind of what it touches.
+    // A phase that is too short is merged with the one before it.
     let mut out: Vec<Phase> = Vec::new();
     for mut phase in raw {
         let short = phase.to_s - phase.from_s < flies.sustained_s;

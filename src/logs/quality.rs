@@ -1,4 +1,4 @@
-//! How good the samples of a channel are: how often something new comes, what was made up, what hangs.
+//! Quality of a channel's samples: rate of new values, interpolated values, frozen values.
 //!
 //! A table that was brought to one clock shows a sample for every row, whoever made it. Between the samples of a slow
 //! sensor a straight line was drawn, or the last value was held: the second differences are zero, or all differences
@@ -92,7 +92,7 @@ fn quantum(values: &[f64]) -> f64 {
     (0..=9).find(whole).map_or(0.0, |k| 10f64.powi(-k))
 }
 
-/// How often straight lines meet, Hz, where the values are straight lines; `None` of anything else.
+/// Rate of the corners, Hz, if the values are linear in between; `None` for other channels.
 fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64> {
     let span = |f: fn(f64, f64) -> f64| values.iter().copied().reduce(f).unwrap_or(0.0);
     let range = span(f64::max) - span(f64::min);

@@ -102,7 +102,7 @@ fn euler([w, x, y, z]: [f64; 4]) -> Option<[f64; 3]> {
     ])
 }
 
-/// Samples that are looked at one by one before a place is searched for.
+/// Number of samples that are tried in turn before a binary search.
 const STEPS: usize = 8;
 
 /// Position of a time among a channel's times.

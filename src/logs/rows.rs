@@ -7,7 +7,7 @@ use super::columns::{COLUMNS, NEEDED, index};
 const REFUSED_SHARE: f64 = 0.05;
 /// The least that a pitot at rest shows, m/s: noise about zero, as true airspeed.
 const PITOT_AT_REST: f64 = -5.0;
-/// Share of the rows that a column fills, below which it is taken for a slower sensor's.
+/// A column with values in less than this share of the rows is taken as that of a slower sensor.
 const FILLED_SHARE: f64 = 0.95;
 /// Fewest rows that a column must fill to be taken for a slower sensor's: one that failed fills few.
 const ENOUGH: usize = 50;
@@ -27,7 +27,7 @@ pub enum Tolerance {
 /// Why a row cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reason {
-    /// A field is no number, or fields are missing.
+    /// A field is not a number, or fields are missing.
     Unreadable,
     /// A needed column is empty.
     Incomplete,

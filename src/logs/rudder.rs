@@ -34,7 +34,7 @@ impl RudderMotion {
         sd(|s| s.rudder_cmd).filter(|sd| *sd > MOVES_PART).map(RudderMotion::Command)
     }
 
-    /// How far it moves, in parts of what counts as movement.
+    /// Standard deviation of the rudder relative to that which counts as movement.
     pub fn size(self) -> f64 {
         match self {
             RudderMotion::Deflection(sd) => sd / MOVES_RAD,
@@ -56,7 +56,7 @@ impl fmt::Display for RudderMotion {
     }
 }
 
-/// Standard deviation in flight of what the log has; `None` if it has too little.
+/// Standard deviation of the logged values in flight; `None` if there are too few.
 fn spread(rows: &[Sample], get: fn(&Sample) -> f64) -> Option<f64> {
     let flying = rows.iter().filter(|s| s.airspeed_mps > phases::Flying::default().from_mps);
     let values: Vec<f64> = flying.map(get).filter(|x| x.is_finite()).collect();

@@ -1,4 +1,4 @@
-//! The sources of a log: which instance of a topic is read, and what else there is.
+//! The sources of a log: the instance of each topic that is read, and the other instances.
 //!
 //! A vehicle may carry two pitots, a VTOL has one controller for its lift and one for its wings. The reader takes the
 //! first instance that moves, the one that the vehicle's type calls for before that, and reports its choice in a finding.
@@ -11,7 +11,7 @@ use super::finding::Finding;
 use super::mapping::rule::Rule;
 use super::topics::{Topic, Topics, period_s};
 
-/// An instance that the user asks for, of a topic: `--source airspeed=1`.
+/// Instance of a topic that the user requests: `--source airspeed=1`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Asked {
     /// Name of the topic.
@@ -61,7 +61,7 @@ pub struct Source {
     pub from_s: f64,
     /// Time of the last one, s.
     pub to_s: f64,
-    /// Whether any of the fields that are wanted of it changes.
+    /// Whether any of its requested fields changes.
     pub moves: bool,
     /// Whether it is read.
     pub read: bool,
@@ -71,14 +71,14 @@ pub struct Source {
 #[derive(Debug, Default)]
 pub(super) struct Choice {
     read: BTreeMap<String, u16>,
-    /// All instances of topics of which there are several.
+    /// All instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Findings about unusual choices.
     pub findings: Vec<Finding>,
 }
 
 impl Choice {
-    /// Chooses for the topics of `rules`; what the user has `asked` for comes first.
+    /// Chooses an instance for each topic of `rules`; those that the user `asked` for take precedence.
     pub fn of(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Choice {
         let mut choice = Choice::default();
         let mut names: Vec<&str> = rules.iter().map(|r| r.topic.as_str()).collect();
@@ -150,7 +150,7 @@ fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
         format!("; {} moves too: --source {name}={other} reads it", others.join(", "))
     });
     let other = other.unwrap_or_default();
-    // That a second sensor is absent or dead is no matter as long as the first one is read.
+    // An absent or failed second sensor does not matter while the first one is read.
     let usual = sources.first().is_some_and(|s| s.read);
     match (asked, dead.is_empty() || usual) {
         (true, _) => {

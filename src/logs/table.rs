@@ -34,7 +34,7 @@ const SLOW_HZ: f64 = 10.0;
 /// samples. Held values would repeat in a third of the rows, by which a reconstruction recognises
 /// them.
 const SPARSE: f64 = 0.65;
-/// Columns that are measurements of the path, not what drives it.
+/// Columns that measure the path, as opposed to inputs that drive it.
 const MEASURED: [&str; 9] = [
     "roll_rad",
     "pitch_rad",
@@ -71,7 +71,7 @@ impl Track<'_> {
         Reader::new(&self.rule, &self.times, &self.series, self.limit_s())
     }
 
-    /// Whether it is measured much more slowly than rows `period` (s) apart.
+    /// Whether the channel is sampled much more slowly than rows `period` (s) apart.
     fn is_sparse(&self, period: f64) -> bool {
         let measured = self.rule.columns().iter().all(|c| MEASURED.contains(c));
         measured && self.rate_hz > 0.0 && self.rate_hz * period < SPARSE
@@ -98,17 +98,17 @@ pub(super) struct Table {
     pub rows: Vec<Sample>,
     pub channels: Vec<Channel>,
     pub notes: Vec<String>,
-    /// The needed columns that nothing fills.
+    /// Required columns without data.
     pub missing: Vec<Missing>,
-    /// The instances of topics of which there are several.
+    /// Instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Findings about unusual sources.
     pub findings: Vec<Finding>,
-    /// The rule by which each column is filled.
+    /// The rule that fills each column.
     pub rules: Vec<Rule>,
 }
 
-/// A needed column that nothing fills.
+/// A required column has no data.
 pub(super) struct Missing {
     pub column: &'static str,
     pub or: Option<&'static str>,
@@ -116,7 +116,7 @@ pub(super) struct Missing {
     pub looked_for: Vec<String>,
 }
 
-/// Puts what the rules find onto one table.
+/// Resamples the fields that the rules select onto one table.
 pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
     let mut choice = Choice::of(topics, rules, asked);
     let (tracks, replaced) = choose(topics, rules, &choice);
@@ -191,7 +191,7 @@ fn choose<'a>(
         let filled = |t: &Track<'a>| t.rule.columns().iter().any(|c| rule.columns().contains(c));
         let taken = chosen.iter().any(filled);
         match chosen.iter_mut().find(same) {
-            // An attitude from angles gives way whole, and never mixes with one from a quaternion.
+            // All angles are replaced together: angles and quaternion are never mixed.
             None if taken => {}
             None => chosen.push(track),
             Some(old) => {

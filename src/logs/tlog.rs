@@ -3,13 +3,13 @@
 //! A record is the host's time (µs since 1970, big-endian) followed by a frame. The crate `mavlink`
 //! has no reader for that; frames are cut by `link::framing`, messages named by `link::wire`.
 //!
-//! Times are the sender's own where a message carries them. A message without (VFR_HUD) gets the
-//! own time that belongs to its host time, by linear interpolation between the messages around it:
-//! in lockstep, where the host's clock is unrelated to the flight's, this is still right.
+//! The time of a message is that of the sender's clock. A message without a time stamp (VFR_HUD) has only the host's
+//! time: it is converted to the sender's clock by linear interpolation between the messages around it. This is correct
+//! in lockstep too, where the host's clock is unrelated to that of the flight.
 //! The instance of a topic is system × 256 + component.
 //!
-//! A vehicle that starts again counts its time from zero again. Each life of each vehicle is a flight of its own, for
-//! its times mean nothing in another one.
+//! The clock of a vehicle starts at zero at each boot. The log of each boot of each vehicle is a flight of its own, because
+//! its times cannot be compared with those of another boot.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -24,16 +24,16 @@ use greylag_link::logged::{self, Logged, Own};
 
 /// Bytes of the host's time.
 const STAMP: usize = 8;
-/// Own times further than this from the clock of the attitude are another clock's, s.
+/// Difference from the clock of the attitude above which a sender's time stamp counts as that of another clock, s.
 const SAME_CLOCK_S: f64 = 5.0;
 /// Wrap of `time_boot_ms`, of `time_usec` where it has 32 bits, s.
 const WRAP_MS_S: f64 = 4_294_967.296;
 
-/// How far back the time of a vehicle goes that has started again, s.
+/// Backward jump of a vehicle's time that counts as a restart, s.
 const BACK_S: f64 = 5.0;
 /// Number of attitudes from which a further system counts as another vehicle.
 const VEHICLE: usize = 50;
-/// Messages in a row that show it; one alone may be late or wrong.
+/// Number of successive messages that must show a restart: a single one may be late or wrong.
 const BACK_FOR: usize = 5;
 
 /// A message before its time is known.
@@ -44,7 +44,7 @@ struct Entry {
     own_s: Option<f64>,
 }
 
-/// The host's time against the sender's own, s, in record number `at`.
+/// A pair of the host's and the sender's time, s, from record number `at`.
 #[derive(Clone, Copy)]
 struct Tick {
     host_s: f64,
@@ -55,14 +55,14 @@ struct Tick {
 #[derive(Default)]
 struct Reader {
     entries: BTreeMap<(&'static str, u16), (Vec<Entry>, Topic)>,
-    /// Times in whole frames, by system with component.
+    /// Clock of each sender, by system × 256 + component.
     clocks: BTreeMap<u16, Vec<Tick>>,
     records: usize,
     out: Topics,
     others: BTreeMap<u32, usize>,
 }
 
-/// Reads what `wanted` names; everything else is counted.
+/// Reads the messages that `wanted` names; all others are counted only.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,
@@ -174,7 +174,7 @@ impl Reader {
         }
     }
 
-    /// All records as the life of the only vehicle; nothing is copied.
+    /// All records as one boot of the only vehicle, without a copy.
     fn only_life(mut self, system: Option<u8>, mut clocks: BTreeMap<u8, Vec<Tick>>) -> Topics {
         let mut out = Topics { system, ..std::mem::take(&mut self.out) };
         clocks.values_mut().for_each(|clock| clock.sort_by(|a, b| a.host_s.total_cmp(&b.host_s)));
@@ -186,7 +186,7 @@ impl Reader {
         out
     }
 
-    /// The lives of the systems that send an attitude: the system with its records.
+    /// The boots of the systems that send an attitude: each system with the range of its records.
     fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
         let mut attitudes: BTreeMap<u8, usize> = BTreeMap::new();
         for ((_, source), (entries, _)) in
@@ -249,7 +249,7 @@ impl Reader {
     }
 }
 
-/// The records in which a vehicle has started again.
+/// Records at which a vehicle has restarted.
 fn starts(clock: &[Tick]) -> Vec<usize> {
     let back = |i: &usize| {
         let before = clock[i - 1].own_s - BACK_S;
@@ -259,7 +259,7 @@ fn starts(clock: &[Tick]) -> Vec<usize> {
     (1..clock.len()).filter(back).map(|i| clock[i].at).collect()
 }
 
-/// An own time with the wraps of its 32 bits undone.
+/// A sender's time, s, with the overflow of its 32 bits removed.
 fn unwrapped(own: f64, last: Option<f64>) -> f64 {
     let last = last.unwrap_or(own);
     own + ((last - own) / WRAP_MS_S).round() * WRAP_MS_S

@@ -81,9 +81,9 @@ pub(super) struct Topics {
     pub naming: Naming,
     /// Name and version of the firmware; empty if the log has none.
     pub firmware: String,
-    /// The topics that were asked for, by name with instance.
+    /// The requested topics, by name with instance.
     pub topics: BTreeMap<(String, u16), Topic>,
-    /// How many records each topic of the file has, asked for or not.
+    /// Number of records of each topic of the file, requested or not.
     pub counts: BTreeMap<(String, u16), usize>,
     /// Parameters of the vehicle; the last value of each.
     pub parameters: BTreeMap<String, f64>,

@@ -76,7 +76,7 @@ enum Place {
     Record(usize),
     /// A record that the file's end cuts.
     Cut,
-    /// Nothing that belongs there.
+    /// An invalid record.
     Damage,
 }
 
@@ -162,7 +162,7 @@ impl Reader {
             if kind != b'D' && undeclared == Undeclared::Refused {
                 return false;
             }
-            // What the window or the file cuts off is judged by its beginning.
+            // A record cut off by the window or the end of the file is judged by its first bytes.
             let Some(rest) = view.get(len..) else { return undeclared == Undeclared::Allowed };
             view = rest;
         }
@@ -263,7 +263,7 @@ impl Reader {
         if layout.fields.is_empty() {
             return;
         }
-        // A record that is too short would be filled up with nothing at many times its size.
+        // A record that is too short would be padded to many times its size.
         if body.len() < layout.size {
             self.short += 1;
             return;

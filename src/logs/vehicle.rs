@@ -19,7 +19,7 @@ pub enum Kind {
     Vtol,
     /// Vehicle without wings.
     Multicopter,
-    /// A helicopter, a rover, a boat: nothing that flies on wings.
+    /// A vehicle without wings: helicopter, rover, boat.
     Other,
 }
 
@@ -73,7 +73,7 @@ fn found(kind: Kind, by: impl Into<String>) -> Option<Vehicle> {
     Some(Vehicle { kind, by: by.into() })
 }
 
-/// The kind behind a MAV_TYPE; `None` of what is no vehicle.
+/// Kind of vehicle of a MAV_TYPE; `None` if the type is not a vehicle.
 fn by_type(number: f64) -> Option<Kind> {
     Some(match number as i64 {
         1 | 16 | 28 => Kind::FixedWing,

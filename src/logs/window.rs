@@ -1,4 +1,4 @@
-//! A file seen through a window: binary logs are read record by record and never held whole.
+//! Buffered window on a file: binary logs are read record by record and are never held in memory completely.
 
 use std::io::{self, Read};
 
@@ -29,7 +29,7 @@ impl<'a> Window<'a> {
         &self.bytes[self.from..]
     }
 
-    /// Goes on by `count` bytes of the last view.
+    /// Advances by `count` bytes of the last view.
     pub fn skip(&mut self, count: usize) {
         self.from = (self.from + count).min(self.bytes.len());
     }

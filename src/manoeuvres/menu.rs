@@ -1,4 +1,4 @@
-//! The menu of flight-test manoeuvres, by name.
+//! Catalogue of flight-test manoeuvres, by name.
 
 use crate::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
 use crate::{Excitation, Schedule, Shape, Step};

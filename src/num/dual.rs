@@ -6,18 +6,18 @@ use super::{Real, each};
 
 /// A value with its gradient with respect to `N` inputs.
 ///
-/// Generic over the scalar beneath, so that a block of lanes can carry gradients too: that is why
-/// this is not the crate `num-dual`, whose scalar must be a float with comparisons.
+/// Generic over the scalar type `T`, so that SIMD lanes ([`Lanes`](super::Lanes)) can carry gradients too. The crate
+/// `num-dual` is not used, because its scalar must be a float with comparisons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<const N: usize, T = f64> {
     /// Value of the function.
     pub value: T,
-    /// Its derivatives with respect to the `N` inputs.
+    /// Derivatives of the function with respect to the `N` inputs.
     pub gradient: [T; N],
 }
 
 impl<const N: usize, T: Real> Dual<N, T> {
-    /// Input number `index`, whose derivative with respect to itself is one.
+    /// The input with number `index` (from 0): its derivative with respect to itself is one.
     pub fn variable(value: T, index: usize) -> Self {
         let mut gradient = [T::zero(); N];
         gradient[index] = T::from_f64(1.0);
@@ -118,7 +118,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        // at zero the radicand's derivative decides, and 0 · ∞ would be NaN
+        // the slope is infinite at zero; zero in its place, since a zero gradient times ∞ would be NaN
         let slope = T::where_less(T::zero(), root, T::from_f64(0.5) / root, T::zero());
         self.chain(root, slope)
     }

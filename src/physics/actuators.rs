@@ -142,7 +142,7 @@ pub struct SurfaceFilter<R = f64> {
 
 /// The filters of all actuators; an aircraft without a rudder has no filter for it.
 ///
-/// The observed numbers ([`ActuatorState`]) are not quite a Markov state; this is.
+/// Complete (Markov) state of the actuators; the observation [`ActuatorState`] is not complete.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuators<R = f64> {
     aileron: SurfaceFilter<R>,
@@ -210,7 +210,7 @@ impl<R: Real> SurfaceFilter<R> {
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls` and commanded to stay there; a rudder without figures stays there.
+    /// Actuators at rest at `controls`, with commands that hold them there. A rudder without figures keeps its position.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),

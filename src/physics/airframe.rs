@@ -28,7 +28,7 @@ pub struct Geometry {
     pub chord: f64,
 }
 
-/// Limits within which the pilot keeps the aircraft.
+/// Flight envelope: limits that the companion enforces.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Envelope {
@@ -50,7 +50,7 @@ pub struct Envelope {
     pub airspeed_min_mps: f64,
     /// Largest true airspeed, m/s.
     pub airspeed_max_mps: f64,
-    /// Default airspeed, m/s.
+    /// Cruise airspeed (true), the default where none is commanded, m/s.
     pub airspeed_cruise_mps: f64,
     /// Largest rate of a surface command, in units of the command (−1..1) per second.
     pub surface_slew_per_s: f64,
@@ -89,7 +89,7 @@ impl Envelope {
 pub struct Reference {
     /// Reference airspeed V0 of x_c, eq. (21) of \[GSFM26\], m/s.
     pub airspeed: f64,
-    /// Altitude of designs and checks, m above mean sea level.
+    /// Altitude at which controllers are designed and models are trimmed and simulated, m above mean sea level.
     pub altitude: f64,
 }
 
@@ -164,7 +164,7 @@ pub struct Airframe {
     pub geometry: Geometry,
     /// Actuator filters at a time step of 0.01 s.
     pub actuators: ActuatorFigures,
-    /// Statement of the file on a rudder.
+    /// Whether the file describes the rudder.
     pub yaw: Yaw,
     /// Surfaces and motors that the controls move, if the file names them.
     pub mixer: Option<Mixer>,
@@ -204,7 +204,7 @@ pub enum FileError {
         what: &'static str,
         /// Path of the file.
         path: PathBuf,
-        /// The system's error.
+        /// The operating system's error.
         why: std::io::Error,
         /// Path of an existing example file.
         example: &'static str,
@@ -258,7 +258,7 @@ struct GeometryFile {
 }
 
 impl File {
-    /// Actuator filters, and the file's statement on a rudder.
+    /// Actuator filters, and whether the file describes the rudder.
     fn controls(&self) -> Result<(ActuatorFigures, Yaw), String> {
         match (self.schema, &self.actuators, &self.controls) {
             (1, Some(alike), None) => alike.figures(),
@@ -419,12 +419,12 @@ pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     ))
 }
 
-/// Checks that a number is positive and at most `most`, the largest of any aircraft.
+/// Checks that a number is positive and at most `most`, the largest value of any aircraft.
 pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String> {
     within(field, number, [most * 1e-9, most])
 }
 
-/// Checks that a number lies within the range of aircraft, both limits positive.
+/// Checks that a number lies between `least` and `most`, which are positive.
 pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));

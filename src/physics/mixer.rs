@@ -136,7 +136,7 @@ impl Mixer {
     /// Builds the mixer of `effectors` on an aircraft with or without a `rudder`.
     ///
     /// # Errors
-    /// If a control moves nothing or does not exist, or two are linearly dependent.
+    /// If a control moves no surface or motor, does not exist, or two are linearly dependent.
     pub fn new(effectors: Vec<Effector>, rudder: bool) -> Result<Mixer, MixerError> {
         let has = [true, true, rudder, true];
         for (j, control) in CONTROLS.into_iter().enumerate() {
@@ -212,7 +212,7 @@ impl Mixer {
         let pairs = [
             (Some(own.aileron), Some(travels.aileron)),
             (Some(own.elevator), Some(travels.elevator)),
-            // a motor's share of the throttle is no angle
+            // a motor's share of the throttle is not an angle
             (own.rudder.filter(|_| self.rudder_deflects()), travels.rudder),
         ];
         for (control, (own, given)) in CONTROLS.into_iter().zip(pairs) {

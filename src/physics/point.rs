@@ -58,7 +58,7 @@ impl<R: Real> AirData<R> {
 pub struct Point<'a, R = f64> {
     /// State of the aircraft.
     pub state: &'a State<R>,
-    /// Acting controls.
+    /// Deflections and throttle position that act now.
     pub controls: &'a Controls<R>,
     /// Airflow at the state.
     pub air: &'a AirData<R>,
@@ -66,11 +66,11 @@ pub struct Point<'a, R = f64> {
     pub geometry: &'a Geometry,
     /// Axes in which drag, side force and lift act.
     pub axes: ForceAxes,
-    /// Sum of the effects that need only the point; zero while those are evaluated.
+    /// Sums of the effects of the first pass, for the effects that depend on them; zero during the first pass.
     pub base: &'a Base<R>,
 }
 
-/// Sums over the effects that need only the point.
+/// Sums over the effects of the first pass: those that depend on state, controls and airflow only.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<R = f64> {
     /// Forces and moments of these effects.
@@ -86,7 +86,7 @@ pub struct Base<R = f64> {
 }
 
 impl<R: Real> Base<R> {
-    /// All quantities zero.
+    /// Sums before any effect is added.
     #[inline(always)]
     pub fn zero() -> Self {
         let wrench = Wrench::zero();

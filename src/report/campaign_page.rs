@@ -1,4 +1,4 @@
-//! The page of a campaign: its findings, its tables beside the paper's, the cell behind each number.
+//! The page of a campaign: findings, tables with the paper's values, and the cell of each number.
 
 use std::collections::BTreeMap;
 

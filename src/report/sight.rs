@@ -18,7 +18,7 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Roll and pitch of the candidates and of what was flown.
+    /// Roll and pitch of the candidates and of the flight.
     pub(super) fn fans(&self) -> [Figure; 2] {
         [self.fan(0, "Roll"), self.fan(1, "Pitch")]
     }

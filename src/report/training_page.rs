@@ -11,7 +11,7 @@ use greylag_learn::dynamics::score::Horizon;
 use greylag_learn::{Learned, Moment};
 use greylag_model::STEP;
 
-/// A trained model's story, with where it came from.
+/// Results of a training, with the files and commands that they come from.
 #[derive(Clone, Debug)]
 pub struct TrainingReport<'a> {
     /// Title of the page.

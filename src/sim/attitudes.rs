@@ -13,11 +13,11 @@ use greylag_physics::Airframe;
 
 /// Attitudes of a flight.
 pub const LEGS: usize = 12;
-/// Steps for which each is wanted: 5 s.
+/// Number of steps for which each attitude is commanded: 5 s.
 const LEG: usize = 500;
 /// Steps at the end of each over which the settled error is taken: 1 s.
 const SETTLED: usize = 100;
-/// The largest roll and pitch that are asked for, degrees, where the airframe's envelope allows them.
+/// Largest commanded roll and pitch, degrees, if the airframe's envelope allows them.
 const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
 /// Purpose of the random stream.
 const ATTITUDES: u64 = 60;
@@ -35,7 +35,7 @@ pub struct Minute {
     pub lost_s: Option<f64>,
     /// Mean over the attitudes of the settled error, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
-    /// Integral of the absolute errors of roll and pitch together, from each change of what is wanted, ° s.
+    /// Integral of |roll error| + |pitch error| from each change of the commanded attitude, ° s.
     pub integral_deg_s: f64,
 }
 

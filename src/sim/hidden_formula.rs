@@ -19,7 +19,7 @@ const FT: f64 = 0.3048;
 ///
 /// # Errors
 ///
-/// What JSBSim cannot express.
+/// If JSBSim cannot express a part of the formula.
 pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     let mut writer = Writer { values, filters: Vec::new() };
     let mut functions = Vec::new();

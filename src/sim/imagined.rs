@@ -114,7 +114,7 @@ impl Imagination {
         imagination
     }
 
-    /// Resets all episodes; `targets` were given out before.
+    /// Starts new episodes, whose targets continue the random sequence after its first `targets`.
     pub fn restart(&mut self, targets: u64) {
         self.targets.go_on_after(targets);
         for k in 0..self.batches.len() {

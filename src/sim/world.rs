@@ -1,30 +1,31 @@
-//! Training environments for policies: blocks of aircraft observed and stepped together.
+//! Training environments for policies: aircraft simulated together in blocks, one aircraft in each SIMD lane.
 
 use crate::Trouble;
 use crate::imagined::{Block, Imagination, Stepped};
 use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
-/// One or many aircraft, each in its own episode, which is reset when it ends.
+/// One or several aircraft, each in its own episode. An episode that ends is followed by a new one.
 pub trait World {
     /// Number of aircraft.
     fn instances(&self) -> usize;
-    /// Observations of a block's aircraft; lanes above the instances are unused.
+    /// Observations of a block's aircraft. The last block may have more lanes than aircraft; those lanes are unused.
     fn observe(&self, block: usize) -> [Block; OBSERVATIONS];
-    /// One step of a block.
+    /// Simulates the aircraft of a block for one time step.
     ///
     /// # Errors
     ///
     /// If the environment cannot continue; losing an aircraft is not an error.
     fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble>;
-    /// Resets all episodes; `targets` were given out before.
+    /// Starts new episodes. Their targets continue the random sequence after its first `targets`, as when training is
+    /// resumed.
     ///
     /// # Errors
     ///
     /// If the environment cannot be reset.
     fn restart(&mut self, targets: u64) -> Result<(), Trouble>;
-    /// Number of targets given.
+    /// Number of targets assigned to episodes so far.
     fn targets(&self) -> u64;
-    /// Number of episodes that ended outside the limits.
+    /// Number of episodes that ended because a validity limit of the model was exceeded.
     fn lost(&self) -> u64;
 }
 

@@ -27,7 +27,7 @@ pub struct FirstLook {
     pub id: &'static str,
     /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
     pub evidence: f64,
-    /// Evidence that the best candidate reaches by chance where nothing is missing.
+    /// Evidence that the best candidate reaches by chance if no effect is missing.
     pub threshold: f64,
 }
 
@@ -60,7 +60,7 @@ pub fn not_cancelled(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     }
 }
 
-/// Maps the stages of a part of a task to stages of the whole, from one share of it to another.
+/// Listener for a part of a task: maps its fractions 0 to 1 to the range `from` to `to` of the whole task.
 pub fn part<'a>(
     progress: &'a Progress<'a>,
     [from, to]: [f64; 2],

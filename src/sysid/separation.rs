@@ -8,7 +8,7 @@ use greylag_model::GreyBox;
 
 /// Number of channels used: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;
-/// Smallest ridge parameter of a free column as a share of its square, so that equal columns are no problem.
+/// Smallest ridge parameter of a free column relative to its squared norm, so that equal columns remain solvable.
 const RIDGE: f64 = 1e-9;
 /// Prior width of a sensor's constant error in a channel, in standard deviations of a window's noise.
 const BIAS_WIDTH: f64 = 100.0;

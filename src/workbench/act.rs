@@ -70,9 +70,9 @@ pub enum Act {
     Keep,
     /// Take the effect accepted last back.
     Undo,
-    /// Accept again what was taken back last.
+    /// Accept again the effect that was removed last.
     Redo,
-    /// Fit what is not fitted, for example after a flight has changed its role.
+    /// Compute the fits that are missing, for example after a flight has changed its role.
     Fit,
     /// Judge the models by the test flights.
     Judge,
@@ -119,10 +119,10 @@ pub enum Act {
 }
 
 impl Bench {
-    /// Does what is asked for.
+    /// Carries out the request.
     ///
     /// # Errors
-    /// The session has moved on since the requester looked, or what is asked for cannot be done.
+    /// The session has changed since the requester's view of it, or the request cannot be carried out.
     pub fn act(self: &Arc<Self>, request: Request) -> Result<(), WorkbenchError> {
         let seen = request.revision;
         match request.act {
@@ -201,12 +201,12 @@ impl Bench {
             inner.supersede(Work::Fit);
             Ok(())
         })?;
-        // what is left may not be fitted: the fit of all of it was cut off, or a flight has another role
+        // the remaining effects may have no fit: it was interrupted, or a flight has another role
         self.start(Work::Fit);
         Ok(())
     }
 
-    /// Accepts again what was taken back last.
+    /// Accepts again the effect that was removed last.
     fn redo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.undone.pop();
@@ -220,7 +220,7 @@ impl Bench {
     /// Takes a log that a page has sent, called `name`.
     ///
     /// # Errors
-    /// It is no log or cannot be used, is there already, or cannot be kept.
+    /// The file is not a log or cannot be used, is in the session already, or cannot be stored.
     pub fn take(&self, seen: u64, name: &str, bytes: &[u8]) -> Result<(), WorkbenchError> {
         self.take_as(seen, name, bytes, None)
     }
@@ -320,7 +320,7 @@ impl Bench {
         })
     }
 
-    /// Reads the model's files again, and the logs by them; what was worked out of the old ones goes.
+    /// Reads the model's files and the logs again, and discards the results from the old files.
     fn reload(&self, seen: u64) -> Result<(), WorkbenchError> {
         let path = self.lock().session.model.clone();
         let read = load(&path)?;

@@ -158,7 +158,7 @@ impl Bench {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Inner> {
-        // what a panicking job left behind is whole: it changes the state in single steps
+        // the state is consistent even after a panic of a job, which changes it in single steps
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -252,7 +252,7 @@ impl Bench {
         let (key, ways, models, flights) = {
             let inner = self.lock();
             let (shown, (ways, models)) = (inner.shown(), inner.ways());
-            // an effect that has no model yet changes nothing
+            // an effect without a fitted model changes nothing
             let effects = if shown == "given" { &[] } else { &inner.session.effects[..] };
             let key = format!("{}{shown}{ways:?}", inner.key("comparison", effects));
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
@@ -274,7 +274,7 @@ impl Bench {
         self.folder.join("fits").join(key)
     }
 
-    /// [`WorkbenchError::ModelChanged`] if the model file differs from what was read.
+    /// [`WorkbenchError::ModelChanged`] if the model file has changed since it was read.
     pub(super) fn same_model(&self) -> Result<(), WorkbenchError> {
         let inner = self.lock();
         match inner.model_changed() {

@@ -18,7 +18,7 @@ pub struct Commands {
     pub compare: String,
     /// Command that finds the effects that the model lacks.
     pub diagnose: String,
-    /// A formula for what is left; empty without a flight to test it on.
+    /// The command that searches a formula for the residual; empty without a flight to test it on.
     pub propose: String,
     /// The amended model; empty without accepted effects.
     pub amend: String,

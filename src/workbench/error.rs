@@ -1,4 +1,4 @@
-//! Why the workbench cannot do what it is asked.
+//! Errors of the workbench's requests.
 
 use std::io;
 use std::path::PathBuf;
@@ -26,13 +26,13 @@ pub enum Kind {
     Conflict,
     /// The data are locked until the test flights are opened.
     Locked,
-    /// There is no such thing.
+    /// The requested object does not exist.
     Missing,
     /// The disk or the program failed.
     Failed,
 }
 
-/// Why the workbench cannot do what it is asked.
+/// Reason why the workbench cannot carry out a request.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkbenchError {
     /// Someone else changed the session first.
@@ -46,7 +46,7 @@ pub enum WorkbenchError {
         /// Revision that the requester saw.
         seen: u64,
     },
-    /// The model file is not what was read.
+    /// The model file has changed since it was read.
     #[error(
         "{} changed on disk since it was read, so what is shown is not about it; reload the model", path.display()
     )]
@@ -54,7 +54,7 @@ pub enum WorkbenchError {
         /// Path of the model file.
         path: PathBuf,
     },
-    /// A log is not what it was.
+    /// A log has changed since it was read.
     #[error(
         "{} is not the log that the session knows: its content changed; take it out of the session and add it again", path.display()
     )]
@@ -142,7 +142,7 @@ pub enum WorkbenchError {
     /// The fit is not done.
     #[error("the fit of the accepted effects is not done; wait for it, or take the effect back")]
     Unfitted,
-    /// A text is no effect file.
+    /// A text is not an effect file.
     #[error("{0}")]
     EffectText(String),
     /// The effect is accepted.
@@ -160,7 +160,7 @@ pub enum WorkbenchError {
     /// The program has no simulator.
     #[error("this program was built without the simulator; build it with the feature sitl")]
     NoSimulator,
-    /// There is no recording.
+    /// The recording does not exist.
     #[error("there is no recording in {}: name the folder that `greylag fly` printed, which holds flight.csv", .0.display())]
     NoRecording(PathBuf),
     /// The session is open elsewhere.

@@ -69,7 +69,7 @@ struct Task {
 }
 
 impl Bench {
-    /// Works out the fits of all accepted effects that are not there yet.
+    /// Computes the missing fits of all accepted effects.
     pub(super) fn fit(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let count = self.lock().session.effects.len();
         for k in 1..=count {
@@ -193,7 +193,7 @@ fn hashed(inner: &Inner, role: Role) -> Vec<Hashed> {
     inner.usable(&[role]).iter().map(of).collect()
 }
 
-/// Writes a fit to `folder`, whole or not at all.
+/// Writes a fit to `folder` atomically.
 fn write(task: &Task, amended: &Amended, folder: &Path) -> Result<(), WorkbenchError> {
     let [logs, hold_out] = &task.logs;
     let slowest = task.model.airframe.envelope.flying_from_mps();

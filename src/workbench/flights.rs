@@ -17,7 +17,7 @@ use greylag_sysid::flight_path::reconstruction::Reconstruction;
 use greylag_sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag_sysid::weak_form::prepared::Prepared;
 
-/// Points of the strip that shows a flight at a glance.
+/// Number of points of the small plot of a flight.
 const STRIP: usize = 160;
 
 /// A log in memory.
@@ -32,7 +32,7 @@ pub struct Loaded {
     pub prepared: Prepared,
 }
 
-/// The flight at a glance: a few values over its length.
+/// Values of a flight for a small plot.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Strip {
     /// Angle of attack α, °.
@@ -48,7 +48,7 @@ pub struct Strip {
 }
 
 impl Loaded {
-    /// Reads `bytes`, the log called `name`, for `model`.
+    /// Reads the log `name` from `bytes`, with the envelope and the mixer of `model`.
     pub fn parse(
         bytes: &[u8],
         name: &str,
@@ -93,12 +93,12 @@ impl Loaded {
         Loaded::parse(&bytes, &entry.name(), reading, model)
     }
 
-    /// Whether the log holds what makes figures wrong.
+    /// Whether the log has defects that falsify the figures computed from it.
     pub fn in_doubt(&self) -> bool {
         self.info.severity() == Severity::Problem
     }
 
-    /// The flight at a glance.
+    /// The values of the flight for a small plot.
     pub fn strip(&self) -> Strip {
         let all: Vec<_> = self.prepared.segments.iter().flatten().collect();
         let every = all.len().div_ceil(STRIP).max(1);

@@ -60,10 +60,10 @@ pub fn grammar() -> Value {
     json!({ "example": EXAMPLE, "variables": variables, "functions": functions })
 }
 
-/// Reads a text as an effect file; nothing is kept.
+/// Parses a text as an effect file, without storing it.
 ///
 /// # Errors
-/// What is wrong with it, in which line, and what to do.
+/// Describes the error, its line and the remedy.
 pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
     let written = file::parse(text).map_err(WorkbenchError::EffectText)?;
     let Description { id, description, formula, .. } = written.about;
@@ -81,7 +81,7 @@ impl Bench {
         let path = effect_file(&self.folder, id);
         let mut before = None;
         let kept = self.change(seen, |inner| {
-            // one that the model has stays what it was fitted with
+            // an effect that is in the model keeps the formula with which it was fitted
             if inner.model.has(id) {
                 return Err(WorkbenchError::Present(id.into()));
             }

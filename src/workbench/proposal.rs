@@ -40,7 +40,7 @@ pub struct Designed {
 }
 
 impl Bench {
-    /// Searches a formula for what the given model leaves unexplained, and stores the result.
+    /// Searches a formula for the unexplained residual of the given model, and stores the result.
     pub(super) fn propose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let (key, model, [search, test], with) = {
             let inner = self.lock();

@@ -25,7 +25,7 @@ pub struct Divided {
 }
 
 impl Inner {
-    /// Takes a log into the session with `role`, or the usual one; one that stood at the same place before goes.
+    /// Adds a log to the session with `role`, or with the default role. It replaces a log with the same path.
     pub fn take_in(&mut self, entry: LogEntry, role: Option<Role>, loaded: Arc<Loaded>) {
         let file = self.folder.join(&entry.path);
         let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
@@ -73,7 +73,7 @@ impl Inner {
 
     /// Whether a flight is a test flight that has not been opened.
     pub fn locked(&self, log: &LogEntry) -> bool {
-        // sessions of before hashes know their flights by name
+        // older sessions without hashes identify flights by name
         let opened = self.session.openings.iter().any(|o| match o.sha256.is_empty() {
             true => o.flights.contains(&log.name()),
             false => o.sha256.contains(&log.sha256),
@@ -112,7 +112,7 @@ impl Inner {
         places.iter().zip(self.names(places)).filter_map(of).collect()
     }
 
-    /// The flights with the role Fit, whole.
+    /// The complete flights with the role Fit.
     pub fn to_fit(&self) -> Result<Vec<Reconstruction>, WorkbenchError> {
         match self.usable(&[Role::Fit])[..] {
             [] => Err(WorkbenchError::NoRole(Role::Fit)),

@@ -69,7 +69,7 @@ pub struct Accepted {
     pub anyway: bool,
 }
 
-/// Why test flights can be seen.
+/// Reason why the test flights have been revealed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Occasion {
@@ -157,7 +157,7 @@ pub struct Flown {
 pub struct Session {
     /// Version of the file's layout: 1.
     pub schema: u32,
-    /// Goes up by one with each change.
+    /// Revision number: increases by one with each change.
     pub revision: u64,
     /// The model to start from.
     pub model: PathBuf,
@@ -219,7 +219,7 @@ impl Session {
         }
     }
 
-    /// Writes the session to `folder`, whole or not at all.
+    /// Writes the session to `folder` atomically.
     ///
     /// # Errors
     /// The folder or the disk refuses.

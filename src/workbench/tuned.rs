@@ -1,4 +1,4 @@
-//! The model with its own coefficients tuned and no effect added: what is left then is for a missing effect to explain.
+//! The model with its own coefficients tuned and no effect added: only a missing effect can explain its remaining error.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +15,7 @@ use greylag_sysid::amend::Fit;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// As its file has it.
+    /// The model as in its file.
     Given,
     /// Its own coefficients fitted, no effect added.
     Tuned,
@@ -52,7 +52,7 @@ impl Inner {
         Some(model)
     }
 
-    /// The model as given, then tuned, then as amended, as far as each is known.
+    /// The model as given, tuned, and amended; those that are not fitted yet are left out.
     pub(super) fn ways(&self) -> (Vec<Way>, Vec<GreyBox>) {
         let mut models = self.models();
         let amended = (models.len() > 1).then(|| models.remove(1));

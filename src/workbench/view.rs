@@ -33,7 +33,7 @@ struct FlightView<'a> {
     name: String,
     path: String,
     role: Role,
-    /// Whether its data may not be seen yet.
+    /// Whether the flight's data are still hidden.
     locked: bool,
     error: Option<&'a str>,
     #[serde(flatten)]
@@ -105,7 +105,7 @@ struct FailingView<'a> {
     notes: &'a [String],
 }
 
-/// A free run that is asked for.
+/// Request for a free run.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
@@ -120,7 +120,7 @@ pub struct RunRequest {
 /// A free run of each model.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeRun {
-    /// The runs of the models: as given, tuned, amended, as far as each is known.
+    /// The runs of the models as given, tuned and amended; those that are not fitted yet are left out.
     pub runs: Vec<OneRun>,
 }
 
@@ -203,7 +203,7 @@ impl Bench {
     /// The flight over time, measured and by the models.
     ///
     /// # Errors
-    /// There is no such flight, or it may not be seen yet.
+    /// The flight does not exist, or is still hidden.
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
         let flight = self.may_be_seen(place)?;
         let missing = WorkbenchError::NoFlight(place);
@@ -229,7 +229,7 @@ impl Bench {
     /// Free runs of the models from a moment of a flight.
     ///
     /// # Errors
-    /// The flight may not be seen, or is not flown at that moment.
+    /// The flight is still hidden, or the aircraft is not in flight at that time.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
         let flight = self.may_be_seen(request.flight)?;
         let (ways, models) = self.lock().ways();
@@ -247,7 +247,7 @@ impl Bench {
         Ok(FreeRun { runs: runs.ok_or(WorkbenchError::NotFlown(request.time_s))? })
     }
 
-    /// A flight whose data may be seen.
+    /// A flight whose data are not hidden.
     fn may_be_seen(&self, place: usize) -> Result<Arc<Loaded>, WorkbenchError> {
         let inner = self.lock();
         let log = inner.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;

@@ -85,7 +85,7 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
     Ok(report.page().render())
 }
 
-/// Prints what was found.
+/// Prints the findings.
 pub fn print(found: &AircraftCheck) {
     println!("\n{}", levels(found));
     println!("\n{}", modes(found));

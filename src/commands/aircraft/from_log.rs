@@ -1,4 +1,4 @@
-//! `greylag aircraft from-log`: a model of an aircraft from its measures and a flight.
+//! `greylag aircraft from-log`: a model of an aircraft from its dimensions and its flight logs.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::model::GreyBox;
 
 /// A coefficient is known if its standard deviation is at most this share of its magnitude.
 const KNOWN: f64 = 0.3;
-/// Manoeuvres that excite the coefficients of an effect, for those that the flights leave unknown.
+/// Start of a coefficient's name, and a manoeuvre that excites such coefficients.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
     ("pitch_linear", "elevator doublets at three airspeeds"),
@@ -44,8 +44,8 @@ pub struct Arguments {
     logs: LogArguments,
 }
 
-/// Writes the estimate from size, fits it to the logs, writes its page and recommends further
-/// flights.
+/// Writes the model estimated from the dimensions, fits it to the logs, writes the page of the fitted aircraft and
+/// recommends further flights.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Arguments { folder, span_m, area_m2, common, logs } = arguments;
     if folder.join("model.toml").exists() {
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     line.extend(["--report".into(), folder.join("fit.html").into_os_string()]);
     let Command::Amend(amend) = command_of(&line)? else { bail!("greylag amend cannot be run") };
     let status = crate::commands::amend::run(&amend).inspect_err(|_| {
-        // so that the same line works once its mistake is mended
+        // the folder must not exist when the corrected command is run again
         let _ = std::fs::remove_dir_all(if made { folder } else { &prior });
     })?;
     if !fitted.exists() {
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(status)
 }
 
-/// Recommends manoeuvres for the coefficients that the flights leave unknown.
+/// Recommends manoeuvres for the coefficients that the flights do not determine.
 fn next(folder: &Path, fitted: &Path) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("amend.json"))?;
     let story: serde_json::Value = serde_json::from_str(&text)?;
@@ -103,7 +103,7 @@ fn next(folder: &Path, fitted: &Path) -> Result<()> {
         }
     }
     match said.is_empty() {
-        true => println!("the flights know every coefficient within {:.0} %", 100.0 * KNOWN),
+        true => println!("the flights determine every coefficient within {:.0} %", 100.0 * KNOWN),
         false => said.iter().for_each(|(manoeuvre, names)| {
             println!(
                 "fly {manoeuvre}: {} not known within {:.0} %",

@@ -1,4 +1,4 @@
-//! `greylag aircraft import derivatives`: what an aerodynamic tool computed, as airframe and model.
+//! `greylag aircraft import derivatives`: airframe and model from the stability derivatives of an aerodynamic tool.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,8 +38,7 @@ pub struct Derivatives {
     control_unit: Angle,
 }
 
-/// Imports the derivatives and lists what the file lacks and what is implausible; the exit status
-/// is 3 for the latter.
+/// Imports the derivatives and lists missing and implausible values. With implausible ones the exit status is 3.
 pub fn run(arguments: &Derivatives) -> Result<ExitCode> {
     let Derivatives { file, out, common, unit_m, control_unit } = arguments;
     if !(*unit_m > 0.0 && *unit_m < 1e3) {

@@ -14,7 +14,7 @@ use crate::sysid::amend::{Added, Options};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::PerFlight;
 
-/// Standard deviation of the measured axes where no other is asked for, °: what eyes and tape leave.
+/// Default standard deviation of the measured axes, °: an installation aligned by eye.
 const ASKEW_DEG: f64 = 3.0;
 
 /// The structures that are tried: the model as given, its coefficients fitted, these with trims and with axes of each

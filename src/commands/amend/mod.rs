@@ -287,7 +287,7 @@ fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf
     }
 }
 
-/// What the diagnosis of the fitted flights says where it asserts no effect, and the commands that go on from there.
+/// Error message when the diagnosis of the fitted flights asserts no effect: its verdict, and the commands to run next.
 fn nothing_asserted(
     arguments: &Arguments,
     diagnosis: &Diagnosis,

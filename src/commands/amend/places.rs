@@ -33,7 +33,7 @@ impl Drop for Places {
     /// A folder that this run made does not stay behind empty.
     fn drop(&mut self) {
         if self.made {
-            // fails where something was written, and nothing is lost otherwise
+            // fails if the folder has files; an empty one is removed
             let _ = fs::remove_dir(&self.folder);
         }
     }

@@ -26,8 +26,8 @@ pub enum Source {
 }
 
 impl Cost {
-    /// What a cell of `stage` costs; `None` if nothing is known of it. A cell that was interrupted counts for none: its
-    /// last session is not the whole.
+    /// Cost of a cell of `stage`; `None` if it is unknown. Interrupted cells are not counted, because the time of their last
+    /// session is not that of the whole cell.
     ///
     /// # Errors
     /// If the times of a cell cannot be read.

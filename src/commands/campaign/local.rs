@@ -22,9 +22,9 @@ const LOOK: Duration = Duration::from_millis(50);
 const PAUSE: Duration = Duration::from_secs(2);
 /// Time that a process has to come to its checkpoint after Ctrl-C.
 const GRACE: Duration = Duration::from_secs(20);
-/// Most times in all that a cell is started whose process a signal ended, as for want of memory.
+/// Largest number of starts of a cell whose process was ended by a signal, for example for lack of memory.
 const KILLS: u32 = 3;
-/// Where what the cells print goes, below the campaign's folder.
+/// Folder of the cells' output text, below the campaign's folder.
 const LOGS: &str = "logs";
 
 /// Treatment of cells that failed before.
@@ -110,7 +110,7 @@ fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
 }
 
 impl Local<'_> {
-    /// Runs until nothing is left that can be run; whether Ctrl-C ended it.
+    /// Runs cells until none is left that can be run. Returns whether Ctrl-C ended the run.
     fn all(&mut self) -> Result<bool> {
         self.show()?;
         loop {
@@ -275,7 +275,7 @@ impl Local<'_> {
             std::thread::sleep(LOOK);
         }
         for child in self.running.values_mut() {
-            // what it has written is whole, and it goes on from there
+            // its files are complete, and a restart resumes from them
             let _ = child.kill();
             let _ = child.wait();
         }

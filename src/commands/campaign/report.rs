@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if programs.len() > 1 {
         let all: Vec<&str> = programs.into_iter().collect();
         println!(
-            "the results come from several programs: {}; run the cells of one of them again",
+            "the results come from several program versions: {}; run the cells again with one of them",
             all.join(", ")
         );
     }
@@ -86,7 +86,7 @@ impl Arguments {
         };
         let mut records = read_lines(path)?;
         let all = records.len();
-        // two cells may have one command, and with it one identity
+        // cells with the same command have the same identity, so the cell's name is compared too
         let planned: HashSet<(&str, &str)> =
             plan.cells.iter().map(|c| (c.id.as_str(), c.identity.as_str())).collect();
         records.retain(|r| planned.contains(&(r.cell.as_str(), r.identity.as_str())));

@@ -109,7 +109,7 @@ impl Client {
         self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
-    /// Asks every half second until it is so.
+    /// Sends the request every half second until it is fulfilled.
     fn until(
         &mut self,
         what: &str,
@@ -121,7 +121,7 @@ impl Client {
             if start.elapsed() > ANSWER_TIMEOUT {
                 bail!("no {what} within {} s: {}", ANSWER_TIMEOUT.as_secs(), self.last_text());
             }
-            // the companion wants a fresh setpoint before it enters offboard
+            // the companion requires a recent setpoint before it enters offboard
             if Instant::now() >= due + Duration::from_millis(100) {
                 if let Some(bytes) = ask(&mut self.protocol) {
                     self.send(&bytes);
@@ -133,7 +133,7 @@ impl Client {
         Ok(())
     }
 
-    /// Sends what is due, and reads one datagram if there is one.
+    /// Sends the messages that are due, and reads one datagram if there is one.
     fn turn(&mut self) -> Result<()> {
         let now = Instant::now();
         if now >= self.heartbeat_due {
@@ -148,7 +148,7 @@ impl Client {
             self.send(&bytes);
         }
         let mut datagram = [0; 2048];
-        // a time-out, or a companion that is not there yet, is no news
+        // a time-out, or a companion that has not started yet, is not an error
         let Ok(length) = self.socket.recv(&mut datagram) else { return Ok(()) };
         let (view, texts) = (&mut self.view, &mut self.texts);
         self.protocol.read(&datagram[..length], |heard| match heard {

@@ -1,4 +1,4 @@
-//! An attitude indicator of letters: the horizon as it is seen from the aircraft.
+//! An attitude indicator in text characters: the horizon as seen from the aircraft.
 
 /// Rows of the indicator, an odd number.
 pub const ROWS: usize = 9;

@@ -67,11 +67,11 @@ impl Live<'_> {
         self.wipe();
         rows.iter().for_each(|row| println!("{row}"));
         self.drawn = rows.len();
-        // a terminal that cannot be written to is no reason to stop flying
+        // an error of the terminal must not end the flight
         let _ = std::io::stdout().flush();
     }
 
-    /// Takes back what was drawn: the cursor goes up, and all below it is cleared.
+    /// Erases the last drawing: moves the cursor up and clears the lines below it.
     fn wipe(&mut self) {
         if self.drawn > 0 {
             print!("\u{1b}[{}A\u{1b}[J", self.drawn);

@@ -27,7 +27,7 @@ pub(super) struct AnyArguments {
     beside: Vec<PathBuf>,
 }
 
-/// A controller with what it knows of the aircraft.
+/// A controller and the information that it has about the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Knowledge {
@@ -156,7 +156,7 @@ fn one(
     Flight { aircraft: exact.airframe.name.clone(), controller: kind.name(), knows, minute }
 }
 
-/// A table of all drawn aircraft: a row for each controller and what it knows.
+/// A table over all drawn aircraft: one row for each controller and its information.
 fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

@@ -1,4 +1,4 @@
-//! Evaluation in models drawn from the widths of the coefficients.
+//! Evaluation in models whose coefficients are drawn from their prior distributions.
 
 use std::process::ExitCode;
 
@@ -25,7 +25,7 @@ struct DrawsDocument<'a> {
     controllers: &'a [Robustness],
 }
 
-/// Flies draws of the first model, prints the tables, writes the JSON.
+/// Evaluates the controllers in draws of the first model, prints the tables, writes the JSON.
 pub(super) fn over_draws(
     arguments: &Arguments,
     draws: u32,

@@ -1,28 +1,28 @@
 //! Control power, damping and stiffness of one axis of an unknown aircraft, estimated in flight.
 //!
 //! Recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark, "Adaptive Control",
-//! 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂, each side differentiated and low-passed alike, so that what is
-//! constant or slow (trim, wind, asymmetry) drops out.
+//! 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂, with both sides differentiated and low-passed alike. Constant and
+//! slow influences (trim, wind, asymmetry) drop out.
 
 use greylag_model::STEP;
 
-/// Corner of the filters that both sides of the regression pass, rad/s.
+/// Corner frequency of the low-pass filters of both sides of the regression, rad/s.
 const CORNER: f64 = 20.0;
-/// Lags that stand for an unknown servo and an unknown delay, 1/s.
+/// Corner frequencies of two first-order lags that approximate an unknown servo and an unknown delay, rad/s.
 const SERVO: [f64; 2] = [25.0, 40.0];
-/// Error of the regression that does not grow with it, in g/V of the cruise airspeed and 1/s.
+/// Constant part of the regression's error, 1/s²; multiplied by V/g at cruise (s) it has the unit of the left side.
 const NOISE: f64 = 4.0;
-/// Error of the regression as a share of what is seen: servos and delays are not those assumed.
+/// Relative part of the regression's error: the true servos and delays differ from those assumed.
 const SHARE: f64 = 0.2;
 /// Forgetting rate of the estimate, 1/s.
 const AGEING: f64 = 1e-3;
 
-/// Power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
+/// Prior of control power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Prior {
     pub mean: [f64; 3],
     pub sd: [f64; 3],
-    /// The least power that is believed.
+    /// Lower limit of the control power.
     pub least: f64,
 }
 
@@ -40,10 +40,10 @@ pub(super) struct Estimate {
 /// Measurements of one axis at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// Rate, rad/s, and the command that was in force, −1..1, positive for positive rates.
+    /// Body rate, rad/s. `command` was in force, −1..1, positive for positive rates.
     pub rate: f64,
     pub command: f64,
-    /// Stand-in for the incidence, rad; zero where none matters.
+    /// Estimate of the incidence angle of the axis, rad; zero for an axis without stiffness.
     pub incidence: f64,
     /// Airspeed over that of cruise.
     pub speed: f64,
@@ -58,7 +58,7 @@ impl Estimate {
         Estimate { prior, theta: prior.mean, covariance, servo: [0.0; 2], filters: None }
     }
 
-    /// Takes an instant in; one that is no number is left out.
+    /// Updates the estimate with the measurements of one instant; those with a NaN are ignored.
     pub(super) fn see(&mut self, seen: &Seen) {
         let Seen { rate, command, incidence, speed, time } = *seen;
         if ![rate, command, incidence, speed].iter().all(|x| x.is_finite()) {
@@ -107,7 +107,7 @@ impl Estimate {
 mod tests {
     use super::*;
 
-    /// Power in (V/g)² that is believed of ω̇ = g u − a ω, V/g = 2 s, after five seconds of a square wave.
+    /// Estimated power, in units of (g/V)², of ω̇ = g u − a ω with V/g = 2 s after five seconds of a square wave.
     fn found(power: f64, damping: f64) -> f64 {
         let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
         let mut estimate = Estimate::new(prior);
@@ -122,7 +122,7 @@ mod tests {
         estimate.theta[0]
     }
 
-    /// From a prior of 400 to a third and to twice of it. A step of delay that the regression does not know takes a fifth.
+    /// The true powers are 120 and 800, the prior is 400. The regression lacks one step of delay, which costs a fifth.
     #[test]
     fn the_power_of_an_axis_is_found_in_five_seconds() {
         for (power, damping) in [(30.0, 6.0), (200.0, 8.0)] {

@@ -20,7 +20,7 @@ const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], 
 /// Lift slope −Z_α, in g/V: cruise at about half the lift of the stall makes it nearly the same for all.
 const LIFT_SLOPE: f64 = 9.0;
 
-/// Rate asked for by an error in roll and in pitch, 1/s.
+/// Gain from an error in roll and in pitch to the commanded rate, 1/s.
 const ATTITUDE: [f64; 2] = [3.0, 2.4];
 /// Bandwidth of the rate loops, 1/s.
 const RATE: f64 = 6.0;
@@ -36,7 +36,7 @@ const ROUNDING: f64 = 0.35;
 
 /// Throttle: at cruise; by parts of airspeed missing; its integral by V/g; by the sine of the pitch.
 const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
-/// The nose goes down from here to there, parts of the cruise airspeed, and so far, rad.
+/// Shares of the cruise airspeed between which the nose is lowered, by up to [`NOSE_DOWN`] (rad).
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
 /// Rudder by the yaw rate beyond that of a coordinated turn, V/g; and at most.
@@ -103,14 +103,13 @@ pub struct Adaptive {
     rudder: bool,
     reference: Option<[f64; 2]>,
     axes: [Axis; 2],
-    /// Stand-in for the change of incidence, rad.
+    /// Estimated change of the angle of attack, rad.
     incidence: f64,
     thrust: f64,
 }
 
 impl Adaptive {
-    /// A controller of the aircraft that `airframe` describes, of which it reads the cruise airspeed and whether there is a
-    /// rudder.
+    /// A controller of the aircraft of `airframe`, from which it takes the cruise airspeed and whether there is a rudder.
     pub fn new(airframe: &Airframe) -> Adaptive {
         Adaptive {
             cruise: airframe.envelope.airspeed_cruise_mps,
@@ -135,7 +134,7 @@ impl Adaptive {
         }
     }
 
-    /// Moves the reference towards `wanted`; the reference with its rates, rad and rad/s.
+    /// Moves the reference towards `wanted`; returns the reference (rad) and its rates (rad/s).
     fn follow(&mut self, now: [f64; 2], wanted: [f64; 2]) -> [[f64; 2]; 2] {
         let mut reference = self.reference.unwrap_or(now);
         let mut rates = [0.0; 2];

@@ -1,6 +1,6 @@
 //! One recurrent policy for any fixed wing: a GRU that was trained by analytic gradients through the flight of aircraft
 //! drawn from a distribution (`params/any/train.py`). Like [`adaptive`](crate::adaptive) it needs the cruise airspeed, and
-//! to know whether there is a rudder; what else an aircraft is like its memory finds out in flight.
+//! to know whether there is a rudder; its recurrent state adapts to all other properties in flight.
 
 mod network;
 
@@ -122,7 +122,7 @@ impl Controller for AnyPolicy {
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
         let (inputs, mut memory) = self.see(seen, target);
         let [aileron, elevator, throttle, rudder] = self.network.step(&mut memory.hidden, &inputs);
-        // what is no number is answered with none, and forgotten
+        // a NaN in the inputs gives a NaN command, and must not enter the recurrent state
         if inputs.iter().all(|x| x.is_finite()) {
             self.memory = memory;
         }

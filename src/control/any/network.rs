@@ -1,4 +1,4 @@
-//! The network of the policy for any aircraft: a GRU with a linear path beside it.
+//! The network of the policy for any aircraft: a GRU and a parallel linear path.
 
 use std::sync::LazyLock;
 
@@ -73,7 +73,7 @@ impl Network {
         })
     }
 
-    /// One step: what it puts out (−1..1); `hidden` moves on.
+    /// One step of the network: returns its outputs (−1..1) and updates `hidden`.
     pub(super) fn step(&self, hidden: &mut [f64; HIDDEN], x: &[f64; INPUTS]) -> [f64; OUTPUTS] {
         let before = *hidden;
         let seen = |k: usize| dot(&self.input[k * INPUTS..][..INPUTS], x) + self.bias[k];

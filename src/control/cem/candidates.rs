@@ -1,4 +1,4 @@
-//! The last tick's search for a reader: its candidates, flown one by one in the model.
+//! The last tick's search for display: its candidates, each simulated with the model.
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};

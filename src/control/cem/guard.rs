@@ -37,7 +37,7 @@ impl Cem {
     /// The policy's own command, without a search.
     pub(super) fn unsearched(&mut self, seen: &Observation, target: &Target) -> Command {
         (self.last, self.planned_for) = (None, None);
-        // without noise the first lane is what the policy does
+        // the first lane has no noise: it is the policy's own plan
         self.blocks[0] = [[[0.0; WIDTH]; 3]; HORIZON];
         self.fly(seen, target, Actions::Policy, [0, 1]);
         flown(&self.candidate(0).plan[0])

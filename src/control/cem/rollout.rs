@@ -36,13 +36,13 @@ pub(super) struct Scene<'a> {
     pub alpha: Option<f64>,
     /// Terminal value function that replaces the critics.
     pub surrogate: Option<Surrogate>,
-    /// Past commands that the integrator needs.
+    /// Memory of the model's integrator: the last acceleration.
     pub memory: Memory,
     /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
-    /// The base controller's law after the plan, and its throttle throughout.
+    /// Law of the base controller: it flies after the plan, and commands the throttle during the plan too.
     pub ahead: Option<&'a Ahead>,
-    /// Without a base: total steps, flown by the policy after the plan; five without a policy.
+    /// Total number of steps without a base controller: the policy flies those after the plan. Five without a policy.
     pub steps: usize,
     /// Sideslip that costs a reward of 1 per step where a rudder is flown, rad.
     pub sideslip: Option<f64>,
@@ -125,7 +125,7 @@ impl Machine {
         out: &mut [Worth],
     ) {
         match self {
-            // SAFETY: `detect` has seen the processor's features
+            // SAFETY: `detect` has checked the processor's features
             #[cfg(target_arch = "x86_64")]
             Machine::Avx512(units) => unsafe { fly_avx512(scene, actions, blocks, out, units) },
             // SAFETY: as above
@@ -199,8 +199,8 @@ struct Flight<R> {
 }
 
 impl<R: Packed> Flight<R> {
-    /// Lags and delays on the deflections start in steady state at the present deflections: over five steps, a plan
-    /// therefore overestimates how much of the present deflection acts.
+    /// Lags and delays of the deflections start in steady state at the present deflections. Over the five steps of a plan, the
+    /// effect of the present deflections is therefore overestimated.
     #[inline(always)]
     fn new(scene: &Scene) -> Self {
         let lane = R::from_f64;
@@ -285,8 +285,8 @@ fn rollout<R: Packed>(
         None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
-    // plain loops, and one call of the model: an iterator that is not inlined leaves the vector
-    // instructions, a second copy of the model doubles what takes minutes to compile
+    // plain loops, because an iterator that is not inlined is compiled without the vector instructions;
+    // one call of the model, because a second inlined copy doubles a compile time of minutes
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];
@@ -314,7 +314,7 @@ fn rollout<R: Packed>(
                 command.aileron = (command.aileron + base.aileron).clamp(-1.0, 1.0);
                 command.elevator = (command.elevator + base.elevator).clamp(-1.0, 1.0);
             }
-            // the base flies throttle and rudder: what is planned is attitude
+            // the base controller commands throttle and rudder: only aileron and elevator are planned
             command.throttle = base.throttle;
             command.rudder = base.rudder;
             command = slewed(command, &flight.previous[0], &scene.model.airframe);

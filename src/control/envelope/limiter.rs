@@ -298,7 +298,7 @@ impl Moment<'_> {
         if !inside {
             return stall;
         }
-        // the incidence of a load factor goes with 1/V²
+        // the angle of attack for a load factor is proportional to 1/V²
         let rate = self.rate(&self.state, &self.controls).airspeed;
         let rate = -2.0 * rate / self.state.airspeed * bounds.load[side] / slope;
         At { limit: Limit::Load, value: alpha, rate }

@@ -51,12 +51,12 @@ pub struct Lqi {
     last: Option<Given>,
 }
 
-/// What a command was made of, to take it back where it was not flown.
+/// Parts of a command, from which the integrals are corrected if another command was flown.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// Roll and pitch of the aircraft, rad.
     attitude: [f64; 2],
-    /// What was added to the integrals, rad s.
+    /// Last change of the integrals, rad s.
     added: [f64; 2],
     /// Deflection of aileron and elevator by their own angle's reference, rad by rad.
     by_reference: [f64; 2],

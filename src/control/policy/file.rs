@@ -70,7 +70,7 @@ pub enum AgentError {
     Content {
         /// Path of the file.
         path: PathBuf,
-        /// What is invalid in it.
+        /// Description of the invalid content.
         why: String,
     },
     /// The policy was trained for another airframe.

@@ -24,7 +24,7 @@ use greylag_physics::{State, Time};
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
 /// Deviations in one plane within this time are attributed to one cause, s.
 const ONE_CAUSE_S: f64 = 20.0;
-/// Fraction of the envelope's smallest airspeed below which nothing is compared.
+/// Fraction of the envelope's smallest airspeed below which the monitor makes no comparison.
 const SLOWEST: f64 = 0.8;
 
 /// Measurement and prediction of one channel: m/s² for specific forces, rad/s² for angular accelerations.

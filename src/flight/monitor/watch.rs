@@ -40,8 +40,8 @@ struct Follows {
 }
 
 impl Watch {
-    /// Takes the residual of a step of `dt` (s), the variance of its prediction, and the deflection (rad) of the
-    /// channel's surface.
+    /// Updates the monitor with the residual of a step of `dt` (s), the variance of its prediction, and the deflection (rad)
+    /// of the channel's surface.
     pub fn see(&mut self, residual: f64, variance: f64, surface: f64, dt: f64) {
         let towards = |from: &mut f64, to: f64, time: f64| *from += (to - *from) * dt / (time + dt);
         towards(&mut self.residual, residual, SMOOTHED_S);
@@ -54,13 +54,13 @@ impl Watch {
         self.departed &= self.quiet_s < QUIET_S;
     }
 
-    /// The residual divided by the half width of its band, signed and dimensionless; outside −1..1 is outside the
-    /// band, NaN before the first.
+    /// The residual divided by the half width of its band, signed and dimensionless: beyond −1..1 it is outside the
+    /// band. NaN before the first residual.
     pub fn share(&self) -> f64 {
         (self.power.sqrt() / self.band()).copysign(self.residual)
     }
 
-    /// Half width of the band in the residual's unit; NaN before the first.
+    /// Half width of the band in the residual's unit; NaN before the first residual.
     pub fn band(&self) -> f64 {
         self.variance.map_or(f64::NAN, |variance| BAND * variance.sqrt())
     }
@@ -109,7 +109,7 @@ mod tests {
 
     const DT: f64 = 0.01;
 
-    /// When a watch departs for each time, s, on a residual and a surface of time; width 1, so a band of 2.
+    /// Times of the reported deviations, s, for a residual as a function of time. Its standard deviation is 1, the band ±2.
     fn departures(seconds: f64, residual: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut watch, mut times) = (Watch::default(), Vec::new());
         for i in 0..(seconds / DT) as usize {

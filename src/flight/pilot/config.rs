@@ -63,7 +63,7 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// If the model has no trim at the cruise airspeed, level or in a glide, or what [`Config::check`] finds.
+    /// If the model has no trim at the cruise airspeed, level or in a glide, or an error of [`Config::check`].
     pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
@@ -87,7 +87,7 @@ impl Config {
             // Five frames: longer than the jitter of a link, shorter than a wrong aileron needs
             // to roll the aircraft far.
             state_hold_s: 0.05,
-            // Full travel in 0.2 s, the lag of the motor: faster would not show in the thrust.
+            // Full travel in 0.2 s, the lag of the motor: a faster command would not change the thrust.
             throttle_slew_per_s: 5.0,
             thrust_source: ThrustSource::Cruise,
             arm_tilt_max_deg: 60.0,
@@ -100,7 +100,7 @@ impl Config {
 }
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
-    // trim depends on equivalent airspeed, which differs by 5 % from true airspeed a thousand metres away
+    // trim depends on equivalent airspeed; at a given true airspeed it changes by 5 % per 1000 m of altitude
     let trim = Trim::straight(model, airspeed, model.airframe.reference.altitude)?;
     let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {

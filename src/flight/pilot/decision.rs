@@ -44,7 +44,7 @@ pub enum Plan {
     Late,
     /// The planner was still busy with an earlier request and did not receive this one.
     Busy,
-    /// There is no planner.
+    /// No planner is active.
     None,
 }
 

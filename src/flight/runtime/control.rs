@@ -150,7 +150,7 @@ impl Control {
         self.duration.is_some_and(|duration| self.started.elapsed() >= duration)
     }
 
-    /// Takes one arrival, the vehicle's before a client's, or waits until `until`.
+    /// Handles one packet, the vehicle's before a client's, or waits for one until `until`.
     fn take_one(&mut self, until: Instant) {
         let wait = until.saturating_duration_since(Instant::now());
         let arrived = select_biased! {
@@ -173,14 +173,14 @@ impl Control {
         }
     }
 
-    /// Detects a stall of this computer, waits until the network thread has delivered what arrived meanwhile, and
-    /// excludes the stall from all timeouts. After a stall, returns the vehicle time from which states are live and no
+    /// Detects a stall of this computer, waits until the network thread has delivered the packets of that time, and excludes
+    /// the stall from all timeouts. After a stall, returns the vehicle time from which states are live and no
     /// longer history.
     fn excuse_stall(&mut self) -> Option<Time> {
         let host = Instant::now();
         let (behind, since) = self.attention.look(host, self.ports.rounds())?;
         let before = self.clock.at(since);
-        // one round may end what the stall began; the next has polled every socket
+        // the first round may have started before the stall; the second has polled every socket
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);

@@ -14,7 +14,7 @@ pub struct Signing {
     pub key: PathBuf,
     /// Whether the vehicle's link is signed.
     pub vehicle: VehicleLink,
-    /// Client links that are declared local: nothing is signed there.
+    /// Client links that are declared local: frames are not signed there.
     pub local: Vec<Address>,
 }
 

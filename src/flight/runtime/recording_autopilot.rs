@@ -27,7 +27,7 @@ impl<F: FnMut(Event)> RecordingAutopilot<'_, F> {
 
 impl<F: FnMut(Event)> Autopilot for RecordingAutopilot<'_, F> {
     fn arm(&mut self, now: Time, force: bool) -> Verdict {
-        // conditions of the controller are no pre-arm check that force could skip
+        // conditions of the controller are not pre-arm checks: a forced command does not skip them
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(format!("arming refused: {obstacle}")),
             None => {

@@ -93,7 +93,7 @@ pub fn trainable(model: &GreyBox) -> Vec<String> {
         let Some(kind) = Kind::from_id(about.id) else { continue };
         let count = about.coefficients.len();
         for (k, c) in about.coefficients[..count - about.shape].iter().enumerate() {
-            // an effect on inertia is no force
+            // an effect on inertia is not a force
             let one: Vec<f64> = (0..count).map(|i| if i == k { 0.1 } else { 0.0 }).collect();
             let (mut body, mut still) = (*model.bare_body(), *model.bare_body());
             kind.change(&one, &mut body);

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamics::loss::Penalty;
 use greylag_model::GreyBox;
 
-/// The objective's origin.
+/// Variant of the training objective, by its publication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
@@ -70,7 +70,7 @@ pub struct Recipe {
     pub hidden: Vec<usize>,
     /// Rollout lengths n, in steps: each has an equal share of the updates in turn.
     pub steps: Vec<usize>,
-    /// Rollouts per minibatch.
+    /// Number of rollouts in a minibatch.
     pub batch: usize,
     /// Total number of updates.
     pub updates: u64,
@@ -78,8 +78,8 @@ pub struct Recipe {
     pub rate: f64,
     /// Final fraction of the learning rate.
     pub rate_end: f64,
-    /// Initial learning rate of the prior's coordinates; 0 freezes them. If trained, they minimise the residual in
-    /// the mean square: a stall outside the prior's structure then biases them.
+    /// Initial learning rate of the prior's coordinates; 0 freezes them. Trained coordinates minimise the mean square of the
+    /// residual, so that an effect outside of the prior's structure, such as stall, biases them.
     pub prior_rate: f64,
     /// Initial values of the trained coefficients.
     pub start: Start,
@@ -90,7 +90,7 @@ pub struct Recipe {
     pub lambda: f64,
     /// τ of eq. (24), the growth of λ per update.
     pub tau: f64,
-    /// The objective's origin.
+    /// Variant of the training objective.
     pub criterion: Criterion,
     /// Weights each rollout by 1/(e² + floor²), e being the prior's error at its end relative to the root mean square
     /// over the rollouts: the residual is then as accurate where the prior errs little as where it errs most, as in a
@@ -125,7 +125,7 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// What is invalid, if anything is.
+    /// Description of the first invalid setting, if there is one.
     pub fn fault(&self) -> Option<&'static str> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if self.steps.is_empty() || self.steps.iter().any(|n| !(1..=500).contains(n)) {

@@ -8,7 +8,7 @@ use crate::framing::FrameCounts;
 /// Least interval between summaries in the log.
 const SUMMARY: Duration = Duration::from_secs(10);
 
-/// Counters of what clients sent.
+/// Counters of the messages from clients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClientCounts {
     /// MAVLink frames, valid and invalid.

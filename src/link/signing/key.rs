@@ -51,8 +51,8 @@ pub enum KeyError {
     },
     /// The file does not hold a key.
     #[error(
-        "key file {} does not hold 64 hexadecimal digits: make one with `greylag link key FILE`, or, of a \
-         passphrase as MAVProxy does, with `greylag link key --passphrase FILE`",
+        "key file {} does not hold 64 hexadecimal digits: make one with `greylag link key FILE`, or, from \
+         a passphrase as MAVProxy does, with `greylag link key --passphrase FILE`",
         path.display()
     )]
     Content {
@@ -92,7 +92,7 @@ impl Key {
         &self.0
     }
 
-    /// Reads a key file: 64 hexadecimal digits, mode 0600 or less.
+    /// Reads a key file: 64 hexadecimal digits, permission bits 0600 or stricter.
     ///
     /// # Errors
     ///
@@ -133,7 +133,7 @@ fn check_mode(file: &File, path: &Path) -> Result<(), KeyError> {
     }
 }
 
-/// Without Unix permissions there is nothing to check.
+/// Systems without Unix permissions: the key file is not checked.
 #[cfg(not(unix))]
 fn check_mode(_: &File, _: &Path) -> Result<(), KeyError> {
     Ok(())

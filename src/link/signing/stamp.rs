@@ -1,4 +1,4 @@
-//! Persistent signing timestamp: stored beside the key, written every second by a thread.
+//! Persistent signing timestamp: stored in the key's folder, written every second by a thread.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -42,7 +42,7 @@ pub struct StampFile {
 }
 
 impl StampFile {
-    /// Opens the file beside a key file; also returns the timestamp to start from.
+    /// Opens the timestamp file of a key file; also returns the timestamp to start from.
     ///
     /// # Errors
     ///

@@ -87,8 +87,8 @@ pub fn parameter_error(
 
 /// STATUSTEXT messages that together carry `words`, in chunks that share `id`.
 ///
-/// MAVLink 1 has no field for chunks, so that `chunks` are separate texts there. Characters
-/// outside ASCII become `?`: receivers differ in their encoding.
+/// MAVLink 1 has no fields for the id and the number of a chunk: there each chunk is a text of its own. Characters
+/// outside ASCII become `?`, because receivers differ in their encoding.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
     let bytes: Vec<u8> =
         words.chars().map(|c| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' }).collect();
@@ -160,7 +160,7 @@ pub fn message_interval(id: u32, interval_us: i32) -> Message {
     }))
 }
 
-/// HOME_POSITION in the wire's units.
+/// HOME_POSITION: latitude and longitude in 1e-7 degrees, altitude above mean sea level in mm.
 pub fn home_position(home: Home, now: Time) -> Message {
     Message::coded(MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude: (home.position[0] * 1e7).round() as i32,
@@ -210,7 +210,7 @@ pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     }))
 }
 
-/// TIMESYNC answer: our time in ns beside theirs.
+/// TIMESYNC reply: our time and the time of the request, both in ns.
 pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
     // Zero would read as a request.
     let ours = i64::try_from(now.as_micros().saturating_mul(1000)).unwrap_or(i64::MAX).max(1);

@@ -17,9 +17,9 @@ pub const SET_MODE: u16 = 176;
 /// Command number of MAV_CMD_SET_MESSAGE_INTERVAL.
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
-/// Standard deviations of the wind in WIND_COV and in WIND, m/s. PX4's wind was accurate to 0.1 m/s in calm air;
-/// ArduPlane's, sent at 2 Hz and drifting by 0.9 m/s, caused a sideslip error of 1.3° (sd) with 0.5 and of 0.3° with 4
-/// (`tests/firmware/angles.py`).
+/// Standard deviations assumed for the wind of WIND_COV (PX4) and of WIND (ArduPlane), m/s. PX4's wind was accurate to
+/// 0.1 m/s in calm air. ArduPlane's is sent at 2 Hz and drifts by 0.9 m/s: assuming 0.5 m/s for it gave a sideslip error
+/// of 1.3° (standard deviation), assuming 4 m/s gave 0.3° (`tests/firmware/angles.py`).
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;
 
@@ -75,7 +75,8 @@ pub enum ControllerMessage {
     Wind {
         /// Velocity of the air, NED, m/s.
         velocity: [f64; 3],
-        /// Standard deviation of its horizontal components, as one of many measurements with correlated errors, m/s.
+        /// Standard deviation assumed for each horizontal component, m/s: larger than the error of one message, because
+        /// successive errors are correlated.
         sd: f64,
     },
     /// Result of a command, COMMAND_ACK.
@@ -92,12 +93,12 @@ pub enum ControllerMessage {
         /// Whether it is present and healthy.
         alive: bool,
     },
-    /// Mode from CURRENT_MODE.
+    /// Present flight mode, from CURRENT_MODE.
     CurrentMode {
         /// Mode number of the flight stack.
         custom_mode: u32,
     },
-    /// PARAM_VALUE with both readings of its value.
+    /// PARAM_VALUE, decoded by both encodings of its value.
     Parameter {
         /// Name of the parameter.
         name: String,
@@ -130,7 +131,7 @@ const AIR: f64 = 287.053;
 pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
     let fields = Fields(frame.payload);
     match frame.id {
-        // By offset: their enumerations grow with every release.
+        // Decoded by byte offset: the crate rejects values that a later release added to an enumeration.
         0 => {
             return Some(ControllerMessage::Heartbeat {
                 autopilot: fields.u8(5),

@@ -1,4 +1,4 @@
-//! The only module that uses rust-mavlink's message types; all others use this project's.
+//! Conversion between MAVLink messages and the project's own types. Only this module uses rust-mavlink's types.
 
 pub mod answer;
 pub mod controller;
@@ -17,15 +17,15 @@ use mavlink::{MavlinkVersion, Message as _};
 
 use super::framing::{self, Frame, Source, Version};
 
-/// A message to be encoded in either version for any peer.
+/// A message that can be encoded in MAVLink 1 or 2.
 #[derive(Clone, Debug)]
 pub struct Message(Content);
 
 #[derive(Clone, Debug)]
 enum Content {
-    /// Encoded by the codec.
+    /// Encoded by rust-mavlink.
     Coded(Box<MavMessage>),
-    /// Encoded by hand, because the codec's enumerations cannot carry every number.
+    /// Encoded by hand, because the enumerations of rust-mavlink cannot represent every number.
     Raw {
         id: u32,
         payload: Vec<u8>,
@@ -43,7 +43,7 @@ impl Message {
         Message(Content::Raw { id, payload, base })
     }
 
-    /// Message id.
+    /// Message id, as numbered by MAVLink.
     pub fn id(&self) -> u32 {
         match &self.0 {
             Content::Coded(message) => message.message_id(),
@@ -74,7 +74,7 @@ fn codec_version(version: Version) -> MavlinkVersion {
     }
 }
 
-/// Decodes a frame by the codec; `None` when an enumeration holds an unknown number.
+/// Decodes a frame by rust-mavlink; `None` if an enumeration has an unknown value.
 fn decode(frame: &Frame<'_>) -> Option<MavMessage> {
     MavMessage::parse(codec_version(frame.version), frame.id, frame.payload).ok()
 }
@@ -82,7 +82,7 @@ fn decode(frame: &Frame<'_>) -> Option<MavMessage> {
 /// CRC_EXTRA of a message; `None` outside the dialect.
 pub fn crc_extra(id: u32) -> Option<u8> {
     match MavMessage::extra_crc(id) {
-        // The codec answers 0 for what it does not know, and one known message has 0 too.
+        // rust-mavlink returns 0 for unknown messages, and one known message has a CRC_EXTRA of 0.
         0 => MavMessage::default_message_from_id(id).map(|_| 0),
         extra => Some(extra),
     }

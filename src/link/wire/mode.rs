@@ -111,7 +111,7 @@ impl Pulse {
 pub enum Role {
     /// Autopilot of the aircraft.
     Autopilot,
-    /// Onboard computer beside an autopilot.
+    /// Onboard computer of a vehicle with a flight controller.
     Onboard,
 }
 

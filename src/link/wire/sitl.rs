@@ -13,10 +13,10 @@ use greylag_physics::{Command, Time};
 /// Flag MAV_MODE_FLAG_SAFETY_ARMED of the base mode.
 const ARMED: u8 = 128;
 
-/// Bit mask of outputs of a vehicle that reports every surface.
+/// Smallest value of `active` of a vehicle that reports all surfaces and their travel.
 const ALL: u32 = 15;
 
-/// Default deflection at normalised 1, rad, of a vehicle that does not send its travel: the X8's.
+/// Deflection at a normalised command of 1 for a vehicle that does not report its travel, rad: that of the X8.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const TRAVEL: f64 = 0.5235;
 

@@ -1,4 +1,4 @@
-//! The names by which other programs write the columns of a table.
+//! Names of the columns of a table in other programs.
 //!
 //! Sources: `FGOutputTextFile.cpp` of JSBSim (output sections and property names), the topics of PX4 as ulog2csv writes
 //! them, the records of ArduPilot as `mavlogdump --format csv` writes them (TYPE.field).
@@ -186,7 +186,7 @@ impl Dialect {
         self.found.push(found);
     }
 
-    /// Whether a column is found under another name, or made from the quaternion.
+    /// Whether a column is read under another name, or computed from the quaternion.
     pub fn fills(&self, column: &str) -> bool {
         let attitude = ["roll_rad", "pitch_rad", "yaw_rad"].contains(&column);
         self.quaternion.is_some() && attitude || self.found.iter().any(|f| f.column == column)

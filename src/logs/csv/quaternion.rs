@@ -1,10 +1,10 @@
-//! Attitude from a quaternion in a table, with its parts in either order.
+//! Attitude from a quaternion in a table, with its scalar component first or last.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::Sample;
 
-/// Order of a quaternion's parts.
+/// Order of a quaternion's components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// w, x, y, z.
@@ -13,7 +13,7 @@ pub enum Order {
     Xyzw,
 }
 
-/// How far the norm may be from 1.
+/// Accepted norms of a quaternion.
 const NORM: std::ops::Range<f64> = 0.9..1.1;
 
 fn turned(q: [f64; 4], order: Order) -> Option<UnitQuaternion<f64>> {
@@ -25,9 +25,9 @@ fn turned(q: [f64; 4], order: Order) -> Option<UnitQuaternion<f64>> {
     NORM.contains(&norm).then(|| UnitQuaternion::new_normalize(q))
 }
 
-/// The order in which the quaternions agree best with the gyros' rates and with gravity in the specific force.
+/// The order in which the quaternions agree best with the body rates and with gravity in the specific force.
 ///
-/// The norm is that of a rotation in either order, so that it only distinguishes a quaternion from other numbers.
+/// The norm does not depend on the order: it only distinguishes a quaternion from other numbers.
 pub(super) fn order(rows: &[Sample], quaternions: &[[f64; 4]]) -> Order {
     let misfit = |order: Order| {
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -51,7 +51,7 @@ pub(super) fn order(rows: &[Sample], quaternions: &[[f64; 4]]) -> Order {
     if misfit(Order::Xyzw) < misfit(Order::Wxyz) { Order::Xyzw } else { Order::Wxyz }
 }
 
-/// Fills roll, pitch and yaw; they stay NaN where the numbers are no rotation.
+/// Computes roll, pitch and yaw; they stay NaN where the four numbers are not a unit quaternion.
 pub(super) fn fill(rows: &mut [Sample], quaternions: &[[f64; 4]], order: Order) {
     for (row, q) in rows.iter_mut().zip(quaternions) {
         if let Some(turn) = turned(*q, order) {

@@ -30,7 +30,7 @@ pub(crate) struct Raw {
     pub notes: Vec<String>,
 }
 
-/// How far a time goes back where another recording begins: in median periods, and s.
+/// Backward jump of time that begins another recording: in median sample periods, and in s.
 const BACK_PERIODS: f64 = 10.0;
 const BACK_S: f64 = 1.0;
 /// How far from the beginning of the recording before another one begins, in parts of its length.
@@ -74,7 +74,7 @@ impl Raw {
         for i in 1..times.len() {
             let whole = i - bounds[bounds.len() - 1] >= RECORDING && times.len() - i >= RECORDING;
             let goes_back = times[i] < times[i - 1] - back;
-            // A clock that is set goes back by some seconds; a recording begins where the one before began.
+            // A clock that is set jumps back by some seconds; a new recording starts again at the first time.
             let start = times[bounds[bounds.len() - 1]];
             let begins = times[i] < start + (BEGINS * (times[i - 1] - start)).max(back);
             let stays = || times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back);
@@ -106,7 +106,7 @@ impl Raw {
     }
 }
 
-/// Where a field goes: place, scale, offset; whether it is one part of a sum.
+/// Destination of a field: column, scale, offset, and whether it is one term of a sum.
 type Target = (Place, f64, f64, Part);
 
 /// Whether a field is a column, or one of several surfaces that make one.
@@ -132,7 +132,7 @@ fn separator(header: &[u8]) -> u8 {
 /// Reads the rows; `mapping` may assign columns with other names or units.
 pub(crate) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
     let text = |source| CsvError::Text { path: path.to_owned(), source };
-    // A row without its line end may miss digits: it is left out.
+    // A row without a line end may lack digits, so it is not read.
     let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
     let delimiter = separator(bytes.split(|b| *b == b'\n').next().unwrap_or_default());
     let mut reader = ::csv::ReaderBuilder::new();
@@ -203,7 +203,7 @@ enum Decimal {
     PointOrComma,
 }
 
-/// The number in a field; NaN of an empty one, `None` of what is neither a number nor a date.
+/// The number in a field; NaN if it is empty, `None` if it is neither a number nor a date.
 fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     let field = std::str::from_utf8(field).ok()?.trim();
     if field.is_empty() {
@@ -217,7 +217,7 @@ fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     plain.or_else(comma).or_else(|| dialect::time(field))
 }
 
-/// Where the file's column `name` goes.
+/// Destination of the file's column `name`.
 fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     let mut targets: Vec<Target> = mapping
         .of_topic(TEXT)
@@ -237,7 +237,7 @@ fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     targets
 }
 
-/// The needed columns that are not among `names`, each with what would satisfy it.
+/// The required columns that are not among `names`, each with the columns that would replace it.
 fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
     let has = |column: &str| {
         let name = mapping.get(column).map_or(column, |entry| &entry.field);
@@ -254,7 +254,7 @@ fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvE
     alone.chain(either).collect()
 }
 
-/// The sample of a record; `None` when a field is no number.
+/// The sample of a record; `None` if a field is not a number.
 fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>], decimal: Decimal) -> Option<Sample> {
     let mut sample = Sample::default();
     for (field, targets) in record.iter().zip(targets).filter(|(_, t)| !t.is_empty()) {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::Sample;
 
-/// How the board of the sensors stands in the body, `[board]` in a mapping:
+/// Orientation of the sensor board in the body, `[board]` in a mapping:
 ///
 /// ```toml
 /// [board]
@@ -27,7 +27,7 @@ pub struct Board {
     to_body: Rotation3<f64>,
 }
 
-/// What axes α and β are of.
+/// Axes to which α and β refer.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 enum Airflow {
@@ -70,7 +70,7 @@ impl Board {
         row.rates_radps = body(row.rates_radps);
         row.specific_force_mps2 = body(row.specific_force_mps2);
         let [roll, pitch, yaw] = row.attitude_rad;
-        // without a heading the attitude turns about a heading of zero, and none is made of it
+        // without a heading the attitude is rotated with a heading of zero, and no heading is computed
         let heading = if yaw.is_finite() { yaw } else { 0.0 };
         let seen = Rotation3::from_euler_angles(roll, pitch, heading);
         let (roll, pitch, turned) = (seen * self.to_body.inverse()).euler_angles();

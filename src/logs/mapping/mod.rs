@@ -14,9 +14,9 @@
 //! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states which part is first.
 //!
 //! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
-//! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, by a
-//! parabola through so many seconds of rows. `[derive] body_rates_over_s` makes p, q, r from roll, pitch and
-//! yaw in the same way. `[board]` turns the axes of a log (see [`Board`]), `[flight]` sets what counts as flight:
+//! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, from a
+//! parabola fitted to the rows of so many seconds. `[derive] body_rates_over_s` computes p, q, r from roll, pitch and yaw
+//! in the same way. `[board]` rotates the axes of a log (see [`Board`]). `[flight]` sets the criteria for flight:
 //! `from_mps` (airspeed; a model's envelope takes precedence) and `shortest_s` (0.5 s at least). `[sensors]` describes sensors and wind, see [`Sensors`].
 
 mod ardupilot;
@@ -42,7 +42,7 @@ use greylag_physics::sensors::CONSTANTS;
 use rule::Rule;
 use written::{Written, WrittenFlight, entry, over, thresholds, turn};
 
-/// The topic name by which a mapping means the columns of a CSV file.
+/// Topic name of the columns of a CSV file in a mapping.
 pub const TEXT: &str = "csv";
 
 /// Why a mapping file cannot be used.
@@ -56,7 +56,7 @@ pub enum MappingError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The text is no mapping.
+    /// The text is not a mapping.
     #[error("mapping {}: {text}", path.display())]
     Text {
         /// Path of the mapping file.
@@ -66,7 +66,7 @@ pub enum MappingError {
     },
 }
 
-/// Where a column comes from.
+/// Source of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The topic, message or record type.
@@ -79,7 +79,7 @@ pub struct Entry {
     pub offset: f64,
     /// The topic's instance; the first one if none is named.
     pub instance: Option<u16>,
-    /// Length of the parabola whose slope is the column, s; `None` takes the field itself.
+    /// Time span of the parabola whose slope is the column's value, s; `None` for the field itself.
     pub rate_over_s: Option<f64>,
 }
 
@@ -88,28 +88,28 @@ pub struct Entry {
 pub struct Mapping {
     /// Source of each mapped column.
     entries: BTreeMap<String, Entry>,
-    /// Time over which body rates are made from the attitude, s.
+    /// Time span of the differentiation of the attitude to body rates, s.
     body_rates_over_s: Option<f64>,
     /// Known properties of sensors and wind.
     sensors: Sensors,
-    /// Where the attitude comes from as a quaternion.
+    /// Source of the attitude, if it is a quaternion.
     quaternion: Option<Turn>,
-    /// How the log's axes stand.
+    /// Orientation of the log's axes in the body.
     board: Option<Board>,
-    /// From when on the aircraft flies.
+    /// Criteria for flight.
     flight: WrittenFlight,
     /// The mixer of the aircraft.
     mixer: Option<Mixer>,
 }
 
-/// Where a quaternion comes from, earth NED to body FRD.
+/// Source of a quaternion, earth NED to body FRD.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turn {
     /// The topic, message or record type.
     pub topic: String,
-    /// The fields of its parts, as they are written.
+    /// Fields of the four components, in the order of the file.
     pub fields: [String; 4],
-    /// Which part comes first; `None` finds it from the rates and gravity.
+    /// Order of the components; if `None`, it is found from body rates and gravity.
     pub order: Option<Order>,
 }
 
@@ -117,7 +117,7 @@ impl Mapping {
     /// Reads a mapping file.
     ///
     /// # Errors
-    /// The file cannot be read, or is no mapping.
+    /// The file cannot be read, or is not a mapping.
     pub fn load(path: &Path) -> Result<Mapping, MappingError> {
         let text = greylag_physics::text_file::read(path)
             .map_err(|source| MappingError::File { path: path.to_owned(), source })?;
@@ -143,7 +143,7 @@ impl Mapping {
         over("derive.body_rates_over_s", body_rates_over_s).map_err(wrong)?;
         let mut sensors = written.sensors;
         if body_rates_over_s.is_some() {
-            // what is made from the attitude has no bias against it
+            // rates differentiated from the attitude have no bias relative to it
             let gyros = CONSTANTS.iter().filter(|(name, _)| name.starts_with("gyro_"));
             gyros.for_each(|(name, _)| sensors.hold(name, 0.0));
         }
@@ -153,12 +153,12 @@ impl Mapping {
         Ok(Mapping { entries, body_rates_over_s, sensors, quaternion, board, flight, mixer: None })
     }
 
-    /// How the log's axes stand, if the mapping says so.
+    /// Orientation of the log's axes in the body, if the mapping has a section `[board]`.
     pub(super) fn board(&self) -> Option<&Board> {
         self.board.as_ref()
     }
 
-    /// From when on an aircraft flies of which `model` is known, the usual one if nothing is.
+    /// Criteria for flight: those of the `model` if it is known, else those of the mapping, else the default ones.
     pub fn flies(&self, model: Option<Flying>) -> Flying {
         let mut flies = model.unwrap_or_else(|| match self.flight.from_mps {
             Some(from) => Flying::from(from),
@@ -181,7 +181,7 @@ impl Mapping {
         self.body_rates_over_s
     }
 
-    /// The columns that are rates of change, each with the time over which it is taken, s.
+    /// The columns that are derivatives of others, each with the time span of its differentiation, s.
     pub(super) fn slopes(&self) -> impl Iterator<Item = (&str, f64)> {
         self.entries.iter().filter_map(|(column, e)| Some((column.as_str(), e.rate_over_s?)))
     }
@@ -197,7 +197,7 @@ impl Mapping {
         }
     }
 
-    /// Whether a column that a log lacks is made from others.
+    /// Whether a column that a log lacks is computed from others.
     pub(super) fn makes(&self, column: &str) -> bool {
         match column {
             derive::AIRSPEED => self.sensors.wind().is_some() && self.get(column).is_none(),

@@ -69,7 +69,7 @@ pub enum Tilt {
 }
 
 impl Tilt {
-    /// The angle, rad; NaN of what is no attitude.
+    /// The angle, rad; NaN if the quaternion is not a rotation.
     fn of(self, [w, x, y, z]: [f64; 4]) -> f64 {
         let norm = (w * w + x * x + y * y + z * z).sqrt();
         if !(0.5..2.0).contains(&norm) {
@@ -236,7 +236,7 @@ impl Rule {
         format!("{}.{}", self.topic, self.fields().join("+"))
     }
 
-    /// Field and factor of a rule that scales one field and adds nothing.
+    /// Field and factor of a rule that only scales one field.
     pub fn factor(&self) -> Option<(&str, f64)> {
         match &self.fill {
             Fill::Sum { terms, offset: 0.0, .. } => match &terms[..] {

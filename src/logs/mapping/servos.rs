@@ -50,7 +50,7 @@ pub fn rules(
         ("elevator_cmd", ELEVATOR, -1.0),
         ("rudder_cmd", RUDDER, -1.0),
     ] {
-        // Two servos of one function move alike: the first is used.
+        // Two servos with the same function move together: the first is used.
         if let Some(n) = channels(function).next() {
             out.push(Rule::sum(column, topic, vec![surface(n, gain)]).noting(note(column)));
         }

@@ -14,11 +14,11 @@ const SPEEDS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("knots", 0.514_444), ("f
 const FOOT: f64 = 0.3048;
 /// Window over which a climb is compared, s.
 const CLIMB_S: f64 = 2.0;
-/// Spread of the middle half of the ratios to the ground speed, over their median, beyond which wind speaks.
+/// Interquartile range of the ratios to the ground speed, relative to their median, above which they show wind.
 const GROUND_SPREAD: f64 = 0.25;
-/// Likewise of the ratios in turns, beyond which manoeuvres speak.
+/// The same for the ratios in turns; a larger range comes from manoeuvres.
 const TURN_SPREAD: f64 = 0.5;
-/// Correlation from which a relation is believed.
+/// Correlation above which a relation is taken as certain.
 const CERTAIN: f64 = 0.8;
 /// Angle of attack that no aircraft exceeds for a twentieth of the time, rad.
 const VANE_LARGE: f64 = 1.0;
@@ -51,7 +51,7 @@ fn steady(ratios: &[f64], spread: f64) -> Option<f64> {
     middle.filter(|m| high.zip(low).is_some_and(|(high, low)| high - low < spread * m))
 }
 
-/// Airspeed over what a steady turn shows; NaN elsewhere.
+/// Ratio of the airspeed to that computed from a steady turn; NaN outside of turns.
 fn by_turn(s: &Sample) -> f64 {
     let [roll, pitch, _] = s.attitude_rad;
     let turn = (s.rates_radps[1] * roll.sin() + s.rates_radps[2] * roll.cos()) / pitch.cos();

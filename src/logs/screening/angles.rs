@@ -12,14 +12,14 @@ use crate::finding::Finding;
 const DEGREE: f64 = PI / 180.0;
 /// Window over which angles and rates are compared, s.
 const WINDOW_S: f64 = 0.5;
-/// Correlation from which a relation is believed.
+/// Correlation above which a relation between an angle and a rate is taken as certain.
 const CERTAIN: f64 = 0.8;
 
-/// Pitch below which roll follows p alone well enough for a statement on its scale, rad.
+/// Largest pitch angle at which the roll rate is close enough to p to compare their scales, rad.
 const GENTLE: f64 = 0.5;
 
-/// Units first; signs only where the units are right, for they are seen through sines. Whether roll and p are of one
-/// scale is asked of flights only: on the ground both are noise.
+/// Checks the units, then the signs. Signs are checked only if the units are right, because their equations contain sines
+/// of the angles. The scale of roll against p is checked in flight only: on the ground both are noise.
 pub fn check(rows: &[Sample], flies: bool) -> Vec<Finding> {
     let windows = windows(rows, WINDOW_S);
     let units = units(rows, &windows);
@@ -31,7 +31,7 @@ pub fn check(rows: &[Sample], flies: bool) -> Vec<Finding> {
     out
 }
 
-/// Roll against p in gentle flight, where both should be of one scale.
+/// Compares the change of roll with the integral of p at small pitch angles, where they should be equal.
 fn scale(windows: &[&[Sample]]) -> Option<Finding> {
     let gentle = |w: &&&[Sample]| {
         w.iter().all(|s| s.attitude_rad[1].is_nan() || s.attitude_rad[1].abs() < GENTLE)
@@ -50,7 +50,7 @@ fn scale(windows: &[&[Sample]]) -> Option<Finding> {
 
 fn units(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
     let mut out = Vec::new();
-    // roll against p alone, pitch against q alone: angles in degrees have no sine
+    // roll against p alone, pitch against q alone: the full equations need sines of angles whose unit is not known yet
     let against = |axis: usize| {
         let pairs = windows
             .iter()
@@ -85,7 +85,7 @@ fn units(rows: &[Sample], windows: &[&[Sample]]) -> Vec<Finding> {
     out
 }
 
-/// φ̇ = p + (q sin φ + r cos φ) tan θ, θ̇ = q cos φ − r sin φ, ψ̇ = (q sin φ + r cos φ) / cos θ.
+/// Signs by the kinematic equations φ̇ = p + (q sin φ + r cos φ) tan θ, θ̇ = q cos φ − r sin φ, ψ̇ = (q sin φ + r cos φ) / cos θ.
 fn signs(windows: &[&[Sample]]) -> Vec<Finding> {
     let [roll, pitch, yaw] = relations(windows);
     let turned = |r: Option<Relation>| r.is_some_and(|r| r.correlation < -CERTAIN);

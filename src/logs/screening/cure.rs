@@ -4,7 +4,7 @@ use crate::Sample;
 use crate::columns::{COLUMNS, index};
 use crate::finding::{Cure, Finding};
 
-/// Columns of which a cure of the first one speaks likewise.
+/// Columns that the same correction applies to, by the first of them.
 const LIKEWISE: [&[&str]; 3] = [
     &["roll_rad", "pitch_rad", "yaw_rad"],
     &["p_radps", "q_radps", "r_radps"],

@@ -25,7 +25,7 @@ fn dead(rows: &[Sample], name: &'static str, get: fn(&Sample) -> f64) -> Option<
     Some(if needed { Finding::problem(text) } else { Finding::warning(text) })
 }
 
-/// Commands that rest all through a flight: another channel or instance holds what flies the aircraft.
+/// Commands that are constant in flight: another channel or instance has the commands that fly the aircraft.
 pub fn commands(flown: &[Sample]) -> Option<Finding> {
     let rests = |name: &str| {
         let get = COLUMNS.iter().find(|c| c.0 == name).map(|c| c.1)?;

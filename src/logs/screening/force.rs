@@ -9,10 +9,10 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 const G: f64 = STANDARD_GRAVITY;
 /// Window over which accelerations are compared, s.
 const WINDOW_S: f64 = 1.0;
-/// Correlation below which a sign is called wrong.
+/// Correlation of measured and expected acceleration below which the axis is reported as inverted.
 const TURNED: f64 = -0.7;
 
-/// Everything about the specific force.
+/// Findings on unit and sign of the measured specific force.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {
     let size = |s: &Sample| s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
     let Some(middle) = quantile(&values(rows, size), 0.5) else { return Vec::new() };
@@ -52,7 +52,7 @@ fn vertical(rows: &[Sample]) -> Option<Finding> {
         )
     } else {
         let text = format!(
-            "az is {z:.2} in the middle: the z accelerometer looks positive up, while the log format's reads about -9.81 in level flight"
+            "the median of az is {z:.2}: the z accelerometer looks positive up, while the log format's reads about -9.81 in level flight"
         );
         cured(text, "az_mps2", -1.0)
     })
@@ -66,7 +66,8 @@ fn turns_left(rows: &[Sample]) -> bool {
     with_intercept(pairs).is_some_and(|r| r.correlation < TURNED)
 }
 
-/// f_x = u̇ + q w − r v + g sin θ and f_y = v̇ + r u − p w − g sin φ cos θ, in still air.
+/// Signs of ax and ay against the equations of motion in still air, body axes: f_x = u̇ + q w − r v + g sin θ and
+/// f_y = v̇ + r u − p w − g sin φ cos θ.
 fn along_and_across(rows: &[Sample]) -> Vec<Finding> {
     let windows = windows(rows, WINDOW_S);
     let body = |s: &Sample| {

@@ -35,7 +35,7 @@ pub fn screen(rows: &[Sample], flies: &Flying) -> Vec<Finding> {
         let of = |rows: &[Sample]| checks(rows, &in_flight(rows, flies), flies);
         out = cure::tried(checks(rows, &flown, flies), rows, of);
         let dead = dead::check(rows);
-        // What stands on the ground may show one value, in a simulation exactly one.
+        // On the ground a channel may be constant, in a simulation exactly so.
         out.extend(
             dead.into_iter().filter(|f| !flown.is_empty() || f.text.starts_with("airspeed")),
         );

@@ -7,7 +7,7 @@ use greylag_num::statistics;
 
 /// A gap of this many median periods ends a window.
 const PAUSE_PERIODS: f64 = 5.0;
-/// Fewest pairs that a relation is taken from.
+/// Smallest number of pairs for a regression.
 const FEWEST: usize = 12;
 
 /// The finite values of a column.
@@ -19,7 +19,7 @@ pub fn values(rows: &[Sample], get: impl Fn(&Sample) -> f64) -> Vec<f64> {
 const TAME: [f64; 2] = [1.3, 0.7];
 const TAME_RATE: f64 = 3.0;
 
-/// Whether the aircraft does not tumble: what is unknown counts as tame.
+/// Whether attitude and body rates are moderate; unknown ones count as moderate.
 pub fn tame(s: &Sample) -> bool {
     let beyond = |x: f64, limit: f64| x.abs() > limit;
     let attitude = (0..2).any(|i| beyond(s.attitude_rad[i], TAME[i]));

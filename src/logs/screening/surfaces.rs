@@ -8,11 +8,11 @@ use crate::phases::Flying;
 
 /// Deflection beyond which no surface is for a hundredth of the time, rad (69°).
 const DEFLECTION_LARGE: f64 = 1.2;
-/// Command beyond which it is no share of the travel.
+/// Magnitude above which a command cannot be normalised to −1..1.
 const COMMAND_LARGE: f64 = 1.5;
-/// Time over which an angular acceleration is taken, s.
+/// Time span over which angular accelerations are computed, s.
 const WINDOW_S: f64 = 0.1;
-/// Partial correlation beyond which a surface is taken to act the other way.
+/// Partial correlation beyond which a surface is reported as reversed.
 const TURNED: f64 = 0.6;
 
 type Get = fn(&Sample) -> f64;

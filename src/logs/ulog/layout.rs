@@ -138,7 +138,7 @@ fn flatten(
                 None => {
                     let before = *offset;
                     flatten(formats, kind, &format!("{path}."), depth, offset, out);
-                    // An unknown type: nothing behind it can be found.
+                    // A field of unknown type: the positions of the fields after it are unknown.
                     if *offset == before {
                         return;
                     }

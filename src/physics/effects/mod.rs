@@ -45,7 +45,7 @@ impl Coefficient {
 const AERODYNAMIC: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// Input of an effect beside the point itself.
+/// Inputs of an effect in addition to the point of evaluation.
 ///
 /// Effects that need more are evaluated after those that need only the point, and receive their sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

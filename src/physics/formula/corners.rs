@@ -1,4 +1,4 @@
-//! Check that a formula is finite over the whole envelope of aircraft.
+//! Check that a formula is finite in all flight conditions of aircraft.
 
 use super::variable::Variable;
 use super::written::Written;
@@ -46,7 +46,7 @@ fn everywhere(effect: &Written, shape: &[f64]) -> Result<(), String> {
     let variables = effect.variables();
     let tried = 1usize << variables.len().min(ALL_CORNERS);
     for corner in 0..tried {
-        // a bit a variable; those behind the twelfth go with the first ones
+        // one bit for each variable; variables after the twelfth share the bits of the first ones
         let side = |k: usize| corner >> (k % ALL_CORNERS) & 1;
         try_at(effect, shape, &variables, |k, v| v.range()[side(k)])?;
     }

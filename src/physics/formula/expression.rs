@@ -9,24 +9,24 @@ use super::variable::Variable;
 pub struct Expression {
     /// Kind of the node.
     pub node: Node,
-    /// Byte offset of its start in the text.
+    /// Byte offset of the node's start in the text of the formula.
     pub at: usize,
 }
 
 /// Kind of a node with its children.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Node {
-    /// A numeric constant.
+    /// A number written in the formula.
     Number(f64),
-    /// A flight variable.
+    /// A variable of the flight, for example α.
     Variable(Variable),
     /// A parameter, by its index in the effect's list.
     Parameter(usize),
     /// A function or operator with its arguments.
     Call(Function, Vec<Expression>),
-    /// An integer power.
+    /// An expression raised to an integer power.
     Power(Box<Expression>, i16),
-    /// A function by points, linear between them, constant outside.
+    /// A function of one argument by its points (argument, value): linear between them, constant outside.
     Table(Box<Expression>, Vec<[f64; 2]>),
 }
 
@@ -43,11 +43,11 @@ macro_rules! functions {
             pub const fn name(self) -> &'static str {
                 match self { $(Function::$id => $name,)* }
             }
-            /// Number of arguments.
+            /// Number of arguments that the function takes.
             pub const fn count(self) -> usize {
                 match self { $(Function::$id => $count,)* }
             }
-            /// Meaning, in words.
+            /// Meaning, in words, for the list of functions.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Function::$id => $meaning,)* }
             }
@@ -101,7 +101,7 @@ impl Function {
 }
 
 impl Expression {
-    /// A constant expression.
+    /// An expression that is the number `x`.
     pub fn number(x: f64) -> Expression {
         Expression { node: Node::Number(x), at: 0 }
     }
@@ -148,7 +148,7 @@ impl Expression {
         Variable::ALL.iter().copied().filter(named).collect()
     }
 
-    /// Number of nodes.
+    /// Number of nodes, this one and its descendants.
     pub fn size(&self) -> usize {
         1 + self.children().iter().map(Expression::size).sum::<usize>()
     }

@@ -7,7 +7,7 @@ use super::file;
 use super::variable::Variable;
 use greylag_num::stream::{Stream, stream};
 
-/// Random stream of the mutations.
+/// Number of the random stream that draws the mutations.
 const DRAW: u64 = 31;
 /// A valid effect file to mutate.
 const WHOLE: &str = r#"schema = 1

@@ -103,7 +103,7 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
             other.name()
         ));
     }
-    // a number would have no bounds, and a search tries effects without shape constants all in one model
+    // a number has no bounds, and a search puts all effects without shape constants into one model
     let Node::Parameter(k) = time.node else {
         return Some(format!("the time of {name} must be a parameter in s, so that it has bounds"));
     };

@@ -6,7 +6,7 @@ use crate::Page;
 use greylag_sysid::amend::Amendment;
 use greylag_sysid::compare::{Answer, Comparison};
 
-/// An amended model's story, with where it came from.
+/// Results of an amendment, with the files and commands that they come from.
 #[derive(Clone, Debug)]
 pub struct AmendmentReport<'a> {
     /// Title of the page.

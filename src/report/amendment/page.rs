@@ -34,7 +34,7 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     Page { title: report.title.clone(), subtitle, sections }
 }
 
-/// What the answer does not say.
+/// Section with the sentences of the amendment, the first [`LEADING`] of them prominent.
 fn in_words(a: &Amendment) -> Section {
     let finding = |s: &String| Finding { sentence: s.clone(), link: None };
     let [lead, rest] = [

@@ -49,7 +49,7 @@ fn panels(c: &Comparison, id: ChannelId) -> Option<Intervals> {
         let lines: Vec<Option<RegimeBins>> =
             channels.iter().map(|ch| bins(*ch, variable)).collect();
         let Some(some) = lines.iter().flatten().find(|b| !b.bins.is_empty()) else { continue };
-        // One flight is no variable.
+        // With one flight, the flight is not a variable.
         if variable == RegimeVariable::Flight && some.bins.len() < 2 {
             continue;
         }

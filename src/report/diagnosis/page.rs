@@ -1,4 +1,4 @@
-//! The page of one diagnosis: what a model lacks, from the sentence to the proof.
+//! The page of one diagnosis: the missing effect, in sentences first, with the evidence below.
 
 use crate::comparison::page::channel_name;
 use crate::diagnosis::DiagnosisReport;
@@ -16,7 +16,7 @@ const LEADING: usize = 2;
 /// Share below which a cell of the map stays blank.
 const BLANK: f64 = 0.05;
 
-/// Words of the sentences on sensors, one a flight.
+/// Words that identify the sentences on sensor errors, one for each flight.
 const SENSORS: &str = ": errors of the sensors and the wind";
 
 /// The page of `report`: the verdict first, then the evidence for it.
@@ -74,7 +74,7 @@ fn findings(d: &Diagnosis) -> Findings {
     Findings { lead, rest: said().skip(LEADING).map(finding).collect() }
 }
 
-/// The way to the curve of the effect that `sentence` names.
+/// Link to the curve of the effect that `sentence` names.
 fn link(d: &Diagnosis, sentence: &str) -> Option<Link> {
     let letter = |c: char| c.is_alphanumeric() || c == '_';
     let names = |id: &str| sentence.split(|c| !letter(c)).any(|word| word == id);
@@ -102,9 +102,9 @@ fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     Section::new("Where it fails", note, figures)
 }
 
-/// Channels over regime variables, of each model: the first one is seen at first.
+/// Residuals of the channels over regime variables, for each model; those of the first model are shown initially.
 fn maps(c: &Comparison) -> Option<Figure> {
-    // one scale of importance for all, so that a switch does not change what a colour means
+    // the same colour scale for all models
     let options: Vec<ChoiceOption> = c
         .models
         .iter()
@@ -148,7 +148,7 @@ fn cell(channel: &ChannelResult, variable: RegimeVariable) -> GridCell {
     if share.is_nan() || share < BLANK {
         return GridCell { text: String::new(), weight: 0.0 };
     }
-    // A channel that is explained stays pale.
+    // The cells of an explained channel are pale.
     let left = channel.unexplained_fraction;
     let importance = if left.is_finite() { (left / 0.1).clamp(0.0, 1.0) } else { 0.0 };
     GridCell { text: percent(share), weight: share * importance }

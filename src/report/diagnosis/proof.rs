@@ -8,7 +8,7 @@ use crate::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
 use greylag_sysid::compare::{Comparison, ModelResult};
 use greylag_sysid::diagnose::Diagnosis;
 
-/// Evidence under which a null is not drawn: decades of nothing would fill the scale.
+/// Null evidence below this value is not drawn, to keep the logarithmic scale short.
 const DRAWN: f64 = 0.1;
 /// Decoys in the table, the strongest first.
 const DECOYS: usize = 8;

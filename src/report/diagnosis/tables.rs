@@ -1,4 +1,4 @@
-//! The tables of a diagnosis: advice, what could not have been seen, coefficients, sensors, candidates.
+//! The tables of a diagnosis: advice, detection limits, coefficients, sensors, candidates.
 
 use crate::Align::{Left, Right};
 use crate::diagnosis::DiagnosisReport;
@@ -24,7 +24,7 @@ pub(crate) fn advice(d: &Diagnosis) -> Section {
     Section::new("What to fly next", "The most useful first.", vec![figure])
 }
 
-/// The smallest amounts that the data would have shown, of what is not asserted.
+/// Detection limits of the effects that are not asserted: the smallest amounts that the data would have shown.
 pub(crate) fn unseen(d: &Diagnosis) -> Section {
     let columns = [("Effect", Left), ("Not seen below", Right), ("of", Left), ("What it is", Left)];
     let mut table = Table::new("What could not have been seen", &columns);

@@ -66,7 +66,7 @@ fn marks(report: &FlightReport) -> Vec<Mark> {
     timed.map(|(i, e)| Mark { time_s: e.time_s, label: (i + 1).to_string() }).collect()
 }
 
-/// What the numbered marks above the plots are.
+/// Legend of the numbered marks above the plots.
 fn marked(report: &FlightReport) -> &'static str {
     match report.events.len() {
         1..=MARKED_EVENTS => " The numbers above the plots are the events listed at the end.",

@@ -1,4 +1,4 @@
-//! The targets of a flight: what each was, how well it was held, where it lay.
+//! The targets of a flight: attitude, quality of tracking, and place in the envelope.
 
 use crate::flight::FlightReport;
 use crate::flight::verdict::signed;

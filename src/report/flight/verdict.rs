@@ -19,7 +19,7 @@ pub(crate) fn duration_s(samples: &[Sample]) -> f64 {
     }
 }
 
-/// What the verdict says first, and beside it, each in parts of sentences.
+/// Clauses of the verdict: those of its main sentence, and further ones.
 struct Parts {
     first: Vec<String>,
     beside: Vec<String>,

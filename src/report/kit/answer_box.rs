@@ -1,4 +1,4 @@
-//! The answer first: sentences in large type, what is left, the command that comes next.
+//! The box with the answer: sentences in large type, the remaining error, the command to run next.
 
 use crate::kit::html::escape;
 use greylag_sysid::compare::Answer;

@@ -1,4 +1,4 @@
-//! Alternatives of which the reader sees one at a time.
+//! Alternative figures, shown one at a time.
 
 use crate::Figure;
 use crate::kit::html::escape;
@@ -10,7 +10,7 @@ pub struct Choice {
     pub anchor: String,
     /// Name of the choice, for example `Channel`.
     pub label: String,
-    /// The alternatives; the first is seen at first. A browser without scripts shows all.
+    /// The alternatives; the first is shown initially. A browser without scripts shows all.
     pub options: Vec<ChoiceOption>,
 }
 

@@ -1,4 +1,4 @@
-//! Lines of a quantity over another, the height by decades or evenly.
+//! Lines of one quantity over another, with a logarithmic or a linear vertical axis.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::Series;
 use crate::kit::html::compact;
 use crate::kit::xy::plotted;
 
-/// Lines over one horizontal quantity.
+/// A figure of lines over a common horizontal axis.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curves {
     /// Title of the figure.
@@ -16,14 +16,14 @@ pub struct Curves {
     pub x_label: String,
     /// Name of the vertical axis, with its unit.
     pub y_label: String,
-    /// Abscissae, in ascending order.
+    /// Values on the horizontal axis, ascending.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
     /// The lines, with one value per abscissa. A value outside the domain of the scale leaves a gap.
     pub series: Vec<Series>,
-    /// Shaded ranges around lines, such as the least and the most of several seeds.
+    /// Shaded ranges around lines, such as the minimum and maximum over several seeds.
     pub ranges: Vec<Range>,
-    /// Heights evenly instead of by decades.
+    /// Whether the vertical axis is linear; it is logarithmic otherwise.
     pub linear: bool,
 }
 
@@ -32,10 +32,10 @@ pub struct Curves {
 pub struct Range {
     /// Index of the line among the series.
     pub of: usize,
-    /// Lower edge, as many values as horizontal ones.
+    /// Lower edge, one value for each of [`Curves::x`].
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper edge, as many values as horizontal ones.
+    /// Upper edge, one value for each of [`Curves::x`].
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
 }

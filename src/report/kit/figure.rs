@@ -27,7 +27,7 @@ pub enum Figure {
     Table(Table),
     /// Findings, one sentence each.
     Findings(Findings),
-    /// Alternatives of which one is seen.
+    /// Alternative figures, shown one at a time.
     Choice(Choice),
     /// Lines over a quantity, by decades.
     Curves(Curves),

@@ -1,4 +1,4 @@
-//! The figure kit: pages, tables and plots that know no aircraft.
+//! The figure kit: pages, tables and plots that do not depend on the subject.
 
 pub(super) mod answer_box;
 pub(super) mod bars;

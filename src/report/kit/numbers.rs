@@ -3,7 +3,7 @@
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub(crate) const NORMAL_95: f64 = 1.96;
 
-/// Three significant digits with a true minus sign; a dash for what is no number.
+/// Three significant digits with a true minus sign; a dash for NaN and infinity.
 pub(crate) fn number(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
@@ -17,7 +17,7 @@ pub(crate) fn number(value: f64) -> String {
     text.replace('-', "−")
 }
 
-/// Evidence to a tenth, from a hundred on to one; a dash for what is no number.
+/// Evidence with one decimal, from 100 on without; a dash for NaN and infinity.
 pub(crate) fn evidence(value: f64) -> String {
     let text = match value {
         v if !v.is_finite() => return "–".into(),
@@ -28,7 +28,7 @@ pub(crate) fn evidence(value: f64) -> String {
     text.replace('-', "−")
 }
 
-/// A share as a whole percentage; a dash for what is no number.
+/// A share in percent, rounded to an integer; a dash for NaN and infinity.
 pub(crate) fn percent(share: f64) -> String {
     if share.is_finite() {
         format!("{:.0}", 100.0 * share).replace('-', "−")

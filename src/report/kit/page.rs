@@ -9,7 +9,7 @@ const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
 const STYLE: &str = include_str!("assets/page.css");
-/// Draws the figures, in one scope: each part uses those before it.
+/// Scripts that draw the figures; each uses functions of those before it, so that all run in one scope.
 const SCRIPTS: [&str; 4] = [
     include_str!("assets/draw.js"),
     include_str!("assets/link.js"),
@@ -39,7 +39,7 @@ pub struct Section {
     pub note: String,
     /// The figures, in order.
     pub figures: Vec<Figure>,
-    /// Whether it is seen at first; plots, which need their size, are not folded.
+    /// Whether the section is open at first. One with plots must be, because a plot takes its size when it is drawn.
     pub folding: Folding,
 }
 
@@ -54,7 +54,7 @@ pub enum Folding {
 }
 
 impl Page {
-    /// The page as one HTML file, UTF-8, that loads nothing.
+    /// The page as one HTML file in UTF-8, which loads no other file.
     pub fn render(&self) -> String {
         let mut data = Vec::new();
         let mut body = String::new();

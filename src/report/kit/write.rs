@@ -1,4 +1,4 @@
-//! Files written whole or not at all.
+//! Atomic writing of files: a file appears complete or not at all.
 
 use std::fs::File;
 use std::io::{self, Write};

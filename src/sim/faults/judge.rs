@@ -7,18 +7,18 @@ use greylag_flight::pilot::{Decision, Source};
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Transient of bank and pitch outside the envelope that is accepted, degrees: about that of a gust against the
-/// surfaces' full slew.
+/// Largest accepted transient of bank and pitch outside the envelope, degrees: about that of a gust while the surfaces move
+/// at their slew limit.
 pub(super) const OVERSHOOT_DEG: f64 = 15.0;
-/// Airspeed that is a finding, as a fraction of the envelope's smallest: half the dynamic pressure, about the stall.
+/// The envelope's smallest airspeed divided by the airspeed that is a finding: half the dynamic pressure, near stall.
 pub(super) const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
-/// Altitude loss that is accepted in a flight of turns, climbs and descents, m, of the initial 600.
+/// Largest accepted altitude loss in a flight of turns, climbs and descents that starts at 600 m, m.
 const ALTITUDE_LOSS_M: f64 = 200.0;
-/// Attitude error at the end that is accepted, degrees.
+/// Largest accepted attitude error at the end, degrees.
 const RECOVERED_DEG: f64 = 3.0;
 /// Tolerance for rounding of a surface step.
 const ROUNDING: f64 = 1e-9;
-/// Steps of constant actuators that count as uncommanded: 0.2 s.
+/// Number of steps with constant actuators after which the aircraft counts as uncommanded: 0.2 s.
 const UNSTEERED: u32 = 20;
 /// Steps after which an exposure no longer explains a finding. Bank and pitch recover within half a second of
 /// regained control; airspeed and altitude take longer.
@@ -28,7 +28,7 @@ const MEMORY_OF_ATTITUDE: u64 = 100;
 /// A violated requirement. Those on the companion itself are never excused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Finding {
-    /// The companion panicked.
+    /// The companion program panicked.
     Panic,
     /// A command was not finite, or out of range.
     Command,
@@ -75,7 +75,7 @@ pub enum Cause {
 }
 
 impl Found {
-    /// Whether `cause` is a possible explanation, and none is established yet.
+    /// Whether `cause` may explain the finding, for which no explanation is established yet.
     pub(super) fn is_open_to(&self, cause: Cause) -> bool {
         self.cause.is_none() && self.suspects.contains(&Some(cause))
     }
@@ -113,11 +113,11 @@ impl Cause {
 pub struct Found {
     /// Time of the finding, s.
     pub at_s: f64,
-    /// The violated requirement.
+    /// The requirement that was violated.
     pub finding: Finding,
     /// Established explanation, for findings on the aircraft.
     pub cause: Option<Cause>,
-    /// Possible explanations by the time alone.
+    /// Possible explanations, from the times of the faults alone.
     pub suspects: [Option<Cause>; 3],
 }
 

@@ -4,32 +4,32 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Time before the first fault, s: a real controller is found and engaged meanwhile.
+/// Time before the first fault, s: enough for the companion to find a real flight controller and to take control.
 pub const FIRST_S: f64 = 12.0;
-/// Time at which the last fault has ended, s.
+/// Time at which all faults have ended, s.
 pub const LAST_S: f64 = 42.0;
 
-/// Kinds of fault.
+/// Kind of a simulated fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
     /// Loss of datagrams, or of stretches of the stream.
     Loss,
-    /// Datagrams are duplicated.
+    /// Random datagrams of the link arrive twice.
     Duplication,
-    /// Datagrams are reordered.
+    /// Random datagrams arrive after later ones.
     Reordering,
     /// Datagrams are delayed, in spikes.
     Delay,
     /// Bits are flipped in datagrams.
     Corruption,
-    /// Datagrams are truncated.
+    /// Random datagrams lose their last bytes.
     Truncation,
     /// Noise and frames of other systems come ten times as often.
     Flood,
     /// The link is down.
     Unplug,
-    /// Sensors are frozen.
+    /// Sensors repeat their last values.
     Frozen,
     /// The pitot tube is blocked.
     Airspeed,
@@ -41,7 +41,7 @@ pub enum FaultKind {
     Clock,
     /// The vehicle restarts: its clock starts again.
     Reboot,
-    /// The client ends.
+    /// The client that sends the commands ends.
     Client,
     /// The companion is not scheduled for stretches of up to 0.3 s: ticks come late, in bursts.
     Starvation,
@@ -98,13 +98,13 @@ impl FaultKind {
         }
     }
 
-    /// Whether it has a severity.
+    /// Whether the kind has a severity.
     pub fn has_strength(self) -> bool {
         use FaultKind::*;
         !matches!(self, Flood | Unplug | Frozen | NotANumber | Reboot | Client | Disk | Killed)
     }
 
-    /// Whether it has a duration: otherwise its effect is not undone at its end.
+    /// Whether the fault ends: a clock jump and a full disk last until the end of the flight.
     pub fn has_length(self) -> bool {
         !matches!(self, FaultKind::Clock | FaultKind::Disk)
     }
@@ -114,7 +114,7 @@ impl FaultKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// Kind of fault.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// Start of the fault, s.
     pub from_s: f64,
@@ -131,7 +131,8 @@ impl Fault {
     }
 }
 
-/// The faults of flight `seed`: one to three, at any time, possibly overlapping; the first cycles through all kinds.
+/// The faults of flight `seed`: one to three, at random times, possibly overlapping. The first one's kind follows from
+/// the seed: consecutive seeds cycle through [`FaultKind::DRAWN`].
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let count = random.random_range(1..=3);

@@ -151,7 +151,7 @@ impl Nearest {
         }
     }
 
-    /// Removes from the flight what the violation of rule `k` does not need.
+    /// Removes everything from the scenario without which rule `k` is still violated.
     fn shrink(
         &mut self,
         factory: &CompanionFactory,

@@ -7,10 +7,11 @@ use greylag_num::least_squares;
 use greylag_num::statistics::mean;
 use greylag_physics::servos::{Surface, Travel};
 
-/// Incidence range of the line through the pitching moment, degrees.
+/// Range of the angle of attack in which the pitching moment is fitted by a line, degrees.
 const LINE_DEG: [f64; 2] = [-4.0, 10.0];
 
-/// Intercept and slope of the pitching moment over incidence, and the fraction of its variation that is left.
+/// Intercept and slope (1/rad) of the pitching moment coefficient over the angle of attack, and the rms residual as a
+/// fraction of its standard deviation.
 pub(super) fn line(polar: &Polar) -> [f64; 3] {
     let [low, high] = LINE_DEG;
     let inside = |a: &f64| (low - 1e-6..=high + 1e-6).contains(&a.to_degrees());
@@ -41,9 +42,9 @@ pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     all.min_by(|a, b| miss(a[0], a[1]).total_cmp(&miss(b[0], b[1]))).unwrap_or([50.0, 0.7])
 }
 
-/// Fraction of a step below which a throttle has no effect: a glider has none.
+/// Fraction of a step below which the throttle has no effect, as in a glider.
 const NO_ANSWER: f64 = 0.01;
-/// Lag of a throttle without a measurable one, s.
+/// Time constant used for a throttle that has no effect, s.
 const USUAL_LAG_S: f64 = 0.2;
 
 /// Time constant (s) of the step response `observed`, from the time to 63 % of its end.
@@ -51,7 +52,7 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
     let end = 0.5;
     match observed.iter().position(|x| *x >= 0.632 * end) {
         Some(k) => (0.01 * k as f64).max(0.01),
-        // slower than the observation time: from the part of the step reached
+        // 63 % was not reached: from the fraction of the step at the end of the observation
         None => {
             let last = observed.last().copied().unwrap_or(0.0) / end;
             if last < NO_ANSWER {
@@ -64,11 +65,11 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
 
 /// Range of time constants for the thrust, s: from one step to the effect's largest.
 const THRUST_LAGS_S: [f64; 2] = [0.01, 10.0];
-/// Remaining fraction of a step response above which a lag does not describe it.
+/// Residual of a step response, as a fraction of the step, above which a first-order lag does not describe it.
 const NO_LAG: f64 = 0.5;
-/// Largest ratio of the residual with a lag to that without.
+/// Largest accepted ratio of the residual with the lag to that without a lag.
 const MUCH_BETTER: f64 = 0.8;
-/// Number of time constants, geometrically spaced.
+/// Number of time constants tried, geometrically spaced.
 const THRUST_LAGS: usize = 400;
 
 /// First-order lag between throttle position and thrust.
@@ -77,13 +78,13 @@ pub(super) struct ThrustLag {
     pub lag: f64,
     /// Residual of the step response: rms as a fraction of the thrust's change.
     pub left: f64,
-    /// Whether it describes the step response, and small movements better than no lag does.
+    /// Whether the lag describes the step response, and describes small movements better than a model without a lag.
     pub better: bool,
 }
 
-/// The lag with the best fit to a step response, validated on the response to a sine; `answers` are thrust and
-/// throttle position after each `step` (s). The settled thrust is `slope` δ + `curve` δ² and a constant. `None` where
-/// the thrust does not change, or no lag fits as well.
+/// The lag that fits the step response `raised` best, validated on the response `waved` to a sine. Each response lists
+/// thrust (N) and throttle position after each `step` (s). The steady thrust is `slope` δ + `curve` δ² and a constant.
+/// `None` if the thrust does not change, or if a model without a lag fits as well.
 pub(super) fn thrust_lag(
     [raised, waved]: [&[[f64; 2]]; 2],
     step: f64,

@@ -61,7 +61,7 @@ pub enum Prior {
     /// The values of the model file with their standard deviations.
     #[default]
     File,
-    /// Only the bounds of what is physically possible.
+    /// Only the physically possible range.
     Bounds,
 }
 
@@ -78,7 +78,7 @@ pub struct Options {
     pub horizons_s: Vec<f64>,
     /// Whether the model's other conventions are tried as well.
     pub conventions: bool,
-    /// Constants estimated for each flight beside those of its sensors.
+    /// Constants estimated for each flight in addition to its sensor errors.
     pub per_flight: PerFlight,
     /// The model tuned to the same flights without any effect ([`tune`](super::tune)), if that has been computed
     /// already.
@@ -152,7 +152,7 @@ pub fn amend(
     Ok(amended)
 }
 
-/// The same for flights that are as the model's file knows them.
+/// The same for flights that are already corrected by the constants in the model's file.
 fn of_right(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -213,7 +213,7 @@ fn of_right(
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 
-/// Flights to fit to, as the model's file knows them.
+/// Flights to fit to, corrected by the constants in the model's file.
 struct Right {
     flights: Vec<Reconstruction>,
     asked: PerFlight,

@@ -16,7 +16,7 @@ use crate::flight_path::reconstruction::Reconstruction;
 use greylag_model::GreyBox;
 use greylag_physics::catalogue;
 
-/// The answer of an amendment: the model as given, tuned, with the effects that joined.
+/// The answer of an amendment, from the errors of the model as given, tuned, and with the added effects.
 pub fn answer(story: &Amendment) -> Answer {
     let joined: Vec<_> = story.effects.iter().filter(|e| e.joined).collect();
     let effects = joined.iter().filter_map(|e| {
@@ -39,19 +39,19 @@ pub fn answer(story: &Amendment) -> Answer {
     })
 }
 
-/// The models behind a diagnosis, by equation error over its flights, and its answer.
+/// The answer of a diagnosis and its tuned model, estimated by equation error from its flights.
 #[derive(Clone, Debug)]
 pub struct Diagnosed {
     /// The model with its own coefficients tuned, no effect added.
     pub tuned: GreyBox,
-    /// The fall of the free-run error on the flights of the diagnosis, with its causes.
+    /// Reduction of the free-run error on the flights of the diagnosis, by tuning and by each effect.
     pub answer: Answer,
 }
 
 /// Evaluates tuning and the asserted effects of `diagnosis` on its own `flights`.
 ///
 /// # Errors
-/// An effect cannot join the model, or a flight has no clock.
+/// An effect cannot be added to the model, or a flight cannot be resampled.
 pub fn diagnosed(
     model: &GreyBox,
     flights: &[Reconstruction],

@@ -1,4 +1,4 @@
-//! Modelling conventions beside the effects, whose choice no coefficient can make up for.
+//! Modelling conventions: choices other than effects, which no coefficient can compensate.
 
 use serde::Serialize;
 

@@ -1,21 +1,22 @@
-//! What a fit has learned of its flights and of the installation that they share, as the model's file keeps it.
+//! Constants that a fit has estimated for each flight and for the installation that the flights share, as written to the
+//! model's file.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::per_flight::PerFlight;
 use greylag_model::{FlightConstants, Known};
 
-/// Standard errors by which a mean over flights must exceed zero to be an installation's.
+/// A mean over flights is taken as a constant of the installation if it exceeds this many of its standard errors.
 const CLEAR: f64 = 2.0;
-/// Where the constants come from, as their source says.
+/// Source of the constants, as written to the model's file.
 const BY: &str = "greylag amend";
 
 /// A flight's constants with the standard deviations of its unknowns, in the order of [`Own::unknowns`].
 pub(super) struct Learned<'a> {
-    /// The flight.
+    /// Name of the flight, from its log file.
     pub name: &'a str,
-    /// Its constants.
+    /// Estimated constants of the flight.
     pub own: &'a Own,
-    /// Their standard deviations.
+    /// Standard deviations of the unknowns among them.
     pub sd: &'a [f64],
 }
 
@@ -57,7 +58,7 @@ pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> K
     all
 }
 
-/// The same without trims, which stand beside coefficients that have changed.
+/// The constants without trims, which are not valid with changed coefficients.
 fn without_trims(known: &Known) -> Known {
     let mut kept = known.clone();
     kept.flights.values_mut().for_each(|own| own.trims = None);
@@ -65,7 +66,7 @@ fn without_trims(known: &Known) -> Known {
     kept
 }
 
-/// What the `flights` have in common; `None` if nothing is clear of zero.
+/// Constants of the installation, the means over `flights`; `None` if none differs significantly from zero.
 fn installation(flights: &[Learned]) -> Option<FlightConstants> {
     let angles: Vec<_> = flights.iter().map(Learned::angles_deg).collect();
     let axes: [f64; 3] =

@@ -120,7 +120,7 @@ pub fn leave_one_out(
 struct Set<'a> {
     /// All flights as they are predicted.
     judged: &'a [Flight],
-    /// The same as they are fitted to: put right by what the model's file knows of them.
+    /// The same flights corrected by their constants in the model's file, as used in the fit.
     fitted: &'a [Flight],
     /// Which of them are long enough to be predicted; the others are fitted to alone.
     judges: &'a [usize],
@@ -128,7 +128,7 @@ struct Set<'a> {
     at: f64,
 }
 
-/// What a structure must beat: the state held, straight flight, and a linear model fitted to the other flights.
+/// Baseline forecasts: the state held, straight flight, and a linear model fitted to the other flights.
 fn black_boxes(model: &GreyBox, set: &Set) -> Vec<Scored> {
     let prepared: Vec<Prepared> = set.judged.iter().map(|f| f.prepared.clone()).collect();
     let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];

@@ -63,7 +63,7 @@ struct Side {
 /// The present model with the perturbed models of its derivatives.
 pub(super) struct Neighbourhood {
     pub model: GreyBox,
-    /// Constants estimated for each flight beside those of its sensors.
+    /// Constants estimated for each flight in addition to its sensor errors.
     pub asked: PerFlight,
     /// Acting deflections under the present model.
     pub acting: Acting,
@@ -77,7 +77,7 @@ pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place) -> Acti
     moved(model, flights, place, SKEW, 0.0)
 }
 
-/// The same with the sensor constant `which` increased by `by`.
+/// As [`acting`], with the sensor constant `which` increased by `by`.
 fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f64) -> Acting {
     let one = |(f, own): (&Flight, &Own)| {
         let mut s = own.sensors;
@@ -245,7 +245,7 @@ pub(super) fn normal(
     eliminate(&j, &r, from, w)
 }
 
-/// Columns of the sensors' offsets: their direct part less their effect through the initial state.
+/// Derivatives by the sensors' offsets: the direct effect less that through the initial state.
 fn sensor_columns(
     j: &mut DMatrix<f64>,
     [count, starts]: [usize; 2],
@@ -266,7 +266,7 @@ fn sensor_columns(
     }
 }
 
-/// Columns of the misalignment angles, from `first` on, likewise.
+/// Derivatives by the misalignment angles, in the same way, in the columns from `first` on.
 fn askew_columns(
     j: &mut DMatrix<f64>,
     [first, starts]: [usize; 2],
@@ -287,7 +287,7 @@ fn askew_columns(
 
 fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -> Normal {
     let m = j.ncols() - 8;
-    // a product of matrices, which is blocked, and not tr_mul, which is not
+    // an explicit transpose: matrix products are blocked, tr_mul is not
     let across = j.transpose();
     let all = &across * j;
     let gradient = &across * r;
@@ -297,7 +297,7 @@ fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -
         own[(k, k)] += w.start[k];
         start_gradient[k] += w.start[k] * from[k];
     }
-    // positive definite by the prior, unless a number is lost; then the search ends
+    // positive definite because of the prior, unless there is a NaN; the search then ends
     let inverse = own.try_inverse().unwrap_or_else(|| SMatrix::from_element(f64::NAN));
     let coupling = all.view((0, m), (m, 8)).into_owned();
     let through = &coupling * inverse;

@@ -161,7 +161,7 @@ pub(super) fn fly(
         let now = state.to_array();
         let error = error(&segment[k + 1].state.to_array(), &now);
         let mean = error.iter().zip(&scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0;
-        // a lost number ends the run too
+        // a NaN ends the run too
         if mean.is_nan() || mean > LEFT * LEFT {
             break;
         }

@@ -5,7 +5,7 @@ use super::judge::judged;
 use super::result::Amendment;
 use crate::per_flight::PerFlight;
 
-/// The amendment in sentences beside its answer: the conventions, and what was refused.
+/// Sentences on the amendment in addition to its answer: conventions and refused effects.
 pub fn sentences(story: &Amendment) -> Vec<String> {
     let mut all = Vec::new();
     let (before, after) = (judged(&story.before), judged(&story.after));

@@ -27,7 +27,7 @@ pub enum Trend {
     Falls,
     /// The sign changes along the variable.
     Reverses,
-    /// There is no such trend.
+    /// The error has no such trend.
     None,
 }
 
@@ -40,7 +40,7 @@ pub struct Finding {
     pub trend: Trend,
 }
 
-/// The worst regime of a channel; `None` if nothing supported differs from zero.
+/// The worst regime of a channel; `None` if the mean residual of no bin with enough samples differs from zero.
 pub fn worst(
     residuals: &[Residual],
     bins: &[RegimeBins],

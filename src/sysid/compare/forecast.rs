@@ -91,7 +91,7 @@ fn regressors(state: &[f64; 8], at: &Instant) -> [f64; REGRESSORS] {
     [roll, pitch, airspeed, p, q, r, alpha, beta, c.aileron, c.elevator, c.throttle, rudder, 1.0]
 }
 
-/// Rates of the eight states over the regressors, by least squares over all steps of `flights`.
+/// Coefficients of the rates of the eight states with respect to the regressors, by least squares over all `flights`.
 fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
     let mut gram = DMatrix::<f64>::zeros(REGRESSORS, REGRESSORS);
     let mut moments = DMatrix::<f64>::zeros(REGRESSORS, 8);

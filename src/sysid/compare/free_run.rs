@@ -1,4 +1,4 @@
-//! Free runs: the model flies from reconstructed states on the recorded deflections.
+//! Free runs: the model is integrated from reconstructed states with the recorded deflections.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,20 +14,20 @@ use greylag_physics::State;
 
 /// Time between starts, s.
 pub const START_EVERY_S: f64 = 3.0;
-/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this: as if
-/// every state were off by its whole scale, 1 rad, V0, 2 V0/b and so on.
+/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this. At 1
+/// the error of every state equals its scale: 1 rad, V0, 2 V0/b and so on.
 pub const DIVERGENCE_BOUND: f64 = 1.0;
 /// Number of points of the growth curve.
 pub const GROWTH_POINTS: usize = 25;
 
-/// Measured and predicted state at a time; `None` once diverged.
+/// Measured and predicted state at a sampled time; `None` once the run has diverged.
 pub(super) type Look = Option<[[f64; 8]; 2]>;
 
 /// All free runs of a model over all flights.
 pub struct Runs {
     /// Sampled times, s after the start, ascending.
     times: Vec<f64>,
-    /// One list for each run: its samples, as far as the flight lasts.
+    /// Samples of each run, up to the end of the flight.
     runs: Vec<Vec<Look>>,
     scale: [f64; 8],
 }
@@ -36,8 +36,8 @@ pub struct Runs {
 /// [`FlightTrace`](super::result::FlightTrace).
 pub type Trace = [Vec<f64>; 8];
 
-/// Flies `model` over all `flights`, each as the model's file knows it, looking at the `horizons` (s) and at the points of the growth
-/// curve up to the longest of them.
+/// Free runs of `model` over all `flights`, sampled at the `horizons` (s) and at the points of the growth curve up to the
+/// longest horizon. Constants of a flight that the model's file states are applied to that flight.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
     let longest = horizons.iter().copied().fold(0.0, f64::max);
     let growth = (1..=GROWTH_POINTS).map(|k| longest * k as f64 / GROWTH_POINTS as f64);
@@ -59,7 +59,7 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     (Runs { times, runs, scale: model.scale() }, traces)
 }
 
-/// The states of `trace` as the sensors of the flight would show them.
+/// Converts the states of `trace` to those that the sensors of the flight would measure, with their errors.
 fn measured_from(trace: &mut Trace, known: &KnownFlight) {
     for k in 0..trace[0].len() {
         let state = known.as_measured(std::array::from_fn(|i| trace[i][k]));
@@ -96,7 +96,7 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
     (runs, trace)
 }
 
-/// A run from one time of a flight.
+/// States of a run that starts at one time of a flight.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
     /// Time on the log's clock, s.
@@ -105,8 +105,8 @@ pub struct Path {
     pub states: Trace,
 }
 
-/// Flies `model` from the measured state at the sample nearest to `time_s` for `seconds`, or until the flight
-/// ends or the run diverges; `None` outside of all segments.
+/// Integrates `model` from the measured state at the sample nearest to `time_s`, for `seconds` or until the flight ends or
+/// the run diverges. `None` if no segment contains `time_s`.
 pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64) -> Option<Path> {
     let known = KnownFlight::of(model, flight);
     let (model, flight) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
@@ -146,7 +146,7 @@ fn run(
         flight.advance(model, state, [&segment[k], next], memory)
     };
     if let Some(before) = start.checked_sub(1) {
-        // the integrator remembers the step before
+        // the integrator uses the acceleration of the step before
         advance(before, segment[before].state, &mut memory);
     }
     let last = looks.last().map_or(0, |l| (start + l).min(segment.len() - 1));
@@ -180,7 +180,7 @@ pub fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     error
 }
 
-/// Root mean square of error / x_c; NaN if any component is.
+/// Root mean square of error / x_c over the eight states; NaN if the error of one is NaN.
 pub(super) fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
     (error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0).sqrt()
 }
@@ -196,7 +196,7 @@ impl Runs {
         place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
     }
 
-    /// Scaled error of each run at one time; a diverged run has the bound.
+    /// Scaled error of each run at one time; a diverged run counts with [`DIVERGENCE_BOUND`].
     fn errors(&self, looks: &[Look]) -> Vec<f64> {
         let one = |look: &Look| match look {
             Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),
@@ -240,7 +240,7 @@ impl Runs {
     /// RMSE, R² and Theil's U with its shares for one state.
     fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
         let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
-        // through the error, so that a roll across ±180° counts the short way round
+        // from the error, so that a roll error across ±180° is the smaller angle
         let predicted: Vec<f64> = runs.iter().map(|r| r[0][k] + error(&r[0], &r[1])[k]).collect();
         let errors: Vec<f64> = predicted.iter().zip(&measured).map(|(a, b)| a - b).collect();
         let rmse = root_mean_square(&errors);

@@ -1,11 +1,11 @@
-//! What a model's file knows of the flights that it is compared with, and what that is worth.
+//! Constants of the compared flights in a model's file, and the free-run errors with and without them.
 
 use super::free_run;
 use super::result::{HorizonScore, KnownUse};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// What the file of `model` knows of `flights`, with the free-run errors without it; `None` if it knows nothing of them.
+/// The constants of `flights` in the file of `model`, with the free-run errors without them; `None` if there are none.
 pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option<KnownUse> {
     let (own, shared): (Vec<&Prepared>, Vec<_>) =
         flights.iter().partition(|f| model.known.names(&f.name));
@@ -23,7 +23,7 @@ pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option
 }
 
 impl KnownUse {
-    /// What is used, and the error `with` it beside that without, at the longest horizon that a run reaches.
+    /// Sentence on the constants used, with the error `with` and without them at the longest horizon that a run reaches.
     pub fn sentence(&self, with: &[HorizonScore]) -> Option<String> {
         let both = with.iter().zip(&self.without).rfind(|(a, b)| a.runs > 0 && b.runs > 0)?;
         let mut what = Vec::new();

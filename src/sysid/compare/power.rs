@@ -8,9 +8,9 @@ const EXCITED: f64 = 0.05;
 
 /// Mean squares of a channel.
 pub struct Power {
-    /// Variance of what was measured.
+    /// Variance of the measured channel.
     pub measured: f64,
-    /// Mean square residual.
+    /// Mean square of the residual.
     pub residual: f64,
     /// Variance that noise accounts for.
     pub noise: f64,
@@ -33,7 +33,7 @@ impl Power {
         }
     }
 
-    /// The unexplained share of what is not noise; NaN where the channel is not excited.
+    /// Unexplained share of the variance beyond noise; NaN if the channel is not excited.
     pub fn unexplained(&self) -> f64 {
         let signal = self.measured - self.noise;
         if signal > EXCITED * self.measured {

@@ -34,7 +34,7 @@ pub struct Comparison {
     pub notes: Vec<String>,
 }
 
-/// A comparison as the JSON document: the first model's free run and channels stand at the top.
+/// A comparison as the JSON document. Free run and channels of the first model are top-level fields.
 #[derive(Debug, Serialize)]
 pub struct Document<'a> {
     #[serde(flatten)]
@@ -83,7 +83,7 @@ pub struct ModelResult {
     pub sentences: Vec<String>,
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
-    /// What the model's file knows of the flights, where it knows any; `free_run` uses it.
+    /// Constants of the flights in the model's file, if it has any; `free_run` uses them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
@@ -95,14 +95,14 @@ pub struct ModelResult {
     pub traces: Vec<ModelTrace>,
 }
 
-/// What a model's file knows of the flights, and what its free runs are worth without it.
+/// Constants of the flights in a model's file, and the errors of its free runs without them.
 #[derive(Clone, Debug, Serialize)]
 pub struct KnownUse {
-    /// Flights of which it has constants of their own (`[flights.NAME]`).
+    /// Flights with constants of their own in the file (`[flights.NAME]`).
     pub flights: Vec<String>,
-    /// Other flights, for which its `[installation]` is used.
+    /// Other flights, for which the file's `[installation]` is used.
     pub by_installation: Vec<String>,
-    /// Free-run error without all that, one entry a horizon.
+    /// Free-run error without these constants, one entry a horizon.
     pub without: Vec<HorizonScore>,
 }
 
@@ -159,7 +159,7 @@ pub struct GrowthPoint {
     pub rmse_scaled: f64,
     /// Median over runs of the scaled error; a diverged run counts with the bound.
     pub median_scaled: f64,
-    /// 90 % quantile over runs of the scaled error, likewise.
+    /// 90 % quantile over runs of the scaled error; a diverged run counts with the bound.
     pub p90_scaled: f64,
 }
 
@@ -201,10 +201,10 @@ pub struct ChannelResult {
     pub map: Map,
 }
 
-/// What a comparison can judge of a model in one channel.
+/// Whether a comparison can judge a model in one channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Abstention {
-    /// The channel.
+    /// Channel that is judged.
     pub channel: ChannelId,
     /// Why the flights cannot judge the model here; `None` where they can.
     pub why: Option<&'static str>,
@@ -215,7 +215,7 @@ pub struct Abstention {
 /// Mean residual over one regime variable.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegimeBins {
-    /// The regime variable.
+    /// Variable whose range is divided into bins.
     pub variable: RegimeVariable,
     /// Name of the variable, for example `angle of attack`.
     pub name: &'static str,
@@ -237,7 +237,7 @@ pub struct Bin {
     pub high: f64,
     /// Mean of the variable over the bin's windows.
     pub center: f64,
-    /// Label of a bin that is no interval, the flight's name; otherwise empty.
+    /// Name of the flight if the bins are flights; otherwise empty.
     pub label: String,
     /// Mean residual (measured − model), in the channel's unit.
     pub mean: f64,

@@ -9,17 +9,17 @@ const EXPLAINED: f64 = 0.01;
 /// Unexplained share below which no regime is named.
 pub const NOTHING_LEFT: f64 = 0.001;
 
-/// Input of a channel's sentence.
+/// Figures from which the sentence of a channel is written.
 pub struct Subject<'a> {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Unexplained share; NaN if the flights do not move it above the noise.
+    /// Unexplained share of the channel's variance; NaN if the flights do not excite the channel above the noise.
     pub unexplained: f64,
     /// Worst regime of the channel, if there is one.
     pub finding: Option<&'a Finding>,
     /// The variable that the residual mainly follows.
     pub follows: Option<RegimeVariable>,
-    /// Whether the uncertainty of the sensor errors may account for all of it (95 %).
+    /// Whether the uncertainty of the sensor errors may account for the whole residual (95 %).
     pub within_doubt: bool,
     /// Mass of the aircraft in the model, kg.
     pub mass: f64,
@@ -93,7 +93,7 @@ fn noun(channel: ChannelId) -> &'static str {
 /// Descriptions of the model's error by its sign: `(model too low, model too high)`.
 fn directions(channel: ChannelId) -> (&'static str, &'static str) {
     match channel {
-        // measured is drag less thrust; people think of the forward force
+        // the channel is drag less thrust, the sentence speaks of the forward force
         ChannelId::Drag => ("too high", "too low"),
         ChannelId::Lift | ChannelId::Airspeed | ChannelId::Alpha => ("too low", "too high"),
         ChannelId::Side | ChannelId::Beta | ChannelId::Yaw => {
@@ -107,7 +107,7 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
 /// The error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
     let [least, most] = regime.interval;
-    // what counts is the side of zero: an interval that does not hold it must not read as if it did
+    // the half width towards zero: an interval that excludes zero must not appear to include it
     let half = if regime.mean > 0.0 { regime.mean - least } else { most - regime.mean };
     let (low, high) = directions(subject.channel);
     if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {
@@ -130,7 +130,7 @@ fn error(subject: &Subject, regime: &Regime) -> String {
     }
 }
 
-/// For moments, the error relative to the measured one, where that has one sign.
+/// For moments, the error relative to the measured moment, if that has the same sign throughout the regime.
 fn strength(channel: ChannelId, regime: &Regime) -> String {
     let moment = matches!(channel, ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw);
     match regime.relative_percent {

@@ -30,7 +30,7 @@ pub struct Options {
     pub detail: Detail,
     /// Whether the search for a formula tries free forms if the shapes of its library do not suffice.
     pub free_forms: bool,
-    /// Constants estimated for each flight beside its sensor errors.
+    /// Constants estimated for each flight in addition to its sensor errors.
     pub per_flight: PerFlight,
 }
 

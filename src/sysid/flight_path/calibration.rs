@@ -1,4 +1,4 @@
-//! Rare instrument errors, freed one by one where a flight shows them significantly.
+//! Rare instrument errors. Each is estimated only if a flight shows it significantly.
 //!
 //! Gains of gyros, accelerometers and vanes, an offset of airspeed or heading, a delay far beyond a sample: if they
 //! were free in every flight, the biases would be less certain in all of them. Each is therefore held until its

@@ -20,7 +20,7 @@ use greylag_num::statistics;
 const WIDTH: usize = COUNT + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
-/// Present estimate.
+/// The present estimate of paths, constants and noise.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Path of each track.
@@ -43,7 +43,7 @@ pub struct Problem<'a> {
     pub log: &'a Log,
     /// Settings of the reconstruction.
     pub options: &'a Options,
-    /// Meaning of a rate sample: held, or at an instant.
+    /// Whether a rate sample is held until the next one, or is the value at an instant.
     pub sampling: Sampling,
     /// Prior means of the constants.
     pub means: Values,
@@ -53,7 +53,7 @@ pub struct Problem<'a> {
 
 /// Solution of one linearisation with `N` unknowns for each instant.
 pub struct Solved<const N: usize> {
-    /// Changes of every instant of every stretch.
+    /// Change of the path at every instant of every stretch.
     moves: Vec<Vec<[f64; N]>>,
     /// Changes of the constants; zero where they are held.
     constants: Values,
@@ -63,8 +63,8 @@ pub struct Solved<const N: usize> {
     pub readings: Vec<Vec<Reading>>,
 }
 
-/// A kinematic step is down-weighted beyond this many times the measurements' bound: a launcher, an impact or an
-/// estimator that aligns itself moves the logged path by more than gyros and accelerometers show.
+/// Ratio of the bound beyond which a kinematic step is down-weighted to that of the measurements. With a launcher, an impact
+/// or an estimator that aligns itself, the logged path moves by more than gyros and accelerometers measure.
 const PROCESS: f64 = 1.5;
 
 impl Problem<'_> {
@@ -107,8 +107,8 @@ impl Problem<'_> {
         measured + between.sum::<f64>()
     }
 
-    /// Residuals of the kinematic steps in the assumed standard deviations of gyros and accelerometers: robust scale
-    /// for each axis of rotation and velocity. Below one, the assumed noise suffices.
+    /// Residuals of the kinematic steps relative to the assumed standard deviations of gyros and accelerometers: a robust scale
+    /// for each axis of rotation and velocity. At most one if the assumed noise is large enough.
     pub fn step_residuals(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
@@ -153,8 +153,8 @@ impl Problem<'_> {
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
     }
 
-    /// Information on the constants from prior and data (the last columns but one); from the prior alone where the
-    /// log carries none.
+    /// Information matrix of the constants, from prior and data. Constants that the log's columns do not observe have the
+    /// prior's information only.
     fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
         let first = W.checked_sub(WIDTH)?;
         Some(SMatrix::from_fn(|i, j| {
@@ -164,8 +164,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// Estimate of each of `places` without a prior, with its standard deviation, one at a time; NaN where the data
-    /// carries no information on it.
+    /// Estimate of each of the constants `places` without its own prior, with the standard deviation; NaN if the data have no
+    /// information on it.
     pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
         let (_, _, left) = self.eliminate::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
         let bound = self.information(&left)?;
@@ -374,7 +374,7 @@ impl<const N: usize> Solved<N> {
         if largest.is_finite() {
             Ok(largest)
         } else {
-            Err(no_path(flight, "the path left the numbers"))
+            Err(no_path(flight, "the path is not finite any more"))
         }
     }
 }

@@ -12,11 +12,11 @@ use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
 
-/// Correlation time of gusts, s: the length scale of turbulence some hundred metres up over the airspeed of a small
-/// aircraft.
+/// Correlation time of gusts, s: the length scale of turbulence at an altitude of some hundred metres, divided by the
+/// airspeed of a small aircraft.
 const GUST_TIME: f64 = 20.0;
 
-/// Share of a gust that remains after `step`, s.
+/// Share of a gust that remains after the time `step` (s).
 pub fn gust_kept(step: f64) -> f64 {
     (-step / GUST_TIME).exp()
 }

@@ -94,7 +94,7 @@ impl Levels {
         let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
         let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
-        // an unknown force is no noise that averages out
+        // an unknown force is not noise: it does not average out
         let gain = if log.has.force { between(force) } else { 0.0 };
         let turn = between(gyro);
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {

@@ -27,7 +27,7 @@ const SHORTEST: f64 = 0.5;
 pub enum ManoeuvreKind {
     /// Neither surfaces nor throttle move.
     Steady,
-    /// Banked, nothing else moves.
+    /// Steady bank, no other motion.
     Turn,
     /// The throttle moves, the surfaces do not.
     Thrust,

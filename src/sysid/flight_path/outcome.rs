@@ -28,13 +28,13 @@ const ROUGH: f64 = 0.1;
 /// Smallest actuator delay that is corrected, samples: a smaller one is within the regression's own error.
 const CORRECTED: f64 = 0.25;
 
-/// Time scale from which a difference between path and measured attitude is no noise, s.
+/// Time scale above which a difference between path and measured attitude does not count as noise, s.
 const DISAGREEING: f64 = 4.0;
 
-/// Uncertainty of a flight controller's pitch and heading over a whole flight, rad: the board is levelled by hand,
-/// the compass calibrated, and an estimator that attributes an accelerometer bias to pitch corrects the accelerations
-/// accordingly, so that the log is consistent. PX4 in SITL: 0.14° to 0.22° of pitch, 0.11° to 0.30° of heading
-/// (results/notes/2026-11-27-flight-path-reconstruction.md); a calibration by hand is assumed to be no better.
+/// Constant error of a flight controller's pitch and heading, rad (standard deviation). A log does not show it: an
+/// estimator that attributes an accelerometer bias to pitch corrects the accelerations consistently. PX4 in SITL has
+/// 0.14° to 0.22° in pitch, 0.11° to 0.30° in heading (results/notes/2026-11-27-flight-path-reconstruction.md). A board
+/// levelled and a compass calibrated by hand are assumed to be no better.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -116,7 +116,7 @@ fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, Reconstr
     all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
 }
 
-/// Root mean square of the drawn errors, in the order of the state.
+/// Root mean square of the drawn errors of each state; the noise `gyro` for the rates.
 fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64; 8] {
     let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
     for draw in erring {
@@ -252,11 +252,11 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// Uncertainty of α and β where no vane measures them: from the wind, the path, the slow difference between its pitch
-/// and heading and the measured ones, and the alignment of those. Their values are zero.
+/// Uncertainty of α and β without vanes. It has four parts: the wind, the path, the slow difference between estimated and
+/// measured pitch and heading, and the alignment of the measured ones. The values themselves are zero.
 ///
-/// A heading for which gyros and compass differ by a degree for half a minute is not known better than that, whatever
-/// the noise of either; the error of β includes it.
+/// If gyros and compass differ by a degree over half a minute, the heading has at least that error, even with little
+/// noise. The error of β includes it.
 fn unmeasured_angles(
     problem: &Problem,
     smoothed: &Found,
@@ -309,7 +309,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     }
     let unseen = |place: &usize| {
         let stated = log.sensors.known(nuisance::NAMES[*place].0).is_some();
-        // a drift that a flight is too short to show does it no harm
+        // a drift that is too slow to observe in a flight does not matter there
         !stated
             && !nuisance::held(*place, problem.widths[*place])
             && !(DRIFT..BEND).contains(place)

@@ -35,8 +35,8 @@ pub struct Segment {
 
 /// A sensor error or a component of the wind, as estimated together with the path.
 ///
-/// The wind is the steady one, about which gusts vary; its standard deviation covers the difference to a mean over
-/// the flight. The velocity through the air at an instant includes the gust.
+/// The wind is the steady part, without gusts. Its standard deviation covers the difference to the mean wind of the flight.
+/// The velocity through the air at an instant includes the gust.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
     /// Name, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
@@ -65,8 +65,7 @@ pub struct Reconstruction {
     pub name: String,
     /// Time between samples, s.
     pub step_s: f64,
-    /// Meaning of body rates and deflections between samples: held from one sample to the next, or samples of
-    /// continuous signals.
+    /// Whether body rates and deflections are constant from one sample to the next, or samples of continuous signals.
     pub sampling: Sampling,
     /// Stretches of the flight without gaps.
     pub segments: Vec<Segment>,
@@ -75,9 +74,9 @@ pub struct Reconstruction {
     /// Standard deviations of the measurement noise as logged, before smoothing, in the order roll, pitch, airspeed,
     /// p, q, r, alpha, beta (units of [`State`]).
     pub noise: [f64; 8],
-    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the same order: rates are
-    /// the gyros' less their biases, not smoothed; the other errors are slow, over tenths of seconds. The constant
-    /// part of the errors is covered by [`Self::nuisances`], not here.
+    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the same order. Body rates are
+    /// measured rates less their biases, not smoothed; the errors of the other states vary over tenths of seconds. Constant
+    /// errors are not included: [`Self::nuisances`] has them.
     pub left: [f64; 8],
     /// Standard deviation of the accelerometers' noise, m/s².
     pub force_noise: [f64; 3],

@@ -61,7 +61,7 @@ impl Turning {
         }
     }
 
-    /// The changes at `alpha` and `beta` (rad): those of [`flow`] where no vane measures.
+    /// The changes at `alpha` and `beta` (rad): those of [`flow`] for an angle that no vane measures.
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {
@@ -71,8 +71,8 @@ impl Turning {
     }
 }
 
-/// What a unit of each angle adds to a state whose α and β are turned as `turning` says, in the order and the units of the
-/// state.
+/// Change of a measured state for a unit of each angle, in the order and the units of the state. `turning` gives the changes
+/// of α and β.
 pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
     let [roll, pitch, _, p, q, r, alpha, beta] = *state;
     let attitude = attitude(roll, pitch);
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use nalgebra::{Rotation3, Vector3};
 
-    /// Against rotation matrices.
+    /// Compared with finite differences of rotation matrices.
     #[test]
     fn a_small_turn_moves_vectors_angles_and_attitude() {
         const STEP: f64 = 1e-6;

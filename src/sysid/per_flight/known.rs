@@ -1,5 +1,5 @@
-//! Flights as a model's file knows them: measured axes turned back into the body's, the sensors' constants taken away, and
-//! the model with the trims of the flight.
+//! Flights corrected by the constants in a model's file: measured axes rotated back to the body axes, sensor errors removed,
+//! and the model with the trims of the flight.
 
 use greylag_model::known::{FlightConstants, SENSORS};
 use greylag_model::{GreyBox, Known};
@@ -10,22 +10,22 @@ use crate::per_flight::askew::{self, Turning};
 use crate::per_flight::trims;
 use crate::weak_form::prepared::Prepared;
 
-/// The state that each of the sensors' constants is added to; the airspeed's is a share of it.
+/// Index of the state to which each sensor error is added; that of the airspeed is relative.
 const ADDED_TO: [usize; SENSORS.len()] = [AIRSPEED, 3, 4, 5, 6, 7];
 const AIRSPEED: usize = 2;
 
 /// A flight with the model that flies it.
 #[derive(Clone, Debug)]
 pub struct KnownFlight {
-    /// The model with the trims of the flight, and nothing more that it knows of flights.
+    /// The model with the trims of the flight and without other constants of flights.
     pub model: GreyBox,
-    /// The flight in the axes of the body, the sensors' constants taken away.
+    /// The flight in body axes, with the sensor errors removed.
     pub flight: Prepared,
     added: Added,
 }
 
 impl KnownFlight {
-    /// `flight` as the file of `model` knows it; `None` if it knows nothing of it.
+    /// `flight` corrected by its constants in the file of `model`; `None` if the file has none.
     pub fn of(model: &GreyBox, flight: &Prepared) -> Option<KnownFlight> {
         let own = model.known.of(&flight.name)?;
         let added = Added { own: own.clone(), turning: flight.turning };
@@ -34,14 +34,14 @@ impl KnownFlight {
         Some(KnownFlight { model: with_trims(model, &own), flight, added })
     }
 
-    /// A predicted state as the sensors of the flight would show it.
+    /// Converts a predicted state to the one that the sensors of the flight would measure, with their errors.
     pub fn as_measured(&self, state: [f64; 8]) -> [f64; 8] {
         let by = self.added.to(&state);
         std::array::from_fn(|k| state[k] + by[k])
     }
 }
 
-/// What is added to the state of a flight.
+/// Measurement errors that are added to the state of a flight.
 #[derive(Clone, Debug)]
 struct Added {
     own: FlightConstants,
@@ -71,7 +71,7 @@ impl Added {
     }
 }
 
-/// `model` with the trims of a flight as coefficients of its own.
+/// `model` with the trims of a flight added as coefficients.
 fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     let mut bare = model.clone();
     bare.known = Default::default();
@@ -107,7 +107,7 @@ pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstructi
     (right, named)
 }
 
-/// The names of `flights` of which `known` has trims.
+/// Names of those `flights` for which `known` has trims.
 pub fn trimmed<'a>(known: &Known, flights: &'a [Reconstruction]) -> Vec<&'a str> {
     let has = |f: &&Reconstruction| known.of(&f.name).is_some_and(|own| own.trims.is_some());
     flights.iter().filter(has).map(|f| f.name.as_str()).collect()

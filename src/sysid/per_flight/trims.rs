@@ -1,4 +1,4 @@
-//! Trims of each flight: constant coefficients beside the model's, and a share of its thrust.
+//! Trims of each flight: constants added to the model's coefficients, and a relative change of its thrust.
 //!
 //! They join a model as an effect outside the catalogue, so a model needs no coefficient of such a name.
 

@@ -27,7 +27,7 @@ pub struct Series {
     pub channel: ChannelId,
     /// Measured values, one for each window, in the channel's unit; NaN where the log has no specific force.
     pub measured: Vec<f64>,
-    /// Predicted values, likewise.
+    /// Predicted values at the same windows.
     pub predicted: Vec<f64>,
     /// Variance of measured − predicted due to sensor noise.
     pub noise_variance: f64,
@@ -124,7 +124,7 @@ fn smooth(weights: &[f64], values: impl Iterator<Item = Vector<f64>>) -> Vector<
 /// A step between two samples.
 struct Step<'a> {
     from: &'a Instant,
-    /// End of the step, for schemes that evaluate within it: controls are still those of the start.
+    /// End of the step, for schemes that evaluate the model there too, with the controls of the start.
     to: Option<&'a Instant>,
 }
 
@@ -240,7 +240,8 @@ fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     variance
 }
 
-/// The part of that variance from quantities averaged by the kernel: accelerations, rates, airspeed, α, β.
+/// Part of the noise variance that comes from averaged or differentiated measurements: accelerations, rates, airspeed, α,
+/// β.
 fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);
     let [fx, fy, fz] = flight.force_noise.map(|sd| (model.body.mass * sd).powi(2));
@@ -267,8 +268,8 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     variance
 }
 
-/// Predicted less the part of the measured side that depends on the state: forces rotated by α and β, gyroscopic
-/// moments.
+/// Predicted value less those parts of the measured one that depend on the state: specific force rotated by α and β, and
+/// gyroscopic moment.
 pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());

@@ -11,7 +11,7 @@ use greylag_sim::faults::{ControllerMode, Fault};
 /// Time before and after the first event in the close-up, s.
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
-/// A decision older than this is no longer in force, s.
+/// Age above which a decision is not in force any more, s.
 const STALE_S: f64 = 0.2;
 /// Drawn length of an instantaneous event, such as a request, s.
 const MOMENT_S: f64 = 0.1;

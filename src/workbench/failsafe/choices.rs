@@ -5,7 +5,7 @@ use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 
 /// Choice of no fault, or of no request.
 pub(super) const NOTHING: &str = "none";
-/// The client arms and asks for OFFBOARD once more.
+/// The client arms and requests OFFBOARD again.
 pub(super) const AGAIN: &str = "again";
 /// Requests of the client: form value, displayed text.
 pub(super) const REQUESTS: [(&str, &str); 7] = [
@@ -37,7 +37,7 @@ pub(super) fn counterpart(counterpart: Counterpart) -> &'static str {
     }
 }
 
-/// Faults that can be chosen, those that are asked for most first.
+/// Faults that can be chosen, the most common ones first.
 pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Unplug,
     FaultKind::Corruption,

@@ -13,9 +13,9 @@ use greylag_sim::faults::{
 pub(super) const FLIGHT_S: f64 = 60.0;
 /// The attitude asked for is flown from this moment to that, s; level before and after.
 const ATTITUDE_S: [f64; 2] = [8.0, 45.0];
-/// Pitch of level flight that a client asks for, degrees.
+/// Pitch that a client commands in level flight, degrees.
 const LEVEL_DEG: f64 = 3.0;
-/// When the client asks for HOLD in the mode of that name, s.
+/// Time at which the client requests HOLD in the mode of that name, s.
 const HOLD_S: f64 = 8.0;
 /// Time from arming to asking for OFFBOARD, s.
 const AFTER_ARMING_S: f64 = 0.1;
@@ -42,7 +42,7 @@ pub(super) const FIELDS: [(&str, &str); 16] = [
     ("seed", "1"),
 ];
 
-/// A number of the form: its field, what it is, its limits and its unit.
+/// A number of the form: field, meaning, limits and unit.
 pub(super) struct Number {
     pub field: &'static str,
     pub what: &'static str,

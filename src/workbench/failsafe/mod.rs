@@ -20,10 +20,10 @@ use greylag_sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
 
 /// Makes the companions with a controller; the error is a message for the page.
 type Make = Box<dyn Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync>;
-/// Stack of the thread that designs a controller, bytes: dual numbers are large where nothing is optimised away.
+/// Stack size of the thread that designs a controller, bytes: dual numbers need much of it in an unoptimised build.
 const STACK: usize = 16 << 20;
 
-/// Flies what the page asks for.
+/// Simulates the scenario that the page requests.
 pub struct Failsafes {
     make: Make,
     /// Companions made so far, by controller: the design of one takes a moment.

@@ -1,4 +1,4 @@
-//! The page: the choices, and beside them the result.
+//! The page: the choices and their result, side by side.
 
 use super::choices::{
     FAULTS, NOTHING, REQUESTS, TURBULENCE, controllers, counterpart, fault, file_name,
@@ -25,7 +25,7 @@ const EXAMPLES: [(&str, &str); 8] = [
     ("Disarm in the air", "counterpart=sitl&fault=none&request=disarm"),
 ];
 
-/// The page with the choices of `form` and what is shown of them; a wrong one is marked.
+/// The page with the choices of `form` and their result; an invalid choice is marked.
 pub(super) fn render(form: &Form, wrong: Option<&Wrong>, shown: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -177,7 +177,7 @@ fn number(form: &Form, name: &str, label: &str, wrong: Option<&Wrong>) -> String
     )
 }
 
-/// Buttons of which one is pressed.
+/// A group of buttons of which one is selected.
 fn group(name: &str, legend: &str, options: &[(&str, &str)], form: &Form) -> String {
     let option = |(value, words): &(&str, &str)| {
         let checked = if form.value(name) == *value { " checked" } else { "" };

@@ -24,7 +24,7 @@ const MUCH_M: f64 = 30.0;
 struct Cause {
     at_s: f64,
     words: String,
-    /// When and what the client asked for, if it did.
+    /// Time and kind of the client's request, if there was one.
     asked: Option<(f64, Asking)>,
 }
 
@@ -215,7 +215,7 @@ impl Flown {
         }
     }
 
-    /// The sample at which what a cause changes has changed.
+    /// The sample at which the effect of a cause is visible.
     fn later(&self, cause: &Cause) -> Option<&Sample> {
         let samples = &self.witnessed.samples;
         samples.get(((cause.at_s + LATER_S) / TICK_S) as usize).or(samples.last())

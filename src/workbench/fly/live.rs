@@ -16,7 +16,7 @@ const STEP_S: f64 = 0.1;
 /// Points that are kept: ten minutes.
 const MOST: usize = 6000;
 
-/// Values over the points; `None` where nothing is known.
+/// Values at the points; `None` where there is no measurement.
 type Column = Vec<Option<f32>>;
 
 /// A flight, or a part of it, as a page draws it.
@@ -87,7 +87,7 @@ pub struct Watcher {
     point: Option<Point>,
 }
 
-/// A mean of what is known.
+/// Mean of the finite values.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
     sum: f64,
@@ -107,7 +107,7 @@ impl Mean {
     }
 }
 
-/// A point that is not whole yet.
+/// A point whose samples are not complete yet.
 struct Point {
     place: i64,
     states: [Mean; STATES.len()],
@@ -123,7 +123,7 @@ impl Watcher {
         Watcher { models: models.iter().map(of).collect(), point: None }
     }
 
-    /// Takes rows; the points that are whole now.
+    /// Adds rows and returns the points that are complete now.
     pub fn take(&mut self, rows: &[Sample]) -> Live {
         let mut live = self.empty();
         for row in rows {
@@ -156,7 +156,7 @@ impl Watcher {
         live
     }
 
-    /// The point that was not whole, at the flight's end.
+    /// The incomplete last point, at the end of the flight.
     pub fn rest(&mut self) -> Live {
         let mut live = self.empty();
         self.finish(&mut live);

@@ -142,7 +142,7 @@ impl Bench {
             Ok(Task { number, log, models, program, stop })
         });
         let task = task.inspect_err(|_| {
-            // what was not written has not begun
+            // a flight whose order was not written has not started
             let mut inner = self.lock();
             let flown = inner.session.flown.len();
             inner.flying = inner.flying.take().filter(|f| f.place < flown);
@@ -177,7 +177,7 @@ impl Bench {
         self.take_as(seen, &name, &bytes, Some(Role::Unused))
     }
 
-    /// The whole flight that is flown, or was last.
+    /// The complete present flight, or the last one.
     pub fn flying(&self) -> Option<Part> {
         let inner = self.lock();
         let Flying { number, on, live, gone, .. } = inner.flying.as_ref()?;
@@ -286,7 +286,7 @@ struct Tail {
 }
 
 impl Tail {
-    /// Rows that were added since the last call; empty while there is no file.
+    /// Rows added to the file since the last call; empty if there is no file yet.
     fn rows(&mut self, log: &Path) -> Result<Vec<greylag_logs::Sample>, WorkbenchError> {
         let mut file = match File::open(log) {
             Ok(file) => file,

@@ -1,4 +1,4 @@
-//! A flight that is asked for, and the command that flies it.
+//! Requested simulator flights, and the commands that fly them.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -18,7 +18,7 @@ pub const SCHEDULES: &str = "schedules";
 /// Aircraft that the simulator holds.
 pub const AIRCRAFT: [&str; 4] = ["x8", "aerosonde", "x8-elevons", "c172p"];
 
-/// A simulator flight that is asked for.
+/// Request for a simulator flight.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Order {

@@ -28,7 +28,7 @@ pub async fn page(
     }
 }
 
-/// Without a simulator nothing is flown.
+/// A build without the simulator flies no scenarios.
 #[cfg(not(feature = "sitl"))]
 pub async fn page(_: State<Shared>, _: Query<Vec<(String, String)>>) -> Response {
     use axum::response::IntoResponse;

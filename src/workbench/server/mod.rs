@@ -1,4 +1,4 @@
-//! The workbench served to a browser on this machine: loopback only, a token, no file from elsewhere.
+//! The workbench served to a browser on this machine: on the loopback interface, with a token, without external files.
 
 mod assets;
 mod failsafes;
@@ -31,12 +31,12 @@ pub enum ServeError {
     /// The session cannot be opened.
     #[error(transparent)]
     Bench(#[from] WorkbenchError),
-    /// The port is taken, or the system refused.
+    /// The port is in use, or the operating system refused it.
     #[error(
         "cannot serve the workbench on 127.0.0.1 port {port}: {source}; give another --port, or 0 for any"
     )]
     Socket {
-        /// The port that was asked for.
+        /// The requested port.
         port: u16,
         /// Error of the operating system.
         source: io::Error,

@@ -90,7 +90,7 @@ pub struct Text {
 pub async fn check(Json(Text { text }): Json<Text>) -> Response {
     match crate::check(&text) {
         Ok(checked) => Json(checked).into_response(),
-        // a text that is being written is no failure of the request
+        // a text that is still being edited is not an error of the request
         Err(error) => Json(json!({ "error": error.to_string() })).into_response(),
     }
 }
@@ -172,7 +172,7 @@ pub async fn events(
     // a change may hold the session; other requests are served meanwhile
     let revision = tokio::task::spawn_blocking(move || shared.bench.revision()).await;
     let first = tokio_stream::once(changed(revision.ok()));
-    // what a page that lags has missed may be a change
+    // a page that lags may have missed a change
     let later = later.map(|event| event.unwrap_or_else(|_| changed(None)));
     let all = first.chain(later).map(|text: Arc<str>| Ok(sse::Event::default().data(&*text)));
     Sse::new(all).keep_alive(KeepAlive::default())

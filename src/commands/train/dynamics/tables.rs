@@ -44,7 +44,7 @@ pub(super) fn shares(residual_map: &ResidualMap) -> Table {
 pub(super) fn coefficients(learned: &[Learned]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    // of a real aircraft nobody knows the truth
+    // the true coefficients of a real aircraft are unknown
     let known = learned.iter().any(|l| l.truth.is_some());
     let columns = if known { 4 } else { 3 };
     table.set_header(["coefficient", "prior", "learned", "true"].iter().take(columns));

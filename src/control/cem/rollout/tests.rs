@@ -33,7 +33,7 @@ fn instruction_sets_agree() {
         sideslip: None,
     };
     let wave = |k: usize| std::array::from_fn(|i| ((k * 16 + i) as f32 * 0.37).sin());
-    // an odd number: the last has no other beside it
+    // an odd number of blocks: the last one is evaluated alone, not in a pair
     let mut blocks: [Block; 3] = std::array::from_fn(|b| {
         std::array::from_fn(|h| std::array::from_fn(|c| wave(40 * b + 3 * h + c)))
     });
@@ -65,7 +65,7 @@ fn surfaces_of_a_plan_move_no_faster_than_the_airframe_allows() {
         let last = Command { aileron: 0.1, elevator: 0.1, throttle: 0.0, rudder: 0.1 };
         let far = Command { aileron: 1.0, elevator: -1.0, throttle: 1.0, rudder: 1.0 };
         let got = slewed(far, &last, &model.airframe);
-        // A rudder that the airframe does not have is nobody's to limit.
+        // The airframe has no rudder, so its command is not limited.
         let wanted = Command { aileron: 0.3, elevator: -0.1, throttle: 1.0, rudder };
         for (got, wanted) in [
             (got.aileron, wanted.aileron),

@@ -1,8 +1,8 @@
 //! The check of surface signs: whether the aircraft responds to the surfaces as the model predicts.
 //!
-//! A real controller's own loops may be right while a channel, a reversal or a mixer between our commands and the
-//! surfaces is wrong. Therefore, when control authority is given, the surfaces first stay at level trim with small
-//! pulses of aileron and elevator, at different times. Rates are regressed on the modelled responses to these pulses;
+//! A flight controller can fly well by its own loops while the channel order, a reversal or a mixer between the companion's
+//! commands and the surfaces is wrong. Therefore, when control authority is given, the companion first commands level
+//! trim with small pulses of aileron and elevator, at different times. Rates are regressed on the modelled responses to these pulses;
 //! gusts are uncorrelated with them. The check ends when both signs are certain, usually after 0.3 s; the pulses grow
 //! until then.
 
@@ -15,36 +15,36 @@ use evidence::{Evidence, Fit};
 use greylag_link::vehicle::{Axis, Fault};
 use greylag_physics::{Command, State, Time};
 
-/// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8, which rolls it at 9 °/s.
+/// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8 and gives it a roll rate of 9 °/s.
 const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
 /// Signs of a round's pulses, each of [`LENGTH`]: their effect on the attitude cancels.
 const PATTERN: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
-/// Length of a pulse in states.
+/// Length of a pulse in state frames of 10 ms.
 const LENGTH: usize = 12;
-/// Delay of the elevator's pulses relative to the aileron's, states.
+/// Delay of the elevator's pulses relative to the aileron's, state frames.
 const OFFSET: usize = 6;
-/// Length of a round in states.
+/// Length of a round in state frames.
 const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
-/// Number of states after which a check ends.
+/// Number of state frames after which a check ends.
 const LONGEST: usize = PULSES.len() * ROUND;
-/// Standard errors from which a sign is certain; tested at every state.
+/// Ratio of the gain to its standard error above which a sign is certain; tested at every state frame.
 const CERTAIN: f64 = 7.0;
-/// States before a sign is judged: its surface has moved both ways and been responded to, since one edge may coincide
-/// with one gust.
+/// State frames before the sign of aileron and of elevator is judged. By then the surface has moved both ways and the
+/// aircraft has responded: a single edge may coincide with a gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
-/// Number of states after a pulse edge within which the response appears.
+/// Number of state frames after a pulse edge within which the response appears.
 const ANSWERED: usize = 7;
 /// Smallest gain that counts as a response: a model may be wrong, but not by a factor of ten.
 const ANSWER: f64 = 0.1;
 /// Change of bank or pitch that aborts the check, rad: 20°.
 const DEPARTED: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
-/// Result after a state.
+/// Result of the check after a state frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// The check continues.
+    /// The check is not finished.
     Open,
-    /// Both signs are right: gains on the modelled responses.
+    /// Both signs are right, with the ratios of measured to modelled response.
     Right([f64; 2]),
     /// Control must be returned.
     Wrong(Fault),
@@ -84,7 +84,7 @@ impl Check {
         Check { answers, stage: Stage::Rest }
     }
 
-    /// Waits for control authority, which is demanded.
+    /// Starts to wait for control authority, which has been requested.
     pub(super) fn await_authority(&mut self) {
         self.stage = Stage::Waiting;
     }
@@ -131,7 +131,7 @@ impl Check {
         verdict
     }
 
-    /// The command on the state of `now` during the check: level trim with pulses.
+    /// The command in reply to the state of `now` during the check: level trim with pulses.
     pub(super) fn command(&self, now: Time) -> Option<Command> {
         let Stage::Running { begun: Some(begun), .. } = &self.stage else { return None };
         let index = begun.index(now) as isize;
@@ -142,7 +142,7 @@ impl Check {
         })
     }
 
-    /// Records the command sent on the state of `now`.
+    /// Records the command that was sent in reply to the state of `now`.
     pub(super) fn commanded(&mut self, now: Time, command: Command) {
         let Stage::Running { begun: Some(begun), evidence, last } = &mut self.stage else { return };
         let index = begun.index(now);
@@ -153,13 +153,13 @@ impl Check {
 }
 
 impl Begun {
-    /// States of 10 ms since the start.
+    /// Number of state frames of 10 ms since the start.
     fn index(&self, now: Time) -> usize {
         ((now.since(self.at).as_micros() as usize) + 5000) / 10_000
     }
 }
 
-/// The pulse on a state, counted from the start of its surface's pulses.
+/// The pulse at state frame `index`, counted from the start of the surface's pulses.
 fn pulse(index: isize) -> f64 {
     let Ok(index) = usize::try_from(index) else { return 0.0 };
     let (round, within) = (index / ROUND, index % ROUND);
@@ -251,11 +251,11 @@ mod tests {
 
     #[test]
     fn right_signs_pass_however_late_the_commands_arrive() {
-        // To 60 ms: a serial line with a controller that samples its channels at 50 Hz has half of it.
+        // Up to 60 ms, twice the delay of a serial line and a controller that samples its channels at 50 Hz.
         for late in 0..=6 {
             let (verdict, states) = verdict(late, |surfaces| surfaces);
             let Verdict::Right(gains) = verdict else { panic!("{late}: {verdict:?}") };
-            // The answers are those of 22 m/s, the aircraft flies at 20: 0.8 of the force.
+            // The modelled responses are those at 22 m/s, the aircraft flies at 20 m/s: 0.8 of the force.
             assert!(gains.iter().all(|gain| (0.5..1.2).contains(gain)), "{late}: {gains:?}");
             assert!(states < ROUND as u64, "{late}: after {states}");
         }
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Roll)));
         let (dead, _) = verdict(2, |[aileron, _]| [aileron, trim]);
         assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Pitch)));
-        // The left of two elevons reversed: what should roll pitches, and the other way round.
+        // The left of two elevons is reversed: an aileron command pitches and an elevator command rolls.
         let (mixed, _) = verdict(2, |[aileron, elevator]| [elevator - trim, aileron + trim]);
         assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
     }

@@ -18,7 +18,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         let mut last = None;
         for step in 0..=self.steps() {
             let at = self.at(step, state);
-            // this scheme knows accelerations only
+            // this scheme integrates accelerations only, so that the residual has no rates of the angles
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
             let outputs = self.ask(&at);
@@ -70,7 +70,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         }
     }
 
-    /// Slopes through JSBSim's scheme: of the state after the step and of the memory, over their inputs.
+    /// Backpropagates through one step of JSBSim's scheme: from the gradients of the next state (`after`) and of the memory
+    /// (`remembered`) to those of the step's inputs.
     #[inline(always)]
     fn advance_back(
         &self,
@@ -104,7 +105,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
     }
 }
 
-/// Slopes over the inputs of a step.
+/// Gradients of the loss with respect to the inputs of a step.
 struct Back<R> {
     state: State<R>,
     learned: State<R>,
@@ -113,7 +114,7 @@ struct Back<R> {
     memory: Vector<R>,
 }
 
-/// Acceleration and spin of prior plus residual.
+/// Linear and angular acceleration of the prior and the residual together.
 #[inline(always)]
 fn pushed<R: Real>(
     outputs: &PriorOutputs<R>,
@@ -131,7 +132,7 @@ fn pushed<R: Real>(
     (acceleration, spin)
 }
 
-/// [`advance_jsbsim`] as a function of state, acceleration and memory, with the slopes over its outputs.
+/// [`advance_jsbsim`] as a function of state, acceleration and memory, weighted by the gradients of its outputs.
 struct Scheme<'a, R> {
     geometry: &'a Geometry,
     density: R,
@@ -158,7 +159,7 @@ impl<R: Real> Sloped<R, 14> for Scheme<'_, R> {
     }
 }
 
-/// Slopes through [`pushed`], over the state and the residual.
+/// Backpropagates through [`pushed`]: gradients with respect to the state and the residual.
 #[inline(always)]
 fn push_back<R: Real>(
     state: &State<R>,

@@ -152,7 +152,7 @@ impl AirData {
             row.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>() + deviation * deviation;
         // an outlier counts for no more than three standard deviations
         let limit = 3.0 * spread.sqrt();
-        // a NaN limit must not panic in the clamp; it limits nothing
+        // a NaN limit must not panic in the clamp; it does not limit
         let innovation = innovation.max(-limit).min(limit);
         for i in 0..3 {
             state[i] += cross[i] / spread * innovation;

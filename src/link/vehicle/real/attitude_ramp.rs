@@ -30,7 +30,7 @@ impl AttitudeRamp {
         let dt = now.since(before).as_secs_f64().min(GAP_S);
         let ramped = std::array::from_fn(|axis| {
             let most = RATE[axis] * dt;
-            // a NaN attitude is no start of a ramp
+            // a ramp cannot start from a NaN attitude
             if from[axis].is_finite() {
                 wanted[axis].clamp(from[axis] - most, from[axis] + most)
             } else {

@@ -16,11 +16,11 @@ const STILL: f64 = 0.5 * DEGREE;
 /// Time for which the wanted attitude must be constant before the error is integrated, s: after a step to the other
 /// bank PX4's roll rings this long, with a period of 5 s.
 const SETTLING_S: f64 = 4.0;
-/// Error above which nothing is integrated, rad: it is not a steady-state error.
+/// Error above which integration stops, rad: it is not a steady-state error.
 const NEAR: f64 = 12.0 * DEGREE;
 /// Change of the wanted attitude beyond which the correction is reset, rad.
 const ANOTHER: f64 = 4.0 * DEGREE;
-/// Gap between two states after which nothing is integrated, s.
+/// Time between two states above which integration is skipped, s.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 

@@ -14,7 +14,7 @@ pub enum Stack {
     Ardupilot,
 }
 
-/// What the companion commands to the controller.
+/// Quantities that the companion commands to the flight controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Authority {
     /// Surfaces and throttle, as sticks in MANUAL.

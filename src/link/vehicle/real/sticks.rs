@@ -10,7 +10,7 @@ struct Rounding(f64);
 impl Rounding {
     fn round(&mut self, wanted: f64, low: f64, high: f64) -> f64 {
         let whole = (wanted + self.0).round().clamp(low, high);
-        // what a stop cuts off is not carried over
+        // the part of the command beyond the stop is discarded
         self.0 = (wanted + self.0 - whole).clamp(-0.5, 0.5);
         whole
     }

@@ -70,7 +70,7 @@ impl Survey {
     /// Counts a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
         match self.sequence.map(|before| sequence.wrapping_sub(before)) {
-            // twice the same
+            // the same entry twice
             Some(0) => {}
             // late: it was counted as lost
             Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),

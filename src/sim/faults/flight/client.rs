@@ -11,7 +11,7 @@ use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 const SETPOINT_EVERY: u64 = 10;
 
 impl Flight {
-    /// The client: arms when possible, then sends its legs.
+    /// The client's actions at a step: it arms when possible, then sends the setpoint of the present leg.
     pub(super) fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
         if acting.iter().any(|fault| fault.kind == FaultKind::Client) {
             return;
@@ -37,7 +37,7 @@ impl Flight {
             if self.armed {
                 self.follower.asked = true;
                 self.desk.pilot().attitude_setpoint(now, setpoint);
-                // a refusal means that the link is lost at this moment: HOLD is flown
+                // refused only if the link is lost at this moment: the companion then flies HOLD
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
@@ -59,11 +59,11 @@ impl Flight {
         self.hear_texts(now_s);
     }
 
-    /// Commands of a ground station over its own link to take control.
+    /// The mode change by which a ground station takes control from the companion, over a link of its own.
     pub(super) fn take_over(&mut self, step: u64) {
         let asked = &self.scenario.asked;
         let taken = asked.iter().any(|a| a.what == Asking::TakeOver && at_step(a.at_s) == step);
-        // in the controller's own mode already, it changes nothing that is visible to the companion
+        // if the flight controller flies by itself already, the companion sees no change
         let steered = self.aircraft.is_steered();
         if taken && self.aircraft.take_over() && steered {
             self.follower.asked = false;

@@ -17,7 +17,7 @@ use greylag_model::{GreyBox, Known};
 
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.96;
-/// Share of its bounds' range from which on a prior's width says no more than they do.
+/// A prior whose width is at least this share of the range of the bounds adds no information to them.
 const WIDE: f64 = 0.5;
 /// A coefficient counts as learned if its posterior width is below this share of the prior's.
 const LEARNED: f64 = 0.7;
@@ -25,10 +25,10 @@ const LEARNED: f64 = 0.7;
 const SAME: f64 = 0.9;
 /// Last change of a coefficient, in standard deviations, above which a fit has not converged.
 const UNSETTLED: f64 = 0.5;
-/// Last change, in standard deviations, above which no estimate of the fit is usable, if the step was taken.
+/// Last change, in standard deviations, above which no estimate of the fit is usable, if the step was accepted.
 const LOST: f64 = 5.0;
 
-/// That coefficients were held, if any were.
+/// Note that names the coefficients that were held, if there are any.
 fn held_note(held: &[String]) -> Option<String> {
     (!held.is_empty()).then(|| {
         format!(
@@ -47,15 +47,17 @@ fn at_bound(free: &Free, value: f64) -> bool {
 }
 
 impl Search<'_> {
-    /// Takes out of the search, at the model's own values, coefficients of which nothing is known beforehand but bounds and
-    /// whose 95 % intervals hold all that these allow; their names. All are left free if nothing else would be.
+    /// Holds the undetermined coefficients at the model's own values, and returns their names.
+    ///
+    /// A coefficient is undetermined if its prior is as wide as its bounds and its 95 % interval contains both bounds. If
+    /// all coefficients are undetermined, none is held.
     pub(super) fn hold_undetermined(&mut self) -> Vec<String> {
         let Some(cholesky) = self.system().information.cholesky() else { return Vec::new() };
         let inverse = cholesky.inverse();
         let undetermined = |(k, f): (usize, &Free)| {
             let (value, half) = (self.place.theta[k], NORMAL_95 * inverse[(k, k)].sqrt());
             let wide = f.width >= WIDE * (f.bounds.1 - f.bounds.0);
-            // data that press a value against its bound do say something of it
+            // data that drive a value to a bound do carry information about it
             let inside = !at_bound(f, value);
             let holds_all = value - half <= f.bounds.0 && value + half >= f.bounds.1;
             !f.added && wide && inside && holds_all
@@ -74,7 +76,7 @@ impl Search<'_> {
         names
     }
 
-    /// The fit as it stands, with intervals.
+    /// The present estimates of the fit, with intervals.
     /// Its model is `given`, without trims of flights.
     /// The coefficients `held` were undetermined.
     pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
@@ -132,7 +134,7 @@ impl Search<'_> {
         })
     }
 
-    /// What the model's file will know of the flights, `given` being the model before.
+    /// Constants of the flights to be written to the model's file; `given` is the model before the fit.
     fn known(&self, given: &GreyBox, sd: &[f64]) -> Known {
         let place = |k: usize| self.free.len() + k * self.of_flight();
         let numbered = self.flights.iter().enumerate();

@@ -12,7 +12,8 @@ use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// A formula is doubtful if a flexible model can still remove this share of what the formula removed.
+/// A formula is doubtful if a flexible model can remove further error, at least this share of the error that the formula
+/// removed.
 const MATERIAL: f64 = 0.02;
 /// A simpler form may remove less than the best one by this share: even an exact formula of a strong effect leaves a
 /// residual of that order, from errors of the reconstructed path.
@@ -20,8 +21,8 @@ const BEHIND: f64 = 0.01;
 /// A larger formula must lower the squared error by this much more than a smaller one.
 const WORTH: f64 = 10.0;
 
-/// Why and in which channels free forms are tried; `None` if the library's formula leaves nothing that a flexible
-/// model could remove.
+/// Reason why free forms are tried, and the channels; `None` if a flexible model could not remove any of the residual that
+/// the library's formula leaves.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {
@@ -49,7 +50,7 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     let why = match (several, library.significant_left_out) {
         (true, _) => "the library needs several shapes for one channel",
         (false, true) => {
-            "a second shape of the library says more, and cannot stand beside the first"
+            "a second shape of the library explains more, but cannot be combined with the first"
         }
         (false, false) => return None,
     };
@@ -94,7 +95,7 @@ pub(super) fn beyond(
         ..*ask
     };
     let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
-    // a form also frees the coefficients that compensated for its absence, which are counted in its fall
+    // the reduction by a form includes that by coefficients which had compensated for its absence
     let falls = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| f.fall));
     let whole = falls.fold(library.excess, f64::max);
     let rung = |f: &Fitted, threshold: f64| Rung {

@@ -76,7 +76,7 @@ pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> 
             quoted(&format!("how much {}", grades::words(&term.form, 1.0)))
         );
         for (name, c) in names(k, term).iter().zip(term.form.shape.constants()) {
-            // a threshold may be zero; what divides may not
+            // a threshold may be zero, a divisor may not
             let (ends, unit, meaning) = match term.form.shape {
                 Shape::Free(_) => ([0.2 * c, 5.0 * c], "", "constant of its shape"),
                 Shape::Lagged(..) => ([0.0, 5.0 * c], "s", "time constant"),

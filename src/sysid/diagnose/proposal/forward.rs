@@ -99,7 +99,7 @@ pub(super) struct Ask<'a> {
     pub channels: [bool; 6],
     /// Least evidence of the first term, whatever chance reaches among `forms`, in case these are preselected.
     pub least: f64,
-    /// Share of what the best form removes by which a simpler one may remove less.
+    /// A simpler form may remove less error than the best one, by this share of the error that the best one removes.
     pub behind: f64,
 }
 

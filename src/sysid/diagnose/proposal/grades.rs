@@ -9,7 +9,7 @@ use greylag_physics::formula::Variable;
 
 /// Trend of a form with each of its variables.
 fn trend(form: &Form) -> Option<String> {
-    // in the steady state a lag is no more
+    // a lag has no effect in the steady state
     let shape = match form.shape {
         Shape::Lagged(v, _) => Shape::Linear(v),
         shape => shape,

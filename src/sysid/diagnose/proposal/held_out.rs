@@ -62,7 +62,7 @@ pub(super) fn tested(
         with.join_most(effect.about.id, &values).ok()?;
     }
     let removed = removed(problem, model, &with, &channels)?;
-    // nothing is gained by a fall below zero
+    // a value below zero does not count as an improvement
     let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
     Some(HeldOut { flights, removed, fall: measured, threshold })
 }

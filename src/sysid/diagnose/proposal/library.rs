@@ -116,7 +116,7 @@ impl Shape {
         }
     }
 
-    /// Constants of the shape beside the coefficient.
+    /// Constants of the shape in addition to the coefficient.
     pub fn constants(&self) -> Vec<f64> {
         match self {
             Shape::Above(_, c) | Shape::Beyond(_, c) | Shape::Lagged(_, c) => vec![*c],

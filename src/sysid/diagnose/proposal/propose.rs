@@ -81,7 +81,7 @@ pub fn propose(
         proposal.sentences.push(nothing(&proposal));
         return Ok(proposal);
     };
-    // further terms show that the first one's form is not the whole
+    // further terms show that the form of the first one is incomplete
     let whole = terms.len() == 1 && !outdone(&proposal);
     proposal.grades.iter_mut().for_each(|grades| grades.form &= whole);
     report(progress, "testing the formula on flights that the search has not seen", TESTED)?;

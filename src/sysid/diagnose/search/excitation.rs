@@ -18,10 +18,10 @@ const NEEDS: [Need; 4] = [
     ("the angle of attack", |i| i.state.alpha, 0.4, 57.3, "°", "pull-ups and a slow flight"),
 ];
 
-/// Notes on variables with little excitation.
+/// Notes on the variables with too little excitation for a diagnosis.
 ///
 /// # Errors
-/// There is too little flight, or aileron, elevator and angle of attack all hardly move.
+/// The flights are too short, or aileron, elevator and angle of attack all hardly move.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
     if seconds < LEAST_S {
@@ -44,8 +44,8 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .collect())
 }
 
-/// The variation of a variable in words; a variable that never moves indicates a missing channel rather than the
-/// manoeuvre.
+/// The variation of a variable in words. If it never moves, the log probably has the wrong channel, rather than too little
+/// excitation.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
         true => format!(
@@ -60,7 +60,7 @@ pub fn moves_rudder(flights: &[Prepared]) -> bool {
     deviation(flights, |i| i.controls.rudder) > MOVES_RAD
 }
 
-/// Standard deviation within the flights, all taken together.
+/// Pooled standard deviation about the mean of each flight.
 fn deviation(flights: &[Prepared], of: fn(&Instant) -> f64) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for flight in flights {

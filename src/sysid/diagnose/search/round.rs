@@ -41,7 +41,7 @@ pub struct Problem {
     pub path: Vec<shared::PathError>,
     /// Prior widths of the sensor errors, by flight.
     pub sensors: Vec<[f64; SENSORS]>,
-    /// Constants estimated for each flight beside them.
+    /// Constants estimated for each flight in addition.
     pub per_flight: PerFlight,
     /// Seed of all random draws.
     pub seed: u64,

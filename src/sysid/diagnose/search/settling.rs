@@ -1,4 +1,4 @@
-//! Ranking of the candidates, and tuning of a model after one of them has joined.
+//! Ranking of the candidate effects, and tuning of the model after one of them has been added.
 
 use crate::diagnose::options::Options;
 use crate::diagnose::regression::rank::Score;
@@ -6,15 +6,15 @@ use crate::diagnose::search::nulls;
 use crate::diagnose::search::round::{Beside, Problem, Round};
 use greylag_model::GreyBox;
 
-/// Tuning passes after an effect has joined, in which nonlinear effects converge.
+/// Number of tuning passes after an effect was added; nonlinear effects need several to converge.
 pub const SETTLING: usize = 3;
-/// If a mass or inertia change moves by more than this share while it is tuned, it was estimated with accelerations
-/// of a model that is too far off.
+/// Largest relative change of a mass or inertia estimate in tuning. Beyond it, the accelerations of the model from which
+/// it was estimated were too wrong.
 const ASTRAY: f64 = 0.1;
 
-/// A round with its candidates' scores.
+/// A round of the search with the scores of its candidates.
 pub struct Ranked {
-    /// The ranked round.
+    /// The round that was ranked.
     pub round: Round,
     /// The candidates, best evidence first.
     pub scores: Vec<(usize, Score)>,
@@ -24,8 +24,8 @@ pub struct Ranked {
     pub threshold: f64,
 }
 
-/// Ranks the candidates of `round`; those of mass and inertia with better accelerations if the model's own are too
-/// far off.
+/// Ranks the candidates of `round`. If the model's accelerations are too wrong for candidates of mass and inertia, those of
+/// a better model are used.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -40,9 +40,10 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     }
 }
 
-/// The round with the accelerations of its model after the best change of mass or inertia has been added and tuned;
+/// The round with accelerations of another model: its own after the best change of mass or inertia was added and tuned.
+///
 /// `None` if that is not needed. With a grossly wrong inertia the model's accelerations are wrong, and so are the
-/// columns made from them: the estimates then differ between flights and are all too small.
+/// regressors computed from them: the estimates then differ between flights and are all too small.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {
@@ -68,7 +69,7 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     Round::beside(problem, round.model.clone(), &round.entries, beside)
 }
 
-/// `model` tuned under the noise of `round`, with its squared error before the last of `passes`.
+/// `model` after `passes` of tuning weighted by the noise of `round`, and its squared error before the last pass.
 pub fn settled(
     problem: &Problem,
     round: &Round,

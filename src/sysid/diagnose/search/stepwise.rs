@@ -36,7 +36,7 @@ const MOST: usize = 6;
 const MOST_SETTLING: usize = 12;
 /// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
 const STEP_TOLERANCE: f64 = 0.2;
-/// Largest number of candidates refused beside the joined effects before the search ends.
+/// Number of refused candidates, in addition to the added effects, after which the search ends.
 const MOST_ASIDE: usize = 4;
 
 /// Searches for the effects that `model` lacks.

@@ -38,7 +38,7 @@ pub(super) fn stretches(
     Ok(stretches)
 }
 
-/// Longest time between rows that is no gap, s: longer for a log that is slow throughout.
+/// Longest time between rows that does not count as a gap, s: longer for a log with a low sample rate.
 pub(super) fn gap(flight: &Flight, options: &Options) -> f64 {
     let times: Vec<f64> = flight.samples.iter().map(|s| s.time_s).collect();
     let periods: Vec<f64> =

@@ -205,7 +205,7 @@ impl<'a> Screen<'a> {
         self.reached(kept, kept.linear, product, constants)
     }
 
-    /// Score in a null flight, likewise.
+    /// Score of a form with that many constants in a null flight.
     pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
         let product = |b: usize| null.signs[b] * kept.blocks[b][1];
         let noise: f64 = (0..self.block_count).map(product).sum();

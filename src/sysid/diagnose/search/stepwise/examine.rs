@@ -42,7 +42,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
     if slight {
         refused.push(under("it takes", heldout, "of the error on held-out segments", HELD_OUT));
     }
-    // what explains something else would be selected besides, not in its place
+    // a candidate that explains another part of the residual would be selected in addition, not instead
     let rival = |(t, other): &&(usize, Score)| {
         !found.beaten.contains(t) && checks::correlation(round, score, other).abs() > RIVAL
     };

@@ -102,7 +102,7 @@ impl Found {
         }
     }
 
-    /// Refuses effects found beside a refused one, since they depend on it.
+    /// Refuses effects that were found together with a refused one, since they depend on it.
     fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
         let Some(first) = self.selected.iter().position(refused) else { return };

@@ -1,4 +1,4 @@
-//! Run-off between close contenders, each added to the model and tuned.
+//! Run-off between candidate effects with similar evidence, each added to the model and tuned.
 
 use super::found::Found;
 use crate::diagnose::search::checks;
@@ -12,9 +12,9 @@ const CONTENDING_CORRELATION: f64 = 0.6;
 /// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
-/// Ranks the best of several close contenders first, after each has been added to the model and tuned under the same
-/// noise, and separates those that are clearly worse from those that are equally good: the linearisation at the model
-/// without them cannot distinguish them.
+/// Decides between close contenders: each is added to the model and tuned with the same noise, since the linearisation
+/// about the model without them cannot distinguish them. The best one is ranked first; the others are divided into
+/// clearly worse and equally good ones.
 pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
