@@ -98,9 +98,9 @@ pub(super) fn freeze(rows: &mut [Sample], channels: &[Channel], flies: &Flying) 
             hanging.for_each(|row| *COLUMNS[column].2(row) = f64::NAN);
         }
         let list: Vec<String> =
-            spans.iter().map(|(a, b)| format!("{:.1} s from {a:.2} s on", b - a)).collect();
+            spans.iter().map(|(a, b)| format!("from {a:.2} to {b:.2} s")).collect();
         out.push(Finding::warning(format!(
-            "{} repeats one value in flight ({}): counted as missing there",
+            "{} does not change in flight {}: frozen; these rows count as missing",
             channel.columns.join(", "),
             list.join(", ")
         )));

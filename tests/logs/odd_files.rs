@@ -143,11 +143,25 @@ fn a_pitot_that_hangs_counts_as_missing_there() {
         (if (5.0..10.0).contains(&t) { 14.321 } else { x }).to_string()
     });
     let log = through_file("stuck.csv", stuck.as_bytes(), read);
-    assert!(said(&log).contains("airspeed_mps repeats one value in flight (5.0 s from 5.00 s on)"));
+    let words = "airspeed_mps does not change in flight from 5.00 to 9.99 s: frozen; these rows count as missing";
+    assert!(said(&log).contains(words), "{}", said(&log));
     let samples = &log.flight.samples;
     assert_eq!(samples.len(), 1500);
     let empty = samples.iter().filter(|s| s.airspeed_mps.is_nan()).count();
     assert!((498..=500).contains(&empty), "{empty}");
+}
+
+#[test]
+fn a_pitot_that_hangs_for_less_than_a_second_is_named_too() {
+    let stuck = rewritten("airspeed_mps", |_, t, x| {
+        (if (5.0..6.0).contains(&t) { 14.321 } else { x }).to_string()
+    });
+    let log = through_file("stuck.csv", stuck.as_bytes(), read);
+    assert!(
+        said(&log).contains("airspeed_mps does not change in flight from 5.00 to 5.99 s: frozen")
+    );
+    let empty = log.flight.samples.iter().filter(|s| s.airspeed_mps.is_nan()).count();
+    assert!((98..=100).contains(&empty), "{empty}");
 }
 
 #[test]
@@ -156,7 +170,11 @@ fn gyros_that_hang_leave_a_gap() {
         (if (5.0..8.0).contains(&t) { 0.0123 } else { x }).to_string()
     });
     let log = through_file("stuck.csv", stuck.as_bytes(), read);
-    assert!(said(&log).contains("q_radps repeats one value in flight"), "{}", said(&log));
+    assert!(
+        said(&log).contains("q_radps does not change in flight from 5.00 to"),
+        "{}",
+        said(&log)
+    );
     assert!(log.flight.samples.iter().all(|s| !(5.05..7.95).contains(&s.time_s)));
     assert_eq!(log.dropped, 0, "left out on purpose, not as unusable");
 }
