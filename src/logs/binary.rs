@@ -24,7 +24,6 @@ pub(super) fn read(
     o: &Options,
     to: Use,
 ) -> Result<Log, LogError> {
-    topics.align();
     let vehicle = vehicle::vehicle(format, &topics);
     let mut hovers = hovers(vehicle.as_ref(), format, &topics, o.flies.sustained_s);
     let mut findings = refused(vehicle.as_ref(), path, to)?;

@@ -272,7 +272,8 @@ fn read(
         return Err(LogError::Foreign { path: path.to_owned(), what: foreign::SDLOG2 });
     }
     let several = lives.len() > 1;
-    let one = |(k, topics): (usize, Topics)| {
+    let one = |(k, mut topics): (usize, Topics)| {
+        topics.align();
         let name = if several { format!("{}#{}", name(path), k + 1) } else { name(path) };
         binary::read(format, topics, &name, path, options, to)
     };
