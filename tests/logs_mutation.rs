@@ -71,11 +71,13 @@ fn measured(bytes: &[u8]) -> (Result<Log, LogError>, usize) {
 /// and the most memory that one took in multiples of its size, what is allowed besides taken off.
 fn mutate(inputs: usize, rows: usize, seed: u64) -> (usize, f64) {
     let truth = samples(rows);
-    let whole = [csv(&truth), ulog(&truth), dataflash(&truth), tlog(&truth)];
+    let binary = dataflash(&truth);
+    let text = in_text(&binary, "ArduPlane V4.6.0").into_bytes();
+    let whole = [csv(&truth), ulog(&truth), binary, tlog(&truth), text];
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut read, mut most) = (0, 0.0f64);
     for i in 0..inputs {
-        let mut bytes = whole[i % 4].clone();
+        let mut bytes = whole[i % whole.len()].clone();
         for _ in 0..rng.random_range(1..6u32) {
             let at = rng.random_range(0..bytes.len());
             match rng.random_range(0..5u32) {

@@ -6,6 +6,8 @@ use super::error::LogError;
 use super::finding::Finding;
 use super::load::{Log, Options, Use, dropped, hint};
 use super::mapping::rule::Rule;
+use super::phases::{self, Flying};
+use super::stretches::Stretches;
 use super::topics::{Naming, Topics};
 use super::vehicle::{self, Kind, Vehicle};
 use super::{Flight, FlowAngles, Format, Sample, assess, derive, rows, screening, table};
@@ -26,10 +28,12 @@ pub(super) fn read(
     let mut hovers = hovers(vehicle.as_ref(), format, &topics, o.flies.sustained_s);
     let mut findings = refused(vehicle.as_ref(), path, to)?;
     let no_wings = !findings.is_empty();
-    let rules = o.mapping.rules(format, &topics);
-    let mut table = table::build(&topics, &rules, &o.sources);
-    // A long log must not be held in memory twice.
+    let mut table = table::build(&topics, &o.mapping.rules(format, &topics), &o.sources);
+    // A long log need not stand in memory twice.
     topics.topics.clear();
+    let flies = Flying { bridged_s: bridged_s(&table), ..o.flies };
+    let stretches = table.whole.take().map(|whole| of_all(whole, &hovers, &o.flies));
+    findings.extend(stretches.iter().map(|stretches| Finding::note(stretches.said())));
     table.missing.retain(|missing| !o.mapping.makes(missing.column));
     findings
         .extend(lacking(&table, &topics, path, to).map(|f| f.into_iter().filter(|_| !no_wings))?);
@@ -37,17 +41,16 @@ pub(super) fn read(
     let end = table.rows.last().map_or(0.0, |row| row.time_s);
     findings.extend(grounded(&mut table.rows, &hovers, vehicle.as_ref()));
     hovers.iter_mut().for_each(|hover| hover.1 = hover.1.min(end));
-    findings.extend(assess::freeze(&mut table.rows, &table.channels, &o.flies));
+    findings.extend(assess::freeze(&mut table.rows, &table.channels, &flies));
     table.rows.retain(|row| !assess::hangs(row, &table.channels));
     table.notes.extend(derive::apply(&mut table.rows, &o.mapping));
     findings.extend(topics.findings);
     if !no_wings {
-        findings.extend(assess::channels(&table.channels, &table.rows, &o.flies));
-        let found = on_wings(&table.rows, &hovers, o);
+        findings.extend(assess::channels(&table.channels, &table.rows, &flies));
+        let found = on_wings(&table.rows, &hovers, &flies);
         findings.extend(found.into_iter().map(|f| named(f, &table.rules, o)));
     }
     let kept = kept(&mut table, path, o, to, &mut findings)?;
-    drop(std::mem::take(&mut table.rows));
     findings.extend(dropped(kept.dropped, &kept.dropped_rows));
     findings.extend(table.notes.iter().map(Finding::note));
     Ok(Log {
@@ -65,19 +68,37 @@ pub(super) fn read(
         dropped: kept.dropped,
         dropped_rows: kept.dropped_rows,
         findings,
-        flies: o.flies,
+        flies,
         vehicle,
         hovers,
         sources: table.sources,
         life: topics.life,
+        stretches,
     })
 }
 
-/// Findings on the rows in wing-borne flight, that is outside of the `hovers` (start and end, s).
-fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], o: &Options) -> Vec<Finding> {
+/// Longest time between the stretches that are kept, s; 0 where all is.
+fn bridged_s(table: &table::Table) -> f64 {
+    let Some(whole) = &table.whole else { return 0.0 };
+    let step = |w: &[Sample]| w[1].time_s - w[0].time_s;
+    table.rows.windows(2).map(step).fold(0.0, f64::max).max(whole.stretches.length_s) + 1.0
+}
+
+/// The stretches with the phases of the whole log, hovers (start and end, s) taken out.
+fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Stretches {
+    whole.air.retain(|s| !hovers.iter().any(|(from, to)| (*from..*to).contains(&s.time_s)));
+    let mut phases = phases::phases(&whole.air, flies);
+    let (from, to) = whole.stretches.span_s;
+    let rate = whole.stretches.rows as f64 / (to - from).max(f64::MIN_POSITIVE);
+    phases.iter_mut().for_each(|p| p.rows = ((p.to_s - p.from_s) * rate).round() as usize + 1);
+    Stretches { phases, ..whole.stretches }
+}
+
+/// Findings on the rows that are flown on wings, beside the `hovers` (start and end, s).
+fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
-        false => screening::screen(rows, &o.flies),
+        false => screening::screen(rows, flies),
     }
 }
 

@@ -1,13 +1,16 @@
 //! The CSV form of a flight log: one row a sample, a header row, SI units.
 
 mod dialect;
+mod head;
 mod quaternion;
 mod raw;
+mod records;
+mod thin;
 mod write;
 
 pub use super::rows::Tolerance;
 pub use quaternion::Order;
-pub(crate) use raw::{Raw, raw};
+pub(crate) use raw::{Raw, raw, read};
 pub use write::Rows;
 pub use write::save;
 pub use write::write;
@@ -107,7 +110,7 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
 
 /// The error that [`settle`] would return for this table, if any.
 pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
-    refusal(&raw.judged(rows::Rows::take), path, tolerance)
+    refusal(&raw.judged(rows::Rows::count), path, tolerance)
 }
 
 fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvError> {

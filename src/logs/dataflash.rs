@@ -16,6 +16,7 @@ use std::io::Read;
 
 use super::finding::Finding;
 use super::format::DATAFLASH_MAGIC;
+use super::stretches::Keep;
 use super::topics::{Topic, Topics};
 use super::ulog::damage;
 use super::window::Window;
@@ -40,6 +41,25 @@ struct Declared {
     time: Option<(u8, usize, f64)>,
     instance: Option<(u8, usize)>,
     wanted: bool,
+    role: Role,
+    /// What was read of it, by instance.
+    read: Vec<Instance>,
+}
+
+/// What a record type is read for besides its numbers.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    None,
+    Parameter,
+    Message,
+    Clock,
+}
+
+/// One instance of a record type.
+struct Instance {
+    number: u16,
+    count: usize,
+    topic: Option<Topic>,
 }
 
 /// Size of format `letter`, bytes.
@@ -108,15 +128,23 @@ fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declar
     let label = if name.starts_with("XK") { "C" } else { "I" };
     let instance = find(label).filter(|(letter, _)| *letter == b'B');
     let wanted = wanted(&name);
-    Some((kind, Declared { name, len, fields, time, instance, wanted }))
+    let role = match &*name {
+        "PARM" => Role::Parameter,
+        "MSG" => Role::Message,
+        name if CLOCKS.contains(&name) => Role::Clock,
+        _ => Role::None,
+    };
+    let read = Vec::new();
+    Some((kind, Declared { name, len, fields, time, instance, wanted, role, read }))
 }
 
 #[derive(Default)]
 struct Reader {
-    declared: BTreeMap<u8, Declared>,
-    /// Samples by type, instance.
-    topics: BTreeMap<(u8, u16), Topic>,
-    counts: BTreeMap<(u8, u16), usize>,
+    /// Types by their number, from the first declared one on.
+    declared: Vec<Option<Declared>>,
+    keep: Keep,
+    /// The values of a record.
+    values: Vec<f64>,
     out: Topics,
     /// The flights before the present one.
     lives: Vec<Topics>,
@@ -131,9 +159,10 @@ struct Reader {
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str) -> bool,
+    keep: Keep,
 ) -> (Vec<Topics>, Window<'a>) {
     let mut window = Window::new(source);
-    let mut reader = Reader::default();
+    let mut reader = Reader { keep, ..Reader::default() };
     let cut = loop {
         let view = window.view(LONGEST + DATAFLASH_MAGIC.len());
         let kind = match view {
@@ -145,7 +174,7 @@ pub(super) fn read<'a>(
         };
         let len = kind.and_then(|kind| match kind {
             FMT => Some(FMT_LEN),
-            _ => reader.declared.get(&kind).map(|declared| declared.len),
+            _ => reader.declared.get(usize::from(kind))?.as_ref().map(|declared| declared.len),
         });
         let (Some(kind), Some(len)) = (kind, len) else {
             reader.damaged();
@@ -182,29 +211,31 @@ impl Reader {
     fn record(&mut self, kind: u8, body: &[u8], wanted: &dyn Fn(&str) -> bool) {
         if kind == FMT {
             if let Some((kind, declared)) = declaration(body, wanted) {
-                self.declared.entry(kind).or_insert(declared);
+                let kind = usize::from(kind);
+                self.declared.resize_with(self.declared.len().max(kind + 1), || None);
+                self.declared[kind].get_or_insert(declared);
             }
             return;
         }
-        let Some(declared) = self.declared.get(&kind) else { return };
-        if declared.name == "PARM" {
-            let name = declared.fields.iter().find(|f| f.0 == "Name");
-            let value = declared.fields.iter().find(|f| f.0 == "Value");
-            if let (Some(name), Some(value)) = (name, value) {
-                let value = number(value.1, body, value.2);
-                let name = text(body.get(name.2..name.2 + 16).unwrap_or_default());
-                self.out.parameters.insert(name, value);
+        let Some(Some(declared)) = self.declared.get_mut(usize::from(kind)) else { return };
+        match declared.role {
+            Role::Parameter => {
+                self.out.parameters.extend(parameter(declared, body));
+                return;
             }
-            return;
+            Role::Message if self.out.firmware.is_empty() => {
+                self.out.firmware = firmware(declared, body).unwrap_or_default();
+            }
+            _ => {}
         }
-        if declared.name == "MSG" && self.out.firmware.is_empty() {
-            let message = declared.fields.iter().find(|f| f.0 == "Message");
-            let said = message.map(|f| text(body.get(f.2..).unwrap_or_default()));
-            let firmware = said.filter(|t| t.contains("Ardu") || t.contains("APM:"));
-            self.out.firmware = firmware.unwrap_or_default();
-        }
-        let instance = declared.instance.map_or(0, |(letter, at)| number(letter, body, at) as u16);
-        *self.counts.entry((kind, instance)).or_default() += 1;
+        let number_of = |(letter, at)| number(letter, body, at) as u16;
+        let instance = declared.instance.map_or(0, number_of);
+        let place = declared.read.iter().position(|i| i.number == instance);
+        let place = place.unwrap_or_else(|| {
+            declared.read.push(Instance { number: instance, count: 0, topic: None });
+            declared.read.len() - 1
+        });
+        declared.read[place].count += 1;
         let Some((letter, at, unit)) = declared.time else { return };
         let time_s = number(letter, body, at) * unit;
         if let Some(hole) = self.holes.last_mut().filter(|hole| hole.is_nan()) {
@@ -214,29 +245,52 @@ impl Reader {
         if !declared.wanted {
             return;
         }
-        let last = self.topics.get(&(kind, instance)).and_then(|t| t.time_s.last());
-        if CLOCKS.contains(&&*declared.name) && last.is_some_and(|last| time_s < last - BACK_S) {
-            let life = gathered(&self.declared, std::mem::take(&mut self.topics));
-            let parameters = self.out.parameters.clone();
-            let firmware = std::mem::take(&mut self.out.firmware);
-            self.lives.push(Topics { topics: life, parameters, firmware, ..Topics::default() });
+        let last = declared.read[place].topic.as_ref().and_then(Topic::last_s);
+        if declared.role == Role::Clock && last.is_some_and(|last| time_s < last - BACK_S) {
+            self.another_life();
         }
-        let topic = self
-            .topics
-            .entry((kind, instance))
-            .or_insert_with(|| Topic::new(declared.fields.iter().map(|f| f.0.clone())));
-        topic.time_s.push(time_s);
-        for ((_, letter, offset), values) in declared.fields.iter().zip(&mut topic.values) {
-            values.push(number(*letter, body, *offset));
+        self.sample(kind, place, time_s, body);
+    }
+
+    /// What was read so far belongs to a flight that is over.
+    fn another_life(&mut self) {
+        let topics = self.gathered();
+        let parameters = self.out.parameters.clone();
+        let firmware = std::mem::take(&mut self.out.firmware);
+        self.lives.push(Topics { topics, parameters, firmware, ..Topics::default() });
+    }
+
+    /// Takes the numbers of a record of type `kind`, of the instance at `place`.
+    fn sample(&mut self, kind: u8, place: usize, time_s: f64, body: &[u8]) {
+        let Some(Some(declared)) = self.declared.get_mut(usize::from(kind)) else { return };
+        self.values.clear();
+        self.values.extend(declared.fields.iter().map(|(_, l, offset)| number(*l, body, *offset)));
+        let labels = declared.fields.iter().map(|f| f.0.clone());
+        let topic = declared.read[place].topic.get_or_insert_with(|| Topic::new(labels, self.keep));
+        topic.push(time_s, &self.values);
+    }
+
+    /// The samples by the names of their types, which have none then.
+    fn gathered(&mut self) -> BTreeMap<(String, u16), Topic> {
+        let mut out = BTreeMap::new();
+        for declared in self.declared.iter_mut().flatten() {
+            for instance in &mut declared.read {
+                if let Some(topic) = instance.topic.take() {
+                    out.entry((declared.name.clone(), instance.number)).or_insert(topic);
+                }
+            }
         }
+        out
     }
 
     fn finish(mut self, cut: usize) -> Vec<Topics> {
-        for ((kind, instance), count) in self.counts {
-            let name = self.declared.get(&kind).map(|d| d.name.clone()).unwrap_or_default();
-            *self.out.counts.entry((name, instance)).or_default() += count;
+        for declared in self.declared.iter().flatten() {
+            for instance in &declared.read {
+                let key = (declared.name.clone(), instance.number);
+                *self.out.counts.entry(key).or_default() += instance.count;
+            }
         }
-        self.out.topics = gathered(&self.declared, self.topics);
+        self.out.topics = self.gathered();
         self.out.findings.extend(damage(self.skipped, &self.holes));
         // The card's last block is padded, so that a cut record at the end is the rule.
         if cut > 0 {
@@ -258,15 +312,17 @@ impl Reader {
     }
 }
 
-/// The samples by the names of their types.
-fn gathered(
-    declared: &BTreeMap<u8, Declared>,
-    topics: BTreeMap<(u8, u16), Topic>,
-) -> BTreeMap<(String, u16), Topic> {
-    let mut out = BTreeMap::new();
-    for ((kind, instance), topic) in topics {
-        let name = declared.get(&kind).map(|d| d.name.clone()).unwrap_or_default();
-        out.entry((name, instance)).or_insert(topic);
-    }
-    out
+/// Name and value of the parameter in a record.
+fn parameter(declared: &Declared, body: &[u8]) -> Option<(String, f64)> {
+    let find = |label: &str| declared.fields.iter().find(|f| f.0 == label);
+    let (name, value) = (find("Name")?, find("Value")?);
+    let value = number(value.1, body, value.2);
+    Some((text(body.get(name.2..name.2 + 16).unwrap_or_default()), value))
+}
+
+/// The firmware's name in a record of a text.
+fn firmware(declared: &Declared, body: &[u8]) -> Option<String> {
+    let message = declared.fields.iter().find(|f| f.0 == "Message");
+    let said = message.map(|f| text(body.get(f.2..).unwrap_or_default()));
+    said.filter(|t| t.contains("Ardu") || t.contains("APM:"))
 }

@@ -76,7 +76,12 @@ fn wide(start: &[u8]) -> Option<Wide> {
     if letters(1) { Some(Wide::Little) } else { letters(0).then_some(Wide::Big) }
 }
 
-/// Converts UTF-16 text to UTF-8; `None` if it is not UTF-16.
+/// Whether a text that begins so is in UTF-16.
+pub(super) fn is_wide(start: &[u8]) -> bool {
+    wide(start).is_some()
+}
+
+/// Text in UTF-8 from text in UTF-16; `None` of what is not UTF-16.
 pub(super) fn narrowed(bytes: &[u8]) -> Option<Vec<u8>> {
     let wide = wide(bytes)?;
     let unit = |pair: &[u8]| match wide {

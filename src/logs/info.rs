@@ -83,8 +83,15 @@ impl Info {
         let times: Vec<f64> = samples.iter().map(|s| s.time_s).collect();
         let period = super::topics::period_s(&times);
         let split = phases::split_s(samples);
-        let gaps = times.windows(2).filter(|w| w[1] - w[0] > split).map(|w| (w[0], w[1] - w[0]));
-        let phases = phases::phases(samples, &log.flies);
+        let steps = times.windows(2).map(|w| (w[0], w[1] - w[0]));
+        let mut gaps: Vec<(f64, f64)> = steps.filter(|(_, step)| *step > split).collect();
+        let mut rows = samples.len();
+        let mut span = times.first().zip(times.last()).map_or((0.0, 0.0), |(a, b)| (*a, *b));
+        if let Some(whole) = &log.stretches {
+            (rows, span) = (whole.rows, whole.span_s);
+            gaps = whole.gaps.iter().filter(|(_, step)| *step > split).copied().collect();
+        }
+        let phases = log.phases();
         let flown =
             phases.iter().filter(|p| p.kind == PhaseKind::Flight).map(|p| p.to_s - p.from_s);
         let flight_s = flown.fold(0.0, |sum, x| sum + x);
@@ -92,12 +99,12 @@ impl Info {
             schema: "greylag.log-info/1",
             name: log.flight.name.clone(),
             format: log.format,
-            rows: samples.len(),
+            rows,
             dropped_rows: log.dropped,
-            from_s: times.first().copied().unwrap_or(0.0),
-            to_s: times.last().copied().unwrap_or(0.0),
+            from_s: span.0,
+            to_s: span.1,
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
-            gaps: gaps.collect(),
+            gaps,
             flight_s,
             phases,
             vehicle: log.vehicle.clone(),
@@ -137,7 +144,9 @@ fn has(log: &Log, column: &str) -> bool {
     let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
     let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
     let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
-    let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole;
+    // Of a long log, stretches are there.
+    let share = log.stretches.as_ref().map_or(1.0, |s| samples.len() as f64 / s.rows.max(1) as f64);
+    let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole * share;
     count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
 }
 

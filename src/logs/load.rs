@@ -1,6 +1,6 @@
 //! A log file of any format read onto the one table.
 
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use serde::Serialize;
@@ -13,9 +13,10 @@ use super::finding::{Finding, Severity};
 use super::foreign;
 use super::format::{DATAFLASH_MAGIC, Format};
 use super::mapping::Mapping;
-use super::phases::{self, Flying, PhaseKind};
+use super::phases::{self, Flying, Phase, PhaseKind};
 use super::quality::Quality;
 use super::sources::{Asked, Source};
+use super::stretches::{Keep, Stretches};
 use super::topics::Topics;
 use super::vehicle::Vehicle;
 use super::{Flight, binary, dataflash, text, tlog, ulog};
@@ -77,6 +78,8 @@ pub struct Log {
     pub sources: Vec<Source>,
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
+    /// What is known of the whole, where a look at a long log kept stretches of it.
+    pub stretches: Option<Stretches>,
 }
 
 impl Log {
@@ -87,9 +90,17 @@ impl Log {
         (!lines.is_empty()).then(|| lines.join("; "))
     }
 
+    /// Phases of flight and ground, in order.
+    pub fn phases(&self) -> Vec<Phase> {
+        match &self.stretches {
+            Some(stretches) => stretches.phases.clone(),
+            None => phases::phases(&self.flight.samples, &self.flies),
+        }
+    }
+
     /// Time in flight, s.
     pub fn flown_s(&self) -> f64 {
-        let phases = phases::phases(&self.flight.samples, &self.flies);
+        let phases = self.phases();
         let flown = phases.iter().filter(|p| p.kind == PhaseKind::Flight);
         flown.fold(0.0, |sum, p| sum + p.to_s - p.from_s)
     }
@@ -208,7 +219,10 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
     Ok(vec![all.swap_remove(number - 1)])
 }
 
-/// Error text for a file of an unknown format.
+/// Bytes of a table that are read at a time.
+const BUFFER: usize = 64 * 1024;
+
+/// Said of a file that is nothing known.
 const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, or a MAVLink .tlog";
 
 /// Reads the flights of the log `source`, which begins with `start`.
@@ -228,25 +242,27 @@ fn read(
         let what = foreign::kind(start).unwrap_or(NONE_OF_THEM);
         return Err(LogError::Foreign { path: path.to_owned(), what });
     };
+    // Rates that are made from other columns need all of them.
+    let keep = match to {
+        Use::Look if !options.mapping.derives() => Keep::Stretches,
+        _ => Keep::All,
+    };
     if format == Format::Csv {
-        let mut bytes = Vec::new();
-        source.read_to_end(&mut bytes).map_err(failed)?;
-        let bytes = door::narrowed(&bytes).unwrap_or(bytes);
-        return text::read(&bytes, path, options, to);
+        return table(start, source, path, options, to, keep);
     }
     let wanted = |topic: &str| options.mapping.wants(format, topic);
     let mut text_log;
     let (lives, window): (Vec<Topics>, _) = match format {
         Format::Ulog => {
             let fields = |topic: &str, field: &str| options.mapping.wants_of_px4(topic, field);
-            let (topics, window) = ulog::read(&mut source, &fields);
+            let (topics, window) = ulog::read(&mut source, &fields, keep);
             (vec![topics], window)
         }
         Format::Dataflash if !start.starts_with(&DATAFLASH_MAGIC) => {
             text_log = Binary::new(&mut source);
-            dataflash::read(&mut text_log, &wanted)
+            dataflash::read(&mut text_log, &wanted, keep)
         }
-        Format::Dataflash => dataflash::read(&mut source, &wanted),
+        Format::Dataflash => dataflash::read(&mut source, &wanted, keep),
         _ => tlog::read(&mut source, &wanted),
     };
     if let Some(error) = window.failure() {
@@ -256,11 +272,31 @@ fn read(
         return Err(LogError::Foreign { path: path.to_owned(), what: foreign::SDLOG2 });
     }
     let several = lives.len() > 1;
-    let one = |(k, topics): (usize, Topics)| {
+    let one = |(k, mut topics): (usize, Topics)| {
+        topics.align();
         let name = if several { format!("{}#{}", name(path), k + 1) } else { name(path) };
         binary::read(format, topics, &name, path, options, to)
     };
     Ok(lives.into_iter().enumerate().map(one).collect())
+}
+
+/// Reads the flights of a table.
+fn table(
+    start: &[u8],
+    source: &mut dyn Read,
+    path: &Path,
+    options: &Options,
+    to: Use,
+    keep: Keep,
+) -> Result<Lives, LogError> {
+    if !door::is_wide(start) {
+        return text::read(&mut BufReader::with_capacity(BUFFER, source), path, options, to, keep);
+    }
+    let mut bytes = Vec::new();
+    let failed = |source| LogError::File { path: path.to_owned(), source };
+    source.read_to_end(&mut bytes).map_err(failed)?;
+    let bytes = door::narrowed(&bytes).unwrap_or(bytes);
+    text::read(&mut &bytes[..], path, options, to, keep)
 }
 
 /// The name of a file.

@@ -13,12 +13,14 @@ pub struct Flying {
     pub sustained_s: f64,
     /// Shortest flight that supports a verdict, s.
     pub shortest_s: f64,
+    /// Time without rows that is no gap, s: between the stretches of a long log that are looked at.
+    pub bridged_s: f64,
 }
 
 impl Default for Flying {
     /// Criteria for an unknown aircraft.
     fn default() -> Flying {
-        Flying { from_mps: 7.0, sustained_s: 2.0, shortest_s: 5.0 }
+        Flying { from_mps: 7.0, sustained_s: 2.0, shortest_s: 5.0, bridged_s: 0.0 }
     }
 }
 
@@ -34,6 +36,7 @@ impl Flying {
             from_mps: airspeed,
             sustained_s: share * usual.sustained_s,
             shortest_s: share * usual.shortest_s,
+            bridged_s: 0.0,
         }
     }
 }
@@ -72,7 +75,7 @@ pub fn split_s(rows: &[Sample]) -> f64 {
 
 /// The phases of a log in order.
 pub fn phases(rows: &[Sample], flies: &Flying) -> Vec<Phase> {
-    let split = split_s(rows);
+    let split = split_s(rows).max(flies.bridged_s);
     let flying = |airspeed: f64| {
         if airspeed > flies.from_mps { PhaseKind::Flight } else { PhaseKind::Ground }
     };

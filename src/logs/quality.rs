@@ -130,13 +130,28 @@ fn steps(times: &[f64]) -> Vec<f64> {
     times.windows(2).map(|w| w[1] - w[0]).collect()
 }
 
+/// Which of the `stays` (from, to, s) of one value are long for a channel that shows `values` at `times`, s.
+pub(super) fn frozen_of(
+    column: &str,
+    times: &[f64],
+    values: &[f64],
+    mut stays: Vec<(f64, f64)>,
+) -> Vec<(f64, f64)> {
+    let limit = if hangs(column) { frozen_s(&changes(times, values)) } else { None };
+    stays.retain(|(from, to)| limit.is_some_and(|limit| to - from > limit));
+    stays
+}
+
+/// How long one value must stay to be called frozen, s; `None` where too little changes.
+fn frozen_s(changes: &[f64]) -> Option<f64> {
+    let usual = quantile(&steps(changes), 0.9);
+    let enough = changes.len() >= ENOUGH / 2 && !usual.is_nan();
+    enough.then(|| FROZEN_S.max(FROZEN_STEPS * usual))
+}
+
 /// Where one value other than zero stays for much longer than is usual.
 fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
-    let usual = quantile(&steps(changes), 0.9);
-    if changes.len() < ENOUGH / 2 || usual.is_nan() {
-        return Vec::new();
-    }
-    let limit = FROZEN_S.max(FROZEN_STEPS * usual);
+    let Some(limit) = frozen_s(changes) else { return Vec::new() };
     let mut out = Vec::new();
     let mut start = 0;
     for i in 1..=values.len() {

@@ -60,6 +60,8 @@ pub(super) struct Rows {
     counts: [usize; Reason::ALL.len()],
     /// Needed columns that may be empty in a row, by their place in [`NEEDED`].
     sparse: [bool; NEEDED.len()],
+    /// Time of the last usable row that was counted and not kept, s.
+    counted_s: Option<f64>,
 }
 
 impl Rows {
@@ -84,12 +86,15 @@ impl Rows {
         }
     }
 
+    /// Counts row `number` as [`Rows::take`] does, without keeping it.
+    pub fn count(&mut self, number: usize, sample: Option<Sample>) {
+        let usable = self.judged(number, sample, self.counted_s);
+        self.counted_s = usable.map(|row| row.time_s).or(self.counted_s);
+    }
+
     /// Counts the rows that it would take, without taking them.
     pub fn counted(mut self, rows: &[Sample]) -> Rows {
-        let mut last = None;
-        for (i, row) in rows.iter().enumerate() {
-            last = self.judged(i + 1, Some(*row), last).map(|row| row.time_s).or(last);
-        }
+        rows.iter().enumerate().for_each(|(i, row)| self.count(i + 1, Some(*row)));
         self
     }
 

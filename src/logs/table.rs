@@ -9,6 +9,8 @@
 //! in the row that follows each of its samples only: rows filled by interpolation would count as
 //! measurements that nobody made. The other rows stay empty, or hold where a row needs a value.
 
+mod whole;
+
 use std::borrow::Cow;
 
 use super::Sample;
@@ -16,11 +18,13 @@ use super::columns::{COLUMNS, EITHER, NEEDED, index};
 use super::finding::Finding;
 use super::load::Channel;
 use super::mapping::rule::Rule;
-use super::quality::Quality;
+use super::quality::{self, Quality};
 use super::resample::{Reader, SAME_S};
 use super::sources::{Asked, Choice, Source};
-use super::topics::{Topics, period_s};
+use super::stretches::Watch;
+use super::topics::{Topic, Topics, period_s};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
+pub(super) use whole::Whole;
 
 /// The longest time that a fast channel is carried over, s.
 const GAP_S: f64 = 0.1;
@@ -55,6 +59,7 @@ struct Track<'a> {
     series: Vec<Vec<f64>>,
     finite_share: f64,
     rate_hz: f64,
+    topic: &'a Topic,
 }
 
 impl Track<'_> {
@@ -77,18 +82,38 @@ impl Track<'_> {
         measured && self.rate_hz > 0.0 && self.rate_hz * period < SPARSE
     }
 
+    /// What is known of all of its samples, where stretches are kept.
+    fn watch(&self) -> Option<&Watch> {
+        self.topic.watch.as_deref().filter(|_| self.topic.level.thins())
+    }
+
+    /// Number of its samples, those that are not kept included.
+    fn samples(&self) -> usize {
+        match self.watch() {
+            Some(watch) => (self.finite_share * watch.samples as f64).round() as usize,
+            None => self.times.len(),
+        }
+    }
+
     fn channel(&self) -> Channel {
         let gap = self.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let column = self.rule.columns()[0];
+        let mut quality = match &self.series[..] {
+            [one] => Quality::of(column, &self.times, one),
+            _ => Quality::default(),
+        };
+        if let (Some(watch), [one]) = (self.watch(), &self.series[..]) {
+            let field = self.rule.factor().and_then(|(field, _)| self.topic.place(field));
+            let stays = field.map(|field| watch.stays(field)).unwrap_or_default();
+            quality.frozen = quality::frozen_of(column, &self.times, one, stays);
+        }
         Channel {
             columns: self.rule.columns().into_iter().map(str::to_owned).collect(),
             origin: self.origin.clone(),
-            samples: self.times.len(),
+            samples: self.samples(),
             rate_hz: self.rate_hz,
-            largest_gap_s: gap,
-            quality: match &self.series[..] {
-                [one] => Quality::of(self.rule.columns()[0], &self.times, one),
-                _ => Quality::default(),
-            },
+            largest_gap_s: self.watch().map_or(gap, |watch| watch.largest_gap_s),
+            quality,
         }
     }
 }
@@ -106,6 +131,8 @@ pub(super) struct Table {
     pub findings: Vec<Finding>,
     /// The rule that fills each column.
     pub rules: Vec<Rule>,
+    /// What is known of the whole, where stretches are kept.
+    pub whole: Option<Whole>,
 }
 
 /// A required column has no data.
@@ -122,16 +149,10 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
     let (tracks, replaced) = choose(topics, rules, &choice);
     choice.findings.extend(replaced);
     let filled = |column: &str| tracks.iter().any(|t| t.rule.columns().contains(&column));
-    // The time comes with any channel.
-    let missing = |column: &'static str, or: Option<&'static str>| {
-        let of_column = rules.iter().filter(|r| r.columns().contains(&column));
-        Missing { column, or, looked_for: of_column.map(Rule::origin).collect() }
-    };
-    let alone = NEEDED[1..].iter().filter(|c| !filled(c)).map(|c| missing(c, None));
-    let either = EITHER.iter().filter(|(c, p)| !filled(c) && !filled(p));
-    let missing: Vec<Missing> = alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect();
+    let missing = lacking(rules, filled);
     let of = |column: &str| tracks.iter().find(|t| t.rule.columns().contains(&column));
-    let base = [of("roll_rad"), of("p_radps")].into_iter().flatten().max_by_key(|t| t.times.len());
+    let base = [of("roll_rad"), of("p_radps")].into_iter().flatten().max_by_key(|t| t.samples());
+    let whole = base.and_then(|base| Whole::of(base, topics, &tracks));
     let base = base.map(|t| t.times.to_vec()).unwrap_or_default();
     let mut rows: Vec<Sample> =
         base.iter().map(|t| Sample { time_s: *t, ..Sample::default() }).collect();
@@ -172,10 +193,23 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
         channels: tracks.iter().map(Track::channel).collect(),
         notes,
         missing,
+        whole,
         sources: choice.sources,
         findings: choice.findings,
         rules: tracks.into_iter().map(|t| t.rule).collect(),
     }
+}
+
+/// The needed columns that are not `filled`.
+fn lacking(rules: &[Rule], filled: impl Fn(&str) -> bool) -> Vec<Missing> {
+    // The time comes with any channel.
+    let missing = |column: &'static str, or: Option<&'static str>| {
+        let of_column = rules.iter().filter(|r| r.columns().contains(&column));
+        Missing { column, or, looked_for: of_column.map(Rule::origin).collect() }
+    };
+    let alone = NEEDED[1..].iter().filter(|c| !filled(c)).map(|c| missing(c, None));
+    let either = EITHER.iter().filter(|(c, p)| !filled(c) && !filled(p));
+    alone.chain(either.map(|(c, p)| missing(c, Some(p)))).collect()
 }
 
 /// For each column the best rule that has data.
@@ -223,6 +257,16 @@ fn choose<'a>(
 fn track<'a>(topics: &'a Topics, rule: &Rule, instance: Option<u16>) -> Option<Track<'a>> {
     let instance = instance?;
     let topic = topics.topics.get(&(rule.topic.clone(), instance))?;
+    track_of(topics, topic, rule, instance)
+}
+
+/// The data of a rule in an instance of its topic.
+fn track_of<'a>(
+    topics: &Topics,
+    topic: &'a Topic,
+    rule: &Rule,
+    instance: u16,
+) -> Option<Track<'a>> {
     let all = rule.series(topic)?;
     let (times, series) = cleaned(&topic.time_s, all);
     if times.is_empty() {
@@ -235,7 +279,7 @@ fn track<'a>(topics: &'a Topics, rule: &Rule, instance: Option<u16>) -> Option<T
     };
     let period = period_s(&times);
     let rate_hz = if period > 0.0 { 1.0 / period } else { 0.0 };
-    Some(Track { rule: rule.clone(), origin, times, series, finite_share, rate_hz })
+    Some(Track { rule: rule.clone(), origin, times, series, finite_share, rate_hz, topic })
 }
 
 /// Times that increase with finite values; the topic's own where they do so already.

@@ -1,5 +1,6 @@
 //! A CSV table read as flights, and judged.
 
+use std::io::BufRead;
 use std::path::Path;
 
 use super::columns::{COLUMNS, EITHER};
@@ -8,7 +9,9 @@ use super::error::LogError;
 use super::finding::Finding;
 use super::load::{Channel, Log, Options, Use, dropped, hint, name};
 use super::mapping::Mapping;
+use super::phases::Flying;
 use super::quality::Quality;
+use super::stretches::Keep;
 use super::topics::period_s;
 use super::{Flight, Format, Sample, assess, derive, screening};
 
@@ -17,13 +20,19 @@ use super::{Flight, Format, Sample, assess, derive, screening};
 /// # Errors
 /// The text is no table. Of each flight: it lacks a needed column, or has too many unusable rows.
 pub(super) fn read(
-    bytes: &[u8],
+    source: &mut dyn BufRead,
     path: &Path,
     options: &Options,
     to: Use,
+    keep: Keep,
 ) -> Result<Vec<Result<Log, LogError>>, LogError> {
-    let bare = |error| LogError::Csv { error, hint: String::new() };
-    let recordings = csv::raw(bytes, path, &options.mapping).map_err(bare)?.recordings();
+    let bare = |error| match error {
+        CsvError::Text { source, .. } if source.is_io_error() => {
+            LogError::File { path: path.to_owned(), source: source.into() }
+        }
+        error => LogError::Csv { error, hint: String::new() },
+    };
+    let recordings = csv::read(source, path, &options.mapping, keep).map_err(bare)?.recordings();
     let several = recordings.len() > 1;
     let one = |(k, raw): (usize, Raw)| {
         let life = several.then(|| format!("recording {}", k + 1));
@@ -52,25 +61,24 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         findings.push(Finding::problem(first.to_string()));
     }
     let mut made = std::mem::take(&mut raw.notes);
-    let channels = channels(&raw.rows, &options.mapping);
-    findings.extend(assess::freeze(&mut raw.rows, &channels, &options.flies));
+    let flies = Flying { bridged_s: raw.bridged_s(), ..options.flies };
+    let mut channels = channels(&raw.rows, &options.mapping);
+    let stretches = raw.stretches(&options.flies);
+    if let Some(stretches) = &stretches {
+        findings.push(Finding::note(stretches.said()));
+        channels.iter_mut().for_each(|channel| raw.of_all(stretches, channel));
+    }
+    findings.extend(assess::freeze(&mut raw.rows, &channels, &flies));
     raw.leave_out(|row| assess::hangs(row, &channels));
     made.extend(derive::apply(&mut raw.rows, &options.mapping));
-    findings.extend(assess::channels(&channels, &raw.rows, &options.flies));
+    findings.extend(assess::channels(&channels, &raw.rows, &flies));
     if !timeless {
-        findings.extend(screening::screen(&raw.rows, &options.flies));
+        findings.extend(screening::screen(&raw.rows, &flies));
     }
     findings.extend(made.iter().map(Finding::note));
-    let reading = if lacking {
-        csv::keep_all(raw, path)
-    } else {
-        let poor = csv::poor(&raw, path, options.tolerance);
-        if let (Some(source), Use::Look) = (&poor, to) {
-            findings.push(Finding::problem(source.to_string()));
-        }
-        let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
-        csv::settle(raw, path, tolerance)
-            .map_err(|error| LogError::Csv { error, hint: hint(&findings) })?
+    let reading = match lacking {
+        true => csv::keep_all(raw, path),
+        false => settled(raw, path, options, to, &mut findings)?,
     };
     if reading.cut_short {
         findings.push(Finding::warning("the file ends in the middle of a row, which is left out"));
@@ -90,12 +98,29 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         dropped: reading.dropped,
         dropped_rows: reading.dropped_rows,
         findings,
-        flies: options.flies,
+        flies,
         vehicle: None,
         hovers: Vec::new(),
         sources: Vec::new(),
         life: None,
+        stretches,
     })
+}
+
+/// The usable rows of a table that lacks no column; for a look however few they are.
+fn settled(
+    raw: Raw,
+    path: &Path,
+    options: &Options,
+    to: Use,
+    findings: &mut Vec<Finding>,
+) -> Result<csv::Reading, LogError> {
+    let poor = csv::poor(&raw, path, options.tolerance);
+    if let (Some(source), Use::Look) = (&poor, to) {
+        findings.push(Finding::problem(source.to_string()));
+    }
+    let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
+    csv::settle(raw, path, tolerance).map_err(|error| LogError::Csv { error, hint: hint(findings) })
 }
 
 /// Names of columns that a finding lists.

@@ -17,6 +17,7 @@ use std::ops::Range;
 
 use super::finding::Finding;
 use super::format::MAVLINK_MARKERS;
+use super::stretches::Keep;
 use super::topics::{Naming, Topic, Topics};
 use super::window::Window;
 use greylag_link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
@@ -135,7 +136,7 @@ impl Reader {
             return;
         }
         let (entries, topic) = self.entries.entry(key).or_insert_with(|| {
-            (Vec::new(), Topic::new(values.fields.iter().map(|f| (*f).to_owned())))
+            (Vec::new(), Topic::new(values.fields.iter().map(|f| (*f).to_owned()), Keep::All))
         });
         entries.push(Entry { at: self.records, host_s, own_s });
         for (x, column) in values.values.iter().zip(&mut topic.values) {
@@ -242,6 +243,7 @@ impl Reader {
                 time_s: entries[from..to].iter().map(|entry| time(entry, clock)).collect(),
                 fields: topic.fields.clone(),
                 values: topic.values.iter().map(|v| v[from..to].to_vec()).collect(),
+                ..Topic::default()
             };
             out.topics.insert(((*name).to_owned(), *source), topic);
         }

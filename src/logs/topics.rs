@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::finding::Finding;
+use super::stretches::{Keep, Level, MOST, Watch};
 
 /// One instance of a topic, stored field by field.
 #[derive(Clone, Debug, Default)]
@@ -13,14 +14,63 @@ pub(super) struct Topic {
     pub fields: Vec<String>,
     /// The fields' values, in the order of `fields`, each as long as `time_s`.
     pub values: Vec<Vec<f64>>,
+    /// The stretches that are kept of it.
+    pub level: Level,
+    /// What is known of all of its samples, where stretches are kept.
+    pub watch: Option<Box<Watch>>,
 }
 
 impl Topic {
     /// A topic without samples.
-    pub fn new<S: Into<String>>(fields: impl IntoIterator<Item = S>) -> Self {
+    pub fn new<S: Into<String>>(fields: impl IntoIterator<Item = S>, keep: Keep) -> Self {
         let fields: Vec<String> = fields.into_iter().map(Into::into).collect();
         let values = vec![Vec::new(); fields.len()];
-        Topic { time_s: Vec::new(), fields, values }
+        let watch = (keep == Keep::Stretches).then(Box::default);
+        Topic { fields, values, watch, ..Topic::default() }
+    }
+
+    /// Adds a sample with the values of its fields.
+    pub fn push(&mut self, time_s: f64, values: &[f64]) {
+        if let Some(watch) = &mut self.watch {
+            watch.take(time_s, values);
+            watch.coarsely(time_s, values);
+            if self.level.thins() && !self.level.keeps(time_s) {
+                return;
+            }
+        }
+        self.time_s.push(time_s);
+        self.values.iter_mut().zip(values).for_each(|(column, x)| column.push(*x));
+        if self.watch.is_some() && self.time_s.len() > MOST {
+            self.level.halved().into_iter().for_each(|level| self.thin(level));
+        }
+    }
+
+    /// Time of the last sample, kept or not, s.
+    pub fn last_s(&self) -> Option<f64> {
+        let watched = self.watch.as_ref().and_then(|watch| watch.span_s).map(|(_, last)| last);
+        watched.filter(|_| self.level.thins()).or(self.time_s.last().copied())
+    }
+
+    /// Keeps no more stretches than those of `level`.
+    fn thin(&mut self, level: Level) {
+        self.level = level;
+        let mut kept = 0;
+        for i in 0..self.time_s.len() {
+            if level.keeps(self.time_s[i]) {
+                self.time_s[kept] = self.time_s[i];
+                self.values.iter_mut().for_each(|column| column[kept] = column[i]);
+                kept += 1;
+            }
+        }
+        self.time_s.truncate(kept);
+        self.values.iter_mut().for_each(|column| column.truncate(kept));
+    }
+
+    /// Its samples of one a second throughout the log, where only stretches of the others are kept.
+    pub fn coarse(&self) -> Option<Topic> {
+        let watch = self.watch.as_ref().filter(|_| self.level.thins())?;
+        let (time_s, values) = (watch.coarse_s.clone(), watch.coarse.clone());
+        Some(Topic { time_s, values, fields: self.fields.clone(), ..Topic::default() })
     }
 
     /// Whether a field exists and has at least two finite values.
@@ -31,10 +81,14 @@ impl Topic {
         first.is_some_and(|first| finite.any(|x| x != first))
     }
 
+    /// The place of a field.
+    pub fn place(&self, name: &str) -> Option<usize> {
+        self.fields.iter().position(|f| f == name)
+    }
+
     /// The values of a field.
     pub fn field(&self, name: &str) -> Option<&[f64]> {
-        let i = self.fields.iter().position(|f| f == name)?;
-        Some(&self.values[i])
+        self.place(name).map(|i| &self.values[i][..])
     }
 }
 
@@ -115,6 +169,13 @@ impl Topics {
     pub fn of_sdlog2(&self) -> bool {
         let has = |name: &str| self.counts.contains_key(&(name.to_owned(), 0));
         self.topics.is_empty() && has("TIME") && has("STAT") && has("ATT")
+    }
+
+    /// Keeps the same stretches of all topics of which stretches are kept.
+    pub fn align(&mut self) {
+        let level = self.topics.values().fold(Level::default(), |l, t| l.sparser(t.level));
+        let fast = self.topics.values_mut().filter(|t| t.level.thins() && t.level != level);
+        fast.for_each(|topic| topic.thin(level));
     }
 
     /// The last value of a parameter.

@@ -10,16 +10,19 @@
 //! parameters. Parameter changes in flight overwrite the value.
 
 mod layout;
+mod subscriptions;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::rc::Rc;
 
 use super::finding::Finding;
 use super::format::ULOG_MAGIC;
+use super::stretches::Keep;
 use super::topics::{Topic, Topics};
 use super::window::Window;
 use layout::{Kind, Layout};
+use subscriptions::{Subscription, Subscriptions};
 
 /// Magic, version and start time.
 const HEADER: usize = 16;
@@ -32,21 +35,24 @@ const IN_STEP: usize = 3;
 /// The kinds of records.
 const KINDS: &[u8] = b"BFIMPQARDCLSO";
 
-/// A message number's topic.
-struct Subscription {
-    key: (String, u16),
-    layout: Rc<Layout>,
-    /// Records of the message; `None` before the first.
-    topic: Option<Topic>,
-    count: usize,
+/// Records behind the present one that are known to follow each other.
+#[derive(Clone, Copy, Default)]
+struct Ahead {
+    records: usize,
+    bytes: usize,
 }
 
 #[derive(Default)]
 struct Reader {
+    /// What was seen ahead when the last record was judged.
+    ahead: Ahead,
     formats: BTreeMap<String, String>,
     /// One for each topic, however often it is subscribed to.
     layouts: BTreeMap<String, Rc<Layout>>,
-    subscriptions: HashMap<u16, Subscription>,
+    subscriptions: Subscriptions,
+    keep: Keep,
+    /// The values of a record.
+    values: Vec<f64>,
     out: Topics,
     dropout_ms: u64,
     dropouts: usize,
@@ -84,9 +90,10 @@ enum Place {
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str, &str) -> bool,
+    keep: Keep,
 ) -> (Topics, Window<'a>) {
     let mut window = Window::new(source);
-    let mut reader = Reader { in_step: true, ..Reader::default() };
+    let mut reader = Reader { in_step: true, keep, ..Reader::default() };
     let header = window.view(HEADER);
     if !header.starts_with(&ULOG_MAGIC) || header.len() < HEADER {
         reader.out.findings.push(Finding::warning("the file ends within its header"));
@@ -132,7 +139,7 @@ impl Reader {
     ///
     /// A record that several others follow is valid. Where the file is damaged, it must have the
     /// size of its topic as well.
-    fn place(&self, view: &[u8]) -> Place {
+    fn place(&mut self, view: &[u8]) -> Place {
         let Some((len, kind)) = header(view) else { return Place::Damage };
         let exact = kind == b'D' && self.fits(view, len);
         if view.len() < len {
@@ -141,22 +148,52 @@ impl Reader {
         }
         let fits = match self.in_step {
             // Its own size is not enough: the damage may have begun within it.
-            true => self.is_in_step(&view[len..], Undeclared::Allowed),
-            false => self.is_in_step(view, Undeclared::Refused),
+            true => self.goes_on(&view[len..], len, kind),
+            false => self.is_in_step(view, IN_STEP, Undeclared::Refused),
         };
         if fits { Place::Record(len) } else { Place::Damage }
     }
 
-    /// Whether the records at the beginning of `view` follow each other, each of the size of its topic.
-    fn is_in_step(&self, mut view: &[u8], undeclared: Undeclared) -> bool {
-        for _ in 0..IN_STEP {
+    /// Whether valid records follow one of `len` bytes. Those that were seen ahead of the record before it need
+    /// no second look, unless the record declares something.
+    fn goes_on(&mut self, rest: &[u8], len: usize, kind: u8) -> bool {
+        let seen = match self.ahead {
+            Ahead { records, bytes } if kind == b'D' && records > 0 && bytes >= len => {
+                Ahead { records: records - 1, bytes: bytes - len }
+            }
+            _ => Ahead::default(),
+        };
+        self.ahead = Ahead::default();
+        let Some(unseen) = rest.get(seen.bytes..) else {
+            return self.is_in_step(rest, IN_STEP, Undeclared::Allowed);
+        };
+        if !self.is_in_step(unseen, IN_STEP - seen.records, Undeclared::Allowed) {
+            return false;
+        }
+        let mut ahead = seen;
+        while ahead.records < IN_STEP {
+            let Some((next, _)) = rest.get(ahead.bytes..).and_then(header) else { break };
+            if rest.len() < ahead.bytes + next {
+                break;
+            }
+            ahead = Ahead { records: ahead.records + 1, bytes: ahead.bytes + next };
+        }
+        // What this record declares may change the judgement.
+        self.ahead = if kind == b'D' { ahead } else { Ahead::default() };
+        true
+    }
+
+    /// Whether `count` records at the beginning of `view` follow each other, each of the size of its topic.
+    fn is_in_step(&self, mut view: &[u8], count: usize, undeclared: Undeclared) -> bool {
+        for _ in 0..count {
             let Some((len, kind)) = header(view) else { return view.len() < RECORD };
-            let known = view.get(RECORD..).and_then(|b| b.first_chunk::<2>());
-            let known =
-                known.is_some_and(|n| self.subscriptions.contains_key(&u16::from_le_bytes(*n)));
-            let excused = undeclared == Undeclared::Allowed && !known;
-            if kind == b'D' && !excused && !self.fits(view, len) {
-                return false;
+            if kind == b'D' {
+                let number = view.get(RECORD..).and_then(|b| b.first_chunk::<2>());
+                let known = number.and_then(|n| self.subscriptions.get(u16::from_le_bytes(*n)));
+                let fits = known.map(|known| known.fits(len));
+                if !fits.unwrap_or(undeclared == Undeclared::Allowed) {
+                    return false;
+                }
             }
             // Numbers hold the letters of the other kinds, so that those show no place to go on at.
             if kind != b'D' && undeclared == Undeclared::Refused {
@@ -171,12 +208,9 @@ impl Reader {
 
     /// Whether a data record of `len` bytes has the size of the topic that it names.
     fn fits(&self, view: &[u8], len: usize) -> bool {
-        let number =
-            view.get(RECORD..).and_then(|b| b.first_chunk()).map(|b| u16::from_le_bytes(*b));
-        let layout = number.and_then(|n| self.subscriptions.get(&n)).map(|s| &s.layout);
-        layout.is_some_and(|l| {
-            l.size > 0 && (RECORD + 2 + l.size..=RECORD + 2 + l.padded).contains(&len)
-        })
+        let number = view.get(RECORD..).and_then(|b| b.first_chunk());
+        let known = number.and_then(|b| self.subscriptions.get(u16::from_le_bytes(*b)));
+        known.is_some_and(|known| known.fits(len))
     }
 
     /// Counts a byte that belongs to no record.
@@ -185,6 +219,7 @@ impl Reader {
             self.holes.push(f64::NAN);
         }
         self.in_step = false;
+        self.ahead = Ahead::default();
         self.skipped += 1;
     }
 
@@ -248,7 +283,7 @@ impl Reader {
 
     fn data(&mut self, body: &[u8]) {
         let number = body.first_chunk().map(|b| u16::from_le_bytes(*b));
-        let Some(subscription) = number.and_then(|n| self.subscriptions.get_mut(&n)) else {
+        let Some(subscription) = number.and_then(|n| self.subscriptions.get_mut(n)) else {
             self.orphans += 1;
             return;
         };
@@ -273,13 +308,13 @@ impl Reader {
         if !micros.is_finite() {
             return;
         }
+        let keep = self.keep;
         let topic = subscription
             .topic
-            .get_or_insert_with(|| Topic::new(layout.fields.iter().map(|f| f.name.clone())));
-        topic.time_s.push(micros * 1e-6);
-        for (field, values) in layout.fields.iter().zip(&mut topic.values) {
-            values.push(field.kind.at(body, field.offset));
-        }
+            .get_or_insert_with(|| Topic::new(layout.fields.iter().map(|f| f.name.clone()), keep));
+        self.values.clear();
+        self.values.extend(layout.fields.iter().map(|f| f.kind.at(body, f.offset)));
+        topic.push(micros * 1e-6, &self.values);
     }
 
     fn keep(&mut self, old: Subscription) {
@@ -290,8 +325,7 @@ impl Reader {
     }
 
     fn finish(mut self) -> Topics {
-        let mut subscriptions: Vec<_> =
-            std::mem::take(&mut self.subscriptions).into_iter().collect();
+        let mut subscriptions = std::mem::take(&mut self.subscriptions).all;
         subscriptions.sort_by_key(|(number, _)| *number);
         subscriptions.into_iter().for_each(|(_, s)| self.keep(s));
         self.out.findings.extend(damage(self.skipped, &self.holes));

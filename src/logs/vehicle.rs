@@ -274,10 +274,11 @@ fn merged(mut spans: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stretches::Keep;
     use crate::topics::Topic;
 
     fn topics(name: &str, field: &str, values: &[(f64, f64)]) -> Topics {
-        let mut topic = Topic::new([field]);
+        let mut topic = Topic::new([field], Keep::All);
         for (t, x) in values {
             topic.time_s.push(*t);
             topic.values[0].push(*x);

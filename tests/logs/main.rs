@@ -8,6 +8,7 @@ mod compare_support;
 mod comparison;
 mod formats;
 mod found_public;
+mod lean;
 #[path = "../support/logs.rs"]
 mod logs_support;
 mod odd_files;

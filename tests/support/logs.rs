@@ -273,3 +273,44 @@ pub fn csv(samples: &[Sample]) -> Vec<u8> {
     greylag::logs::csv::write(&samples.to_vec().into(), &mut out).unwrap();
     out
 }
+
+/// The binary log in text, as ground stations save it, behind the lines of the firmware.
+pub fn in_text(binary: &[u8], firmware: &str) -> String {
+    let mut out = format!("\n{firmware}\n\nFree RAM: 1234\n");
+    let mut letters: [(String, String); 256] = std::array::from_fn(|_| Default::default());
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned();
+    out += "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\n";
+    out += "FMT, 200, 67, MSG, Z, Message\n";
+    let mut at = 0;
+    let mut lengths = [89usize; 256];
+    while at + 3 <= binary.len() {
+        let kind = usize::from(binary[at + 2]);
+        let body = &binary[at + 3..at + lengths[kind]];
+        if kind == 128 {
+            let (declared, name) = (usize::from(body[0]), text(&body[2..6]));
+            let (format, labels) = (text(&body[6..22]), text(&body[22..86]));
+            lengths[declared] = usize::from(body[1]);
+            out += &format!("FMT, {declared}, {}, {name}, {format}, {labels}\n", body[1]);
+            letters[declared] = (name, format);
+        } else {
+            let (name, format) = &letters[kind];
+            let mut offset = 0;
+            let mut fields = vec![name.clone()];
+            for letter in format.bytes() {
+                let piece = &body[offset..];
+                let (value, size) = match letter {
+                    b'Q' => (u64::from_le_bytes(piece[..8].try_into().unwrap()).to_string(), 8),
+                    b'f' => (f32::from_le_bytes(piece[..4].try_into().unwrap()).to_string(), 4),
+                    b'B' => (piece[0].to_string(), 1),
+                    b'd' => (f64::from_le_bytes(piece[..8].try_into().unwrap()).to_string(), 8),
+                    other => panic!("{}", char::from(other)),
+                };
+                fields.push(value);
+                offset += size;
+            }
+            out += &(fields.join(", ") + "\n");
+        }
+        at += lengths[kind];
+    }
+    out
+}

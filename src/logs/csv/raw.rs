@@ -1,16 +1,22 @@
 //! A table as read from its file, before rows are judged.
 
-use std::collections::BTreeSet;
-use std::ops::Range;
+use std::io::BufRead;
 use std::path::Path;
 
 use super::CsvError;
-use super::dialect::{self, Dialect};
+use super::dialect;
+use super::head::Head;
 use super::quaternion;
-use crate::columns::{COLUMNS, EITHER, NEEDED, Place, index};
-use crate::mapping::{Mapping, TEXT};
+use super::records::{Fields, Records};
+use super::thin::{STRETCH, Thin, Whole};
+use crate::Channel;
+use crate::columns::{COLUMNS, index};
+use crate::mapping::Mapping;
+use crate::phases::Flying;
+use crate::quality::frozen_of;
+use crate::stretches::{Keep, Stretches};
 use crate::topics::period_s;
-use crate::{Sample, mixed, rows};
+use crate::{Sample, rows};
 
 /// A table as read from its file, before rows are judged.
 #[derive(Default)]
@@ -18,16 +24,17 @@ pub(crate) struct Raw {
     /// The rows that could be read and have a time.
     pub rows: Vec<Sample>,
     /// Number of the file's rows before each row.
-    places: Vec<usize>,
-    /// The rows of the file that are its own, of which those left out on purpose count as none.
-    range: Range<usize>,
-    left_out: BTreeSet<usize>,
+    pub(super) places: Vec<usize>,
+    /// Numbers of the file's rows before each row that could not be read.
+    pub(super) unreadable: Vec<usize>,
     /// The needed columns that it lacks.
     pub missing: Vec<CsvError>,
     pub(crate) unknown_columns: Vec<String>,
     pub(super) cut_short: bool,
     /// Notes on columns that were found under other names.
     pub notes: Vec<String>,
+    /// What is known of the whole, where stretches of it are kept.
+    pub(crate) whole: Option<Whole>,
 }
 
 /// Backward jump of time that begins another recording: in median sample periods, and in s.
@@ -45,24 +52,56 @@ impl Raw {
         take: impl Fn(&mut rows::Rows, usize, Option<Sample>),
     ) -> rows::Rows {
         let mut rows = rows::Rows::with_sparse_columns_of(&self.rows);
-        let mut next = self.rows.iter().zip(&self.places).peekable();
-        for i in self.range.clone().filter(|i| !self.left_out.contains(i)) {
-            let own = next.next_if(|(_, place)| **place == i).map(|(sample, _)| *sample);
-            // The header is row 1.
-            take(&mut rows, i + 2, own);
+        let mut unreadable = self.unreadable.iter().peekable();
+        // The header is row 1.
+        for (sample, place) in self.rows.iter().zip(&self.places) {
+            while let Some(i) = unreadable.next_if(|i| *i < place) {
+                take(&mut rows, i + 2, None);
+            }
+            take(&mut rows, place + 2, Some(*sample));
         }
+        unreadable.for_each(|i| take(&mut rows, i + 2, None));
         rows
     }
 
-    /// Takes out rows on purpose; how many.
-    pub fn leave_out(&mut self, is: impl Fn(&Sample) -> bool) -> usize {
-        let before = self.left_out.len();
-        let out = self.rows.iter().zip(&self.places).filter(|(row, _)| is(row));
-        self.left_out.extend(out.map(|(_, place)| *place).collect::<Vec<_>>());
-        let places = std::mem::take(&mut self.places);
-        let rows = std::mem::take(&mut self.rows).into_iter().zip(places);
-        (self.rows, self.places) = rows.filter(|(row, _)| !is(row)).unzip();
-        self.left_out.len() - before
+    /// Takes out rows on purpose, which count as none of the file's.
+    pub fn leave_out(&mut self, is: impl Fn(&Sample) -> bool) {
+        if self.rows.iter().any(&is) {
+            let places = std::mem::take(&mut self.places);
+            let rows = std::mem::take(&mut self.rows).into_iter().zip(places);
+            (self.rows, self.places) = rows.filter(|(row, _)| !is(row)).unzip();
+        }
+    }
+
+    /// Where rows are left out between stretches: the times of the rows on both sides, s.
+    fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
+        let pairs = self.rows.windows(2).zip(self.places.windows(2));
+        let left_out =
+            pairs.filter(|(_, places)| self.whole.is_some() && places[1] - places[0] >= STRETCH);
+        left_out.map(|(rows, _)| (rows[0].time_s, rows[1].time_s))
+    }
+
+    /// Longest time between the stretches that are kept, s; 0 where all is.
+    pub fn bridged_s(&self) -> f64 {
+        self.pauses().map(|(from, to)| 1.01 * (to - from)).fold(0.0, f64::max)
+    }
+
+    /// What is known of the whole table, where stretches of it are kept.
+    pub fn stretches(&self, flies: &Flying) -> Option<Stretches> {
+        let times: Vec<f64> = self.rows.iter().map(|s| s.time_s).collect();
+        self.whole.as_ref()?.stretches(period_s(&times), flies)
+    }
+
+    /// Makes a channel of the stretches one of the whole table.
+    pub fn of_all(&self, stretches: &Stretches, channel: &mut Channel) {
+        let share = self.rows.len() as f64 / stretches.rows.max(1) as f64;
+        channel.samples = (channel.samples as f64 / share).round() as usize;
+        channel.largest_gap_s = self.whole.as_ref().map_or(0.0, |whole| whole.watch.largest_gap_s);
+        let column = channel.columns.first().map(String::as_str).unwrap_or_default();
+        let (Some(place), Some(whole)) = (index(column), &self.whole) else { return };
+        let seen = self.rows.iter().map(|s| (s.time_s, COLUMNS[place].1(s)));
+        let (times, values): (Vec<f64>, Vec<f64>) = seen.filter(|(_, x)| x.is_finite()).unzip();
+        channel.quality.frozen = frozen_of(column, &times, &values, whole.watch.stays(place));
     }
 
     /// The recordings that follow one another in the table: each begins where the time goes back
@@ -89,101 +128,75 @@ impl Raw {
         let last = bounds.len() - 2;
         let one = |k: usize| {
             let (from, to) = (bounds[k], bounds[k + 1]);
-            let first = if k == 0 { self.range.start } else { self.places[from] };
-            let end = if k == last { self.range.end } else { self.places[to] };
+            let first = if k == 0 { 0 } else { self.places[from] };
+            let end = if k == last { usize::MAX } else { self.places[to] };
+            let unreadable = self.unreadable.iter().filter(|i| (first..end).contains(*i));
             Raw {
                 rows: self.rows[from..to].to_vec(),
                 places: self.places[from..to].to_vec(),
-                range: first..end,
-                left_out: BTreeSet::new(),
+                unreadable: unreadable.copied().collect(),
                 missing: Vec::new(),
                 unknown_columns: self.unknown_columns.clone(),
                 cut_short: self.cut_short && k == last,
                 notes: self.notes.clone(),
+                whole: None,
             }
         };
         (0..=last).map(one).collect()
     }
 }
 
-/// Destination of a field: column, scale, offset, and whether it is one term of a sum.
-type Target = (Place, f64, f64, Part);
-
-/// Whether a field is a column, or one of several surfaces that make one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
-    Whole,
-    OneOfSeveral,
-}
-
-/// Separator of a table's columns: commas, else semicolons or tabs.
-fn separator(header: &[u8]) -> u8 {
-    let count = |by: u8| header.iter().filter(|b| **b == by).count();
-    if count(b',') > 0 && count(b';') <= count(b',') {
-        return b',';
-    }
-    [b';', b'\t']
-        .into_iter()
-        .max_by_key(|by| count(*by))
-        .filter(|by| count(*by) > 0)
-        .unwrap_or(b',')
-}
-
-/// Reads the rows; `mapping` may assign columns with other names or units.
+/// Reads the rows of a text in memory; `mapping` may assign columns with other names or units.
 pub(crate) fn raw(bytes: &[u8], path: &Path, mapping: &Mapping) -> Result<Raw, CsvError> {
+    read(&mut &bytes[..], path, mapping, Keep::All)
+}
+
+/// Reads the rows of a text; `mapping` may assign columns with other names or units.
+pub(crate) fn read(
+    source: &mut dyn BufRead,
+    path: &Path,
+    mapping: &Mapping,
+    keep: Keep,
+) -> Result<Raw, CsvError> {
     let text = |source| CsvError::Text { path: path.to_owned(), source };
-    // A row without a line end may lack digits, so it is not read.
-    let end = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
-    let delimiter = separator(bytes.split(|b| *b == b'\n').next().unwrap_or_default());
-    let mut reader = ::csv::ReaderBuilder::new();
-    let mut reader = reader.flexible(true).delimiter(delimiter).from_reader(&bytes[..end]);
-    let header = reader.byte_headers().map_err(text)?.clone();
-    let names: Vec<String> =
-        header.iter().map(|h| String::from_utf8_lossy(h).trim().to_owned()).collect();
-    let dialect = Dialect::of(&names, mapping);
-    let mut targets: Vec<Vec<Target>> =
-        names.iter().map(|name| targets(name, mapping, &dialect)).collect();
-    let mixed = mixed::columns(&names, mapping);
-    for part in &mixed {
-        targets[part.field].push((part.place, part.share, 0.0, Part::OneOfSeveral));
-    }
-    let mut made: Vec<String> = mixed.iter().map(|part| part.column.to_owned()).collect();
-    made.extend(COLUMNS.iter().filter(|c| dialect.fills(c.0)).map(|c| c.0.to_owned()));
-    let missing = missing_columns(&[names.clone(), made].concat(), mapping, path);
-    let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
-    let unknown = unknown.map(|(name, _)| name.clone());
-    let mut out = Raw {
-        missing,
-        unknown_columns: unknown.filter(|n| !n.is_empty() && !dialect.reads(n)).collect(),
-        cut_short: end < bytes.len(),
-        notes: dialect.said().into_iter().collect(),
-        ..Raw::default()
-    };
-    let parts = dialect.quaternion.as_ref().map(|q| {
-        q.each_ref().map(|name| names.iter().position(|n| n == name).unwrap_or(usize::MAX))
-    });
+    let mut records = Records::new(source);
+    let header = records.next().map_err(text)?;
+    let name = |i| header.and_then(|h| h.get(i)).map(|h| String::from_utf8_lossy(h).into_owned());
+    let count = header.map_or(0, Fields::len);
+    let names: Vec<String> = (0..count).filter_map(name).map(|n| n.trim().to_owned()).collect();
+    let (head, mut out) = Head::of(&names, records.delimiter, path, mapping);
     let mut quaternions: Vec<[f64; 4]> = Vec::new();
-    let comma = if delimiter == b',' { Decimal::Point } else { Decimal::PointOrComma };
-    for record in reader.byte_records() {
-        let record = record.map_err(text)?;
-        // A row that lacks fields is damaged, and would take many times its size.
-        let whole = record.len() >= targets.len();
-        let sample = sample(&record, &targets, comma).filter(|s| whole && s.time_s.is_finite());
-        if let Some(sample) = sample {
-            out.rows.push(sample);
-            out.places.push(out.range.end);
-            quaternions.extend(parts.map(|q| {
-                q.map(|i| record.get(i).and_then(|f| number(f, comma)).unwrap_or(f64::NAN))
-            }));
+    // A row has its place among the stretches by its number, but pauses are found by times whose unit is known.
+    let mut thin = Thin::new(if head.dialect.time_by_steps { Keep::All } else { keep });
+    let mut number = 0;
+    while let Some(record) = records.next().map_err(text)? {
+        let sample = head.sample(record);
+        sample.iter().for_each(|sample| thin.take(number, sample));
+        match sample {
+            Some(sample) if thin.keeps(number) => {
+                out.rows.push(sample);
+                out.places.push(number);
+                quaternions.extend(head.quaternion(record));
+            }
+            Some(_) => {}
+            None => out.unreadable.push(number),
         }
-        out.range.end += 1;
+        number += 1;
+        if thin.is_full(out.rows.len()) {
+            thin.thin(&mut quaternions, &out.places);
+            thin.thin(&mut out.rows, &out.places);
+            let places = out.places.clone();
+            thin.thin(&mut out.places, &places);
+        }
     }
-    if dialect.quaternion.is_some() {
+    out.cut_short = records.cut_short();
+    out.whole = thin.whole();
+    if head.dialect.quaternion.is_some() {
         let order = mapping.quaternion().and_then(|q| q.order);
         let order = order.unwrap_or_else(|| quaternion::order(&out.rows, &quaternions));
         quaternion::fill(&mut out.rows, &quaternions, order);
     }
-    if dialect.time_by_steps {
+    if head.dialect.time_by_steps {
         in_seconds(&mut out.rows);
     }
     Ok(out)
@@ -194,77 +207,4 @@ fn in_seconds(rows: &mut [Sample]) {
     let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
     let unit = dialect::unit_of(period_s(&times));
     rows.iter_mut().for_each(|row| row.time_s *= unit);
-}
-
-/// How decimals may be written.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Decimal {
-    Point,
-    PointOrComma,
-}
-
-/// The number in a field; NaN if it is empty, `None` if it is neither a number nor a date.
-fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
-    let field = std::str::from_utf8(field).ok()?.trim();
-    if field.is_empty() {
-        return Some(f64::NAN);
-    }
-    let plain = field.parse().ok();
-    let comma = || match decimal {
-        Decimal::PointOrComma if field.contains(',') => field.replacen(',', ".", 1).parse().ok(),
-        _ => None,
-    };
-    plain.or_else(comma).or_else(|| dialect::time(field))
-}
-
-/// Destination of the file's column `name`.
-fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
-    let mut targets: Vec<Target> = mapping
-        .of_topic(TEXT)
-        .filter(|(_, entry)| entry.field == name)
-        .filter_map(|(column, e)| Some((COLUMNS[index(column)?].2, e.scale, e.offset, Part::Whole)))
-        .collect();
-    if mapping.get(name).is_none()
-        && let Some(i) = index(name)
-    {
-        targets.push((COLUMNS[i].2, 1.0, 0.0, Part::Whole));
-    }
-    let under_other_names = dialect.found.iter().filter(|f| f.field == name);
-    targets.extend(
-        under_other_names
-            .filter_map(|f| Some((COLUMNS[index(&f.column)?].2, f.scale, f.offset, Part::Whole))),
-    );
-    targets
-}
-
-/// The required columns that are not among `names`, each with the columns that would replace it.
-fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
-    let has = |column: &str| {
-        let name = mapping.get(column).map_or(column, |entry| &entry.field);
-        names.iter().any(|n| n == name)
-    };
-    let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
-    let alone = NEEDED.into_iter().filter(|column| !has(column) && !mapping.makes(column));
-    let alone =
-        alone.map(|column| missing(column, "add it, in the unit its name ends with".into()));
-    let either = EITHER.into_iter().filter(|(command, position)| !has(command) && !has(position));
-    let either = either.map(|(command, position)| {
-        missing(command, format!("add it, or the position `{position}`"))
-    });
-    alone.chain(either).collect()
-}
-
-/// The sample of a record; `None` if a field is not a number.
-fn sample(record: &::csv::ByteRecord, targets: &[Vec<Target>], decimal: Decimal) -> Option<Sample> {
-    let mut sample = Sample::default();
-    for (field, targets) in record.iter().zip(targets).filter(|(_, t)| !t.is_empty()) {
-        let x = number(field, decimal)?;
-        for (place, scale, offset, part) in targets.iter().filter(|_| !x.is_nan()) {
-            let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
-            let place = place(&mut sample);
-            let sums = *part == Part::OneOfSeveral && !place.is_nan();
-            *place = if sums { *place + value } else { value };
-        }
-    }
-    Some(sample)
 }

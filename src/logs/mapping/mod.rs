@@ -171,6 +171,11 @@ impl Mapping {
         flies
     }
 
+    /// Whether any column is made from the rows of others around it.
+    pub(super) fn derives(&self) -> bool {
+        self.body_rates_over_s.is_some() || self.slopes().next().is_some()
+    }
+
     /// Known properties of sensors and wind.
     pub fn sensors(&self) -> &Sensors {
         &self.sensors

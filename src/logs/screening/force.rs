@@ -1,7 +1,7 @@
 //! Accelerometers: unit and sign of each axis.
 
 use super::cured;
-use super::relation::{change, mean, quantile, tame, values, windows, with_intercept};
+use super::relation::{change, mean, quantile, values, windows, with_intercept};
 use crate::Sample;
 use crate::finding::Finding;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
@@ -9,7 +9,12 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 const G: f64 = STANDARD_GRAVITY;
 /// Window over which accelerations are compared, s.
 const WINDOW_S: f64 = 1.0;
-/// Correlation of measured and expected acceleration below which the axis is reported as inverted.
+/// Bank and pitch of about level flight, rad, and the greatest rate, rad/s.
+const LEVEL: [f64; 2] = [0.8, 0.5];
+const LEVEL_RATE: f64 = 1.0;
+/// Specific force of about level flight, g.
+const CARRIED: std::ops::Range<f64> = 0.5..1.5;
+/// Correlation below which a sign is called wrong.
 const TURNED: f64 = -0.7;
 
 /// Findings on unit and sign of the measured specific force.
@@ -42,9 +47,19 @@ fn unit(middle: f64) -> Option<(&'static str, f64)> {
     }
 }
 
+/// Whether the aircraft flies about level and carries about its weight, so that the force shows which way z is: a
+/// dive or a tumble may push it down for long. What is unknown of the attitude counts as level.
+fn is_level(s: &Sample) -> bool {
+    let size = s.specific_force_mps2.iter().map(|a| a * a).sum::<f64>().sqrt();
+    let beyond = (0..2).any(|i| s.attitude_rad[i].abs() > LEVEL[i]);
+    !beyond
+        && s.rates_radps.iter().all(|rate| rate.abs() < LEVEL_RATE)
+        && CARRIED.contains(&(size / G))
+}
+
 fn vertical(rows: &[Sample]) -> Option<Finding> {
-    let level = |s: &Sample| if tame(s) { s.specific_force_mps2[2] } else { f64::NAN };
-    let z = quantile(&values(rows, level), 0.5).filter(|z| *z > 5.0)?;
+    let z = |s: &Sample| if is_level(s) { s.specific_force_mps2[2] } else { f64::NAN };
+    let z = quantile(&values(rows, z), 0.5).filter(|z| *z > 5.0)?;
     let left = turns_left(rows);
     Some(if left {
         Finding::problem(

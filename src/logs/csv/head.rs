@@ -1,0 +1,211 @@
+//! The head of a table: where its fields go, and the numbers in them.
+
+use std::path::Path;
+
+use super::CsvError;
+use super::dialect::{self, Dialect};
+use super::raw::Raw;
+use super::records::Fields;
+use crate::columns::{COLUMNS, EITHER, NEEDED, Place, index};
+use crate::mapping::{Mapping, TEXT};
+use crate::{Sample, mixed};
+
+/// Where a field goes: place, scale, offset; whether it is one part of a sum.
+type Target = (Place, f64, f64, Share);
+
+/// Whether a field is a column, or one of several surfaces that make one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Share {
+    Whole,
+    OneOfSeveral,
+}
+
+/// Where the fields of a table go.
+pub(super) struct Head {
+    targets: Vec<Vec<Target>>,
+    /// What the names say.
+    pub dialect: Dialect,
+    /// Fields of a quaternion.
+    quaternion: Option<[usize; 4]>,
+    decimal: Decimal,
+}
+
+impl Head {
+    /// Where the fields with these names go, and their table, without rows yet.
+    pub fn of(names: &[String], delimiter: u8, path: &Path, mapping: &Mapping) -> (Head, Raw) {
+        let dialect = Dialect::of(names, mapping);
+        let mut targets: Vec<Vec<Target>> =
+            names.iter().map(|name| targets(name, mapping, &dialect)).collect();
+        let mixed = mixed::columns(names, mapping);
+        for part in &mixed {
+            targets[part.field].push((part.place, part.share, 0.0, Share::OneOfSeveral));
+        }
+        let mut made: Vec<String> = mixed.iter().map(|part| part.column.to_owned()).collect();
+        made.extend(COLUMNS.iter().filter(|c| dialect.fills(c.0)).map(|c| c.0.to_owned()));
+        let missing = missing_columns(&[names.to_vec(), made].concat(), mapping, path);
+        let unknown = names.iter().zip(&targets).filter(|(_, targets)| targets.is_empty());
+        let unknown = unknown.map(|(name, _)| name.clone());
+        let table = Raw {
+            missing,
+            unknown_columns: unknown.filter(|n| !n.is_empty() && !dialect.reads(n)).collect(),
+            notes: dialect.said().into_iter().collect(),
+            ..Raw::default()
+        };
+        let place = |name: &String| names.iter().position(|n| n == name).unwrap_or(usize::MAX);
+        let quaternion = dialect.quaternion.as_ref().map(|q| q.each_ref().map(place));
+        let decimal = if delimiter == b',' { Decimal::Point } else { Decimal::PointOrComma };
+        (Head { targets, dialect, quaternion, decimal }, table)
+    }
+
+    /// The sample in a record; `None` when a field of it is no number, or the time is missing.
+    pub fn sample(&self, record: Fields<'_>) -> Option<Sample> {
+        // A row that lacks fields is damaged, and would take many times its size.
+        if record.len() < self.targets.len() {
+            return None;
+        }
+        let mut sample = Sample::default();
+        (0..self.targets.len()).try_for_each(|i| self.field(record, i, &mut sample))?;
+        sample.time_s.is_finite().then_some(sample)
+    }
+
+    /// Puts field `i` where it belongs; `None` when it is no number.
+    fn field(&self, record: Fields<'_>, i: usize, sample: &mut Sample) -> Option<()> {
+        let targets = &self.targets[i];
+        if targets.is_empty() {
+            return Some(());
+        }
+        let x = number(record.get(i)?, self.decimal)?;
+        for (place, scale, offset, share) in targets.iter().filter(|_| !x.is_nan()) {
+            let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+            let place = place(sample);
+            let sums = *share == Share::OneOfSeveral && !place.is_nan();
+            *place = if sums { *place + value } else { value };
+        }
+        Some(())
+    }
+
+    /// The parts of the quaternion in a record, if the table has one.
+    pub fn quaternion(&self, record: Fields<'_>) -> Option<[f64; 4]> {
+        let part = |i| record.get(i).and_then(|f| number(f, self.decimal)).unwrap_or(f64::NAN);
+        self.quaternion.map(|q| q.map(part))
+    }
+}
+
+/// How decimals may be written.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Decimal {
+    Point,
+    PointOrComma,
+}
+
+/// The number in a field; NaN of an empty one, `None` of what is neither a number nor a date.
+fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
+    if let Some(x) = short(field) {
+        return Some(x);
+    }
+    let field = std::str::from_utf8(field).ok()?.trim();
+    if field.is_empty() {
+        return Some(f64::NAN);
+    }
+    let plain = field.parse().ok();
+    let comma = || match decimal {
+        Decimal::PointOrComma if field.contains(',') => field.replacen(',', ".", 1).parse().ok(),
+        _ => None,
+    };
+    plain.or_else(comma).or_else(|| dialect::time(field))
+}
+
+/// Powers of ten that a number holds exactly.
+const TENS: [f64; 16] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+
+/// A number of at most 15 digits without an exponent, which most fields hold: numerator and denominator are exact, so
+/// that the quotient is the number nearest to the decimal one (Clinger 1990).
+fn short(field: &[u8]) -> Option<f64> {
+    let (sign, digits) = match field {
+        [b'-', rest @ ..] => (-1.0, rest),
+        rest => (1.0, rest),
+    };
+    if digits.len() > TENS.len() {
+        return None;
+    }
+    let (mut whole, mut behind, mut point) = (0u64, 0, false);
+    for b in digits {
+        match b {
+            b'0'..=b'9' => {
+                whole = 10 * whole + u64::from(b - b'0');
+                behind += usize::from(point);
+            }
+            b'.' if !point => point = true,
+            _ => return None,
+        }
+    }
+    let count = digits.len() - usize::from(point);
+    (1..TENS.len()).contains(&count).then(|| sign * (whole as f64 / TENS[behind]))
+}
+
+/// Where the file's column `name` goes.
+fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
+    let mut targets: Vec<Target> = mapping
+        .of_topic(TEXT)
+        .filter(|(_, entry)| entry.field == name)
+        .filter_map(|(column, e)| {
+            Some((COLUMNS[index(column)?].2, e.scale, e.offset, Share::Whole))
+        })
+        .collect();
+    if mapping.get(name).is_none()
+        && let Some(i) = index(name)
+    {
+        targets.push((COLUMNS[i].2, 1.0, 0.0, Share::Whole));
+    }
+    let under_other_names = dialect.found.iter().filter(|f| f.field == name);
+    targets.extend(
+        under_other_names
+            .filter_map(|f| Some((COLUMNS[index(&f.column)?].2, f.scale, f.offset, Share::Whole))),
+    );
+    targets
+}
+
+/// The needed columns that are not among `names`, each with what would satisfy it.
+fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
+    let has = |column: &str| {
+        let name = mapping.get(column).map_or(column, |entry| &entry.field);
+        names.iter().any(|n| n == name)
+    };
+    let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
+    let alone = NEEDED.into_iter().filter(|column| !has(column) && !mapping.makes(column));
+    let alone =
+        alone.map(|column| missing(column, "add it, in the unit its name ends with".into()));
+    let either = EITHER.into_iter().filter(|(command, position)| !has(command) && !has(position));
+    let either = either.map(|(command, position)| {
+        missing(command, format!("add it, or the position `{position}`"))
+    });
+    alone.chain(either).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_number_is_that_of_the_standard_library_to_the_bit() {
+        let mut seed = 1u64;
+        for _ in 0..50_000 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let (digits, point) = (seed >> 33, (seed >> 20) as usize % 8);
+            let text = format!("{:.point$}", digits as f64 / 10f64.powi((seed >> 10) as i32 % 11));
+            for text in [text.clone(), format!("-{text}")] {
+                let right: f64 = text.parse().unwrap();
+                let count = text.bytes().filter(u8::is_ascii_digit).count();
+                match short(text.as_bytes()) {
+                    Some(own) => assert_eq!(own.to_bits(), right.to_bits(), "{text}"),
+                    None => assert!(count > 15, "{text}"),
+                }
+            }
+        }
+        for text in ["", "-", ".", "1e3", "1.2.3", "+1", " 1", "inf"] {
+            assert_eq!(short(text.as_bytes()), None, "{text}");
+        }
+        assert_eq!([&b"1."[..], b".5", b"-0"].map(short), [Some(1.0), Some(0.5), Some(-0.0)]);
+    }
+}

@@ -1,0 +1,217 @@
+//! The records of a table, line by line: most tables quote nothing, and their fields stand where they are.
+
+use std::io::{self, BufRead, Cursor, Read};
+
+/// Whole lines of a source: a last one without its end may miss digits, and is held back.
+pub(super) struct Lines<'a> {
+    source: &'a mut dyn BufRead,
+    line: Vec<u8>,
+    from: usize,
+    /// Whether the source ended in the middle of a line.
+    pub cut_short: bool,
+}
+
+impl<'a> Lines<'a> {
+    pub fn new(source: &'a mut dyn BufRead) -> Self {
+        Lines { source, line: Vec::new(), from: 0, cut_short: false }
+    }
+
+    /// Reads the next line, with its end; `false` after the last one.
+    fn next(&mut self) -> io::Result<bool> {
+        self.line.clear();
+        self.from = 0;
+        self.source.read_until(b'\n', &mut self.line)?;
+        if self.line.last().is_some_and(|b| *b != b'\n') {
+            self.cut_short = true;
+            self.line.clear();
+        }
+        Ok(!self.line.is_empty())
+    }
+}
+
+impl Read for Lines<'_> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        if self.from == self.line.len() && !self.next()? {
+            return Ok(0);
+        }
+        let count = to.len().min(self.line.len() - self.from);
+        to[..count].copy_from_slice(&self.line[self.from..self.from + count]);
+        self.from += count;
+        Ok(count)
+    }
+}
+
+type Quoted<'a> = ::csv::Reader<io::Chain<Cursor<Vec<u8>>, Lines<'a>>>;
+
+/// Where the records come from.
+enum Origin<'a> {
+    Plain(Lines<'a>),
+    /// From the first line with a quote on, or with a line end within it.
+    Quoted(Box<Quoted<'a>>),
+    /// After an error.
+    Nothing,
+}
+
+/// The records of a table.
+pub(super) struct Records<'a> {
+    from: Origin<'a>,
+    /// Separator of the fields; known from the first line on.
+    pub delimiter: u8,
+    begun: bool,
+    record: ::csv::ByteRecord,
+    line: Vec<u8>,
+    ends: Vec<usize>,
+}
+
+/// The fields of one record.
+#[derive(Clone, Copy)]
+pub(super) struct Fields<'a> {
+    bytes: &'a [u8],
+    /// Where each field ends; the next one begins behind the separator, or at once.
+    ends: &'a [usize],
+    between: usize,
+}
+
+impl<'a> Fields<'a> {
+    pub fn len(self) -> usize {
+        self.ends.len()
+    }
+
+    pub fn get(self, i: usize) -> Option<&'a [u8]> {
+        let start = if i == 0 { 0 } else { self.ends.get(i - 1)? + self.between };
+        self.bytes.get(start..*self.ends.get(i)?)
+    }
+}
+
+/// Separator of a table's columns: commas, else semicolons or tabs.
+fn separator(header: &[u8]) -> u8 {
+    let count = |by: u8| header.iter().filter(|b| **b == by).count();
+    if count(b',') > 0 && count(b';') <= count(b',') {
+        return b',';
+    }
+    [b';', b'\t']
+        .into_iter()
+        .max_by_key(|by| count(*by))
+        .filter(|by| count(*by) > 0)
+        .unwrap_or(b',')
+}
+
+/// Mark of UTF-8 at the beginning of a text.
+const MARK: &[u8] = b"\xEF\xBB\xBF";
+
+impl<'a> Records<'a> {
+    pub fn new(source: &'a mut dyn BufRead) -> Self {
+        Records {
+            from: Origin::Plain(Lines::new(source)),
+            delimiter: b',',
+            begun: false,
+            record: ::csv::ByteRecord::new(),
+            line: Vec::new(),
+            ends: Vec::new(),
+        }
+    }
+
+    /// The next record; `None` after the last one.
+    pub fn next(&mut self) -> Result<Option<Fields<'_>>, ::csv::Error> {
+        while let Origin::Plain(lines) = &mut self.from {
+            if !lines.next()? {
+                return Ok(None);
+            }
+            let first = !std::mem::replace(&mut self.begun, true);
+            if first {
+                self.delimiter = separator(lines.line.split(|b| *b == b'\n').next().unwrap_or(&[]));
+            }
+            let line = content(&lines.line);
+            if line.contains(&b'"') || line.contains(&b'\r') {
+                self.quoted();
+                break;
+            }
+            let line = if first { line.strip_prefix(MARK).unwrap_or(line) } else { line };
+            if line.is_empty() {
+                continue;
+            }
+            self.line.clear();
+            self.line.extend_from_slice(line);
+            self.ends.clear();
+            let delimiter = self.delimiter;
+            let places = self.line.iter().enumerate().filter(|(_, b)| **b == delimiter);
+            self.ends.extend(places.map(|(i, _)| i));
+            self.ends.push(self.line.len());
+            return Ok(Some(Fields { bytes: &self.line, ends: &self.ends, between: 1 }));
+        }
+        let Origin::Quoted(reader) = &mut self.from else { return Ok(None) };
+        if !reader.read_byte_record(&mut self.record)? {
+            return Ok(None);
+        }
+        self.ends.clear();
+        let ends = (0..self.record.len()).filter_map(|i| self.record.range(i)).map(|r| r.end);
+        self.ends.extend(ends);
+        Ok(Some(Fields { bytes: self.record.as_slice(), ends: &self.ends, between: 0 }))
+    }
+
+    /// Leaves the present line and those behind it to a reader that knows quotes.
+    fn quoted(&mut self) {
+        if let Origin::Plain(mut lines) = std::mem::replace(&mut self.from, Origin::Nothing) {
+            let line = Cursor::new(std::mem::take(&mut lines.line));
+            lines.from = 0;
+            let mut builder = ::csv::ReaderBuilder::new();
+            let builder = builder.flexible(true).has_headers(false).delimiter(self.delimiter);
+            self.from = Origin::Quoted(Box::new(builder.from_reader(line.chain(lines))));
+        }
+    }
+
+    /// Whether the source ended in the middle of a line.
+    pub fn cut_short(&self) -> bool {
+        match &self.from {
+            Origin::Plain(lines) => lines.cut_short,
+            Origin::Quoted(reader) => reader.get_ref().get_ref().1.cut_short,
+            Origin::Nothing => false,
+        }
+    }
+}
+
+/// A line without its end.
+fn content(line: &[u8]) -> &[u8] {
+    let end = line.iter().rposition(|b| *b != b'\n' && *b != b'\r').map_or(0, |i| i + 1);
+    &line[..end]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The records by this reader, and by one that knows quotes from the beginning on.
+    fn both(text: &[u8]) -> [Vec<Vec<Vec<u8>>>; 2] {
+        let mut source = io::BufReader::with_capacity(7, text);
+        let mut records = Records::new(&mut source);
+        let mut own = Vec::new();
+        while let Some(fields) = records.next().unwrap() {
+            own.push((0..fields.len()).map(|i| fields.get(i).unwrap().to_vec()).collect());
+        }
+        let end = text.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+        assert_eq!(records.cut_short(), end < text.len());
+        let mut builder = ::csv::ReaderBuilder::new();
+        let builder = builder.flexible(true).has_headers(false).delimiter(records.delimiter);
+        let other = builder.from_reader(&text[..end]).into_byte_records();
+        let other = other.map(|r| r.unwrap().iter().map(<[u8]>::to_vec).collect()).collect();
+        [own, other]
+    }
+
+    #[test]
+    fn the_records_are_those_of_the_reader_that_knows_quotes() {
+        for text in [
+            &b"a,b,c\n1,2,3\n\n4,,6\n7,8\n9,10,11,12\n1,2"[..],
+            b"\xEF\xBB\xBFa;b\r\n1;2\r\n\r\n3;4\r\n",
+            b"a,b\n1,\"2,\n3\"\n4,5\n\"6\"\"\",7\n",
+            b"\"a\",\"b\"\n1,2\n\"3,4\n",
+            b"a\tb\n1\t2\r3\t4\n5\t6\n",
+            b"\n\na,b\n1,2\n",
+            b"a,b\r\r\n1,2\n3,4\"\n5\n",
+            b"",
+            b"a,b",
+        ] {
+            let [own, other] = both(text);
+            assert_eq!(own, other, "{}", String::from_utf8_lossy(text));
+        }
+    }
+}

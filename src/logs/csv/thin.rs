@@ -1,0 +1,100 @@
+//! Stretches of a long table: a look at it parses every row, and keeps some.
+
+use crate::Sample;
+use crate::columns::COLUMNS;
+use crate::phases::{self, Flying};
+use crate::stretches::{Keep, Level, MOST, Stretches, Watch};
+
+/// Rows of a stretch.
+pub(super) const STRETCH: usize = 4096;
+/// Of how many rows one airspeed is read throughout.
+const COARSE: usize = 16;
+/// How far a time goes back where another recording may begin, s.
+const BACK_S: f64 = 1.0;
+
+/// What is kept of a table.
+#[derive(Default)]
+pub(super) struct Thin {
+    keep: Keep,
+    level: Level,
+    watch: Watch,
+    /// Times and airspeeds, s and m/s.
+    air: Vec<(f64, f64)>,
+    due: bool,
+    last_s: f64,
+}
+
+impl Thin {
+    pub fn new(keep: Keep) -> Thin {
+        Thin { keep, last_s: f64::NEG_INFINITY, ..Thin::default() }
+    }
+
+    /// Whether row `number` of the file is kept.
+    pub fn keeps(&self, number: usize) -> bool {
+        self.keep == Keep::All || (number / STRETCH).is_multiple_of(self.level.every())
+    }
+
+    /// Takes row `number` of the file, kept or not.
+    pub fn take(&mut self, number: usize, row: &Sample) {
+        if self.keep == Keep::All {
+            return;
+        }
+        if row.time_s < self.last_s - BACK_S {
+            // Another recording may begin: its first rows show it.
+            self.keep = Keep::All;
+        }
+        self.last_s = row.time_s;
+        self.watch.take(row.time_s, &COLUMNS.map(|(_, get, _)| get(row)));
+        self.due |= number.is_multiple_of(COARSE);
+        if self.due && row.airspeed_mps.is_finite() {
+            self.due = false;
+            self.air.push((row.time_s, row.airspeed_mps));
+        }
+    }
+
+    /// Whether `rows` are too many; the stretches are fewer then.
+    pub fn is_full(&mut self, rows: usize) -> bool {
+        let fewer = (self.keep == Keep::Stretches && rows > MOST).then(|| self.level.halved());
+        self.level = fewer.flatten().unwrap_or(self.level);
+        fewer.is_some()
+    }
+
+    /// Keeps those of `all` whose rows are kept; `places` are the numbers of their rows.
+    pub fn thin<T: Copy>(&self, all: &mut Vec<T>, places: &[usize]) {
+        let mut place = places.iter();
+        all.retain(|_| place.next().is_some_and(|place| self.keeps(*place)));
+    }
+
+    /// What is known of the whole table; `None` if all of it is kept.
+    pub fn whole(self) -> Option<Whole> {
+        let every = self.level.every();
+        self.level.thins().then_some(Whole { watch: self.watch, air: self.air, every })
+    }
+}
+
+/// What is known of a table of which stretches are kept.
+pub(crate) struct Whole {
+    pub(crate) watch: Watch,
+    air: Vec<(f64, f64)>,
+    every: usize,
+}
+
+impl Whole {
+    /// The stretches, with the phases of the whole; rows are `period` apart, s.
+    pub(crate) fn stretches(&self, period: f64, flies: &Flying) -> Option<Stretches> {
+        let (from, to) = self.watch.span_s?;
+        let airspeeds: Vec<Sample> = self
+            .air
+            .iter()
+            .map(|(t, v)| Sample { time_s: *t, airspeed_mps: *v, ..Sample::default() })
+            .collect();
+        Some(Stretches {
+            every: self.every,
+            length_s: STRETCH as f64 * period,
+            rows: self.watch.samples,
+            span_s: (from, to),
+            gaps: self.watch.gaps.clone(),
+            phases: phases::phases(&airspeeds, flies),
+        })
+    }
+}

@@ -1,0 +1,207 @@
+//! Stretches of a long log: a look at it keeps the fast topics in parts of its time only, and counts the rest.
+//!
+//! Units, signs, axes and delays show in some minutes of flight. What happens only once does not: steps
+//! without samples and values that stay are watched in every sample, and one sample a second stays throughout.
+
+use super::phases::Phase;
+
+/// How much of a log is kept in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Keep {
+    /// Every sample: what is computed from a log needs all of it.
+    #[default]
+    All,
+    /// Of topics with more samples than [`MOST`], stretches.
+    Stretches,
+}
+
+/// Samples of a topic above which every other one of its stretches goes.
+pub(super) const MOST: usize = 65_536;
+/// Length of a stretch, s.
+pub(super) const LENGTH_S: f64 = 30.0;
+/// Times that the stretches are halved at most.
+const LEVELS: u32 = 24;
+/// Shortest time without a sample that is noted, s, and in usual steps.
+const PAUSE_S: f64 = 0.1;
+const PAUSE_STEPS: f64 = 3.0;
+/// Shortest time for which a value that stays is noted, s.
+const STAYS_S: f64 = 1.0;
+/// Pauses of a topic and stays of a field that are noted at most.
+const NOTED: usize = 4096;
+/// Time between the samples that are kept throughout, s.
+const COARSE_S: f64 = 1.0;
+
+/// Every 2^level-th stretch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Level(u32);
+
+impl Level {
+    /// Whether anything is left out.
+    pub fn thins(self) -> bool {
+        self.0 > 0
+    }
+
+    /// Of how many stretches one is kept.
+    pub fn every(self) -> usize {
+        1 << self.0
+    }
+
+    /// Whether `time_s` lies in a stretch that is kept.
+    pub fn keeps(self, time_s: f64) -> bool {
+        (time_s / LENGTH_S).floor() as i64 % (1 << self.0) == 0
+    }
+
+    /// Half of the stretches; `None` where that is no use any more.
+    pub fn halved(self) -> Option<Level> {
+        (self.0 < LEVELS).then_some(Level(self.0 + 1))
+    }
+
+    /// The level of fewer stretches.
+    pub fn sparser(self, other: Level) -> Level {
+        Level(self.0.max(other.0))
+    }
+}
+
+/// A value that stays.
+#[derive(Clone, Debug)]
+struct Stay {
+    value: f64,
+    from_s: f64,
+    to_s: f64,
+}
+
+/// What is known of every sample of a topic, those that are not kept included.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Watch {
+    /// Number of samples at increasing times.
+    pub samples: usize,
+    /// Time of the first and of the last sample, s.
+    pub span_s: Option<(f64, f64)>,
+    /// Longest time between two samples, s.
+    pub largest_gap_s: f64,
+    /// Where samples lack for much longer than usual: from, how long, s.
+    pub gaps: Vec<(f64, f64)>,
+    /// Where each field keeps one value other than zero: from, to, s.
+    stays: Vec<Vec<(f64, f64)>>,
+    current: Vec<Stay>,
+    /// One sample a second: times, and the values of each field.
+    pub coarse_s: Vec<f64>,
+    pub coarse: Vec<Vec<f64>>,
+}
+
+impl Watch {
+    /// Takes the time (s) of a sample with the values of its fields.
+    pub fn take(&mut self, time_s: f64, values: &[f64]) {
+        if !time_s.is_finite() || self.span_s.is_some_and(|(_, last)| time_s <= last) {
+            return;
+        }
+        let (first, last) = self.span_s.unwrap_or((time_s, time_s));
+        let step = time_s - last;
+        self.largest_gap_s = self.largest_gap_s.max(step);
+        let usual = (last - first) / self.samples.max(1) as f64;
+        if step > PAUSE_S.max(PAUSE_STEPS * usual) && self.gaps.len() < NOTED {
+            self.gaps.push((last, step));
+        }
+        self.samples += 1;
+        self.span_s = Some((first, time_s));
+        self.stay(time_s, values);
+    }
+
+    /// Keeps the sample if the last one that was kept so is a second old.
+    pub fn coarsely(&mut self, time_s: f64, values: &[f64]) {
+        if self.coarse_s.last().is_none_or(|last| time_s - last >= COARSE_S) {
+            self.coarse_s.push(time_s);
+            self.coarse.resize_with(values.len(), Vec::new);
+            self.coarse.iter_mut().zip(values).for_each(|(column, x)| column.push(*x));
+        }
+    }
+
+    fn stay(&mut self, time_s: f64, values: &[f64]) {
+        if self.current.is_empty() {
+            let begun = |x: &f64| Stay { value: *x, from_s: time_s, to_s: time_s };
+            self.current = values.iter().map(begun).collect();
+            self.stays = vec![Vec::new(); values.len()];
+        }
+        for ((stay, ended), x) in self.current.iter_mut().zip(&mut self.stays).zip(values) {
+            if stay.value == *x {
+                stay.to_s = time_s;
+            } else if x.is_finite() {
+                ended.extend(long(stay).filter(|_| ended.len() < NOTED));
+                *stay = Stay { value: *x, from_s: time_s, to_s: time_s };
+            }
+        }
+    }
+
+    /// Where a field, by its place, keeps one value other than zero: from, to, s.
+    pub fn stays(&self, field: usize) -> Vec<(f64, f64)> {
+        let ended = self.stays.get(field).into_iter().flatten().copied();
+        ended.chain(self.current.get(field).and_then(long)).collect()
+    }
+}
+
+/// The span of a stay that is long enough to be noted.
+fn long(stay: &Stay) -> Option<(f64, f64)> {
+    let noted = stay.value != 0.0 && stay.to_s - stay.from_s > STAYS_S;
+    noted.then_some((stay.from_s, stay.to_s))
+}
+
+/// A log whose fast topics were looked at in stretches: what is known of the whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretches {
+    /// Of how many stretches one was looked at.
+    pub every: usize,
+    /// Length of a stretch, s.
+    pub length_s: f64,
+    /// Rows of the table if it were whole.
+    pub rows: usize,
+    /// Times of its first and last row, s.
+    pub span_s: (f64, f64),
+    /// Where rows lack: from, how long, s.
+    pub gaps: Vec<(f64, f64)>,
+    /// Phases of flight and ground of the whole log.
+    pub phases: Vec<Phase>,
+}
+
+impl Stretches {
+    /// The note to the user.
+    pub(super) fn said(&self) -> String {
+        format!(
+            "a long log of {} rows: a look at it judges units, signs and axes by one of {} stretches of {:.0} s; \
+             what computes with it reads every row",
+            self.rows, self.every, self.length_s
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fewer_stretches_are_some_of_the_more() {
+        let one = Level::default().halved().unwrap();
+        let two = one.halved().unwrap();
+        assert!((0..1000).all(|t| !two.keeps(f64::from(t)) || one.keeps(f64::from(t))));
+        let kept = (0..1200).filter(|t| two.keeps(f64::from(*t))).count();
+        assert_eq!((kept, two.every()), (300, 4));
+    }
+
+    #[test]
+    fn pauses_and_values_that_stay_are_noted_with_their_times() {
+        let mut watch = Watch::default();
+        for k in (0..1000).filter(|k| !(300..350).contains(k)) {
+            let x = if (500..800).contains(&k) { 3.0 } else { f64::from(k) };
+            watch.take(0.01 * f64::from(k), &[x, 0.0]);
+            watch.coarsely(0.01 * f64::from(k), &[x, 0.0]);
+        }
+        let near =
+            |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs() < 1e-9 && (b - d).abs() < 1e-9;
+        let [gap] = watch.gaps[..] else { panic!("{:?}", watch.gaps) };
+        assert!(near(gap, (2.99, 0.51)), "{gap:?}");
+        let [stay] = watch.stays(0)[..] else { panic!() };
+        assert!(near(stay, (5.0, 7.99)), "{stay:?}");
+        // Zero is a sensor that is not there.
+        assert!(watch.stays(1).is_empty());
+        assert_eq!((watch.samples, watch.coarse_s.len()), (950, 10));
+    }
+}

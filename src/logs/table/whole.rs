@@ -1,0 +1,46 @@
+//! What is known of a whole log of which stretches are kept.
+
+use super::{Track, fill, make_true, track_of};
+use crate::Sample;
+use crate::stretches::{LENGTH_S, Stretches};
+use crate::topics::Topics;
+
+/// A table of which only stretches are kept.
+pub(crate) struct Whole {
+    /// The stretches, without the phases of the whole.
+    pub stretches: Stretches,
+    /// Airspeed of the whole log, of one row a second at least.
+    pub air: Vec<Sample>,
+}
+
+impl Whole {
+    /// What is known of the whole log, where stretches of the topic of the table's times are kept.
+    pub(super) fn of(base: &Track<'_>, topics: &Topics, tracks: &[Track<'_>]) -> Option<Whole> {
+        let watch = base.watch()?;
+        let stretches = Stretches {
+            every: base.topic.level.every(),
+            length_s: LENGTH_S,
+            rows: base.samples(),
+            span_s: watch.span_s?,
+            gaps: watch.gaps.clone(),
+            phases: Vec::new(),
+        };
+        let of = |column: &str| tracks.iter().find(|t| t.rule.columns().contains(&column));
+        let mut air: Vec<Sample> = Vec::new();
+        for column in ["airspeed_mps", "air_density_kgpm3", "altitude_m"] {
+            let Some(track) = of(column) else { continue };
+            let coarse = track.topic.coarse();
+            let slow = coarse.as_ref().and_then(|topic| track_of(topics, topic, &track.rule, 0));
+            let track = slow.as_ref().unwrap_or(track);
+            if column == "airspeed_mps" {
+                let row = |t: &f64| Sample { time_s: *t, ..Sample::default() };
+                air = track.times.iter().map(row).collect();
+            }
+            fill(&mut air, track);
+        }
+        if of("airspeed_mps").is_some_and(|t| t.rule.equivalent) {
+            make_true(&mut air);
+        }
+        Some(Whole { stretches, air })
+    }
+}

@@ -1,0 +1,60 @@
+//! The topics of a ULog by the numbers of their messages.
+
+use std::rc::Rc;
+
+use super::RECORD;
+use super::layout::Layout;
+use crate::topics::Topic;
+
+/// A message number's topic.
+pub(super) struct Subscription {
+    pub key: (String, u16),
+    pub layout: Rc<Layout>,
+    /// Records of the message; `None` before the first.
+    pub topic: Option<Topic>,
+    pub count: usize,
+}
+
+impl Subscription {
+    /// Whether a record of `len` bytes has the topic's size.
+    pub fn fits(&self, len: usize) -> bool {
+        let sizes = RECORD + 2 + self.layout.size..=RECORD + 2 + self.layout.padded;
+        self.layout.size > 0 && sizes.contains(&len)
+    }
+}
+
+/// The subscriptions by their message numbers: several are looked up for each record.
+#[derive(Default)]
+pub(super) struct Subscriptions {
+    /// Place of each number among the others, from 1 on; 0 of a number that is not there.
+    places: Vec<u16>,
+    pub all: Vec<(u16, Subscription)>,
+}
+
+impl Subscriptions {
+    fn place(&self, number: u16) -> Option<usize> {
+        usize::from(*self.places.get(usize::from(number))?).checked_sub(1)
+    }
+
+    pub fn get(&self, number: u16) -> Option<&Subscription> {
+        Some(&self.all[self.place(number)?].1)
+    }
+
+    pub fn get_mut(&mut self, number: u16) -> Option<&mut Subscription> {
+        let place = self.place(number)?;
+        Some(&mut self.all[place].1)
+    }
+
+    /// Sets the subscription of a number; returns the one that it had. The last of 65,536 numbers has no place.
+    pub fn insert(&mut self, number: u16, new: Subscription) -> Option<Subscription> {
+        if let Some(old) = self.get_mut(number) {
+            return Some(std::mem::replace(old, new));
+        }
+        let place = u16::try_from(self.all.len() + 1).ok()?;
+        let needed = usize::from(number) + 1;
+        self.places.resize(self.places.len().max(needed), 0);
+        self.places[usize::from(number)] = place;
+        self.all.push((number, new));
+        None
+    }
+}
