@@ -94,7 +94,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     notes.append(&mut diagnosis.notes);
     diagnosis.notes = notes;
     let Diagnosed { tuned, answer } = diagnosed(&model, &flights, &diagnosis)?;
-    let answer = answer.then(next(arguments, &diagnosis));
+    let next = next(arguments, &diagnosis, answer.numbers.change_percent);
+    let answer = answer.then(next);
     // drawn before anything is written, so that Ctrl-C leaves nothing behind
     let drawn = arguments.report.as_ref().map(|path| {
         let mut models = [tuned, model.clone()];
@@ -132,8 +133,11 @@ struct Document<'a> {
     answer: &'a Answer,
 }
 
-/// The command that comes next.
-fn next(arguments: &Arguments, diagnosis: &Diagnosis) -> String {
+/// Fall of the error by which tuning is worth a command, %.
+const WORTH_TUNING: f64 = 1.0;
+
+/// The command that comes next; `change_percent` is what tuning and effects change of the error.
+fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> String {
     let model = &arguments.model;
     let out = model.parent().unwrap_or(Path::new("")).join("amended");
     let (model, out, logs) = (quoted(model), quoted(&out), arguments.logs.words());
@@ -143,6 +147,9 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis) -> String {
             format!("greylag design --between {a} {b}")
         }
         (Verdict::Effect, _) => format!("greylag amend --model {model}{logs} --accept --out {out}"),
+        (Verdict::Adequate, _) if change_percent > -WORTH_TUNING => {
+            format!("greylag aircraft check --model {model}")
+        }
         (Verdict::Adequate, _) => {
             format!("greylag amend --model {model}{logs} --tune-only --out {out}")
         }

@@ -23,6 +23,7 @@ use crate::control::cem::Change;
 use crate::control::envelope::Guarded;
 use crate::control::quality::Limits;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
+use crate::logs::quoted;
 use crate::model::GreyBox;
 use crate::report::EvaluationReport;
 use crate::sim::episode::STEPS;
@@ -182,7 +183,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     if let Some(path) = &arguments.report {
         let flights = flights(&entrants, &plant)?;
-        files::write(path, &page(arguments, &evaluations, &flights), overwrite)?;
+        files::write(path, &page(arguments, &evaluations, &flights, &plant), overwrite)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -209,6 +210,7 @@ fn page(
     arguments: &Arguments,
     evaluations: &[Evaluation],
     flights: &[(Target, Vec<Tracking>)],
+    plant: &PlantOptions,
 ) -> String {
     let provenance = [
         ("targets", arguments.targets.display().to_string()),
@@ -221,9 +223,30 @@ fn page(
         subtitle: subtitle(arguments),
         evaluations,
         flights,
+        next: next(arguments, evaluations, plant),
         provenance: provenance.map(|(k, v)| (k.into(), v)).to_vec(),
     };
     report.page().render()
+}
+
+/// The command that flies what the best controller flew here, in a whole flight with its page; none where several models
+/// or policies flew, for a name does not tell their files, or an aircraft of one's own, whose options it would repeat.
+fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
+    let mean = |e: &&Evaluation| {
+        let of = e.groups.iter().max_by_key(|score| score.count);
+        of.map_or(f64::INFINITY, |score| score.mean_deg)
+    };
+    let best = evaluations.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)));
+    match (best, &arguments.models[..], &arguments.policies[..]) {
+        (Some(best), [model], [policy]) if plant.aircraft_dir.is_none() => format!(
+            "greylag demo --aircraft {} --controller {} --model {} --policy {}",
+            plant.aircraft,
+            best.controller,
+            quoted(model),
+            quoted(policy)
+        ),
+        _ => String::new(),
+    }
 }
 
 /// Description of the evaluation in one line.

@@ -11,7 +11,7 @@ use crate::flight::replay::replay_watched;
 use crate::flight::runtime::Companion;
 use crate::link::vehicle::Vehicle;
 use crate::logs::csv::{self, Tolerance};
-use crate::logs::{Flight, Sample};
+use crate::logs::{Flight, Sample, quoted};
 use crate::model::GreyBox;
 use crate::report::{
     Cycle, Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, LoopTiming, Segment, Sight,
@@ -34,6 +34,8 @@ pub struct Reporter<'a> {
     pub controller: &'a str,
     /// The model that the controller is designed from.
     pub model: &'a GreyBox,
+    /// Its file.
+    pub model_file: &'a Path,
     /// Seed of everything random, where it is known.
     pub seed: Option<u64>,
     /// The attitudes that were to be tracked.
@@ -70,6 +72,11 @@ impl Reporter<'_> {
             events: self.texts.iter().map(event).collect(),
             comparison: self.compared(flight),
             sights: self.sights.clone(),
+            next: format!(
+                "greylag compare --model {} --log {}",
+                quoted(self.model_file),
+                quoted(&folder.join("flight.csv"))
+            ),
         })
     }
 }

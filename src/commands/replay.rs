@@ -73,6 +73,8 @@ pub struct Again {
     pub controller: ControllerKind,
     /// Model of the aircraft.
     pub model: GreyBox,
+    /// Its file.
+    pub model_file: PathBuf,
     /// Pilot and controllers, as at the start of the flight.
     pub companion: Companion,
     /// The other end of the vehicle's link.
@@ -120,7 +122,7 @@ impl FlownArguments {
         }
         let command = self.command.or(said.map(|s| s.commanded)).unwrap_or(CommandName::Surfaces);
         let vehicle = vehicle(profile, command, &model);
-        Ok(Again { controller, model, companion, vehicle })
+        Ok(Again { controller, model, model_file: file, companion, vehicle })
     }
 }
 

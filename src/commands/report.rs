@@ -37,7 +37,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     files::writable(&page, overwrite)?;
     let flight = read(folder)?;
-    let Again { controller, model, companion, vehicle } = arguments.flown.again(folder)?;
+    let Again { controller, model, model_file, companion, vehicle } =
+        arguments.flown.again(folder)?;
     let sights = match controller.pace() {
         Pace::Planned => sights(folder, companion, vehicle).unwrap_or_else(|why| {
             eprintln!("the report does not show what the planner saw: {why:#}");
@@ -49,6 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         title: format!("Flight {}: {controller}, model {}", folder.display(), model.name),
         controller: controller.name(),
         model: &model,
+        model_file: &model_file,
         seed: None,
         segments: segments(&flight),
         texts: Vec::new(),

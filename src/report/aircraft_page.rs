@@ -89,13 +89,17 @@ impl AircraftReport<'_> {
         match findings.split_first() {
             None => Verdict {
                 outcome: Outcome::Reached,
+                reason: String::new(),
                 sentence: format!("It {flies}; nothing is to be mended."),
                 details,
+                next: String::new(),
             },
             Some((first, rest)) => Verdict {
                 outcome: Outcome::Missed,
+                reason: String::new(),
                 sentence: format!("To be mended before a flight: {first}."),
                 details: rest.iter().cloned().chain(details).collect(),
+                next: String::new(),
             },
         }
     }

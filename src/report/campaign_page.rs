@@ -54,7 +54,8 @@ impl CampaignReport<'_> {
         let departures = self.summaries.iter().flat_map(Summary::departures).map(sentence);
         let note = "A claim holds if the 95 % interval of the difference of means, resampled over seeds, lies above \
                     zero. With three seeds such an interval is too narrow; ten are the paper's.";
-        let findings = Findings { lead: claims.collect(), rest: departures.collect() };
+        let (lead, rest) = (claims.collect(), departures.collect());
+        let findings = Findings { lead, rest, ..Findings::default() };
         Section::new("Findings", note, vec![Figure::Findings(findings)])
     }
 

@@ -25,6 +25,8 @@ pub struct EvaluationReport<'a> {
     pub evaluations: &'a [Evaluation],
     /// Single flights: a target, and for it one flight of each evaluation.
     pub flights: &'a [(Target, Vec<Tracking>)],
+    /// The next command, ready to be copied; empty if none is known.
+    pub next: String,
     /// Inputs of the evaluation, such as files and options, as names and values.
     pub provenance: Vec<(String, String)>,
 }
@@ -49,10 +51,12 @@ impl EvaluationReport<'_> {
         let plain = |sentence: String| Finding { sentence, link: None };
         let mut lead: Vec<Finding> =
             answer::sentences(self.evaluations).into_iter().map(plain).collect();
-        let rest = lead.split_off(lead.len().min(1));
+        // tracking and what it costs the aircraft are one answer
+        let rest = lead.split_off(lead.len().min(2));
+        let next = self.next.clone();
         match lead.is_empty() {
             true => Section::default(),
-            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest })]),
+            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest, next })]),
         }
     }
 
@@ -300,12 +304,15 @@ mod tests {
             subtitle: "Flown in JSBSim".into(),
             evaluations: &evaluations,
             flights: &flights,
+            next: "greylag demo --controller lqi".into(),
             provenance: vec![("seed".into(), "1".into())],
         };
         let html = page.page().render();
         for part in [
             "hybrid (exact &lt;model&gt;)",
             "hybrid in the paper",
+            "Next: <code>greylag demo --controller lqi</code>",
+            "<p>Envelope kept: lqi",
             "0.440 [0.410, 0.490]",
             "Roll seen ahead at 0.10 s",
             "plan flown",

@@ -114,7 +114,11 @@ impl LearningReport<'_> {
         let rest = lead.split_off(lead.len().min(1));
         match lead.is_empty() {
             true => Section::default(),
-            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest })]),
+            false => Section::new(
+                "",
+                "",
+                vec![Figure::Findings(Findings { lead, rest, ..Findings::default() })],
+            ),
         }
     }
 

@@ -52,7 +52,7 @@ pub use evaluation_page::answer::sentences as evaluation_answer;
 pub use flight::{
     Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, Segment, SurfaceTravel,
 };
-pub use kit::answer_box::AnswerBox;
+pub use kit::answer_box::{AnswerBox, First};
 pub use kit::bars::{BarGroup, Bars};
 pub use kit::choice::{Choice, ChoiceOption};
 pub use kit::curves::{Curves, Range};

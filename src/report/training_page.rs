@@ -28,6 +28,8 @@ pub struct TrainingReport<'a> {
     pub learned: &'a [Horizon],
     /// Map of the residual's contribution; `None` for a model without one.
     pub residual: Option<&'a ResidualMap>,
+    /// The next command, ready to be copied; empty if none is known.
+    pub next: String,
     /// Notes for the reader of the page.
     pub notes: &'a [String],
     /// Things and their values: files, hashes, options.
@@ -73,9 +75,10 @@ impl TrainingReport<'_> {
             .filter(|(p, l)| p.rms.is_finite() && l.rms.is_finite());
         let mut lead: Vec<Finding> = both.rev().take(2).map(change).collect();
         let rest = lead.split_off(lead.len().min(1));
+        let next = self.next.clone();
         match lead.is_empty() {
             true => Section::default(),
-            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest })]),
+            false => Section::new("", "", vec![Figure::Findings(Findings { lead, rest, next })]),
         }
     }
 

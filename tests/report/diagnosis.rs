@@ -3,7 +3,7 @@
 use crate::report_comparison;
 use crate::report_diagnosis;
 use greylag::report::{DiagnosisReport, Figure, Page};
-use greylag::sysid::compare::Comparison;
+use greylag::sysid::compare::{Answer, Comparison};
 use greylag::sysid::diagnose::{Diagnosis, Verdict};
 use serde_json::Value;
 
@@ -199,6 +199,32 @@ fn hostile_text_stays_text() {
     let html = report.page().render();
     assert!(!html.contains("<script>alert") && !html.contains("<b>"));
     figures(&html);
+}
+
+/// The channel and the variable of the effect, with what tuning and the effect leave; where nothing is asserted, that is
+/// said first, and no suspect stands under the heading of a found effect.
+#[test]
+fn the_box_says_where_the_tuned_model_fails() {
+    let answer = Answer::nothing().with_effect("Nothing is missing here.".into());
+    let said = |d: &Diagnosis| {
+        let report = DiagnosisReport { answer: Some(&answer), ..report(d, None) };
+        text(&report.page().render())
+    };
+    let mut d = report_diagnosis::diagnosis();
+    let found = said(&d);
+    assert!(
+        found.contains("Where it fails: lift, with angle of attack (tuned 18.2 % unexplained"),
+        "{found}"
+    );
+    assert!(found.contains("unexplained, with lift_stall 1.60 %"), "{found}");
+    assert!(found.find(&answer.error) < found.find(&answer.effect));
+
+    d.verdict = Verdict::Adequate;
+    d.effects.iter_mut().for_each(|c| c.asserted = false);
+    let none = said(&d);
+    assert!(none.contains("nowhere clearly; tuned, it leaves most of lift, 18.2 %"), "{none}");
+    assert!(none.find(&answer.effect) < none.find(&answer.error));
+    assert!(none.contains("The nearest suspects, none of them shown"));
 }
 
 #[test]

@@ -156,6 +156,14 @@ fn the_first_sentence_says_how_the_envelope_was_kept() {
     for part in ["Outside the envelope for 0.500 s (load factor 0.500 s)", "Latency"] {
         assert!(html.contains(&format!("<li>{part}")), "{part}");
     }
+    // beside the word, why; and what to do next
+    let why = html.split("Missed: ").nth(1).and_then(|rest| rest.split('<').next());
+    assert!(why.is_some_and(|why| why.contains("envelope left")), "{why:?}");
+    assert!(
+        html.contains(
+            "<code>greylag compare --model params/x8/jsbsim.toml --log flight.csv</code>"
+        )
+    );
     let sentence = line;
     for part in
         ["outside the envelope for 0.500 s (load factor 0.500 s)", "to 3.00 of 2.20", "latency"]

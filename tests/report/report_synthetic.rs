@@ -100,6 +100,7 @@ pub fn report(flight: &Flight) -> FlightReport<'_> {
         events: events(),
         comparison: None,
         sights: Vec::new(),
+        next: "greylag compare --model params/x8/jsbsim.toml --log flight.csv".into(),
     }
 }
 

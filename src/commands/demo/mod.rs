@@ -32,7 +32,6 @@ use crate::flight::recorder::Place;
 use crate::flight::runtime::{Companion, Flight, FlightOptions, Pace};
 use crate::link::address::Address;
 use crate::link::vehicle::{Sitl, Vehicle};
-use crate::logs::quoted;
 use crate::manoeuvres::Schedule;
 use crate::model::GreyBox;
 use crate::report::FlightReport;
@@ -125,6 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         controller: arguments.controller.name(),
         seed: Some(arguments.seed.into()),
         model: &model,
+        model_file: &arguments.model,
         segments: tracked.iter().map(segment).collect(),
         texts,
         sights,
@@ -133,11 +133,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let page = folder.join("report.html");
     files::write(&page, &report.page().render(), Overwrite::Never)?;
     println!("report: {}", page.display());
-    println!(
-        "next: greylag compare --model {} --log {}",
-        quoted(&arguments.model),
-        quoted(&folder.join("flight.csv"))
-    );
+    println!("next: {}", report.next);
     Ok(verdict(&report, trouble.as_deref()))
 }
 

@@ -17,6 +17,7 @@ use crate::learn::dynamics::export;
 use crate::learn::dynamics::residual_map::{ResidualMap, residual_map};
 use crate::learn::dynamics::score::{Horizon, free_run};
 use crate::learn::{self, Checkpoint, Learned, Moment, Recipe, Trainer};
+use crate::logs::quoted;
 use crate::model::{GreyBox, Integrator, STEP};
 use crate::report::TrainingReport;
 use tables::{coefficients, horizons, line, shares};
@@ -226,6 +227,10 @@ impl Document<'_> {
             prior: &self.prior,
             learned: &self.learned,
             residual: self.residual.as_ref(),
+            next: format!(
+                "greylag evaluate --controller lqi-damped --model {}",
+                quoted(&folder.join(export::MODEL))
+            ),
             notes: &self.notes,
             provenance: vec![
                 ("Program".into(), self.program.into()),

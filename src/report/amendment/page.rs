@@ -2,9 +2,13 @@
 
 use crate::Align::{Left, Right};
 use crate::amendment::AmendmentReport;
+use crate::comparison::place;
 use crate::diagnosis::{proof, suspects, tables};
+use crate::kit::html::file_names;
 use crate::kit::numbers::{NORMAL_95, interval, number, percent};
-use crate::{AnswerBox, Curves, Figure, Finding, Findings, Page, Section, Series, Style, Table};
+use crate::{
+    AnswerBox, Curves, Figure, Finding, Findings, First, Page, Section, Series, Style, Table,
+};
 use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
@@ -16,7 +20,8 @@ const LEADING: usize = 2;
 pub fn amendment_page(report: &AmendmentReport) -> Page {
     let a = report.amendment;
     let answer = report.answer.unwrap_or(&a.answer).clone();
-    let answer = Figure::Answer(Box::new(AnswerBox { answer }));
+    let place = report.held_out.map_or(String::new(), |c| place::of_models(&c.models));
+    let answer = Figure::Answer(Box::new(AnswerBox { answer, place, first: First::Error }));
     let mut sections = vec![Section::new("", "", vec![answer])];
     sections.push(match report.held_out {
         Some(comparison) => proof::before_and_after(comparison),
@@ -30,7 +35,7 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     sections.push(notes(a).folded());
     sections.push(provenance(report).folded());
     sections.retain(|s| !s.figures.is_empty());
-    let subtitle = format!("{} with {}.", a.model, report.log_files.join(", "));
+    let subtitle = format!("{} with {}.", a.model, file_names(&report.log_files));
     Page { title: report.title.clone(), subtitle, sections }
 }
 
@@ -44,7 +49,11 @@ fn in_words(a: &Amendment) -> Section {
     .map(|some| some.iter().map(finding).collect::<Vec<_>>());
     match lead.is_empty() {
         true => Section::default(),
-        false => Section::new("In words", "", vec![Figure::Findings(Findings { lead, rest })]),
+        false => Section::new(
+            "In words",
+            "",
+            vec![Figure::Findings(Findings { lead, rest, ..Findings::default() })],
+        ),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Input of the report on a comparison.
 
 pub(super) mod page;
+pub(super) mod place;
 pub(super) mod regimes;
 pub(super) mod tables;
 pub(super) mod traces;

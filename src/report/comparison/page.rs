@@ -1,9 +1,9 @@
 //! The page of one comparison of models with flights.
 
 use crate::comparison::ComparisonReport;
-use crate::comparison::{regimes, tables, traces};
+use crate::comparison::{place, regimes, tables, traces};
 use crate::{
-    AnswerBox, BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, Link, Page,
+    AnswerBox, BarGroup, Bars, ChoiceOption, Curves, Figure, Finding, Findings, First, Link, Page,
     Section, Series, Style,
 };
 use greylag_sysid::compare::answer::Way;
@@ -17,7 +17,9 @@ const OF_OTHERS: usize = 2;
 /// The page of `report`: the verdict first, then the evidence for it.
 pub fn comparison_page(report: &ComparisonReport) -> Page {
     let c = report.comparison;
-    let answer = Figure::Answer(Box::new(AnswerBox { answer: c.answer.clone() }));
+    let answer = c.answer.clone();
+    let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
+    let answer = Figure::Answer(Box::new(boxed));
     let words = Figure::Findings(findings(c));
     // of one model the question is where it fails, of several by how much they differ
     let (first, later) = match c.models.len() {
@@ -104,7 +106,7 @@ fn findings(c: &Comparison) -> Findings {
         let sentence = "No channel could be compared: the notes say why.".into();
         lead.push(Finding { sentence, link: None });
     }
-    Findings { lead, rest }
+    Findings { lead, rest, ..Findings::default() }
 }
 
 /// The way to the channel that `sentence` speaks of.

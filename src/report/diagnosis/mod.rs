@@ -1,6 +1,7 @@
 //! Input of the report on a diagnosis.
 
 pub(super) mod page;
+pub(super) mod place;
 pub(super) mod proof;
 pub(super) mod suspects;
 pub(super) mod tables;

@@ -2,11 +2,12 @@
 
 use crate::comparison::page::channel_name;
 use crate::diagnosis::DiagnosisReport;
-use crate::diagnosis::{proof, suspects, tables};
+use crate::diagnosis::{place, proof, suspects, tables};
+use crate::kit::html::file_names;
 use crate::kit::numbers::percent;
 use crate::{
-    AnswerBox, BarGroup, Bars, Choice, ChoiceOption, Figure, Finding, Findings, Grid, GridCell,
-    GridRow, Link, Page, Section, Style, Table,
+    AnswerBox, BarGroup, Bars, Choice, ChoiceOption, Figure, Finding, Findings, First, Grid,
+    GridCell, GridRow, Link, Page, Section, Style, Table,
 };
 use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
@@ -26,7 +27,12 @@ pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     let words = || Figure::Findings(findings(d));
     let (first, later) = match answer {
         Some(answer) => {
-            let answer = Figure::Answer(Box::new(AnswerBox { answer }));
+            let first = match d.effects.iter().any(|c| c.asserted) {
+                true => First::Error,
+                false => First::Effect,
+            };
+            let answer = AnswerBox { answer, place: place::of_diagnosis(d), first };
+            let answer = Figure::Answer(Box::new(answer));
             (answer, Section::new("In words", "", vec![words()]))
         }
         None => (words(), Section::default()),
@@ -59,7 +65,7 @@ fn subtitle(report: &DiagnosisReport) -> String {
         Verdict::Unknown => "these flights cannot say",
         Verdict::Unexplained => "something is missing that the catalogue does not hold",
     };
-    format!("{} with {}: {verdict}.", d.model, report.log_files.join(", "))
+    format!("{} with {}: {verdict}.", d.model, file_names(&report.log_files))
 }
 
 fn findings(d: &Diagnosis) -> Findings {
@@ -71,7 +77,8 @@ fn findings(d: &Diagnosis) -> Findings {
         let sentence = "The diagnosis says nothing: the notes say why.".into();
         lead.push(Finding { sentence, link: None });
     }
-    Findings { lead, rest: said().skip(LEADING).map(finding).collect() }
+    let rest = said().skip(LEADING).map(finding).collect();
+    Findings { lead, rest, ..Findings::default() }
 }
 
 /// Link to the curve of the effect that `sentence` names.

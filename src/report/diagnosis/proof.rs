@@ -125,5 +125,6 @@ fn statement(c: &Comparison) -> Findings {
     let detail = |m: &ModelResult| {
         plain(format!("{}: {} of the characteristic values x_c", m.name, number(error(m))))
     };
-    Findings { lead: vec![plain(lead)], rest: c.models.iter().map(detail).collect() }
+    let rest = c.models.iter().map(detail).collect();
+    Findings { lead: vec![plain(lead)], rest, ..Findings::default() }
 }

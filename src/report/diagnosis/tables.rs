@@ -20,7 +20,7 @@ pub(crate) fn advice(d: &Diagnosis) -> Section {
         return Section::default();
     }
     let rest = d.advice.iter().skip(1).map(finding).collect();
-    let figure = Figure::Findings(Findings { lead, rest });
+    let figure = Figure::Findings(Findings { lead, rest, ..Findings::default() });
     Section::new("What to fly next", "The most useful first.", vec![figure])
 }
 

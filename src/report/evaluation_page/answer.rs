@@ -17,7 +17,10 @@ pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
     let mut all = vec![ranking(*best, rest)];
     let measured = ranked.iter().any(|(_, score)| score.kept_rate.is_finite());
     if measured {
-        all.push(format!("Envelope kept: {}.", each(&ranked, |s| percent(s.kept_rate))));
+        all.push(format!(
+            "Envelope kept: {}.",
+            each(&ranked, |s| format!("in {} of the flights", percent(s.kept_rate)))
+        ));
     }
     all.push(match ranked.iter().all(|(_, s)| s.divergence_rate == 0.0) {
         true => "No target was lost.".into(),

@@ -44,6 +44,8 @@ pub struct FlightReport<'a> {
     pub comparison: Option<Comparison>,
     /// Insight into the planner at some ticks; empty if no planner flew.
     pub sights: Vec<Sight>,
+    /// The next command, ready to be copied; empty if none is known.
+    pub next: String,
 }
 
 /// Flight envelope with which a flight is compared.

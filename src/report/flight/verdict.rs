@@ -63,6 +63,7 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let late = report.timing.as_ref().map(LoopTiming::late);
     let kept = report.envelope.map(|e| kept(&report.flight.samples, &e).kept);
+    let reason = reason(all - tracked, late, kept);
     let outcome = match (all, late) {
         _ if tracked < all => Outcome::Missed,
         _ if kept == Some(false) => Outcome::Missed,
@@ -73,7 +74,27 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     let Parts { first, beside } = Parts::of(report);
     let beside = beside.iter().map(|part| capital(part) + ".");
     let details = not_tracked(report).into_iter().chain(beside).chain(details(report)).collect();
-    Verdict { outcome, sentence: format!("{}.", first.join("; ")), details }
+    let sentence = format!("{}.", first.join("; "));
+    Verdict { outcome, reason, sentence, details, next: report.next.clone() }
+}
+
+/// All that made the flight miss, in words.
+fn reason(not_tracked: usize, late: Option<usize>, kept: Option<bool>) -> String {
+    let plural = |n: usize, one: &str| match n {
+        1 => format!("1 {one}"),
+        n => format!("{n} {one}s"),
+    };
+    let mut all = Vec::new();
+    if not_tracked > 0 {
+        all.push(plural(not_tracked, "target") + " not tracked");
+    }
+    if kept == Some(false) {
+        all.push("envelope left".into());
+    }
+    if let Some(late @ 1..) = late {
+        all.push(plural(late, "cycle") + " of the loop late");
+    }
+    all.join(", ")
 }
 
 /// The text with a capital letter first.

@@ -1,5 +1,6 @@
-//! The box with the answer: sentences in large type, the remaining error, the command to run next.
+//! The box with the answer: sentences in large type, where the model fails, the remaining error, the command to run next.
 
+use crate::kit::figure::next_command;
 use crate::kit::html::escape;
 use greylag_sysid::compare::Answer;
 
@@ -12,6 +13,19 @@ const ERROR: &str = "Error: root mean square over the eight states of a free run
 pub struct AnswerBox {
     /// The answer that the box shows.
     pub answer: Answer,
+    /// Where the model fails, in one sentence; empty if nothing is known.
+    pub place: String,
+    /// Sentence in the first place.
+    pub first: First,
+}
+
+/// Sentence that leads the box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum First {
+    /// The fall of the error.
+    Error,
+    /// The sentence on effects: where none is missing, the fall by tuning is not the answer.
+    Effect,
 }
 
 impl AnswerBox {
@@ -21,16 +35,67 @@ impl AnswerBox {
             true => String::new(),
             false => format!("<p{class}>{}</p>", escape(text)),
         };
-        let next = match next.is_empty() {
-            true => String::new(),
-            false => format!("<p class=\"rest\">Next: <code>{}</code></p>", escape(next)),
+        let next = next_command(next);
+        let [one, two] = match self.first {
+            First::Error => [error, effect],
+            First::Effect => [effect, error],
         };
         format!(
-            "<div class=\"verdict answer\">{}{}{}{next}{}</div>\n",
-            line("", error),
-            line("", effect),
+            "<div class=\"verdict answer{}\">{}{}{}{}{next}{}</div>\n",
+            self.tone(),
+            line("", one),
+            line("", two),
+            line(" class=\"rest\"", &self.place),
             line(" class=\"rest\"", left),
             line(" class=\"how\"", ERROR)
         )
+    }
+
+    /// Class of the colour: the usual one says that the error falls.
+    fn tone(&self) -> &'static str {
+        let change = self.answer.numbers.change_percent;
+        match self.first {
+            First::Effect => " open",
+            First::Error if change < 0.0 => "",
+            First::Error if change > 0.0 => " missed",
+            First::Error => " open",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answer(change_percent: f64) -> Answer {
+        let mut answer = Answer { error: "fell".into(), ..Answer::nothing() };
+        answer.numbers.change_percent = change_percent;
+        answer.with_effect("nothing is missing".into()).then("greylag diagnose".into())
+    }
+
+    #[test]
+    fn the_box_is_green_only_where_the_error_falls() {
+        let html = |change, first| {
+            AnswerBox { answer: answer(change), place: "Where it fails: lift.".into(), first }
+                .html()
+        };
+        assert!(html(-50.0, First::Error).starts_with("<div class=\"verdict answer\">"));
+        assert!(html(5.0, First::Error).starts_with("<div class=\"verdict answer missed\">"));
+        // of one model alone there is no change
+        assert!(html(f64::NAN, First::Error).starts_with("<div class=\"verdict answer open\">"));
+    }
+
+    #[test]
+    fn where_nothing_is_missing_that_is_said_first() {
+        let said = |first| {
+            let boxed =
+                AnswerBox { answer: answer(5.0), place: "Where it fails: lift.".into(), first };
+            let html = boxed.html();
+            ["nothing is missing", "fell", "Where it fails: lift.", "Next: "]
+                .map(|part| html.find(part).expect(part))
+        };
+        assert!(said(First::Effect).is_sorted());
+        let [effect, error, place, next] = said(First::Error);
+        assert!([error, effect, place, next].is_sorted());
     }
 }

@@ -61,10 +61,14 @@ pub enum Outcome {
 pub struct Verdict {
     /// Its outcome, shown as a word as well as a colour.
     pub outcome: Outcome,
+    /// Why it is missed, beside the word of the outcome; empty if the sentence says so.
+    pub reason: String,
     /// The verdict as one sentence.
     pub sentence: String,
     /// Shorter lines under it, in order.
     pub details: Vec<String>,
+    /// The next command, ready to be copied; empty if none is known.
+    pub next: String,
 }
 
 impl Verdict {
@@ -77,10 +81,23 @@ impl Verdict {
         let details: String =
             self.details.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
         let list = if details.is_empty() { details } else { format!("<ul>{details}</ul>") };
+        let reason = match self.reason.is_empty() {
+            true => String::new(),
+            false => format!(": {}", escape(&self.reason)),
+        };
         format!(
-            "<div class=\"verdict {class}\"><span class=\"outcome\">{word}</span><p>{}</p>{list}</div>\n",
-            escape(&self.sentence)
+            "<div class=\"verdict {class}\"><span class=\"outcome\">{word}{reason}</span><p>{}</p>{}{list}</div>\n",
+            escape(&self.sentence),
+            next_command(&self.next)
         )
+    }
+}
+
+/// The next command as a line of a box; nothing if there is none.
+pub(crate) fn next_command(next: &str) -> String {
+    match next.is_empty() {
+        true => String::new(),
+        false => format!("<p class=\"rest\">Next: <code>{}</code></p>", escape(next)),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Findings in plain words, each with a link to its evidence.
 
+use crate::kit::figure::next_command;
 use crate::kit::html::escape;
 
 /// Sentences, the leading ones large.
@@ -9,6 +10,8 @@ pub struct Findings {
     pub lead: Vec<Finding>,
     /// The rest, in order.
     pub rest: Vec<Finding>,
+    /// The next command, ready to be copied; empty if none is known.
+    pub next: String,
 }
 
 /// One finding, as a sentence.
@@ -34,7 +37,7 @@ impl Findings {
         let lead: String = self.lead.iter().map(|f| format!("<p>{}</p>", f.html())).collect();
         let rest: String = self.rest.iter().map(|f| format!("<li>{}</li>", f.html())).collect();
         let list = if rest.is_empty() { rest } else { format!("<ul>{rest}</ul>") };
-        format!("<div class=\"verdict findings\">{lead}{list}</div>\n")
+        format!("<div class=\"verdict findings\">{lead}{}{list}</div>\n", next_command(&self.next))
     }
 }
 

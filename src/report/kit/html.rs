@@ -1,6 +1,11 @@
 //! Text and data escaped for an HTML page.
 
+use std::path::Path;
+
 use serde::{Serialize, Serializer};
+
+/// Number of files that a line names.
+const NAMED: usize = 6;
 
 /// `text` with the five characters that mean something to HTML replaced; safe as element text
 /// and inside a quoted attribute.
@@ -19,6 +24,18 @@ pub fn escape(text: &str) -> String {
         }
     }
     safe
+}
+
+/// Names of the files without their folders, the first ones of many; the provenance has the paths.
+pub(crate) fn file_names(paths: &[String]) -> String {
+    let name = |path: &String| {
+        Path::new(path).file_name().map_or(path.clone(), |name| name.to_string_lossy().into_owned())
+    };
+    let mut names: Vec<String> = paths.iter().take(NAMED).map(name).collect();
+    if paths.len() > NAMED {
+        names.push(format!("{} more", paths.len() - NAMED));
+    }
+    names.join(", ")
 }
 
 /// `data` as JSON for a `<script>` element: no `<` is left in it, so neither `</script>` nor `<!--`

@@ -11,8 +11,9 @@ pub fn error(n: &Numbers) -> String {
     if rest.is_empty() {
         text += &format!(" is {}", number(first.error));
         if let Some(b) = &n.baseline {
+            let beside = if b.error < first.error { "worse" } else { "better" };
             text += &format!(
-                "; the best forecast without aerodynamics ({}) errs by {}",
+                ", {beside} than the best forecast without aerodynamics ({}), {}",
                 b.name,
                 number(b.error)
             );

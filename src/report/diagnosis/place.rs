@@ -1,0 +1,75 @@
+//! Where the tuned model fails, in one sentence for the answer box.
+
+use crate::kit::numbers::number;
+use greylag_sysid::compare::ChannelId;
+use greylag_sysid::diagnose::{Candidate, ChannelLeft, Diagnosis, Verdict};
+
+/// The channel of each asserted effect with the variable that shows it; without one, the channel of which most is left.
+pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
+    let asserted: Vec<&Candidate> = d.effects.iter().filter(|c| c.asserted).collect();
+    let places: Vec<String> = asserted.iter().filter_map(|c| of_effect(d, c)).collect();
+    if !places.is_empty() {
+        return format!("Where it fails: {}.", places.join("; "));
+    }
+    let share = |ch: &&ChannelLeft| ch.tuned_unexplained_fraction.is_finite();
+    let by_share = |a: &&ChannelLeft, b: &&ChannelLeft| {
+        a.tuned_unexplained_fraction.total_cmp(&b.tuned_unexplained_fraction)
+    };
+    let Some(worst) = d.channels.iter().filter(share).max_by(by_share) else {
+        return String::new();
+    };
+    let left = number(100.0 * worst.tuned_unexplained_fraction);
+    let name = name(&worst.channel);
+    match d.verdict {
+        Verdict::Adequate => {
+            format!("Where it fails: nowhere clearly; tuned, it leaves most of {name}, {left} %.")
+        }
+        _ => format!("Where it fails: most in {name}, of which {left} % is left after tuning."),
+    }
+}
+
+/// "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash 0.3 %)".
+fn of_effect(d: &Diagnosis, c: &Candidate) -> Option<String> {
+    let curve = c.curve.as_ref()?;
+    let mut text = format!("{}, with {}", name(&curve.channel), plain(&curve.variable));
+    let left = d.channels.iter().find(|ch| ch.channel == curve.channel);
+    let shares = left.map(|ch| [ch.tuned_unexplained_fraction, ch.unexplained_fraction]);
+    if let Some([tuned, after]) = shares.filter(|all| all.iter().all(|x| x.is_finite())) {
+        let [tuned, after] = [tuned, after].map(|share| number(100.0 * share));
+        text += &format!(" (tuned {tuned} % unexplained, with {} {after} %)", c.id);
+    }
+    Some(text)
+}
+
+/// A channel's name without its symbol.
+fn name(symbol: &str) -> &str {
+    let id = ChannelId::ALL.into_iter().find(|id| id.symbol() == symbol);
+    id.map_or(symbol, |id| id.name())
+}
+
+/// A variable without its unit, which is the last word if it is no word of letters alone.
+fn plain(variable: &str) -> &str {
+    match variable.rsplit_once(' ') {
+        Some((words, unit)) if unit.contains(['°', '/']) || unit.len() == 1 => words,
+        _ => variable,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variable_is_named_without_its_unit() {
+        let all = [
+            "elevator movement °/s",
+            "airspeed m/s",
+            "altitude m",
+            "angle of attack °",
+            "throttle",
+        ];
+        let said = ["elevator movement", "airspeed", "altitude", "angle of attack", "throttle"];
+        assert_eq!(all.map(plain), said);
+        assert_eq!((name("m"), name("?")), ("pitching moment", "?"));
+    }
+}
