@@ -100,7 +100,8 @@ fn a_look_at_a_long_log_holds_stretches_and_knows_the_whole() {
             near(a.largest_gap_s, b.largest_gap_s, 0.1);
             near(a.rate_hz / b.rate_hz, 1.0, 1e-6);
         }
-        let stuck = |info: &Info| info.findings.iter().any(|f| f.text.contains("p_radps does not change"));
+        let stuck =
+            |info: &Info| info.findings.iter().any(|f| f.text.contains("p_radps does not change"));
         assert!(stuck(&all) && stuck(&look), "{name}");
         assert!(look.findings.iter().any(|f| f.text.contains("long log")), "{name}");
         let served = |info: &Info| -> Vec<bool> {
