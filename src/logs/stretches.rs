@@ -25,7 +25,7 @@ const LEVELS: u32 = 24;
 const PAUSE_S: f64 = 0.1;
 const PAUSE_STEPS: f64 = 3.0;
 /// Shortest time for which a value that stays is noted, s.
-const STAYS_S: f64 = 1.0;
+const STAYS_S: f64 = 0.5;
 /// Pauses of a topic and stays of a field that are noted at most.
 const NOTED: usize = 4096;
 /// Time between the samples that are kept throughout, s.
