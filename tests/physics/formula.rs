@@ -163,7 +163,7 @@ fn what_is_wrong_is_said_with_line_and_cure() {
         (channel("qbar*S*b", "k/alpha"), "1", ["no number at", "max"]),
         (channel("qbar*S*b", "k*sqrt(alpha)"), "1", ["no number at", "alpha = -0.6"]),
         (channel("qbar*S*b", "k + 0.1"), "1", ["no parameter", "k*"]),
-        (channel("qbar*S*b", "k*lag(alpha, 0.1)"), "1", ["remembers aileron", "alpha_dot"]),
+        (channel("qbar*S*b", "k*lag(alpha, 0.1)"), "1", ["takes only aileron", "alpha_dot"]),
         (channel("qbar*S*b", "k"), "furlong", ["furlong", "SI units"]),
         (String::new(), "1", ["channels", "missing"]),
     ];

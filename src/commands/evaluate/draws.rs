@@ -50,7 +50,7 @@ pub(super) fn over_draws(
         println!("{}", draws_table(&flown));
         println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
         println!(
-            "intervals take all flights for independent; how draws differ is in the second table"
+            "intervals assume independent flights; the second table shows how draws differ"
         );
     }
     if let Some(path) = &arguments.json {

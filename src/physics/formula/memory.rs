@@ -90,7 +90,7 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
     let name = function.name();
     let [argument, time] = all else { return None };
     if argument.any(&|node| matches!(node, Node::Call(inner, _) if inner.has_memory())) {
-        return Some(format!("{name} stands around another lag or delay; write one of them"));
+        return Some(format!("{name} contains another lag or delay; write only one"));
     }
     use Variable::{Aileron, Elevator, Rudder, Throttle};
     let other = argument
@@ -99,7 +99,7 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
         .find(|v| !matches!(v, Aileron | Elevator | Rudder | Throttle));
     if let Some(other) = other {
         return Some(format!(
-            "{name} remembers aileron, elevator, rudder and throttle alone, not {}; airflow lags by alpha_dot and beta_dot",
+            "{name} takes only aileron, elevator, rudder and throttle, not {}; for a lag of the airflow use alpha_dot and beta_dot",
             other.name()
         ));
     }

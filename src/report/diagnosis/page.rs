@@ -141,7 +141,7 @@ fn map(model: &ModelResult) -> Option<Figure> {
     let mut columns = vec![("left".to_string(), "share that is unexplained".to_string())];
     columns.extend(variables.iter().map(|v| (sign(*v).to_string(), v.name().to_string())));
     Some(Figure::Grid(Grid {
-        title: format!("What follows what, {}", model.name),
+        title: format!("Unexplained share by channel and variable, {}", model.name),
         unit: "how much of the unexplained follows each variable, %".into(),
         corner: "Channel".into(),
         columns,

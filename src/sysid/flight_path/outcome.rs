@@ -303,7 +303,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
                 (true, true) => "the wind-corrected velocity and the inertial sensors",
                 (true, false) => "the wind-corrected velocity",
                 (false, true) => "the inertial sensors alone, so that a slow error remains",
-                (false, false) => "the airspeed and the attitude, which hardly hold it",
+                (false, false) => "the airspeed and the attitude, which hardly determine it",
             }
         ));
     }

@@ -176,11 +176,11 @@ fn judge(
     Judged { abstained, faultless, tuned, doubtful }
 }
 
-/// The verdict, and where it is [`Verdict::Unknown`] for want of evidence, the reason.
+/// The verdict and, if it is [`Verdict::Unknown`] for lack of evidence, the reason.
 ///
-/// Nothing is said to be missing beside figures that cannot be, where no channel can be judged, where the model as given
-/// has no sure error, or where a flexible model of the states removes little of what is left: that is then not a function
-/// of the states, as errors of timing and of filtered sensors are not.
+/// No effect is asserted if figures are impossible, if no channel can be judged, if the given model has no certain error,
+/// or if a flexible model of the states removes little of the residual: it is then not a function of the states, for
+/// example timing errors or filtered sensors.
 fn spoken(
     found: &Found,
     doubtful: &[String],

@@ -108,7 +108,7 @@ fn answer(content: &Content) -> Option<String> {
     }
 }
 
-/// Why nothing is said to be missing although more than noise is left.
+/// Reason why no effect is asserted although the residual exceeds noise.
 fn undecided(content: &Content) -> String {
     match content.why_unknown {
         Some(WhyUnknown::GivenModelFaultless) => "The model as given has no sure error in any channel of these flights, \
