@@ -49,9 +49,7 @@ pub(super) fn over_draws(
         tables::print(&all);
         println!("{}", draws_table(&flown));
         println!("flown in draws of model {} from the widths of its coefficients", models[0].name);
-        println!(
-            "intervals assume independent flights; the second table shows how draws differ"
-        );
+        println!("intervals assume independent flights; the second table shows how draws differ");
     }
     if let Some(path) = &arguments.json {
         let document = DrawsDocument {
