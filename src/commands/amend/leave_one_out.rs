@@ -26,14 +26,15 @@ pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     };
     let none = PerFlight::default();
     let trims = PerFlight { trims: Some(asked.trims.unwrap_or(1.0)), ..none };
-    let axes = PerFlight { askew_deg: Some(asked.askew_deg.unwrap_or(ASKEW_DEG)), ..none };
+    let askew_deg = asked.askew_deg.unwrap_or(ASKEW_DEG);
+    let axes = PerFlight { askew_deg: Some(askew_deg), ..none };
     let both = PerFlight { trims: trims.trims, askew_deg: axes.askew_deg };
     let mut all = vec![
         Structure { name: "as given".into(), fitted: Fitted::Nothing },
         of("--tune-only".into(), &[], none),
         of("--tune-only --flight-trims".into(), &[], trims),
-        of(format!("--tune-only --axes-askew {}", ASKEW_DEG), &[], axes),
-        of(format!("--tune-only --flight-trims --axes-askew {}", ASKEW_DEG), &[], both),
+        of(format!("--tune-only --axes-askew {askew_deg}"), &[], axes),
+        of(format!("--tune-only --flight-trims --axes-askew {askew_deg}"), &[], both),
         Structure { name: "--tune-only --from-scratch".into(), fitted: Fitted::FromScratch },
     ];
     let alone =
