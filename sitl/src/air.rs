@@ -27,7 +27,7 @@ pub struct Turbulence {
 /// A gust that rises as one minus cosine, holds, falls the same way (JSBSim `cosine-gust`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gust {
-    /// Start, s of the plant's time; the next step at or after it carries the gust's first frame.
+    /// Start, s of the plant's time; the gust begins in the first step at or after this time.
     pub start_s: f64,
     /// Velocity at the peak, north-east-down, m/s; not zero.
     pub velocity_ned_mps: [f64; 3],
@@ -49,7 +49,7 @@ impl Gust {
 /// Why the air is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AirError {
-    /// A component of the wind is not a number JSBSim can use.
+    /// A component of the steady wind is not finite or exceeds the accepted range.
     #[error("steady wind: {value} m/s is not within ±{MAX_AIR_MPS} m/s; give finite components")]
     Wind {
         /// The component that is out of range, m/s.

@@ -37,13 +37,13 @@ const BUILT_IN: [(&str, &str); 12] = [
 
 /// Name of the aircraft that flies unless another is named.
 pub(crate) const BUILT_IN_NAME: &str = "x8";
-/// Names of all that are built in.
+/// Names of the built-in aircraft.
 const BUILT_IN_NAMES: &str = "x8, aerosonde, x8-elevons, c172p";
 
 /// Why an aircraft could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum AircraftError {
-    /// The name is not that of the built-in aircraft, and no folder was given.
+    /// No built-in aircraft has that name, and no folder was given.
     #[error(
         "no aircraft '{name}' is built in (only {BUILT_IN_NAMES}); give the folder that holds \
          {name}/{name}.xml with --aircraft-dir"
@@ -95,8 +95,9 @@ impl Resolver for Tree {
 
 /// Loads `name` into `fdm`, with `effects` written into its XML.
 ///
-/// With `dir`, the file is `dir/NAME/NAME.xml`, its own `Engines` folder is searched first and then
-/// `dir/../engine`, as in a JSBSim tree. The time step must be set before: filters freeze theirs.
+/// With `dir`, the file is `dir/NAME/NAME.xml`; engines are searched in its own `Engines` folder
+/// first and then in `dir/../engine`, as in a JSBSim tree. Set the time step before this call:
+/// JSBSim's filters keep the step that they have at loading.
 pub(crate) fn load(
     fdm: &mut Fdm,
     dir: Option<&Path>,
@@ -122,7 +123,8 @@ pub(crate) fn load(
         .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
 }
 
-/// The document with a system that declares what is held: an aircraft may read what only another program defines.
+/// The document with an added system that declares the held properties: an aircraft may read a property that only
+/// another program defines.
 fn declared(document: &str, held: &[(String, f64)]) -> String {
     let end = document.rfind("</fdm_config>").filter(|_| !held.is_empty());
     let Some(end) = end else { return document.to_owned() };
@@ -131,7 +133,7 @@ fn declared(document: &str, held: &[(String, f64)]) -> String {
     };
     let lines: String = held
         .iter()
-        // what JSBSim itself has, and what a file writes, is not declared twice
+        // properties that JSBSim defines or that the file writes are not declared again
         .filter(|(name, _)| {
             plain(name)
                 && !document.contains(&format!("<output>{name}<"))

@@ -65,8 +65,8 @@ impl Effector {
     }
 }
 
-/// Gives `plant` the surfaces and conditions of the airframe file at `path`; a file that names no JSBSim property
-/// leaves its surfaces to the aircraft's own channels.
+/// Gives `plant` the surfaces and conditions of the airframe file at `path`. A file without a `position` property
+/// leaves the plant on the aircraft's own control channels.
 ///
 /// # Errors
 /// If the file cannot be read, or describes surfaces that cannot be flown.

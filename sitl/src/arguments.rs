@@ -188,7 +188,7 @@ struct StartArgs {
 }
 
 impl Cli {
-    /// Where the other side is met.
+    /// Address of PX4 or ArduPilot if the shim is their simulator, else of the companion.
     fn address(&self) -> &Address {
         let simulated = self.px4.px4_sim.as_ref().or(self.ardupilot.ardupilot_sim.as_ref());
         simulated.unwrap_or(&self.link)
@@ -234,10 +234,10 @@ impl Cli {
     }
 }
 
-/// Parameters that are played, by name and value, and the names of the others.
+/// Parameters that the flight stack simulates, by name and value, and the names of the others.
 type Played = (Vec<(String, f64)>, Vec<String>);
 
-/// The parameters of a file that `personality` plays, and the names of the others.
+/// The parameters of a file that `personality` simulates, and the names of the others.
 fn played(path: &Path, personality: Personality) -> Result<Played, ParameterFileError> {
     let (played, others): (Vec<_>, Vec<_>) = parameter_file::read(path)?
         .into_iter()
@@ -258,13 +258,13 @@ impl From<PersonalityName> for Personality {
     }
 }
 
-/// Why the command line cannot be followed.
+/// Error in a file that the command line names.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// The airframe file.
+    /// The airframe file cannot be used.
     #[error(transparent)]
     Airframe(#[from] AirframeError),
-    /// The parameter file.
+    /// The parameter file cannot be used.
     #[error(transparent)]
     Parameters(#[from] ParameterFileError),
 }

@@ -81,7 +81,7 @@ pub struct FaultArgs {
 }
 
 impl SensorArgs {
-    /// White noise: the preset with what replaces it.
+    /// White noise of the preset, with the standard deviations that the options replace.
     pub fn noise(&self) -> Noise {
         let preset = match self.noise {
             Preset::None => Noise::NONE,

@@ -1,4 +1,5 @@
-//! Effects hidden in the aircraft: terms that JSBSim flies while no message shows them.
+//! Hidden effects: terms of the flight dynamics that JSBSim simulates and that no message to the
+//! companion reveals.
 //!
 //! An effect is written into the aircraft's XML before JSBSim loads it, as further aerodynamic
 //! functions, flight-control components, external forces, or changed mass figures. With no effect,
@@ -30,7 +31,7 @@ pub struct Effect {
 }
 
 impl Place {
-    /// The axis of the aerodynamics, if it is one.
+    /// The aerodynamic axis; `None` for the thrust.
     fn axis(self) -> Option<Axis> {
         Some(match self {
             Place::Drag => Axis::Drag,
@@ -75,7 +76,7 @@ pub struct Filter {
 /// Kinds of filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilterKind {
-    /// A first-order lag, bilinear at the step.
+    /// A first-order lag, discretised at the step by the bilinear transform.
     Lag,
     /// A pure delay of a whole number of steps.
     Delay,
@@ -126,9 +127,9 @@ impl Hidden {
         Ok(Hidden { effect, amplitude, functions: &[], filters: &[] })
     }
 
-    /// An effect called `id` that is not of the list: expressions of JSBSim's functions, each with where it acts.
-    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the properties with the positions,
-    /// [`Filter::placeholder`] for the output of one of `filters`. It lives as long as the process.
+    /// An effect `id` outside the list, given as expressions of JSBSim's functions, each with the axis on which it acts.
+    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the position properties,
+    /// [`Filter::placeholder`] for the output of one of `filters`. The effect stays in memory until the process ends.
     pub fn written(id: &str, functions: Vec<(Place, String)>, filters: Vec<Filter>) -> Self {
         let effect = Effect {
             id: id.to_owned().leak(),
@@ -165,7 +166,7 @@ impl Hidden {
         (self.effect.write)(document, self.amplitude)
     }
 
-    /// The effect of the catalogue that is hidden.
+    /// The effect that is hidden.
     pub fn effect(&self) -> &'static Effect {
         self.effect
     }
@@ -254,7 +255,7 @@ pub enum HiddenError {
         /// Length of a step, s.
         step_s: f64,
     },
-    /// An effect is asked for twice.
+    /// An effect is given twice.
     #[error("hidden effect {id} is given twice; give it once, with the sum")]
     Twice {
         /// Identifier of the effect that is given twice.

@@ -1,4 +1,4 @@
-//! The program `greylag-sitl`: a flight controller with an aircraft, played to a companion.
+//! The program `greylag-sitl`: simulates an aircraft and its flight controller for a companion.
 
 mod one_line;
 

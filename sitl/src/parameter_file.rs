@@ -15,7 +15,7 @@ pub enum ParameterFileError {
         /// Reason why it cannot be read.
         why: String,
     },
-    /// A line is neither of the two forms.
+    /// A line has neither of the two accepted forms.
     #[error(
         "{path}, line {line}: {text:?} is no parameter; write NAME VALUE, or as QGroundControl saves it",
         path = path.display()
@@ -28,7 +28,7 @@ pub enum ParameterFileError {
         /// Content of the line.
         text: String,
     },
-    /// No parameter in it is simulated.
+    /// The flight stack simulates none of the file's parameters.
     #[error(
         "{path} has no parameter that the {stack} personality plays; give the file of that stack",
         path = path.display()
@@ -43,8 +43,8 @@ pub enum ParameterFileError {
 
 /// Names and values of the file at `path`, in its order.
 ///
-/// A line is `NAME VALUE` (or with a comma, a tab or `=` between; ArduPilot, MAVProxy, Mission Planner), or system, component,
-/// name, value and type (QGroundControl). What follows a `#` is a comment.
+/// A line has one of two forms: `NAME VALUE`, separated by white space, a comma or `=` (ArduPilot, MAVProxy, Mission Planner);
+/// or system, component, name, value and type (QGroundControl). A `#` begins a comment.
 ///
 /// # Errors
 /// If it cannot be read, is longer than a mebibyte, or has a line of another form.

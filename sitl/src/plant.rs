@@ -120,7 +120,7 @@ pub enum PlantError {
         /// The first quantity that is not finite.
         quantity: &'static str,
     },
-    /// JSBSim failed while doing something.
+    /// A call to JSBSim failed.
     #[error("JSBSim failed while {doing}: {source}")]
     Jsbsim {
         /// Operation that failed.

@@ -85,7 +85,7 @@ pub fn held(text: &str) -> Result<(String, f64), String> {
     }
 }
 
-/// Numbers written with commas.
+/// Numbers separated by commas.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbers<const N: usize>(pub [f64; N]);
 

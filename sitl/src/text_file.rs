@@ -1,10 +1,10 @@
-//! Text files that a person wrote: read whole, unless they are too long to be that.
+//! Hand-written text files: read whole, and refused above 1 MiB.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Bytes of the longest file that is read: all parameters of a firmware take 60 KiB, an airframe file 10.
+/// Size of the longest file that is read, bytes: all parameters of a firmware take 60 KiB, an airframe file 10 KiB.
 const LONGEST: u64 = 1 << 20;
 
 /// The text of the file at `path`.

@@ -9,7 +9,8 @@ use greylag_model::{GreyBox, Integrator, Trim, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
-/// Delays that are tried, ms; a loop stable at the last one counts as sufficient.
+/// Step and largest value of the delays that are tried, ms; a loop that is stable at the largest
+/// has enough margin.
 const STEP_MS: usize = 4;
 const LONGEST_MS: usize = 120;
 /// Length of a simulation in ticks, with a full-deflection pulse in this range; the last two seconds are judged, as
@@ -25,8 +26,8 @@ const TICK_MS: usize = 10;
 /// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate after a pulse of
 /// full deflection, in level flight at the cruise airspeed; `None` if it is stable up to 0.12 s.
 ///
-/// The observed surface positions are undelayed, as with a real flight controller, which does not report them. It
-/// takes a second for a controller that needs microseconds.
+/// The observed surface positions are undelayed, as with a real flight controller, which does not report them.
+/// The search takes about a second for a controller that computes its command in microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
     // JSBSim's Euler steps delay the attitude by one cycle, which no aircraft does
     let model = &{

@@ -34,8 +34,8 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// A companion at a vehicle from which nothing was received yet. The controller is called synchronously, wherever
-    /// it would run in flight.
+    /// A companion at a vehicle from which nothing was received yet. The controller is called synchronously, even one
+    /// that has a thread of its own in flight.
     pub fn new(companion: Companion, vehicle: Vehicle) -> Self {
         let mut pilot = companion.pilot;
         pilot.take_on(&vehicle);
@@ -55,8 +55,7 @@ impl Desk {
         self.recorder = Some(recorder);
     }
 
-    /// Takes bytes that arrive at `host`, appends the replies to `out`, and calls `show` with each state and its
-    /// decision.
+    /// Takes bytes that arrive at `host`, appends the replies to `out`, and calls `watch` with each state and its decision.
     pub fn receive(
         &mut self,
         host: Duration,
@@ -108,7 +107,7 @@ impl Desk {
     fn heed(&mut self, host: Duration) {
         while let Some(notice) = self.vehicle.take_notice() {
             if let Some(words) = notice.ending() {
-                // forced arming is never refused
+                // forced disarming is never refused
                 let _ = self.pilot.disarm(self.now(host), true);
                 self.pilot.send_text(Severity::Critical, &words);
             }

@@ -66,7 +66,7 @@ pub struct Outcome {
     pub different: u64,
     /// Plans of the controller that differ in any bit from the recorded ones.
     pub plans_different: u64,
-    /// Ticks whose state is missing in the telemetry; later ticks are no evidence.
+    /// Ticks whose state is missing in the telemetry; the commands after such a tick cannot be compared.
     pub without_state: u64,
     /// The first differences, in order.
     pub differences: Vec<Difference>,

@@ -208,7 +208,7 @@ mod tests {
         assert!(them.believed(NOW, &frames).is_empty());
         let counts = them.counts();
         assert_eq!((counts.believed, counts.replayed), (2, 2));
-        // A second later the stamps have risen, and a second's worth: 100,000.
+        // One second later the timestamps have risen by 100,000.
         let later = us.sign(NOW + 1_000_000, 3, &heartbeat(2));
         assert_eq!(them.believed(NOW, &later), later);
         assert_eq!(them.stamp(), stamp_of(NOW) + 100_000);

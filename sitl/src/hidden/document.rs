@@ -7,7 +7,7 @@ use crate::plant::Properties;
 /// Property with the thrust that hidden effects add, lbf.
 pub(crate) const THRUST_PROPERTY: &str = "hidden/thrust-lbs";
 
-/// Properties of the engine's thrust in the frame before, and of the lagged thrust there, lbf.
+/// Properties of the engine's thrust and of the lagged thrust, both one frame old, lbf.
 const THRUST_BEFORE: &str = "hidden/thrust-before-lbs";
 const THRUST_LAGGED: &str = "hidden/thrust-lagged-lbs";
 
@@ -34,7 +34,7 @@ impl Axis {
         }
     }
 
-    /// Property of the length that makes a moment of a force, ft.
+    /// Property of the axis's reference length, ft.
     fn length(self) -> &'static str {
         if self == Axis::Pitch { "metrics/cbarw-ft" } else { "metrics/bw-ft" }
     }
@@ -100,7 +100,7 @@ impl<'a> Document<'a> {
             .replace("{throttle}", &self.properties.throttle_position)
     }
 
-    /// The deflection of `surface`, rad, as it acts in the end.
+    /// The deflection of `surface` after all effects, rad.
     pub(super) fn deflection(&self, surface: Surface) -> String {
         property(self.position(surface))
     }
@@ -216,7 +216,7 @@ impl<'a> Document<'a> {
         self.saturation = Some(cubic);
     }
 
-    /// Adds a force along the thrust, lbf.
+    /// Adds a force along the body x axis, lbf.
     pub(super) fn add_thrust(&mut self, expression: String) {
         self.thrust.push(expression);
     }
@@ -224,7 +224,7 @@ impl<'a> Document<'a> {
     /// Lets the thrust act through a first-order lag of `constant`, s.
     pub(super) fn lag_thrust(&mut self, constant: f64) {
         let thrust = property("propulsion/engine/thrust-lbs");
-        // flight controls are evaluated before the engines: both components hold the frame before
+        // flight controls are evaluated before the engines: both components hold the value of the previous frame
         for (component, name, settings) in [
             ("pure_gain", THRUST_BEFORE, "<gain>1</gain>".to_owned()),
             ("lag_filter", THRUST_LAGGED, format!("<c1>{}</c1>", 1.0 / constant)),

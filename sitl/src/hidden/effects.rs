@@ -9,13 +9,13 @@ const LBF: f64 = 4.448_221_615_260_5;
 const FT: f64 = 0.3048;
 /// Airspeed at which speed-dependent effects vanish, m/s: that of the neutral start.
 const V0_MPS: f64 = 16.67;
-/// Throttle at which the propeller wash vanishes: level trim at 16.67 m/s.
+/// Throttle at which the propeller-wash effect vanishes: level trim at 16.67 m/s.
 const THROTTLE0: f64 = 0.118;
 /// Newton metres per lbf ft, which is also kg m² per slug ft².
 const LBF_FT: f64 = LBF * FT;
-/// Bound of coefficients: beyond it, an amplitude is taken for a slip.
+/// Bound of coefficients: a larger amplitude is taken for a typing error.
 const ANY: f64 = 1e3;
-/// Bound of what goes with the size of the aircraft: N, N m, N m s, kg m².
+/// Bound of amplitudes that scale with the size of the aircraft (N, N m, N m s, kg m²).
 const LARGE: f64 = 1e7;
 
 /// Every effect that can be hidden.

@@ -1,9 +1,10 @@
 //! Finds which property of an aircraft commands which surface by trying all candidates.
 //!
-//! Commands are what the aircraft's systems read and nothing of them writes. Each is commanded in full, to both sides where its domain
-//! has two (a negative command to flaps may give no number), while the aircraft stands still in its state, for as long as lags,
-//! delays and hysteresis need. What rolls most without pitching or yawing is the aileron, alone or as a pair with the other side's;
-//! elevator and rudder likewise. The surface's position is a property that the aerodynamics read and the command moves.
+//! Candidates are the properties that the aircraft's systems read and do not write. Each is set to full command, with both signs
+//! where its domain has both (a negative flap command may give NaN), while the aircraft is held in its state, until lags, delays
+//! and hysteresis have settled. The aileron is the command, or the pair of a left and a right command, that rolls the aircraft
+//! most with the least pitching and yawing; usual names score higher. Elevator and rudder are found likewise. The position of a
+//! surface is a property that the aerodynamics read and that the command moves.
 
 mod document;
 mod roles;
@@ -19,15 +20,15 @@ use crate::aircraft;
 use document::Names;
 use roles::{Tried, choose};
 
-/// Frames that a command is given to come to rest: 20 s in frames of 10 ms.
+/// Most frames in which the surfaces may come to rest after a command: 20 s in frames of 10 ms.
 const FRAMES: usize = 2000;
-/// Frames without movement after which it is at rest: longer than any delay of an actuator.
+/// Frames without movement after which the surfaces count as at rest: longer than any delay of an actuator.
 const AT_REST: usize = 60;
 /// Relative movement below which a surface counts as still.
 const STILL: f64 = 1e-9;
-/// Airspeed at which commands are tried, m/s: any at which the air has a pressure will do.
+/// Airspeed at which commands are tried, ft/s: any speed with a dynamic pressure will do.
 const AIRSPEED_FPS: f64 = 150.0;
-/// Moments of the air, body axes, lbf ft.
+/// Aerodynamic moments, body axes, lbf ft.
 const MOMENTS: [&str; 3] = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "moments/n-aero-lbsft"];
 /// Reference lengths that make moments comparable.
 const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"];
@@ -86,7 +87,7 @@ struct Bench {
     lengths: [f64; 3],
 }
 
-/// Moments (by their lengths) and positions.
+/// Moments divided by their reference lengths, lbf, and positions.
 #[derive(Clone)]
 struct Seen {
     moments: [f64; 3],
@@ -148,7 +149,7 @@ impl Bench {
                 bench.fdm.run()?;
                 bench.see()
             };
-            // an aircraft that cannot bear a command throws at it
+            // JSBSim fails on a command outside the domain of the aircraft's functions
             let Ok(seen) = frame(self) else { return Ok(None) };
             if !seen.moments.iter().chain(&seen.positions).all(|x| x.is_finite()) {
                 return Ok(None);
@@ -194,7 +195,7 @@ impl Bench {
         }))
     }
 
-    /// The least command that does what one does: an actuator's stop may come before.
+    /// The least command with the deflection of the command 1: an actuator may reach its stop earlier.
     fn full_at(&mut self, node: NodeId, none: &Seen, full: &Seen) -> Result<f64, PlantError> {
         let reach = |seen: &Seen| -> f64 {
             let pairs = seen.positions.iter().zip(&none.positions);
@@ -202,7 +203,7 @@ impl Bench {
         };
         let whole = reach(full);
         let (mut least, mut most) = (0.0, 1.0);
-        // most of a half: a command in its domain
+        // bisect only if the command 0.9 already gives the full deflection
         match self.at(Some(node), 0.9)? {
             Some(seen) if reach(&seen) > (1.0 - 1e-6) * whole => {}
             _ => return Ok(1.0),
@@ -217,7 +218,7 @@ impl Bench {
         Ok(most)
     }
 
-    /// The command that moves the throttle, where the usual one does not.
+    /// The command that moves the throttle; `None` if the usual one does, or if none does.
     fn throttle(&mut self, names: &Names) -> Result<Option<String>, PlantError> {
         let Some(place) = look(&self.fdm, "fcs/throttle-pos-norm") else { return Ok(None) };
         let usual = super::options::THROTTLE_COMMAND.to_owned();
@@ -235,8 +236,8 @@ impl Bench {
     }
 }
 
-/// The aircraft of `options`, steered by the usual properties or those that are named, and if they do not steer it, by those that are
-/// found; what was found stands beside it.
+/// Loads the aircraft of `options` with the properties named there, or the usual ones. If the usual ones are missing, move no
+/// surface or deflect one to the wrong side, those that `discover` finds take their place and are returned with the plant.
 ///
 /// # Errors
 /// If it cannot be loaded or nothing steers it. Names that were given are not replaced.

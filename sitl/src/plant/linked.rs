@@ -1,7 +1,8 @@
 //! One value that stands for several properties: `NAME`, or `[-]NAME[*SCALE],…`.
 //!
-//! An aircraft whose left and right aileron have a command each, in radians to 0.52, has the aileron
-//! `fcs/left_rad*0.52,-fcs/right_rad*0.52`: written, each gets its share; read, the mean over all.
+//! For example, an aircraft whose left and right aileron have separate commands, in rad up to 0.52,
+//! has the aileron `fcs/left_rad*0.52,-fcs/right_rad*0.52`. A write gives each property the value
+//! times its factor; a read gives the mean of the properties times their factors.
 
 use jsbsim::{Error, Fdm, NodeId};
 
@@ -37,7 +38,7 @@ pub(super) fn parts(text: &str) -> Vec<Part> {
 pub(super) struct Linked(Vec<(NodeId, f64)>);
 
 impl Linked {
-    /// Looks every part up on a loaded aircraft; the first that is missing is named.
+    /// Looks every part up on a loaded aircraft; the error names the first that is missing.
     pub fn find(fdm: &Fdm, aircraft: &str, text: &str) -> Result<Linked, PlantError> {
         let node = |part: Part| Ok((needed(fdm, aircraft, &part.name)?, part.factor));
         Ok(Linked(parts(text).into_iter().map(node).collect::<Result<_, PlantError>>()?))
@@ -58,7 +59,7 @@ impl Linked {
         }
     }
 
-    /// The mean of the parts, each by its factor.
+    /// Mean of the parts, each times its factor.
     pub fn read(&self, fdm: &mut Fdm) -> Result<f64, Error> {
         let mut sum = 0.0;
         for (node, factor) in &self.0 {

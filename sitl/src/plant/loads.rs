@@ -27,7 +27,7 @@ pub struct MassProperties {
     pub inertia_kgm2: [f64; 4],
 }
 
-/// JSBSim's integrators, by which it can be held in its state while engines and filters go on.
+/// JSBSim's integrators: with all of them off, the state is held while engines and filters run.
 const INTEGRATORS: [&str; 4] = [
     "simulation/integrator/rate/rotational",
     "simulation/integrator/rate/translational",
@@ -36,12 +36,13 @@ const INTEGRATORS: [&str; 4] = [
 ];
 /// Longest time that engines are given to settle, s.
 const SETTLING_S: f64 = 60.0;
-/// Change of thrust within a second that counts as settled, in parts of it.
+/// Change of the thrust within a second that counts as settled, as a fraction of the thrust (at least of 1 N).
 const SETTLED: f64 = 1e-4;
 
 impl Plant {
-    /// Thrust along body x in N, and the truth there, once the engines have settled at `throttle` (0..1) with
-    /// the aircraft held in `start`; after 60 s as it is then. Reset it before it is stepped.
+    /// Thrust along body x, N, and the state once the engines have settled at `throttle` (0..1) with the
+    /// aircraft held in `start`. Engines that have not settled after 60 s give their values at that time.
+    /// Reset the plant before it is stepped.
     ///
     /// # Errors
     /// [`PlantError`] when the aircraft cannot be evaluated there.
@@ -147,14 +148,14 @@ impl Plant {
         }
     }
 
-    /// The loads in `start` with the surfaces at rest where `inputs` command them. Reset
-    /// it before it is stepped.
+    /// The loads in `start` with the surfaces at rest where `inputs` command them. Reset the plant
+    /// before it is stepped.
     ///
     /// # Errors
     /// [`PlantError`] when the aircraft cannot be evaluated there.
     pub fn loads(&mut self, start: &Start, inputs: &Inputs) -> Result<Loads, PlantError> {
         self.reset(start)?;
-        // Filters keep the step for which they were laid out; nothing else moves in so short a one.
+        // Filters keep the step for which they were discretised; nothing else moves in a step this short.
         self.fdm.set_dt(STILL_S);
         let held = self.come_to_rest(inputs, "holding a state");
         let found = held.and_then(|_| self.loads_now());
@@ -177,7 +178,7 @@ impl Plant {
         })
     }
 
-    /// Mass and inertia at the start, as the aircraft's file loads it.
+    /// Present mass and inertia, with fuel and payload.
     ///
     /// # Errors
     /// [`PlantError::Property`] if JSBSim lacks a property of the mass or inertia.

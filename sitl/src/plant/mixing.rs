@@ -1,7 +1,7 @@
 //! The mixer of an aircraft whose surfaces and motors are commanded one by one.
 //!
-//! The shim shares no code with the companion, so that the two check each other: here the way back is by normal
-//! equations.
+//! The shim shares no code with the companion, so that the two check each other: here the controls are computed
+//! from the positions by normal equations.
 
 use super::{Inputs, Properties};
 
@@ -10,9 +10,9 @@ use super::{Inputs, Properties};
 pub struct Moved {
     /// Name of the surface or motor.
     pub name: String,
-    /// Property of its command; `None` if the aircraft makes it of the usual commands itself.
+    /// Property of its command; `None` if the aircraft derives it from the usual commands itself.
     pub command: Option<String>,
-    /// Property of its position, rad, 0..1 of a motor.
+    /// Property of its position: rad for a surface, 0..1 for a motor.
     pub position: String,
     /// Command per unit of aileron, elevator, rudder and throttle.
     pub gains: [f64; 4],
@@ -32,7 +32,7 @@ impl Moved {
         }
     }
 
-    /// Half the travel, rad; one of a motor.
+    /// Half the travel, rad; 1 for a motor.
     fn unit(&self) -> f64 {
         self.travel.map_or(1.0, |[least, most]| 0.5 * (most - least))
     }
@@ -46,7 +46,7 @@ impl Moved {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixing {
     moved: Vec<Moved>,
-    /// Deflection (rad, throttle 0..1) of each control for a position of each of them.
+    /// For each surface or motor, the deflection of each control (rad, throttle 0..1) per unit of its position.
     shares: Vec<[f64; 4]>,
     has_rudder: bool,
 }

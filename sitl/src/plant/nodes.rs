@@ -50,7 +50,7 @@ impl Nodes {
                 let [a, b, c] = names.map(|name| node(&format!("{before}{name}{after}")));
                 Ok([a?, b?, c?])
             };
-        // Only these can stand still with their throttle open.
+        // Only engines with a starter can be off while their throttle is open.
         let is_started = look("propulsion/starter_cmd").is_some();
         Ok(Nodes {
             steering: Steering::find(fdm, options)?,
@@ -93,13 +93,13 @@ impl Nodes {
         self.steering.is_shared()
     }
 
-    /// Starts every engine that can be off; `Some` with the number of the first that does not run
-    /// then. JSBSim starts them at full power, from where they follow the throttle.
+    /// Starts every engine that can be off, and returns the index of the first that does not run
+    /// after that. JSBSim starts engines at full power; they then follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {
         if self.running.is_empty() {
             return Ok(None);
         }
-        // Without a pilot at the lever a constant-speed propeller stays at its coarsest, and may stop its engine.
+        // A constant-speed propeller whose lever is not commanded stays at its coarsest pitch and may stop its engine.
         for engine in 0..self.running.len() {
             let lever = format!("fcs/advance-cmd-norm[{engine}]");
             if look(fdm, &lever).is_some() {
@@ -186,7 +186,7 @@ impl Nodes {
             fdm.set_property(&format!("atmosphere/wind-{name}-fps"), speed / FT)?;
         }
         if wind == [0.0; 3] {
-            // The initial condition leaves rounding in the wind, and a direction with it.
+            // The initial condition leaves a rounding error in the wind, and with it a wind direction.
             fdm.set_property("atmosphere/psiw-rad", 0.0)?;
         } else {
             settle(fdm, options.step_s)?;
@@ -234,7 +234,7 @@ impl Nodes {
         })
     }
 
-    /// Total force, which JSBSim sums without the weight, by the mass.
+    /// Specific force, m/s²: JSBSim's total force, which excludes the weight, divided by the mass.
     fn specific_force(&self, fdm: &mut Fdm) -> Result<[f64; 3], Error> {
         let mass = fdm.read_node(self.mass)?;
         read3(fdm, &self.force, FT / mass)

@@ -33,9 +33,9 @@ pub struct PlantOptions {
     pub longitude_deg: f64,
     /// The state at which the episodes of a simulator start.
     pub start: Start,
-    /// Length of one step, s: [`DT_S`](super::DT_S) unless something else is needed. JSBSim lays
-    /// out the actuators' filters for the step when it loads the aircraft, so another step is
-    /// another aircraft by a little (`sitl/tests/plant/step.rs` measures it).
+    /// Length of one step, s: [`DT_S`](super::DT_S) unless something else is needed. JSBSim
+    /// discretises the actuators' filters for the step when it loads the aircraft, so another step
+    /// gives a slightly different aircraft (`sitl/tests/plant/step.rs` measures the difference).
     pub step_s: f64,
 }
 
@@ -67,8 +67,8 @@ pub struct Properties {
     pub elevator_command: String,
     /// Property of the throttle command, 0..1.
     pub throttle_command: String,
-    /// Property of the aileron position, rad; where the aircraft lacks the default,
-    /// `fcs/left-aileron-pos-rad`.
+    /// Property of the aileron position, rad. An aircraft that lacks the default property is read
+    /// at `fcs/left-aileron-pos-rad`.
     pub aileron_position: String,
     /// Property of the elevator position, rad.
     pub elevator_position: String,

@@ -2,16 +2,16 @@
 
 use jsbsim::{Error, Fdm, NodeId};
 
-/// A step too short to move the aircraft, s. Filters and kinematics keep the step for which they were laid out.
+/// A step too short to move the aircraft, s. Filters and kinematics keep the step for which they were discretised.
 pub(super) const STILL_S: f64 = 1e-12;
 
 /// Longest time that flaps and gear are given to reach the position that is held, s.
 const TRANSIT_S: f64 = 60.0;
-/// Time without a change of the air's loads after which they have reached it, s.
+/// Time without a change of the aerodynamic loads after which flaps and gear count as at rest, s.
 const AT_REST_S: f64 = 0.5;
 /// Relative change of a load per frame below which it counts as constant.
 const UNCHANGED: f64 = 1e-9;
-/// Forces (lbf) and moments (lbf ft) of the air, body axes.
+/// Aerodynamic forces (lbf) and moments (lbf ft), body axes.
 const LOADS: [&str; 6] = [
     "forces/fbx-aero-lbs",
     "forces/fby-aero-lbs",
@@ -42,7 +42,7 @@ pub(super) fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {
     Ok(())
 }
 
-/// Lets flaps, gear and whatever else `held` commands reach its position before the flight begins, 60 s at most.
+/// Holds the properties `held` until flaps, gear and other systems have reached their positions, 60 s at most.
 pub(super) fn settle_conditions(
     fdm: &mut Fdm,
     held: &[(NodeId, f64)],

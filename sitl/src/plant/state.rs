@@ -17,7 +17,7 @@ pub struct Start {
     pub airspeed_mps: f64,
     /// Angle of attack, rad.
     pub alpha_rad: f64,
-    /// Sideslip angle, rad; the airspeed vector from the right is positive.
+    /// Sideslip angle, rad; positive when the air comes from the right.
     pub beta_rad: f64,
     /// Roll rate, body axes, rad/s.
     pub p_radps: f64,
@@ -91,7 +91,7 @@ impl Inputs {
     }
 }
 
-/// Everything the plant shows of itself after a step, without sensor errors.
+/// True state of the plant after a step, without sensor errors.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Truth {
     /// Time since the reset, s.
@@ -132,17 +132,17 @@ pub struct Truth {
     pub static_pressure_pa: f64,
     /// Deflection of the aileron, rad.
     pub aileron_rad: f64,
-    /// Aileron rate, rad/s: the deflection's change over the last step by the step.
+    /// Aileron rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub aileron_rate_radps: f64,
     /// Deflection of the elevator, rad.
     pub elevator_rad: f64,
-    /// Elevator rate, rad/s: the deflection's change over the last step by the step.
+    /// Elevator rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub elevator_rate_radps: f64,
     /// Position of the throttle, 0..1.
     pub throttle: f64,
     /// Deflection of the rudder, rad.
     pub rudder_rad: f64,
-    /// Rudder rate, rad/s: the deflection's change over the last step by the step.
+    /// Rudder rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub rudder_rate_radps: f64,
     /// Thrust along the body x axis, N, hidden effects on it included.
     pub thrust_n: f64,

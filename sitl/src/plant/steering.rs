@@ -12,7 +12,7 @@ use super::{Inputs, PlantError, PlantOptions, Properties};
 pub(super) enum Steering {
     /// By JSBSim's usual properties.
     Usual(Usual),
-    /// By surfaces and motors of their own.
+    /// By surfaces and motors that are commanded one by one.
     Mixed(Box<Mixed>),
 }
 
@@ -20,7 +20,7 @@ pub(super) struct Usual {
     surfaces: [Linked; 2],
     /// Command and position of the rudder.
     rudder: Option<[Linked; 2]>,
-    /// One a throttle; none on a glider.
+    /// Command of each throttle; empty on a glider.
     throttles: Vec<NodeId>,
     positions: [Linked; 2],
     throttle_position: Option<NodeId>,
@@ -131,7 +131,7 @@ impl Steering {
         }
     }
 
-    /// Whether a property is moved by more than one control, so that the controls can be commanded in full one by one only.
+    /// Whether two controls share a property, so that only one control at a time can be commanded in full.
     pub(super) fn is_shared(&self) -> bool {
         match self {
             Steering::Usual(usual) => {
@@ -153,7 +153,7 @@ impl Steering {
     }
 }
 
-/// Command and position of the rudder; one that is named must be there.
+/// Command and position of the rudder; a rudder that the options name must exist.
 fn rudder(
     fdm: &Fdm,
     aircraft: &str,

@@ -3,7 +3,7 @@
 use super::lookup::look;
 use super::{FULL_DEFLECTION_RAD, Inputs, Plant, PlantError, jsbsim};
 
-/// Steps without flight that an actuator is given to reach its stop: 20 s in steps of 10 ms.
+/// Most steps in which an actuator may reach its stop while the aircraft is held: 20 s in steps of 10 ms.
 const STEPS: usize = 2000;
 /// Steps without movement after which a surface counts as being at its stop: half a second, longer
 /// than any delay of an actuator.
@@ -12,8 +12,8 @@ const AT_REST: usize = 50;
 const STILL_RAD: f64 = 1e-12;
 /// Travel below which a surface counts as fixed, rad.
 const LEAST_RAD: f64 = 1e-3;
-/// A travel that differs by less from [`FULL_DEFLECTION_RAD`] is that one, rad: an actuator's
-/// filter stops short of its end by rounding.
+/// A travel that differs from [`FULL_DEFLECTION_RAD`] by less than this is taken as equal to it,
+/// rad: an actuator's filter stops short of its end by rounding.
 const ROUNDING_RAD: f64 = 1e-9;
 
 /// Where a surface comes to rest at full command.
@@ -107,8 +107,8 @@ impl Plant {
         })
     }
 
-    /// Aileron, elevator and rudder where they come to rest at `command`, rad. Surfaces that two controls move
-    /// would reach their stops before, so there each control is commanded alone.
+    /// Aileron, elevator and rudder where they come to rest at `command`, rad. Two controls at full command
+    /// would drive a surface that they share to its stop too early, so each is then commanded alone.
     fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
         let [aileron, elevator, rudder] = [command; 3];
         if !self.nodes.is_shared() {
@@ -124,7 +124,7 @@ impl Plant {
 
     /// Aileron, elevator and rudder where they come to rest at `inputs`, rad.
     fn rest(&mut self, inputs: &Inputs) -> Result<[f64; 3], PlantError> {
-        // Filters keep the step for which they were laid out; nothing else moves in so short a one.
+        // Filters keep the step for which they were discretised; nothing else moves in a step this short.
         self.fdm.set_dt(super::settling::STILL_S);
         self.come_to_rest(inputs, "measuring the travel of the surfaces")
     }

@@ -13,15 +13,15 @@ use crate::plant::{Inputs, Truth};
 /// An answer older than this is not flown, µs: as in real time.
 const STALE_US: u64 = 500_000;
 
-/// The shim on a bench. It flies as in real time: on the newest answer that came within the step,
-/// else with the surfaces where they were commanded.
+/// The shim on a bench. As in real time, a step uses the newest answer that came within it; without
+/// an answer the last command stays.
 pub struct Bench {
     flight: Flight,
     parser: Parser,
     encoder: Encoder,
     distorter: Distorter,
     newest: Option<Answer>,
-    /// The newest time that was answered, of those shown.
+    /// Newest frame time that the companion has answered, µs.
     answered_us: u64,
     shown_us: u64,
     measured: Truth,
@@ -53,7 +53,7 @@ impl Bench {
         self.distorter.now = distortion;
     }
 
-    /// Appends a state frame, with what else is due.
+    /// Appends a state frame and the other messages that are due.
     pub fn show(&mut self, out: &mut Vec<u8>) {
         let (frame, measured) = self.flight.measure();
         self.measured = measured;

@@ -5,7 +5,7 @@ use crate::plant::Truth;
 /// Present errors of the sensors and the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
-    /// Every sensor shows what it showed when this began.
+    /// Every sensor keeps the value that it had when this began.
     pub frozen: bool,
     /// The airspeed sensor shows this, as a blocked tube does, m/s.
     pub airspeed_mps: Option<f64>,

@@ -9,13 +9,13 @@ use crate::plant::PlantError;
 /// Why a run of the shim could not begin or had to end.
 #[derive(Debug, thiserror::Error)]
 pub enum ShimError {
-    /// An option has a value that means nothing.
+    /// An option has an invalid value.
     #[error("cannot start the shim: {rule}; correct the option")]
     Option {
         /// The rule that is broken.
         rule: &'static str,
     },
-    /// A parameter that the played stack does not have.
+    /// The simulated stack has no parameter of that name.
     #[error("the {stack} personality has no parameter {name}; it has {known}")]
     Parameter {
         /// Name of the simulated stack.

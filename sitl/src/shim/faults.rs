@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::options::FrameFaults;
 
-/// Draws the fate of frames, in streams of their own so that neither changes the other.
+/// Draws losses and delays of frames from separate random streams, so that neither changes the other.
 #[derive(Clone, Debug)]
 pub struct Faults {
     rule: FrameFaults,

@@ -99,7 +99,7 @@ impl Flight {
         self.flown as f64 * FRAME_US as f64 * 1e-6
     }
 
-    /// Lets the aircraft go.
+    /// Releases the aircraft from its start.
     pub fn launch(&mut self) {
         self.launched = true;
     }

@@ -57,7 +57,7 @@ impl Launcher {
         Ok(launcher)
     }
 
-    /// Puts the aircraft back.
+    /// Puts the aircraft back to its start.
     ///
     /// # Errors
     /// If it cannot be flown from its start.
@@ -130,7 +130,7 @@ impl Launcher {
         }
     }
 
-    /// The state at `share` of the final speed, pulled or (0) standing.
+    /// The state at the fraction `share` of the final speed; `pull` is 1 on the catapult, 0 on the stand.
     fn pulled(&self, share: f64, pull: f64) -> Truth {
         let released = self.released;
         let velocity = released.velocity_ned_mps.map(|v| v * share);

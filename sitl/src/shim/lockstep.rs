@@ -44,7 +44,7 @@ pub fn fly(
     }
 }
 
-/// Time at which a frame is due, and the answer so far.
+/// Times and sendings of a frame that is not answered yet.
 struct Asking {
     since: Instant,
     next: Instant,

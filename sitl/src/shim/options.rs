@@ -73,8 +73,8 @@ impl Noise {
         altitude_m: 0.0,
     };
 
-    /// The order of what a small autopilot shows in flight with the motor running: an assumption,
-    /// not a measurement of one product (0.3 °/s, 0.3 m/s², 0.2°, 0.3 m/s, 0.3°, 0.2 m).
+    /// Typical noise of a small autopilot in flight with the motor running: an assumption, not a
+    /// measurement of one product (0.3 °/s, 0.3 m/s², 0.2°, 0.3 m/s, 0.3°, 0.2 m).
     pub const REALISTIC: Noise = Noise {
         gyro_radps: 0.0052,
         accelerometer_mps2: 0.3,
@@ -109,7 +109,7 @@ pub struct Bias {
     pub alpha_rad: f64,
     /// Added to the sideslip, rad.
     pub beta_rad: f64,
-    /// The airspeed shown is this times the true one; 1 is right.
+    /// Ratio of the measured to the true airspeed; 1 is no error.
     pub airspeed_scale: f64,
 }
 
@@ -145,17 +145,17 @@ pub struct FrameFaults {
 /// Everything a run needs.
 #[derive(Clone, Debug)]
 pub struct ShimOptions {
-    /// Where the companion is met.
+    /// Address of the link to the companion, or to the stack whose simulator this run is.
     pub link: Address,
     /// Clock that paces the run.
     pub pace: Pace,
     /// When the aircraft begins to fly.
     pub launch: Launch,
-    /// Ends the run after so much simulated flight, s, not counting the time held at the start.
+    /// Simulated flight after which the run ends, s; the time held at the start does not count.
     pub duration_s: Option<f64>,
     /// The state at the start.
     pub start: Start,
-    /// The aircraft, its air, what is hidden in it.
+    /// The aircraft, its air and its hidden effects.
     pub plant: PlantOptions,
     /// Seed of sensor noise and frame faults.
     pub seed: u64,
@@ -169,13 +169,13 @@ pub struct ShimOptions {
     pub faults: FrameFaults,
     /// Flight stack to simulate; `None` uses the profile `sitl`.
     pub personality: Option<Personality>,
-    /// Parameters of the played stack that differ from its defaults.
+    /// Parameters of the simulated stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
-    /// Names in the parameter file that the played stack lacks: they are printed and have no effect.
+    /// Names in the parameter file that the simulated stack lacks: they are printed and have no effect.
     pub unplayed: Vec<String>,
-    /// Be the simulator of PX4 SITL instead; `None` speaks to a companion.
+    /// Options for a run as the simulator of PX4 SITL; `None` for a run with a companion.
     pub px4: Option<Px4Options>,
-    /// Be the simulator of ArduPilot SITL instead; `None` speaks to a companion.
+    /// Options for a run as the simulator of ArduPilot SITL; `None` for a run with a companion.
     pub ardupilot: Option<ArdupilotOptions>,
     /// Initial value of the vehicle's clock, s. A value just below a counter's overflow tests the overflow in flight.
     pub clock_start_s: f64,
@@ -210,7 +210,7 @@ impl ShimOptions {
         }
     }
 
-    /// Refuses numbers that mean nothing, before anything is opened.
+    /// Refuses invalid numbers before anything is opened.
     pub(super) fn check(&self) -> Result<(), ShimError> {
         let faults = &self.faults;
         let mut errors = self.noise.values().to_vec();
@@ -236,7 +236,7 @@ impl ShimOptions {
             self.personality.is_none() || self.pace == Pace::RealTime,
             "a personality flies in real time, as the flight controller it plays does",
         )?;
-        // Ten thousand years, which still are whole microseconds.
+        // Ten thousand years, whose microseconds fit in 64 bits.
         demand(
             (0.0..=3.2e11).contains(&self.clock_start_s),
             "the clock must start at 0 s or later, and at 3.2e11 s at the latest",
@@ -268,7 +268,7 @@ impl ShimOptions {
         demand(start.altitude_m > 0.0, "the altitude at the start must be positive")
     }
 
-    /// Refuses what the simulator interfaces of PX4 and ArduPilot cannot be asked for.
+    /// Refuses options that the simulator interfaces of PX4 and ArduPilot do not support.
     fn check_simulators(&self) -> Result<(), ShimError> {
         if let Some(px4) = &self.px4 {
             demand(

@@ -70,7 +70,7 @@ struct Output {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputMap(Vec<Output>);
 
-/// A map of outputs that cannot be flown by.
+/// An assignment of outputs that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "cannot read the outputs '{given}': {fault}; write them like left-aileron=6,right-aileron=7,elevator=8,throttle=5, with the numbers of PX4's PWM_MAIN_FUNCn or of ArduPilot's SERVOn_FUNCTION (aileron, left-aileron, right-aileron, elevator, left-elevon, right-elevon, rudder, throttle; a minus reverses)"

@@ -17,12 +17,12 @@ use crate::plant::Inputs;
 const PERIOD: Duration = Duration::from_micros(FRAME_US);
 /// A cycle that begins later than this is late.
 const LATE: Duration = Duration::from_millis(2);
-/// A clock that is further behind than this is set anew: no burst of frames makes up for it.
+/// Delay beyond which the clock is reset: no burst of frames makes up for it.
 const HOPELESS: Duration = Duration::from_millis(100);
 /// An answer older than this is not flown, µs.
 const STALE_US: u64 = 500_000;
-/// How often the link is looked at while an answer is expected, to measure when it comes: finely
-/// as long as it is punctual, then coarsely.
+/// Intervals at which the link is polled while an answer is expected: short while the answer may be
+/// punctual, to measure its time, then long.
 const LOOKS: [Duration; 2] = [Duration::from_micros(100), Duration::from_millis(1)];
 /// An answer within this time is punctual.
 const PUNCTUAL: Duration = Duration::from_millis(4);
@@ -96,7 +96,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
         }
     }
 
-    /// Judges how punctual this cycle is; returns the deadline it counts from.
+    /// Records the lateness of this cycle; returns the deadline from which the next one counts.
     fn begin(&mut self, deadline: Instant) -> Instant {
         let now = Instant::now();
         let late = now.saturating_duration_since(deadline);
@@ -110,7 +110,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
         deadline
     }
 
-    /// Measures, and puts the frame on its way.
+    /// Measures the state and queues its frame for sending.
     fn show(&mut self, flight: &mut Flight, faults: &mut Faults, due: Instant) {
         let (frame, measured) = flight.measure();
         self.now_us = frame.time_us;

@@ -76,12 +76,12 @@ impl<'a> Session<'a> {
         self.last_message.is_some()
     }
 
-    /// Whether the companion has come within reach since this was last asked.
+    /// Whether the companion has become reachable since the last call.
     pub fn take_newly_reachable(&mut self) -> bool {
         std::mem::take(&mut self.newly_reachable)
     }
 
-    /// The bytes of a state frame, with sequence numbers of their own.
+    /// The bytes of a state frame, with new sequence numbers.
     pub fn encode(&mut self, frame: &StateFrame) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(320);
         frame.encode(&mut self.encoder, &mut bytes);

@@ -32,7 +32,7 @@ pub enum Event {
     Paused,
     /// Lockstep: the answer has come after all.
     Resumed,
-    /// The played flight controller has changed its mode.
+    /// The simulated flight controller has changed its mode.
     Mode(String),
     /// Event of a run against PX4.
     Px4(Px4Event),
@@ -120,7 +120,7 @@ impl Latency {
         self.longest
     }
 
-    /// The time that this share (0..1) of the answers stayed within, to the bin; zero without answers.
+    /// The quantile `share` (0..1) of the times from frame to answer, to the bin; zero without answers.
     pub fn quantile(&self, share: f64) -> Duration {
         let wanted = (share * self.count as f64).ceil() as u64;
         let mut seen = 0;
@@ -161,11 +161,11 @@ pub struct Summary {
     pub unanswered_steps: u64,
     /// Real time: cycles that began more than 2 ms late.
     pub late_cycles: u64,
-    /// Real time: the latest beginning of a cycle.
+    /// Real time: the largest delay of the start of a cycle.
     pub latest_cycle: Duration,
     /// Runs of bytes that were no frame.
     pub bad_frames: u64,
-    /// Good frames of others than the companion, with messages unknown here.
+    /// Valid frames of other senders than the companion, and frames with unknown messages.
     pub foreign_frames: u64,
     /// Simulated time that was shown, s.
     pub simulated_s: f64,

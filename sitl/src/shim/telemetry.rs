@@ -33,7 +33,7 @@ const SENSORS: u32 = 0x01 | 0x02 | 0x08 | 0x10 | 0x20;
 /// The five messages that make a state frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateFrame {
-    /// The time the frame is known by, µs.
+    /// Simulated time that identifies the frame, µs.
     pub time_us: u64,
     imu: HighresImu,
     hud: VfrHud,

@@ -1,10 +1,10 @@
 //! The model monitor compares measured accelerations in flight with the model's predictions.
 //!
-//! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at the
-//! measured state and surfaces. Its band is two standard deviations of the prediction, from the standard deviations of the
-//! model's coefficients (15 % where its file states none) and of the measured inputs, gusts included where no vanes measure them. A channel outside its band for 2 s is
-//! reported once, and again only after it has been well inside for 5 s. Deviations in the same plane within 20 s are
-//! attributed to the same cause and not reported again.
+//! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at the measured
+//! state and surfaces. Its band is two standard deviations of the prediction. These follow from the standard deviations of the
+//! model's coefficients (15 % where its file states none) and of the measured inputs, which include gusts where no vanes measure
+//! the incidence. A channel outside its band for 2 s is reported once, and again only after it has been well inside for 5 s.
+//! Deviations in the same plane within 20 s are attributed to the same cause and not reported again.
 //!
 //! No command depends on the monitor.
 

@@ -18,7 +18,7 @@ const THROTTLE_SD: f64 = 0.02;
 /// 1.9 σ_w / √(L b).
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
-/// Largest step of a difference in α and β, rad: a step of a whole gust would end behind the stall, where lift has come back down.
+/// Largest step of the finite differences in α and β, rad: the step of a whole gust would end beyond the stall, where lift drops.
 const INCIDENCE_STEP: f64 = 2.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 

@@ -11,7 +11,7 @@ const COMPARED_S: f64 = 3.0;
 const BAND: f64 = 2.0;
 /// Time outside the band after which a deviation is reported, s.
 const OUTSIDE_S: f64 = 2.0;
-/// It is reported again only after the residual was below this fraction of the band for this time, s.
+/// A deviation is reported again only after the residual was below this fraction of the band for this time, s.
 const QUIET: f64 = 0.7;
 const QUIET_S: f64 = 5.0;
 /// Correlation above which a residual follows a surface, and the smallest surface movement that shows it, rad.

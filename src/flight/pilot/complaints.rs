@@ -9,7 +9,7 @@ use greylag_physics::Time;
 /// Least time between two warnings of the same kind, s.
 const COMPLAINT_INTERVAL_S: f64 = 5.0;
 
-/// Delay of airspeed and altitude that is reported, s: after a gap the first is 20 ms away.
+/// Delay of airspeed and altitude above which it is reported, s: after a gap they normally follow within 20 ms.
 const LATE_AIR_S: f64 = 0.5;
 
 /// Time of the last report of each kind.

@@ -12,8 +12,8 @@ const PROTECTION_BAND: f64 = 2.0;
 const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
 /// Smallest pitch above the maximum airspeed, rad: clearly nose up, not a climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
-/// Load factor available at the minimum airspeed. An envelope sets that airspeed near 1.41 times the stall speed (13
-/// to 9.2 m/s for the X8), where lift allows 2; a margin of 1.2 times the stall speed in a turn leaves 2 / 1.2².
+/// Load factor available at the minimum airspeed. That airspeed is about 1.41 times the stall speed (13 and 9.2 m/s
+/// for the X8), so that the lift allows a load factor of 2; a margin of 1.2 on the stall speed in a turn leaves 2 / 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 

@@ -380,7 +380,7 @@ impl Pilot {
         self.target = self.limits.limit(wish, frame.state.airspeed);
         self.report_limits(&wish);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
-        // Noise of a sensor at rest.
+        // Noise of a sensor at rest may be negative.
         state.airspeed = state.airspeed.max(0.0);
         Pending::Fly {
             seen: Observation {

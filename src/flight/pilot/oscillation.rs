@@ -1,10 +1,10 @@
 //! The oscillation guard detects a limit cycle of the loop through a surface at its limits.
 //!
-//! A loop with more delay than its margin can enter a limit cycle that the surface's slew limit sustains: the X8 by
-//! ArduPlane's channels oscillated at 2.6 Hz, q to 228 °/s, for 50 s, with every state fresh and every command in
-//! range. Its signature is a rate that changes sign repeatedly with the command at its limit, or sweeping over half
-//! of its travel, in each half period. A manoeuvre shows this once or twice; turbulence does not move a command this
-//! far.
+//! A loop with more delay than its margin can enter a limit cycle that the surface's slew limit sustains. The X8,
+//! commanded through ArduPlane's channels, oscillated at 2.6 Hz, q to 228 °/s, for 50 s, with every state fresh and
+//! every command in range. The signature is a rate that changes sign repeatedly with the command at its limit, or
+//! sweeping over half of its travel, in each half period. A manoeuvre shows this once or twice; turbulence does not
+//! move a command this far.
 
 use super::limits::TICK_S;
 use greylag_link::vehicle::Axis;
@@ -38,11 +38,11 @@ struct Swings {
     mean: Option<f64>,
     /// Sign of the present half period, 0 before the first.
     sign: f64,
-    /// Its duration, and the time of it with the command at a limit, s.
+    /// Duration of the present half period, and its part with the command at a limit, s.
     lasts: f64,
     limited: f64,
     peak: f64,
-    /// Smallest and largest command in it.
+    /// Smallest and largest command of the present half period.
     range: [f64; 2],
     /// Consecutive half periods that qualified, and their total duration, s.
     row: u32,
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn a_swing_over_half_of_the_travel_is_found_without_the_limit() {
-        // 0.15 of a change in a tick at most, where 0.2 are allowed, and 0.8 at most
+        // the elevator changes by at most 0.15 a tick, where 0.2 is allowed, and reaches at most 0.8
         let q = |t: f64| 2.5 * (TAU * 3.0 * t).sin();
         let elevator = |part: f64| move |t: f64| -part * (TAU * 3.0 * t + 0.6).sin();
         let at = trips(5.0, q, elevator(0.8)).unwrap();

@@ -34,7 +34,7 @@ enum Entry {
     Call(Call),
 }
 
-/// The handle of the control thread.
+/// The control thread's handle to the recorder.
 #[derive(Debug)]
 pub struct Recorder {
     queue: Queue<Entry, Written>,
@@ -105,7 +105,7 @@ impl Recorder {
         self.queue.hand_over(Entry::Call(call));
     }
 
-    /// Errors since the last call; each file fails at most once.
+    /// The oldest error that was not returned yet; each file fails at most once.
     pub fn trouble(&self) -> Option<String> {
         self.troubles.try_recv().ok()
     }

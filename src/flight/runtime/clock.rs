@@ -7,10 +7,10 @@ use greylag_physics::Time;
 /// Advance of vehicle time between frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Real time: between frames it advances with the host's clock, while the link is polled.
+    /// Real time: between frames vehicle time advances with the host's clock, while the link is polled.
     RealTime,
-    /// Lockstep: it stands between frames, until the vehicle has been silent for [`PATIENCE`]. A flight then does not
-    /// depend on the speed of the machine.
+    /// Lockstep: vehicle time stands between frames, until the vehicle has been silent for [`PATIENCE`]. A flight
+    /// then does not depend on the speed of the machine.
     Lockstep,
 }
 
@@ -80,7 +80,7 @@ mod tests {
         let start = Instant::now();
         let time = |ms: u64| Time::from_micros(1000 * ms);
         let later = |ms: u64| start + Duration::from_millis(ms);
-        // A second in which the link was looked at, then four in which nobody was there to look.
+        // One second in which the link was polled, then four in which it was not.
         for (pace, after_a_second, after_five) in
             [(Pace::RealTime, 6000, 6100), (Pace::Lockstep, 5000, 5000)]
         {

@@ -8,7 +8,7 @@ const LATE: Duration = Duration::from_millis(100);
 const USUAL: Duration = Duration::from_millis(10);
 /// Least time between two reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(5);
-/// Fraction of a stall in which the thread was runnable from which the cause is other load.
+/// Fraction of a stall in which the thread was runnable, above which the cause is other load.
 const BUSY: f64 = 0.5;
 
 /// The thread that stalled.
@@ -34,8 +34,8 @@ impl Attention {
         Attention { looked: host, network: (0, host) }
     }
 
-    /// Checks at `host`, with the rounds of the network thread; on a stall the thread and the time since which it did
-    /// not listen.
+    /// Checks at `host`, with the rounds of the network thread. On a stall, returns the thread and the time since
+    /// which it did not listen.
     pub(super) fn look(&mut self, host: Instant, rounds: u64) -> Option<(Behind, Instant)> {
         let looked = std::mem::replace(&mut self.looked, host);
         if rounds != self.network.0 {
@@ -76,7 +76,7 @@ pub(super) enum Cause {
 pub(super) struct Waited(Option<Duration>);
 
 impl Waited {
-    /// Reads the counters; zero where the system has none.
+    /// Reads the counters; unknown where the system has none.
     pub(super) fn now() -> Self {
         let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
         Waited(
@@ -144,7 +144,7 @@ impl Reports {
     }
 }
 
-/// The processes that use the processor, as text.
+/// Text on the load of the processors by other work.
 fn busy() -> String {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let load = std::fs::read_to_string("/proc/loadavg").ok();

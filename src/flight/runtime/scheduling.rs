@@ -10,8 +10,8 @@ use super::timing::Histogram;
 const PRIORITY: i32 = 40;
 /// Period of the measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// A hundredth of the wake-ups may be later than the first, none later than the second: a plan has 8 ms of a cycle of
-/// 10 ms.
+/// Limits of the wake-up latency: one wake-up in a hundred may exceed the first, none the second. A plan has 8 ms of
+/// a cycle of 10 ms.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
 /// Puts this thread, and all that it starts, into the scheduling class SCHED_FIFO: it runs before all threads outside
@@ -33,7 +33,7 @@ pub fn take_real_time() -> io::Result<()> {
     Err(io::Error::from(io::ErrorKind::Unsupported))
 }
 
-/// Wake-up latency of a thread that sleeps for each 10 ms.
+/// Wake-up latency of a thread that sleeps for 10 ms at a time.
 #[derive(Clone, Debug, Default)]
 pub struct Punctuality {
     late: Histogram,

@@ -75,8 +75,8 @@ impl Session {
         }
     }
 
-    /// Notes the version of a received frame: a peer that has sent MAVLink 2 is answered in it, one that has only
-    /// sent MAVLink 1 in that.
+    /// Notes the version of a received frame. A peer that has sent MAVLink 2 is answered in MAVLink 2, a peer
+    /// that has only sent MAVLink 1 in MAVLink 1.
     pub fn note_frame(&mut self, host: Duration, frame: &Frame<'_>) {
         let stale = host.saturating_sub(self.heard) > VERSION_MEMORY;
         if !self.spoken || stale || frame.version == Version::V2 {

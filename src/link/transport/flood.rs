@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// Datagrams per second that are accepted from one sender: a flight controller that sends each message by itself
 /// sends 500, a parameter list or a log at full speed 1000.
 const PER_SECOND: f64 = 4000.0;
-/// Burst in datagrams: what accumulates while this computer stalls for some seconds.
+/// Burst in datagrams: as many as accumulate while this computer stalls for some seconds.
 const BURST: f64 = 1000.0;
 /// Number of senders tracked; all others share one limit.
 const SENDERS: usize = 64;
@@ -121,7 +121,7 @@ mod tests {
             taken += u32::from(senders.may(sender(2 + (i % 60_000) as u16), now));
         }
         assert_eq!(own, 200);
-        // 4000 a second and the first burst for all strangers, one for each place and second.
+        // 4000 a second and the first burst for all other senders, and one a second for each tracked place.
         assert!(taken < 41_000 + 10 * 64, "{taken}");
     }
 }

@@ -226,7 +226,7 @@ async fn write(
             count(&port.counters.outbox_full);
             frame = newer;
         }
-        // Never flushed: that waits for the last bit to have left the port.
+        // The port is not flushed: a flush waits until the last bit has left it.
         match timeout(STALLED, stream.write_all(&frame)).await {
             Ok(Ok(())) => count(&port.counters.sent),
             Ok(Err(_)) => {

@@ -85,7 +85,7 @@ fn count_of(connections: &Connections) -> usize {
 
 /// Serves one connection, reading and writing, until it ends.
 async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: SocketAddr) {
-    // A command must not wait for more bytes to fill a segment; without this it is only slower.
+    // A command must not wait for more bytes to fill a segment; where this option fails, commands are only slower.
     let _ = stream.set_nodelay(true);
     let (reading, writing) = stream.into_split();
     let (queue, frames) = channel(QUEUE);

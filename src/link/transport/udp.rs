@@ -34,7 +34,7 @@ pub(super) fn reach(
     to: SocketAddr,
     outgoing: Receiver<(SocketAddr, Vec<u8>)>,
 ) -> io::Result<SocketAddr> {
-    // To this machine only from this machine, so that no stranger finds the port.
+    // A loopback address is reached from a loopback address, so that other machines cannot find the port.
     let from: SocketAddr = match (to, to.ip().is_loopback()) {
         (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),
         (SocketAddr::V4(_), false) => (Ipv4Addr::UNSPECIFIED, 0).into(),

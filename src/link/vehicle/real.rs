@@ -69,7 +69,7 @@ pub struct Real {
     intruder: Option<Source>,
     /// Another component of the controller's system (a gimbal, a camera) that sends heartbeats, and when it last did.
     sibling: Option<(Duration, Source)>,
-    /// The host's clock when something was last due.
+    /// Host time of the last call of `due`.
     now: Duration,
     parameters: Parameters,
     survey: Survey,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::aircraft;
 
-/// Names by what the aircraft's files do with them.
+/// Names of properties, by how the aircraft's files use them.
 pub(super) struct Names {
     /// Properties that the systems read but do not write: the commands and others.
     pub commands: Vec<String>,
@@ -56,12 +56,12 @@ impl Names {
     }
 }
 
-/// Aerodynamics, and the rest.
+/// The text within `<aerodynamics>`, and the rest.
 fn parted(all: &str) -> (String, String) {
     let (mut inside, mut outside, mut rest) = (String::new(), String::new(), all);
     while let Some(from) = rest.find("<aerodynamics") {
         let to = rest[from..].find("</aerodynamics>").map_or(rest.len(), |k| from + k);
-        // a reference to a file has no end of its own
+        // a reference to a file closes itself and has no end tag
         if rest[from..].find("/>").is_some_and(|k| !rest[from..from + k].contains('>')) {
             outside.push_str(&rest[..from + 1]);
             rest = &rest[from + 1..];
@@ -75,7 +75,7 @@ fn parted(all: &str) -> (String, String) {
     (inside, outside)
 }
 
-/// Outputs of components, and the property that a component's name is.
+/// Properties that components write: their outputs, and the properties that bear their names.
 fn written(systems: &str) -> BTreeSet<String> {
     let mut all: BTreeSet<String> = elements(systems, "output").into_iter().collect();
     for component in attributes(systems, "name") {

@@ -8,24 +8,25 @@ use crate::plant::{PlantError, Properties};
 #[derive(Clone, Debug)]
 pub(super) struct Tried {
     pub command: String,
-    /// Rolling, pitching, yawing moment by their lengths at the command 1, less those at 0.
+    /// Rolling, pitching and yawing moment, each divided by its reference length, at the command 1
+    /// less those at 0, lbf.
     pub moments: [f64; 3],
-    /// Positions that moved: at the command −1 (0 where it has no other side) and 1.
+    /// Positions that moved, with their changes at the commands −1 (0 without a negative side) and 1.
     pub moved: Vec<(String, [f64; 2])>,
-    /// The command at which all is at its stop.
+    /// The least command that gives the full deflection.
     pub full_at: f64,
-    /// Whether it has two sides.
+    /// Whether the command may be negative.
     pub two_sided: bool,
 }
 
-/// Full deflection where only a share of it is known, rad: 20°.
+/// Deflection assumed at full command where only a normalised position is known, rad: 20°.
 const SHARE_RAD: f64 = 0.349;
-/// Least share of a moment beside the largest of its axis.
+/// Least moment of a candidate, as a fraction of the largest about the same axis.
 const LEAST: f64 = 0.05;
-/// Least share of a moment beside the largest of any axis: less is rounding.
+/// Least moment about an axis, as a fraction of the largest about any axis: less is rounding.
 const LEAST_OF_ALL: f64 = 1e-3;
 
-/// A control: the aileron is one of these with the axis 0.
+/// A control and its axis: 0 roll, 1 pitch, 2 yaw.
 struct Role {
     name: &'static str,
     axis: usize,
@@ -46,7 +47,7 @@ const ROLES: [Role; 3] = [
     },
     Role { name: "rudder", axis: 2, sense: -1.0, words: ["rud", "rud", "yaw"], does: "yaws" },
 ];
-/// Words of commands that move the aircraft, and do not steer it.
+/// Parts of the names of commands that are no primary controls.
 const OTHERS: [&str; 7] = ["flap", "spoil", "brake", "trim", "slat", "gear", "gain"];
 
 /// One command, or two with a sign for the second.
@@ -82,7 +83,7 @@ pub(super) fn choose(tried: &[Tried], names: &Names, aircraft: &str) -> Result<F
     Ok(Found { properties, notes })
 }
 
-/// Commands with what they move most, in short.
+/// Short list of the commands, each with the axis that it moves most.
 fn listed(tried: &[Tried], names: &Names) -> String {
     if tried.is_empty() {
         return format!("{} commands were tried, none moves anything", names.commands.len());
@@ -122,7 +123,7 @@ fn best<'a>(tried: &'a [Tried], role: &Role) -> Option<Choice<'a>> {
 fn score(parts: &[(&Tried, f64)], role: &Role, largest: f64) -> f64 {
     let sum = |axis: usize| parts.iter().map(|(t, sign)| sign * t.moments[axis]).sum::<f64>().abs();
     let own = sum(role.axis);
-    // roll and yaw go together in every aircraft; pitch stands apart
+    // moments about the other two axes count against a candidate
     let beside: f64 = (0..3).filter(|k| *k != role.axis).map(sum).sum();
     if !(own > LEAST * largest && own > 1e-9) || parts.iter().any(|(t, _)| !t.two_sided) {
         return 0.0;
@@ -146,7 +147,7 @@ fn are_sides(a: &str, b: &str) -> bool {
     swapped || (a.len() == b.len() && differ.len() == 1 && letters)
 }
 
-/// The position that a command moves: in radians, and most.
+/// The position that a command moves: the one in rad with the largest change, else a normalised one.
 fn position(tried: &Tried) -> Option<&(String, [f64; 2])> {
     let kind = |name: &str| match name {
         _ if name.contains("deg") => 0,

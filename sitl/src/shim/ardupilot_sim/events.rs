@@ -28,7 +28,7 @@ pub enum ArdupilotEvent {
     Catapult,
     /// No servo packet for a second.
     Stopped,
-    /// A servo packet has come after all.
+    /// Servo packets come again after a silence.
     Resumed,
     /// A datagram that is no servo packet: from where, of how many bytes.
     Garbage(SocketAddr, usize),

@@ -1,9 +1,9 @@
 //! ArduPilot's JSON interface: the shim as the simulator of stock ArduPlane SITL.
 //!
 //! ArduPilot sends a servo packet for every step, to UDP port 9002, and waits for the state, one
-//! line of JSON. So ArduPilot drives: a step is made on a new packet and never without, and it
-//! keeps to the wall clock or not by its own option `--speedup`. The protocol is that of
-//! ArduPilot's public documentation (SITL, JSON interface).
+//! line of JSON. ArduPilot therefore sets the pace: the simulation steps only on a new packet, and
+//! ArduPilot's option `--speedup` decides whether the run follows the wall clock. The protocol is
+//! that of ArduPilot's public documentation (SITL, JSON interface).
 
 mod events;
 mod packet;
@@ -30,10 +30,11 @@ pub use state::Home;
 
 /// One step of JSBSim, µs.
 const STEP_US: u64 = 1_000;
-/// ArduPilot is shown every second step at most: it refuses to arm when its sensors come slower
-/// than 1.8 times its own loop (SCHED_LOOP_RATE, up to 250 Hz of a plane), whatever it asks for.
+/// Most steps of JSBSim between two states that are sent. ArduPilot refuses to arm when its sensors
+/// update slower than 1.8 times its own loop (SCHED_LOOP_RATE, up to 250 Hz on a plane), whatever
+/// rate it asks for.
 const MOST_STEPS: u64 = 2;
-/// After this silence it is reported, and another ArduPilot is answered.
+/// Silence after which ArduPilot is reported as stopped and another ArduPilot may connect.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// Options of a run against ArduPilot only.
@@ -325,7 +326,7 @@ enum Meeting {
     Again,
 }
 
-/// Steps of JSBSim from one state to the next at `asked_hz`: as many as come nearest, at least one.
+/// Steps of JSBSim between two states at the rate `asked_hz`: the nearest whole number from 1 to `MOST_STEPS`.
 fn steps(asked_hz: u16) -> u64 {
     let nearest = (1e6 / (f64::from(asked_hz.max(1)) * STEP_US as f64)).round() as u64;
     nearest.clamp(1, MOST_STEPS)

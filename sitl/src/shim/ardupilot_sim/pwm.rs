@@ -38,8 +38,8 @@ impl PwmRange {
     /// 1000, 1500 and 2000 µs, as for ArduPilot's own simulated aircraft.
     pub const STANDARD: PwmRange = PwmRange { low_us: 1000, neutral_us: 1500, high_us: 2000 };
 
-    /// What `pwm_us` commands: −1..1 of a surface, 0..1 of a throttle, beyond that outside the
-    /// range. Without a pulse nothing is commanded.
+    /// Command of a pulse of `pwm_us`: −1..1 for a surface, 0..1 for a throttle. A pulse width
+    /// beyond the stops gives a command beyond these limits; no pulse (0) gives 0.
     pub fn command(self, pwm_us: u16, range: Range) -> f64 {
         let [pwm, low, neutral, high] =
             [pwm_us, self.low_us, self.neutral_us, self.high_us].map(f64::from);

@@ -84,7 +84,7 @@ mod tests {
         let truth = Truth {
             yaw_rad: std::f64::consts::FRAC_PI_2,
             airspeed_mps: 20.0,
-            // A quarter of the density halves the pressure's speed.
+            // A quarter of the density halves the equivalent airspeed.
             air_density_kgpm3: 1.225 / 4.0,
             specific_force_mps2: [0.0, 0.0, -9.81],
             velocity_ned_mps: [1.0, 2.0, 3.0],

@@ -103,11 +103,11 @@ messages! {
         errors_count4: u16,
         /// Battery remaining, %; −1 is unknown.
         battery_remaining: i8,
-        /// Further bits of what is fitted (extension).
+        /// Further bits of the sensors that are fitted (extension).
         onboard_control_sensors_present_extended: u32,
-        /// Further bits of what is switched on (extension).
+        /// Further bits of the sensors that are enabled (extension).
         onboard_control_sensors_enabled_extended: u32,
-        /// Further bits of what is healthy (extension).
+        /// Further bits of the sensors that are healthy (extension).
         onboard_control_sensors_health_extended: u32,
     }
 
@@ -214,7 +214,7 @@ messages! {
         time_usec: u64,
         /// Bit 0: the sender is in lockstep; unused in the profile `sitl`.
         flags: u64,
-        /// Aileron, elevator, throttle, then unused.
+        /// Aileron, elevator, throttle, rudder, then unused; of PX4 the outputs 1 to 16.
         controls: [f32; 16],
         /// MAV_MODE_FLAG bits; 128 is armed.
         mode: u8,

@@ -112,7 +112,7 @@ fn front(bytes: &[u8]) -> Front {
         return Front::Unfinished;
     }
     let Some(extra) = crc_extra(layout.id) else {
-        // Without a checksum, only a frame that ends where another begins is believed.
+        // The checksum cannot be checked: the frame counts only if another frame or the end of the data follows.
         let plausible = matches!(bytes.get(total), None | Some(&(MAGIC_1 | MAGIC_2)));
         return if plausible { Front::Unknown(total) } else { Front::Garbage };
     };

@@ -1,13 +1,13 @@
 //! ArduPlane's failsafes, as its sources have them (`events.cpp`, `radio.cpp`, `system.cpp` of 4.6 to 4.8-dev).
 //!
-//! One state remembers what has failed; each failure acts once, when it is found, and what has acted hides lesser ones.
+//! One state holds the active failure. Each failure acts once, when it is detected, and masks lesser ones while it is active.
 
 use super::modes::Mode;
 use super::parameters::Table;
 
-/// ArduPilot neutralises its sticks at RC_FS_TIMEOUT, and counts ten readings of its channels at 50 Hz more.
+/// Time of ten more readings of the channels at 50 Hz, which ArduPilot counts after RC_FS_TIMEOUT, s.
 const COUNTED_S: f64 = 0.2;
-/// Long failures are looked for at 3 Hz.
+/// Steps between two checks for long failures: 3 Hz.
 const LOOK_EVERY: u64 = 33;
 /// FS_SHORT_TIMEOUT: a ground station whose heartbeat is younger than this is connected, s.
 const BACK_S: f64 = 1.5;
@@ -17,11 +17,11 @@ const BACK_S: f64 = 1.5;
 enum Failed {
     #[default]
     Nothing,
-    /// The receiver, since this time, µs; what was flown before.
+    /// RC receiver lost since this time, µs, and the mode before.
     Short(u64, Mode),
-    /// The receiver, for longer.
+    /// RC receiver lost for longer than FS_LONG_TIMEOUT, or from the start.
     Long,
-    /// The ground station.
+    /// Ground station lost.
     Station,
 }
 
@@ -42,11 +42,11 @@ pub(super) struct Seen {
 /// Action of a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Act {
-    /// The mode to go to; none where it stays.
+    /// The mode to go to; `None` where the mode stays.
     pub(super) mode: Option<Mode>,
-    /// Whether what a companion has put in the place of the channels is dropped.
+    /// Whether the companion's channel overrides are dropped.
     pub(super) drops_overrides: bool,
-    /// For the ground station.
+    /// STATUSTEXT for the ground station.
     pub(super) words: &'static [u8],
 }
 
@@ -63,13 +63,13 @@ pub(super) struct Failsafes {
 }
 
 impl Failsafes {
-    /// Looks at a step.
+    /// Evaluates the failsafes at a step.
     pub(super) fn watch(&mut self, seen: &Seen, parameters: &Table) -> Option<Act> {
         let patience = parameters.get("RC_FS_TIMEOUT") + COUNTED_S;
         let silent = !seen.radio && seen.sticks_s.is_none_or(|age| age > patience);
         let receiver = parameters.get("THR_FAILSAFE") == 1.0 && silent;
         if !std::mem::replace(&mut self.begun, true) && receiver {
-            // On the ground already.
+            // The failure is older than the flight: its failsafe has acted on the ground already.
             self.failed = Failed::Long;
         }
         let short = parameters.get("FS_SHORT_ACTN") as i32;
@@ -133,5 +133,5 @@ impl Failsafes {
     }
 }
 
-/// FS_SHORT_ACTN that leaves it to the long failsafe.
+/// FS_SHORT_ACTN that disables the short failsafe.
 const SHORT_DISABLED: i32 = 3;

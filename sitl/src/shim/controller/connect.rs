@@ -17,17 +17,17 @@ const MISSION_ACCEPTED: u8 = 0;
 const MISSION_UNSUPPORTED: u8 = 3;
 const MISSION_INVALID_SEQUENCE: u8 = 13;
 
-/// MAV_PROTOCOL_CAPABILITY bits of what is played by both: MISSION_INT, SET_ATTITUDE_TARGET,
+/// MAV_PROTOCOL_CAPABILITY bits of both simulated stacks: MISSION_INT, SET_ATTITUDE_TARGET,
 /// MAVLINK2, MISSION_FENCE, MISSION_RALLY (lists that are always empty) ...
 const CAPABILITIES: u64 = 1 << 2 | 1 << 6 | 1 << 13 | 1 << 14 | 1 << 15;
 /// ... and how integers are sent as parameters: PARAM_ENCODE_BYTEWISE, PARAM_ENCODE_C_CAST.
 const BYTEWISE: u64 = 1 << 4;
 const CAST: u64 = 1 << 17;
-/// Versions that are played, as FLIGHT_SW_VERSION has them: 1.15.0 and 4.6.0, released.
+/// Simulated versions in the encoding of FLIGHT_SW_VERSION: 1.15.0 and 4.6.0, released.
 const PX4_VERSION: u32 = 0x010F_00FF;
 const ARDUPILOT_VERSION: u32 = 0x0406_00FF;
 
-/// A message that is sent on request, with what was asked for in param2.
+/// A message that is sent on request, with the index of the mode or message that the request names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Requested {
     id: u32,
@@ -93,7 +93,7 @@ impl FlightController {
                 self.encoder.encode(&message, out);
             }
             AvailableModes::ID => {
-                // 0 asks for all; they are counted from 1.
+                // Index 0 requests all modes; modes are counted from 1.
                 let wanted = |at: usize| index < 1.0 || index as usize == at + 1;
                 for (at, mode) in Mode::ALL.into_iter().enumerate().filter(|(at, _)| wanted(*at)) {
                     let message = mode.available(self.personality, at);
@@ -147,8 +147,8 @@ impl FlightController {
         self.encoder.encode(&answer, &mut self.waiting);
     }
 
-    /// The mission protocol as a controller answers it that holds no mission, fence or rally
-    /// points and takes none; whether the frame was of it.
+    /// Answers the mission protocol as a controller that holds no mission, fence or rally points
+    /// and accepts none. Returns whether the frame belongs to that protocol.
     pub(super) fn mission(&mut self, frame: &Frame) -> bool {
         let ours = |system: u8, component: u8| system == SYSTEM && matches!(component, 0 | 1);
         let (target, mission_type, result) = if let Some(m) = frame.decode::<MissionRequestList>() {

@@ -12,7 +12,7 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// `measured` with its rates behind a low-pass of `cutoff_hz`; 0 is none.
+    /// `measured` with its rates low-pass filtered at `cutoff_hz`; 0 is no filter.
     pub(super) fn filtered(&mut self, mut measured: Truth, cutoff_hz: f64) -> Truth {
         let now = [measured.p_radps, measured.q_radps, measured.r_radps];
         let share = if cutoff_hz > 0.0 { share(cutoff_hz) } else { 1.0 };
@@ -35,8 +35,8 @@ impl Lag {
     }
 }
 
-/// Share of a new sample in a first-order low-pass at the steps' rate that is as late, for what is slow,
-/// as the second-order Butterworth low-pass of both stacks: √2 / (2π f), 11 ms at 20 Hz.
+/// Weight of a new sample in a first-order low-pass at the step rate. Its delay at low frequency is that
+/// of the second-order Butterworth low-pass of both stacks: √2 / (2π f), 11 ms at 20 Hz.
 fn share(cutoff_hz: f64) -> f64 {
     let late_s = std::f64::consts::SQRT_2 / (std::f64::consts::TAU * cutoff_hz);
     DT_S / (DT_S + late_s)

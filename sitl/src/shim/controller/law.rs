@@ -1,8 +1,9 @@
-//! The stack's own attitude loops, with the airspeed and altitude loops it flies by itself with.
+//! The attitude loops of a flight stack, and its airspeed and altitude loops for the autonomous modes.
 //!
-//! Both stacks are alike: attitude errors ask for rates, with those of a coordinated turn; rate errors, their integral and the
-//! rates asked for move the surfaces, less so the faster the aircraft flies. PX4: `FixedwingAttitudeControl`,
-//! `FixedwingRateControl`, August 2025. ArduPlane: `AP_RollController`, `AP_PitchController`, 4.8.
+//! Both stacks have the same structure. The attitude error gives a commanded rate, to which the rate of a coordinated turn is
+//! added. The rate error, its integral and the commanded rate (feed-forward) give the deflection, which is scaled down with
+//! airspeed. PX4: `FixedwingAttitudeControl`, `FixedwingRateControl`, August 2025. ArduPlane: `AP_RollController`,
+//! `AP_PitchController`, 4.8.
 
 use super::Personality;
 use crate::plant::{DT_S, Inputs, Travel, Truth};
@@ -14,19 +15,19 @@ const AIRSPEED: [f64; 2] = [0.2, 0.1];
 const CRUISE_MPS: f64 = 20.0;
 /// Throttle in level flight.
 const THROTTLE: f64 = 0.2;
-/// Altitude error (m) and climb rate (m/s) to pitch (rad), and the most of it.
+/// Gains from altitude error (m) and climb rate (m/s) to pitch (rad), and the limit of that pitch, rad.
 const ALTITUDE: [f64; 3] = [0.01, 0.02, 0.15];
-/// The X8's elevator in level flight at that speed, rad: the loops have flown for minutes when something begins.
+/// The X8's elevator in level flight at that speed, rad: the pitch integrator begins there, as after minutes of flight.
 const LEVEL_RAD: f64 = 0.0685;
 /// Travel of the X8's surfaces, rad.
 const X8_TRAVEL: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Bank up to which a turn is coordinated, rad.
 const COORDINATED: f64 = 80.0 * std::f64::consts::PI / 180.0;
-/// Rate error at which PX4's integrator stops, rad/s; smaller errors are weighted down towards it.
+/// Rate error at which the integrators stop, rad/s, as in PX4; smaller errors are weighted down towards it.
 const NOT_INTEGRATED: f64 = 400.0 * std::f64::consts::PI / 180.0;
 
-/// An axis: time constant of the attitude, s; largest rate, rad/s; torque of a rate error, of its integral with its
-/// bound, and of the rate that is asked for.
+/// Gains of an axis: time constant of the attitude, s; rate limit, rad/s; torque per rate error, per integral of
+/// the rate error with the limit of that torque, and per commanded rate.
 #[derive(Clone, Copy, Debug)]
 struct Gains {
     time_constant_s: f64,
@@ -44,9 +45,9 @@ struct Stack {
     pitch: Gains,
     /// Deflection of a torque of 1, rad.
     full_rad: f64,
-    /// Cutoff of the low-pass that rates asked for go through, Hz; infinite for none.
+    /// Cutoff of the low-pass on the commanded rates, Hz; infinite for none.
     cutoff_hz: f64,
-    /// Airspeed at which the gains are right, and the least that they are scaled for, m/s.
+    /// Airspeed for which the gains are tuned, and the lowest airspeed of the gain scaling, m/s.
     scaled_at_mps: f64,
     least_mps: f64,
 }
@@ -62,9 +63,9 @@ const PX4: Stack = Stack {
     least_mps: 11.0,
 };
 
-/// ArduPlane's for the X8, as in the log of the flight that the test below replays: RLL2SRV_TCONST, _RMAX, RLL_RATE_P, _I, _IMAX,
-/// _FF, those of pitch, RLL_RATE_FLTT. A torque of 1 is 57.3 degrees, of which 45 are full travel. SCALING_SPEED; half of it is the
-/// least.
+/// ArduPlane's gains for the X8, as in the log of the flight that the test below replays: RLL2SRV_TCONST, _RMAX, RLL_RATE_P, _I,
+/// _IMAX, _FF, those of pitch, RLL_RATE_FLTT. A torque of 1 is 57.3 degrees, of which 45 are full travel. SCALING_SPEED; half of
+/// it is the least.
 const ARDUPILOT: Stack = Stack {
     roll: Gains {
         time_constant_s: 0.45,
@@ -93,7 +94,7 @@ const ARDUPILOT: Stack = Stack {
 pub(super) struct Law {
     stack: Stack,
     travel: Travel,
-    /// Rates asked for behind their low-pass, rad/s.
+    /// Commanded rates after the low-pass, rad/s.
     wanted: [f64; 2],
     /// Torques of the integrals.
     integral: [f64; 2],
@@ -115,7 +116,7 @@ impl Law {
         Law { stack, travel, wanted: [0.0; 2], integral: [0.0, level], slow: 0.0, altitude: None }
     }
 
-    /// A new mode begins. ArduPlane forgets its integrals then, PX4 only where rates are not controlled.
+    /// Begins a new mode. ArduPlane then resets its integrators, PX4 only after a mode without rate control.
     pub(super) fn begin(&mut self, forgets: bool) {
         (self.slow, self.altitude) = (0.0, None);
         if forgets {
@@ -146,7 +147,7 @@ impl Law {
                 let error = wanted - rate;
                 let torque = (gains.p * error + self.integral[axis]) * scale * scale
                     + gains.forward * wanted * scale;
-                // no further into a stop
+                // anti-windup: the integrator pushes no further into a stop
                 if torque.abs() < travels[axis] || torque.signum() != error.signum() {
                     let share = (1.0 - (error / NOT_INTEGRATED).powi(2)).max(0.0);
                     let sum = self.integral[axis] + share * gains.i * error * DT_S;
@@ -186,7 +187,7 @@ impl Law {
         throttle
     }
 
-    /// Flies level at the altitude at which it began.
+    /// Flies level at the altitude at which the mode began.
     pub(super) fn level(&mut self, seen: &Truth) -> Inputs {
         let altitude = *self.altitude.get_or_insert(seen.altitude_m);
         let climb = -seen.velocity_ned_mps[2];
@@ -214,7 +215,7 @@ mod tests {
     use super::*;
     use crate::plant::{Plant, PlantOptions, Start};
 
-    /// Seven attitudes and thrusts that real PX4 was asked for in OFFBOARD, and what it made of them: from its own ULog and the
+    /// Seven attitudes and thrusts that were commanded to real PX4 in OFFBOARD, and its response: from its own ULog and the
     /// simulator's truth.
     const PX4_FLOWN: &str = include_str!("../../../../tests/data/px4_attitude_steps.csv");
     /// The attitudes and thrusts of ArduPlane's own LOITER, likewise from its log.
@@ -245,7 +246,8 @@ mod tests {
 
     #[test]
     fn the_loops_fly_the_attitudes_that_real_controllers_flew() {
-        // the loops of before: 5.7° and 3.4°, 38° at most, beside PX4; 3.2° and 2.1°, 9° at most, beside ArduPlane
+        // an earlier version of the loops was off by 5.7° and 3.4° rms, 38° at most, for PX4; 3.2° and 2.1°, 9° at
+        // most, for ArduPlane
         for (personality, flown, bounds) in [
             (Personality::Px4, PX4_FLOWN, [0.6, 0.6, 4.0]),
             (Personality::Ardupilot, ARDUPILOT_FLOWN, [0.8, 0.6, 2.5]),

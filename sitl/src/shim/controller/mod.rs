@@ -1,9 +1,9 @@
-//! A played flight controller: what PX4 or ArduPilot would do with what a companion sends.
+//! A simulated flight controller: the response of PX4 or ArduPilot to a companion's messages.
 //!
 //! Bytes in, bytes out, ten milliseconds a step; no socket and no clock, so that a flight can be
-//! run in lockstep with a companion in the same process. What is played is what bears on a
-//! companion: identities, modes with their rules, streams on request, the parameter server, the
-//! sampling of sticks, time-outs, the stack's own attitude loops. Estimation is perfect but for the
+//! run in lockstep with a companion in the same process. The simulation covers what a companion
+//! depends on: identities, modes with their rules, streams on request, the parameter server, the
+//! sampling of sticks, timeouts, the stack's own attitude loops. Estimation is perfect but for the
 //! sensor errors of the options.
 
 mod ardupilot_failsafe;
@@ -43,16 +43,16 @@ pub const SYSTEM: u8 = 1;
 const COMPONENT: u8 = 1;
 /// ArduPilot reads its channels every second step: 50 Hz.
 const SAMPLE_EVERY: u64 = 2;
-/// PX4's commander looks at the requirements of its modes every tenth step: 10 Hz ...
+/// PX4's commander checks the requirements of its modes every tenth step: 10 Hz ...
 const LOOK_EVERY: u64 = 10;
 /// ... and sticks reach it through another module: real PX4 refused MANUAL 150 ms after the first
-/// stick in two of three requests, and never after 300 ms.
+/// stick in two of three requests, and never 300 ms after it.
 const STICKS_SEEN_S: f64 = 0.15;
-/// A radio with its sticks released, µs: idle throttle.
+/// Pulses of a radio with released sticks and idle throttle, µs.
 const RADIO_US: [u16; 3] = [1500, 1500, 1000];
 /// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
 const RECEIVER: u32 = 1 << 16;
-/// The bank at which ArduPilot turns back to where GUIDED was entered, rad: 45° to 55° were seen.
+/// Bank of ArduPilot's turn back to where GUIDED was entered, rad; 45° to 55° were observed.
 const TURN_BACK: f64 = 50.0 * std::f64::consts::PI / 180.0;
 
 /// Flight stack whose behaviour is simulated.
@@ -99,7 +99,7 @@ struct Setpoint {
 
 const HEARTBEAT: u32 = 0;
 
-/// The played flight controller with the aircraft it flies.
+/// The simulated flight controller with the aircraft that it flies.
 pub struct FlightController {
     personality: Personality,
     flight: Flight,
@@ -111,10 +111,10 @@ pub struct FlightController {
     lag: Lag,
     distorter: Distorter,
     sticks: Sticks,
-    /// When the last heartbeat of the system came that ArduPilot takes for its ground station, µs.
+    /// Time of the last heartbeat of the system that ArduPilot takes for its ground station, µs.
     station_us: Option<u64>,
     failsafes: Failsafes,
-    /// Where aileron and elevator stick, if they do.
+    /// Commands at which aileron and elevator are jammed; `None` where they are free.
     jammed: [Option<f64>; 2],
     setpoint: Option<Setpoint>,
     mode: Mode,
@@ -145,7 +145,7 @@ impl FlightController {
         FlightController::with(personality, Flight::new(options)?, &options.parameters)
     }
 
-    /// Whether the played `personality` has a parameter of this name.
+    /// Whether the simulated `personality` has a parameter of this name.
     pub fn plays(personality: Personality, name: &str) -> bool {
         Table::has(personality, name)
     }
@@ -199,7 +199,7 @@ impl FlightController {
             let heartbeat = self.heartbeat();
             self.encoder.encode(&heartbeat, out);
         }
-        // The controller's own loops see what is right: only what is sent can be wrong.
+        // The controller's own loops use the undistorted measurement; only messages are distorted.
         let cutoff = match self.personality {
             Personality::Px4 => self.parameters.get("IMU_GYRO_CUTOFF"),
             Personality::Ardupilot => self.parameters.get("INS_GYRO_FILTER"),
@@ -223,7 +223,7 @@ impl FlightController {
         frames.iter().for_each(|frame| self.take(frame));
     }
 
-    /// Forgets a frame that has not come whole, as when the wire was cut.
+    /// Discards an unfinished frame, as after a break of the link.
     pub fn restart_stream(&mut self) {
         self.parser.restart();
     }
@@ -235,7 +235,7 @@ impl FlightController {
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         self.watch();
         self.commanded = self.command();
-        // PX4 has no such parameter: NaN, and no delay.
+        // PX4 lacks this parameter: its value is NaN, which gives no delay.
         let inputs = self.lag.delayed(self.commanded, self.parameters.get("SIM_SERVO_DELAY"));
         let inputs = Inputs {
             aileron: self.jammed[0].unwrap_or(inputs.aileron),
@@ -256,7 +256,7 @@ impl FlightController {
         self.inputs
     }
 
-    /// Last measurement: the truth, without sensor errors in the options.
+    /// Last measurement; it is the truth if the options set no sensor errors.
     pub fn measured(&self) -> Truth {
         self.measured
     }
@@ -271,12 +271,12 @@ impl FlightController {
         self.parameters.put(name, value);
     }
 
-    /// The aileron sticks where it is, from now on.
+    /// Jams the aileron at its present command.
     pub fn jam_aileron(&mut self) {
         self.jammed[0] = Some(self.inputs.aileron);
     }
 
-    /// The elevator sticks where it is, from now on.
+    /// Jams the elevator at its present command.
     pub fn jam_elevator(&mut self) {
         self.jammed[1] = Some(self.inputs.elevator);
     }
@@ -417,7 +417,7 @@ impl FlightController {
     fn asked_for_mode(&mut self, main: f32, sub: f32) -> u8 {
         let Some(mode) = Mode::of(self.personality, main, sub) else { return 2 };
         let refused = match mode {
-            // PX4 wants to see the stream first.
+            // PX4 accepts MANUAL and OFFBOARD only while their sticks or setpoints arrive.
             Mode::Manual => self.personality == Personality::Px4 && !self.manual_allowed,
             Mode::Guided => self.personality == Personality::Px4 && !self.setpoint_alive(),
             Mode::Hold | Mode::Return | Mode::Circle => false,
@@ -430,7 +430,7 @@ impl FlightController {
     }
 
     fn manual_control(&mut self, m: &ManualControl) {
-        // 0 and 4 of COM_RC_IN_MODE do not listen to MAVLink.
+        // COM_RC_IN_MODE 0 and 4 ignore sticks over MAVLink.
         let listens = !matches!(self.parameters.get("COM_RC_IN_MODE") as i32, 0 | 4);
         if self.personality == Personality::Px4 && listens && m.target == SYSTEM {
             self.sticks.manual(self.now_us, m);
@@ -444,7 +444,7 @@ impl FlightController {
         let ours = f64::from(system) == self.parameters.get("MAV_GCS_SYSID");
         if self.personality == Personality::Ardupilot && ours && m.target_system == SYSTEM {
             self.sticks.override_channels(self.now_us, m);
-            // Overrides count as its heartbeats do.
+            // Overrides count as heartbeats of the ground station.
             self.station_us = Some(self.now_us);
             self.counts.sticks += 1;
         } else {
@@ -511,13 +511,13 @@ impl FlightController {
         }
     }
 
-    /// Whether a mode has been on for long enough: it may wait for its first stick or target.
+    /// Whether the mode has lasted 0.5 s, in which its first stick or target may arrive.
     fn settled(&self) -> bool {
         (self.now_us - self.entered_us) as f64 * 1e-6 > 0.5
     }
 
-    /// PX4's. Lost sticks count in HOLD too, whoever gave it the aircraft; in OFFBOARD only its
-    /// setpoints do. On its way home it goes on.
+    /// PX4's failsafe. In OFFBOARD only lost setpoints count, in every other mode lost sticks do. A
+    /// return flight goes on without sticks.
     fn px4_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
         if self.mode == Mode::Guided {
             let lost = self.settled() && !self.setpoint_alive();
@@ -538,7 +538,7 @@ impl FlightController {
         Some((mode, b"Manual control lost"))
     }
 
-    /// ArduPilot's.
+    /// ArduPilot's failsafe; where the mode stays, its text is sent here.
     fn ardupilot_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
         let act = self.failsafes.watch(&self.seen(), &self.parameters)?;
         if act.drops_overrides {
@@ -563,7 +563,7 @@ impl FlightController {
         }
     }
 
-    /// Whether ArduPilot takes its sticks for released, after RC_FS_TIMEOUT without any.
+    /// Whether ArduPilot takes its sticks as released, after RC_FS_TIMEOUT without an override.
     fn sticks_end(&self) -> bool {
         let patience = self.parameters.get("RC_FS_TIMEOUT");
         let ended = self.sticks.age_s(self.now_us).is_some_and(|age| age > patience);
@@ -583,7 +583,7 @@ impl FlightController {
 
     fn command(&mut self) -> Inputs {
         if self.mode == Mode::Manual {
-            // Between two samples the channels stand as they stood.
+            // Between two samples the last command is kept.
             let samples = match self.personality {
                 Personality::Px4 => true,
                 Personality::Ardupilot => self.steps.is_multiple_of(SAMPLE_EVERY),

@@ -1,9 +1,9 @@
-//! The modes of the played stacks, in their own numbers.
+//! The modes of the simulated stacks, with their own numbers.
 
 use super::Personality;
 use crate::shim::codec::AvailableModes;
 
-/// A mode, by what it does.
+/// A mode, named by its behaviour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// The sticks move the surfaces: MANUAL.
@@ -19,7 +19,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Those that can be asked for.
+    /// The modes that can be requested.
     pub(super) const ALL: [Mode; 4] = [Mode::Manual, Mode::Guided, Mode::Hold, Mode::Return];
 
     /// Main and sub mode.

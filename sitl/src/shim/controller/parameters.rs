@@ -1,4 +1,4 @@
-//! The parameter server of the simulated stacks: a small table of what concerns a companion.
+//! The parameter server of the simulated stacks: a small table of the parameters that concern a companion.
 
 use super::Personality;
 use crate::shim::codec::{Encoder, ParamRequestRead, ParamSet, ParamValue};
@@ -8,7 +8,7 @@ use crate::shim::error::ShimError;
 const INT: u8 = 6;
 const REAL: u8 = 9;
 
-/// Name, value, type. PX4's are its defaults, but those that a companion has to have set.
+/// Name, value, type: PX4's defaults, except where a companion needs another value.
 const PX4: [(&str, f64, u8); 14] = [
     ("PWM_MAIN_REV", 0.0, INT),
     ("MAV_SYS_ID", 1.0, INT),
@@ -26,7 +26,7 @@ const PX4: [(&str, f64, u8); 14] = [
     ("IMU_GYRO_CUTOFF", 40.0, REAL),
 ];
 
-/// ArduPilot's are of one radio's calibration, with a reversed pitch channel.
+/// ArduPilot's parameters, with the calibration of a radio whose pitch channel is reversed.
 const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
@@ -45,7 +45,7 @@ const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("RC_OPTIONS", 32.0, INT),
     // Of ArduPilot's own simulator: 1 is no radio, 0 one with its sticks released.
     ("SIM_RC_FAIL", 1.0, INT),
-    // Low-pass of the gyros, Hz; 0 is none. What comes late between command and surface, ms.
+    // Cutoff of the gyros' low-pass, Hz; 0 is none. Delay from command to surface, ms.
     ("INS_GYRO_FILTER", 20.0, INT),
     ("SIM_SERVO_DELAY", 0.0, INT),
     ("RCMAP_ROLL", 1.0, INT),

@@ -1,4 +1,4 @@
-//! The played controller by the wall clock, over a link.
+//! The simulated controller in real time over a link.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -79,7 +79,7 @@ fn finish(
     Ok(summary)
 }
 
-/// Judges how punctual this cycle is; returns the deadline it counts from.
+/// Records the lateness of this cycle; returns the deadline from which the next one counts.
 fn begin(deadline: Instant, summary: &mut Summary) -> Instant {
     let now = Instant::now();
     let late = now.saturating_duration_since(deadline);

@@ -10,13 +10,13 @@ use crate::shim::codec::{ManualControl, RcChannelsOverride};
 pub(super) struct Sticks {
     manual: Option<(u64, [i16; 3])>,
     channels: Option<(u64, [u16; 3])>,
-    /// When channels were last overridden, though they were given back since.
+    /// Time of the last override, µs; kept after the channels were released.
     overridden: Option<u64>,
-    /// When the stream of MANUAL_CONTROL that lasts began.
+    /// Start of the present uninterrupted stream of MANUAL_CONTROL, µs.
     since: Option<u64>,
 }
 
-/// A gap of so much ends a stream of sticks, µs: PX4's default COM_RC_LOSS_T.
+/// A longer gap than this ends a stream of sticks, µs: PX4's default COM_RC_LOSS_T.
 const GAP_US: u64 = 500_000;
 
 impl Sticks {
@@ -31,7 +31,7 @@ impl Sticks {
         self.since.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// A channel of 0 goes back to the radio.
+    /// Takes an override; a 0 in one of the first three channels releases all three to the radio.
     pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
         let [one, two, three, ..] = m.channel;
         let given_back = [one, two, three].contains(&0);
@@ -72,8 +72,8 @@ fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
     let stick = |thousandths: i16| f64::from(thousandths) / 1000.0;
     let roll = stick(y) * parameters.get("FW_MAN_R_SC") + parameters.get("TRIM_ROLL");
     let pitch = -stick(x) * parameters.get("FW_MAN_P_SC") + parameters.get("TRIM_PITCH");
-    // One bit for each output. The played loops are right either way: what is played here is a
-    // mix-up between stick and surface.
+    // One bit for each output. It reverses the sticks and not the attitude loops, to simulate a
+    // wrong sign between stick and surface.
     let reversed = parameters.get("PWM_MAIN_REV") as u32;
     let sign = |output: u32| if reversed >> output & 1 == 1 { -1.0 } else { 1.0 };
     Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z), rudder: 0.0 }

@@ -10,7 +10,7 @@ const SEA_LEVEL: f64 = 1.225;
 /// Command result MAV_RESULT_DENIED.
 pub(super) const DENIED: u8 = 2;
 
-/// A stream with the time between its messages, µs, and the next one's.
+/// A stream with its period and the time of its next message, µs.
 #[derive(Clone, Copy, Debug)]
 struct Row {
     id: u32,
@@ -27,7 +27,7 @@ pub(super) struct Equipment {
     pub receiver: u32,
 }
 
-/// The streams, in the order in which they are looked at.
+/// The streams, in the order in which they are sent.
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
     rows: [Row; 8],
@@ -36,7 +36,7 @@ pub(super) struct Streams {
 }
 
 impl Streams {
-    /// The streams of an aircraft so equipped.
+    /// The streams of an aircraft with this equipment.
     pub(super) fn new(equipment: Equipment) -> Self {
         let row = |id, interval_us| Row { id, interval_us, due_us: 0 };
         // Default rates of a telemetry port.
@@ -53,14 +53,14 @@ impl Streams {
         Streams { rows, equipment, last_us: 0 }
     }
 
-    /// SET_MESSAGE_INTERVAL: MAV_RESULT. Faster than the steps is limited, as PX4 does; faster than
-    /// `denied_hz` is denied and changes nothing, as ArduPilot does.
+    /// MAV_RESULT of SET_MESSAGE_INTERVAL. A rate above that of the steps is limited to it, as PX4
+    /// does; a rate above `denied_hz` is denied and changes nothing, as ArduPilot does.
     pub(super) fn set(&mut self, id: u32, interval_us: f32, denied_hz: f64) -> u8 {
         let Some(row) = self.rows.iter_mut().find(|row| row.id == id) else {
             // MAV_RESULT_UNSUPPORTED.
             return 3;
         };
-        // A microsecond of rounding.
+        // 1 µs of tolerance for rounding.
         if interval_us > 0.0 && f64::from(interval_us) + 1.0 < 1e6 / denied_hz {
             return DENIED;
         }
@@ -71,7 +71,7 @@ impl Streams {
         0
     }
 
-    /// Whether it can be sent.
+    /// Whether the message can be sent.
     pub(super) fn knows(&self, id: u32) -> bool {
         self.rows.iter().any(|row| row.id == id)
     }
@@ -154,7 +154,7 @@ fn encode(
     }
 }
 
-/// Both stacks show an equivalent airspeed.
+/// VFR_HUD with the equivalent airspeed, as both stacks send it.
 fn hud(measured: &Truth) -> VfrHud {
     let equivalent = measured.airspeed_mps * (measured.air_density_kgpm3 / SEA_LEVEL).sqrt();
     VfrHud { airspeed: equivalent as f32, ..telemetry::hud(measured) }

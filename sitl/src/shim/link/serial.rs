@@ -28,7 +28,7 @@ pub struct SerialLink {
     end: End,
     wait: Wait,
     port: Option<TTYPort>,
-    /// The end of a batch that found no room; it must go first, or frames are torn.
+    /// The unsent end of a batch; it is sent before anything else, or frames would be torn.
     unsent: Vec<u8>,
     /// No process has the other end open.
     hung_up: bool,
@@ -124,7 +124,7 @@ impl SerialLink {
         if was { Arrival::Nothing } else { Arrival::Closed }
     }
 
-    /// Looks for the port again, now and then.
+    /// Tries to open the port again, at most once every `RETRY`.
     fn look(&mut self) -> bool {
         let now = Instant::now();
         let End::Device { path, baud } = &self.end else { return false };
@@ -141,7 +141,7 @@ impl SerialLink {
 impl Drop for SerialLink {
     fn drop(&mut self) {
         if let End::Pseudo { name } = &self.end {
-            // It leads nowhere from now on.
+            // The name leads to no terminal from now on.
             let _ = std::fs::remove_file(name);
         }
     }
@@ -155,7 +155,7 @@ fn device(path: &str, baud: u32) -> io::Result<TTYPort> {
 fn pseudo(name: &Path) -> io::Result<TTYPort> {
     let (far, near) = TTYPort::pair()?;
     let path = near.name().ok_or_else(|| io::Error::other("the pseudo-terminal has no name"))?;
-    // A name that leads to a terminal which is gone may be used again; nothing else.
+    // Only a name whose terminal is gone may be replaced.
     if name.is_symlink() && !name.exists() {
         std::fs::remove_file(name)?;
     }

@@ -31,7 +31,7 @@ pub struct TcpLink {
     source: Source,
     wait: Wait,
     stream: Option<TcpStream>,
-    /// The end of a batch that found no room; it must go first, or frames are torn.
+    /// The unsent end of a batch; it is sent before anything else, or frames would be torn.
     unsent: Vec<u8>,
     /// The companion on the present stream has fallen silent.
     silent: bool,
@@ -127,7 +127,7 @@ impl TcpLink {
         Arrival::Closed
     }
 
-    /// Looks for a new stream, now and then.
+    /// Looks for a new stream, at most once every `RETRY`.
     fn look(&mut self) -> Option<SocketAddr> {
         let now = Instant::now();
         if now < self.next_look {

@@ -164,7 +164,7 @@ impl Client {
         }
     }
 
-    /// Whether HIL_STATE_QUATERNION is due; faster than the steps is every step.
+    /// Whether HIL_STATE_QUATERNION is due; a period shorter than a step means every step.
     pub(super) fn wants_state(&mut self, now_us: u64) -> bool {
         let Some(interval) = self.state_interval_us.filter(|_| now_us >= self.next_state_us) else {
             return false;

@@ -8,8 +8,8 @@ pub enum Clock {
     /// No message has arrived yet.
     #[default]
     Unknown,
-    /// It shows simulated time less so much, µs: nothing, or the time at which it was started, as
-    /// PX4 counts from the first HIL_SENSOR that it sees.
+    /// The clock lags simulated time by this offset, µs: 0, or the time of the first HIL_SENSOR
+    /// that PX4 sees, from which it counts.
     Behind(u64),
     /// Another clock: messages are counted instead, as Gazebo's plugin does.
     Foreign,
@@ -27,11 +27,11 @@ pub enum Answers {
 }
 
 impl Clock {
-    /// Judges a message of `time_us` after the steps from [`FIRST_US`] or later, `begun_us`, to
-    /// `shown_us`.
+    /// Finds the step that a message of the time `time_us` answers. Steps were shown from
+    /// `begun_us`, which is [`FIRST_US`] or later, to `shown_us`.
     ///
-    /// Simulated time begins so late that the two ways of counting cannot be confused before it
-    /// has doubled.
+    /// Simulated time begins at [`FIRST_US`], so that an offset of 0 and one of `begun_us` cannot
+    /// be confused before as much time has passed again.
     pub fn judge(&mut self, time_us: u64, begun_us: u64, shown_us: u64) -> Answers {
         if *self == Clock::Unknown {
             *self = Clock::of(time_us, begun_us, shown_us);

@@ -14,13 +14,13 @@ pub enum Px4Event {
     Connected(SocketAddr),
     /// The client has closed its connection: the aircraft is back at its start.
     Gone,
-    /// The client is in lockstep: a step is made on its answer and never without.
+    /// The client is in lockstep: a step is made on its answer, or after 3 s without one.
     Lockstep,
     /// The client's times are of another clock: its messages are counted instead.
     ForeignClock,
     /// The catapult has been released.
     Catapult,
-    /// Lockstep: no answer for a second; simulated time is stopped.
+    /// Lockstep: no answer for a second; until one comes a step is made every 3 s.
     Stopped,
     /// Lockstep: the answer has come after all.
     Resumed,
@@ -28,7 +28,7 @@ pub enum Px4Event {
     Silent,
     /// Real time: actuator messages come again.
     SilenceEnded,
-    /// The client is not what this side speaks to; why, and what to do.
+    /// The client cannot be used as PX4; the text gives the reason and the remedy.
     Refused(&'static str),
 }
 

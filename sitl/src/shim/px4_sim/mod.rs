@@ -3,7 +3,7 @@
 //! PX4 is the TCP client, port 4560. It is shown HIL_SENSOR at 250 Hz and HIL_GPS at 10 Hz of
 //! simulated time, HIL_STATE_QUATERNION when it asks, and answers with HIL_ACTUATOR_CONTROLS. Until
 //! its first answer time runs freely, so that it can boot; once an answer has the lockstep flag, a
-//! step is made on its answer and never without. The protocol is that of PX4's public
+//! step is made on its answer, or after 3 s without one. The protocol is that of PX4's public
 //! documentation (Simulator MAVLink API) as its module `simulator_mavlink` speaks it.
 
 mod actuation;
@@ -39,16 +39,18 @@ pub const FIRST_US: u64 = 1_000_000_000;
 /// HIL_GPS is sent every this many steps: 10 Hz.
 const GPS_EVERY: u64 = 25;
 const STEP: Duration = Duration::from_micros(STEP_US);
-/// After this silence it is reported.
+/// Silence of PX4 after which it is reported.
 const SILENCE: Duration = Duration::from_secs(1);
-/// A clock that is further behind than this is set anew: no burst makes up for it.
+/// Delay beyond which the clock is reset: no burst of steps makes up for it.
 const HOPELESS: Duration = Duration::from_millis(100);
-/// How long an answer is waited for by yielding, then how often the link is looked at.
-/// Time without an answer after which lockstep makes a step all the same: PX4 that changed its mode may wait for a sensor
-/// before it sends actuators, and both would wait for ever.
+/// Time without an answer after which lockstep makes a step all the same. A PX4 that changed its mode may wait for a
+/// sensor before it sends actuators, and both sides would wait for ever.
 const NUDGE: Duration = Duration::from_secs(3);
+/// Time for which an answer is awaited by yielding.
 const SPIN: Duration = Duration::from_micros(300);
+/// Interval at which the link is polled after that.
 const LOOK: Duration = Duration::from_micros(100);
+/// Interval at which the link is polled without a client.
 const IDLE: Duration = Duration::from_millis(5);
 
 /// Options of a run against PX4 only.
@@ -201,7 +203,7 @@ impl Run<'_> {
         deadline + STEP
     }
 
-    /// Talks until the next step may be made; `false` when it may not, for the client has gone.
+    /// Exchanges messages until the next step is due; `false` if the client has gone or the run is stopped.
     fn converse(&mut self, deadline: Instant, stop: &AtomicBool) -> Result<bool, ShimError> {
         let connection = self.connection;
         while !stop.load(Ordering::Relaxed) {
@@ -296,7 +298,7 @@ impl Run<'_> {
         events.into_iter().for_each(|event| self.notify(Event::Px4(event)));
     }
 
-    /// Makes a step with what was last asked for.
+    /// Makes a step with the last commands.
     fn advance(&mut self) -> Result<Option<Over>, ShimError> {
         let actuation = self.client.as_ref().and_then(|client| client.actuation);
         let (armed, inputs) = actuation.map_or((false, Inputs::default()), |a| (a.armed, a.inputs));

@@ -3,8 +3,8 @@
 use greylag_model::{GreyBox, Trim, TrimError, Twin};
 use greylag_physics::Command;
 
-/// Length of a response in states, including the one on which the step is commanded: 0.4 s, by when the roll rate has
-/// settled; the short period nearly so, and its last value is continued.
+/// Length of a response in states, including the one on which the step is commanded: 0.4 s. By then the roll rate has
+/// settled and the pitch rate nearly; later states take the last value.
 const SPAN: usize = 41;
 /// Size of the simulated step, of −1..1: small enough to be linear, large compared with rounding.
 const STEP: f64 = 0.01;
@@ -24,7 +24,7 @@ impl Answers {
     ///
     /// If the model has no straight-flight trim there.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        // a thousand metres change a response by a tenth
+        // 1000 m of altitude change a response by a tenth
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);

@@ -13,8 +13,8 @@ const LATENESS: isize = 9;
 const LEAST: usize = 14;
 /// Largest lag-one autocorrelation of the regression residuals that is accounted for.
 const MAX_AUTOCORRELATION: f64 = 0.9;
-/// Range of states by which control authority was given before the first state of the check: its notice shares the
-/// link with the states, and the controller samples its channels at its own time.
+/// Lead of the handover of control authority relative to the first state of the check, states. The notice of the
+/// handover shares the link with the states, and the controller samples its channels at its own time.
 const TAKEN: RangeInclusive<isize> = -1..=2;
 
 /// Estimated gain on the modelled response, with its standard error.
@@ -176,7 +176,7 @@ mod tests {
         }
     }
 
-    /// The record of an aircraft that answers as the model does, its rates beside that changed by `leftover` from state to state.
+    /// The record of an aircraft that responds as the model does, with `leftover` added to its rates from state to state.
     fn record(answers: &Answers, states: usize, leftover: impl Fn(usize) -> f64) -> Evidence {
         let mut evidence = Evidence::default();
         let changes = [[(0, 0.06), (12, -0.12)], [(6, 0.06), (18, -0.12)]];
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn gusts_that_wander_leave_more_doubt_than_as_large_ones_that_do_not() {
-        // Changes by 0.01 rad/s: of one sign for nine states, or of the other at each.
+        // Rate changes of ±0.01 rad/s whose sign alternates every nine states, or every state.
         let answers = x8();
         let doubt = |states: usize| {
             let gust = |index: usize| if (index / states).is_multiple_of(2) { 0.01 } else { -0.01 };

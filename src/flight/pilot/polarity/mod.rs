@@ -1,10 +1,9 @@
 //! The check of surface signs: whether the aircraft responds to the surfaces as the model predicts.
 //!
 //! A flight controller can fly well by its own loops while the channel order, a reversal or a mixer between the companion's
-//! commands and the surfaces is wrong. Therefore, when control authority is given, the companion first commands level
-//! trim with small pulses of aileron and elevator, at different times. Rates are regressed on the modelled responses to these pulses;
-//! gusts are uncorrelated with them. The check ends when both signs are certain, usually after 0.3 s; the pulses grow
-//! until then.
+//! commands and the surfaces is wrong. Therefore, when control authority is given, the companion first commands level trim with
+//! small pulses of aileron and elevator, at different times. Rates are regressed on the modelled responses to these pulses; gusts
+//! are uncorrelated with them. The check ends when both signs are certain, usually after 0.3 s; the pulses grow until then.
 
 mod answers;
 mod evidence;
@@ -288,8 +287,8 @@ mod tests {
         assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
     }
 
-    /// A clock that jumps, at the first states or later, ends the check; it neither lasts for ever nor takes memory
-    /// for the states that never were.
+    /// A clock jump, at the first states or later, ends the check. The check neither lasts for ever nor allocates
+    /// memory for the skipped states.
     #[test]
     fn a_clock_that_jumps_ahead_ends_the_check() {
         let model = GreyBox::load(Path::new(concat!(

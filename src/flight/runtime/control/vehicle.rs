@@ -47,7 +47,8 @@ impl Control {
         self.take_notices();
     }
 
-    /// Takes arrivals until a state is live: a full socket keeps the oldest of a stall, which are history.
+    /// Takes arrivals until a state is live: a full socket buffer holds the oldest states of a stall,
+    /// which are history.
     fn catch_up(&mut self, mut newest: Option<Heard>, live: Time) -> Option<Heard> {
         let until = Instant::now() + CATCH_UP;
         while newest.is_none_or(|heard| heard.state.time < live) {
@@ -71,7 +72,7 @@ impl Control {
             Arrival::Opened(_) | Arrival::Closed(_) => return newest,
         };
         self.record(packet.arrived, &packet.bytes);
-        // The vehicle is taken out for the time of the call, since each tick answers through it.
+        // The states are collected first, since each tick answers through the vehicle.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
         let mut places = states.iter_mut();
         self.vehicle.handle(
@@ -169,7 +170,7 @@ impl Control {
             if let Some(words) = notice.ending() {
                 let now = self.clock.at(Instant::now());
                 self.note(Call::Disarm(now, true));
-                // forced arming is never refused
+                // forced disarming is never refused
                 let _ = self.pilot.disarm(now, true);
                 self.pilot.send_text(Severity::Critical, &words);
             }

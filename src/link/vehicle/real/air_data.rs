@@ -1,4 +1,4 @@
-//! Angle of attack and sideslip by an estimator, where the controller sends none.
+//! Angle of attack and sideslip, estimated without vanes from the controller's other measurements.
 //!
 //! An extended Kalman filter of three states, the velocity relative to the air in body axes
 //! (u, v, w), driven by accelerometers, gyros, attitude (Beard & McLain \[BM12\], eq. 3.15):
@@ -9,10 +9,11 @@
 //! w' = q u - p v + g cos θ cos φ   + az
 //! ```
 //!
-//! Three measurements hold it: the airspeed |(u, v, w)|; the climb rate, in air that rises and
-//! sinks about zero; and a sideslip that is zero in the mean, or, where wind and velocity over
-//! ground are reported, the sideways velocity that follows from them. The state being a velocity, a
-//! constant wind cancels; a steady updraught of 1 m/s shows as w/V, 3° at 20 m/s.
+//! Three measurements correct it: the airspeed |(u, v, w)|; the climb rate, in air whose vertical
+//! velocity is zero in the mean; and a sideslip that is zero in the mean, or, where wind and
+//! velocity over ground are reported, the sideways velocity computed from them. The state is a
+//! velocity relative to the air, so a constant wind cancels; a steady updraught of 1 m/s shows as
+//! w/V, 3° at 20 m/s.
 
 use greylag_physics::atmosphere::MIDDLE_GRAVITY;
 
@@ -26,10 +27,10 @@ const CLIMB: f64 = 0.5;
 /// Standard deviation of the pseudo-measurement v = 0 at every step, m/s: relative to the process
 /// noise it returns the sideslip to zero within a few seconds, so that drift is bounded and turns show.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviations of the estimated angle of attack and sideslip, rad. With an exact attitude 0.2° and 0.3 to
-/// 0.5° beside real ArduPlane, 0.1° and 0.2° beside real PX4, in calm air (`tests/firmware/angles.py`); gusts add to it. An
-/// error of pitch is one of the angle of attack, an error of heading one of the sideslip: the attitude may be 1° off in pitch and 2° in
-/// heading (ArduPlane's own was by 0.7° and 0.9°, a compass may be by more), taken as two standard deviations.
+/// Standard deviations of the estimated angle of attack and sideslip, rad. With an exact attitude and in calm air they are 0.2°
+/// and 0.3° to 0.5° for real ArduPlane, 0.1° and 0.2° for real PX4 (`tests/firmware/angles.py`); gusts add to them. A pitch error
+/// adds to the angle of attack, a heading error to the sideslip: 1° of pitch and 2° of heading are taken as two standard
+/// deviations (ArduPlane's own attitude was off by 0.7° and 0.9°; a compass may be off by more).
 pub const DEVIATION: [f64; 2] = [0.71 * DEGREE, 1.12 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Lowest airspeed at which the flow angles are estimated, m/s.
@@ -53,7 +54,7 @@ pub struct Measured {
     pub velocity: [f64; 3],
     /// The air's velocity, NED, m/s; NaN when not reported.
     pub wind: [f64; 3],
-    /// Its standard deviation, and so that of the sideways velocity that follows from it, m/s.
+    /// Standard deviation of the wind, and so of the sideways velocity computed from it, m/s.
     pub wind_sd: f64,
 }
 
@@ -244,7 +245,8 @@ mod tests {
         let yaw = 0.4 + turn * t;
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
         let [p, q, r] = [-turn * sp, turn * sr * cp, turn * cr * cp];
-        // Velocity in body axes does not change: what is felt is what turns it, less gravity.
+        // The velocity is constant in body axes: the specific force is the acceleration that turns
+        // it, less gravity.
         let specific_force = [
             q * w - r * v + MIDDLE_GRAVITY * sp,
             r * u - p * w - MIDDLE_GRAVITY * cp * sr,
@@ -270,8 +272,9 @@ mod tests {
 
     #[test]
     fn the_angles_of_a_climbing_turn_with_sideslip_are_found() {
-        // Every measurement agrees with the motion, so the filter has to find it whatever it trusts; the
-        // sideslip that it takes for zero pulls by (0.05 / 5)² of it. 0.03° is a fiftieth of what the LQI bears.
+        // Every measurement is consistent with the motion, so the filter has to find it with any weights. The
+        // pseudo-measurement of zero sideslip biases it by the fraction (0.05 / 5)². 0.03° is a fiftieth of the
+        // error that the LQI tolerates.
         for (air, attitude, turn) in
             [([21.0, 1.5, 2.0], [0.6, 0.25], 0.35), ([19.0, -2.0, 0.5], [-0.9, -0.1], -0.6)]
         {
@@ -347,7 +350,7 @@ mod tests {
 
     #[test]
     fn a_glitch_moves_the_angles_by_a_tenth_of_a_degree() {
-        // 40 m/s of climb in one measurement: it counts for 1.5 m/s, of which a fiftieth is believed.
+        // An outlier of 40 m/s of climb: its innovation is limited to 1.5 m/s, and the gain is about a fiftieth.
         let mut filter = AirData::default();
         let before = (0..400).filter_map(|_| filter.update(&level(), 0.01)).last().unwrap();
         let after = filter.update(&Measured { climb: 40.0, ..level() }, 0.01).unwrap();

@@ -218,8 +218,8 @@ impl Assembly {
         };
         let estimated = self.estimator.update(&measured, step);
         let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);
-        // ArduPilot's AOA_SSA is no vane's: it follows from the wind that its filter supposes. Beside real ArduPlane that sideslip
-        // was wrong by 1.7° (sd), this one by 0.4°.
+        // ArduPilot derives AOA_SSA from the wind estimate of its filter, without vanes. With real ArduPlane the standard
+        // deviation of its sideslip error was 1.7°, that of this estimate 0.4°.
         match estimated.filter(|_| whole).or(reported) {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),

@@ -1,6 +1,7 @@
-//! Slow integral correction of the attitude commanded to a controller, whose loops leave a steady-state error of 0.3° to
-//! 1.8°, and in steep turns, as played, up to 9° of pitch for half a minute, where their elevator feed-forward does not fit
-//! the aircraft.
+//! Slow integral correction of the attitude commanded to a controller.
+//!
+//! The controller's loops leave a steady-state error of 0.3° to 1.8°. In steep turns, simulated loops whose elevator
+//! feed-forward does not fit the aircraft leave up to 9° of pitch for half a minute.
 //!
 //! The error is integrated over seconds, within narrow bounds, and only while the wanted attitude is constant and nearly
 //! reached: constant errors are removed, transients are left to the controller.
@@ -9,7 +10,7 @@ use greylag_physics::Time;
 
 /// Time constant of the integrator, s: five times slower than a controller's attitude loop.
 const TIME_S: f64 = 2.5;
-/// Largest correction, rad: what PX4's and ArduPlane's loops, as played, leave at 55° of bank and 20° nose down.
+/// Largest correction, rad: the error of the simulated loops of PX4 and ArduPlane at 55° of bank and 20° nose down.
 const MOST: f64 = 10.0 * DEGREE;
 /// Change of the wanted attitude that restarts settling, rad.
 const STILL: f64 = 0.5 * DEGREE;
@@ -28,7 +29,7 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeTrim {
     added: [f64; 2],
-    /// The wanted attitude at which it was found, rad.
+    /// The wanted attitude at which the correction was found, rad.
     found_at: [f64; 2],
     last: Option<Time>,
     /// The constant wanted attitude, and since when.
@@ -74,8 +75,8 @@ fn far(a: [f64; 2], b: [f64; 2], by: f64) -> bool {
 mod tests {
     use super::*;
 
-    /// A controller whose attitude follows within half a second and stays off by `error` (rad), flown for 20 s from what is wanted;
-    /// what is wanted, of time (s). The error at each time.
+    /// Attitude error at each tick of 20 s of flight, rad, with a controller that follows within half a second and stays off by
+    /// `error` (rad). `wanted` is the wanted roll (rad) as a function of time (s); the flight starts there.
     fn flown(error: f64, wanted: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut trim, mut roll) = (AttitudeTrim::default(), wanted(0.0));
         (0..2000)
@@ -91,7 +92,8 @@ mod tests {
 
     #[test]
     fn an_error_that_stays_is_gone_after_some_seconds() {
-        // 1.8°, the largest that was measured beside real firmware; a tenth of a degree is asked.
+        // 1.8° is the largest error that was measured with real firmware; it must fall below a
+        // tenth of a degree.
         let errors = flown(1.8 * DEGREE, |_| 0.8);
         assert!(errors[140].abs() > 1.5 * DEGREE, "the controller's own at first");
         assert!(errors[1400..].iter().all(|e| e.abs() < 0.1 * DEGREE), "{}", errors[1400] / DEGREE);
@@ -103,7 +105,7 @@ mod tests {
         // 10° of 11° at the most.
         assert!((errors[1999].abs() / DEGREE - 1.0).abs() < 0.01, "{}", errors[1999] / DEGREE);
         assert!(flown(13.0 * DEGREE, |_| 0.8)[1999].abs() > 12.9 * DEGREE, "no error that stays");
-        // Half a hertz: nothing stands still, so nothing is added to what the controller does by itself.
+        // Half a hertz: the wanted attitude is never constant, so no correction is added.
         let sine = |t: f64| 0.3 * (3.1 * t).sin();
         let mut plain = 0.0;
         for (tick, error) in flown(0.01, sine).into_iter().enumerate() {
@@ -168,7 +170,7 @@ mod tests {
         let [roll, _] = trimmed().command(at, [0.8, 0.0], [0.8, 0.0]);
         assert!(((roll - 0.8) / DEGREE - 1.8).abs() < 0.1, "{}", roll / DEGREE);
         assert_eq!(trimmed().command(at, [-0.8, 0.0], [0.8, 0.0]), [-0.8, 0.0]);
-        // Who engages again begins anew.
+        // A new engagement starts without a correction.
         let mut trim = trimmed();
         trim.rest();
         assert_eq!(trim.command(at, [0.8, 0.0], [0.8, 0.0]), [0.8, 0.0]);

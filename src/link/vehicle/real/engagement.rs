@@ -13,7 +13,8 @@ pub(super) const ASK_AGAIN: Duration = Duration::from_millis(250);
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Time after which an unconfirmed return is reported: two heartbeats are due.
 const UNCONFIRMED: Duration = Duration::from_secs(2);
-/// HEARTBEAT and CURRENT_MODE may overtake one another by a datagram.
+/// Time after engaging for which another mode is ignored: HEARTBEAT and CURRENT_MODE may overtake
+/// one another by a datagram.
 const GRACE: Duration = Duration::from_millis(100);
 
 /// Phase of the engagement.
@@ -80,7 +81,7 @@ impl Engagement {
         matches!(self.phase, Phase::Engaged { .. })
     }
 
-    /// Starts engaging on demand; whether this is new.
+    /// Starts engaging on demand; returns whether it starts now.
     pub(super) fn begin(&mut self, host: Duration) -> bool {
         let begins = !self.barred && !self.steers();
         if begins {

@@ -1,22 +1,22 @@
 //! Intensity of the turbulence, from airspeed and velocity over ground.
 //!
-//! No sensor without vanes shows a gust from the side or from below: an estimated angle of attack or sideslip is wrong by
-//! the gust over the airspeed. Gusts along the path do show, as the difference of the airspeed and the velocity over ground
-//! less the mean wind; at altitude all three components are of one intensity (MIL-F-8785C, 3.7.2).
+//! Without vanes no sensor measures a gust from the side or from below: an estimated angle of attack or sideslip is wrong
+//! by the gust divided by the airspeed. Gusts along the path are measured, as the difference between the velocity over
+//! ground, less the mean wind, and the airspeed. At altitude all three components have the same intensity (MIL-F-8785C, 3.7.2).
 
 /// Time constant of the mean wind, s.
 const WIND_S: f64 = 10.0;
 /// Longest averaging time of the gusts' power, s.
 const AVERAGED_S: f64 = 60.0;
-/// Intensity supposed at first, m/s (moderate turbulence), and the time for which it counts, s.
+/// Intensity assumed at first, m/s (moderate turbulence), and the averaging time that it counts for, s.
 const SUPPOSED_MPS: f64 = 1.5;
 const SUPPOSED_S: f64 = 20.0;
 /// Length of gusts at altitude, m (MIL-F-8785C above 2000 ft).
 const LENGTH_M: f64 = 533.0;
-/// Factor of the gusts in the deviation of the flow angles: a gust lasts for half a minute, so that it is not averaged and the
-/// largest of a flight counts, 3.5 standard deviations where independent errors count two.
+/// Factor on the gusts in the standard deviation of the flow angles. A gust lasts for half a minute and does not average out,
+/// so that the largest of a flight counts: 3.5 standard deviations, where independent errors count two.
 const LASTING: f64 = 1.75;
-/// Lowest airspeed at which gusts are estimated, and by which one is divided, m/s.
+/// Lowest airspeed at which gusts are estimated, and the smallest by which a gust is divided, m/s.
 const SLOWEST_MPS: f64 = 3.0;
 /// Longest gap between two velocities, s.
 const GAP_S: f64 = 1.0;
@@ -42,7 +42,7 @@ impl Default for Gusts {
 
 impl Gusts {
     /// Takes a state `step` seconds after the last one: roll, pitch and yaw, α and β (rad), the true airspeed (m/s), and
-    /// the velocity over ground (NED, m/s), NaN where none has come with it. Below flying speed it begins anew.
+    /// the velocity over ground (NED, m/s), NaN where none was received with it. Below flying speed the estimate restarts.
     pub fn update(
         &mut self,
         attitude: [f64; 3],
@@ -70,12 +70,12 @@ impl Gusts {
         (0..3).for_each(|i| wind[i] += off[i] * dt / (WIND_S + dt));
         let along: f64 = off.iter().zip(path).map(|(a, b)| a * b).sum();
         self.averaged = (self.averaged + dt).min(AVERAGED_S);
-        // the mean wind follows what is slower: of a first-order process its share is known
+        // the mean wind absorbs the slow part of the gusts; for a first-order process its share is known
         let whole = along.powi(2) * (1.0 + LENGTH_M / (airspeed * WIND_S));
         self.power += (whole - self.power) * dt / self.averaged;
     }
 
-    /// Error of an angle of attack or sideslip that does not see the gusts, rad, to be counted with two standard deviations.
+    /// Standard deviation that gusts add to an angle of attack or sideslip estimated without vanes, rad; bands count two of it.
     pub fn incidence(&self, airspeed: f64) -> f64 {
         LASTING * self.deviation() / airspeed.max(SLOWEST_MPS)
     }

@@ -217,7 +217,7 @@ const ARDUPILOT_SURFACES: [Rule; 31] = [
     with_radio(rule(&["FS_LONG_TIMEOUT"], Need::Between(1.5, 3.0), 2.0, RADIO)),
     optional(with_radio(rule(&["MAV_GCS_SYSID_HI"], Need::OneOf(ZERO), 0.0, STATION))),
     rule(&["RC_OPTIONS"], Need::Without(2), 32.0, "bit 1 makes it ignore overrides"),
-    // Until 4.7 a channel's place is RCMAP's and its option 0; later the option says it, and there is no RCMAP.
+    // Until 4.7 RCMAP assigns the channels and their options are 0; later the options assign them, and there is no RCMAP.
     optional(rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, ROLL)),
     optional(rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, PITCH)),
     optional(rule(&["RCMAP_THROTTLE"], Need::OneOf(&[3.0]), 3.0, THROTTLE)),

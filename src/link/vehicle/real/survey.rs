@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// Length of the window for rates.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Largest lateness of a frame in sequence numbers: further back is a restart.
+/// Largest delay of a late frame in sequence numbers; one further back is a restart of the counter.
 const LATE: u32 = 32;
 /// Number of round-trip times kept.
 const TRIPS: usize = 256;
@@ -70,7 +70,7 @@ impl Survey {
     /// Counts a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
         match self.sequence.map(|before| sequence.wrapping_sub(before)) {
-            // the same entry twice
+            // the same frame twice
             Some(0) => {}
             // late: it was counted as lost
             Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),
