@@ -1,4 +1,4 @@
-//! Evidence for things, each as a bar against its own threshold, in groups that belong together.
+//! Evidence for candidates, each drawn as a bar against its own threshold, in groups.
 
 use crate::Style;
 use crate::kit::html::escape;
@@ -16,16 +16,16 @@ pub struct Evidence {
     pub groups: Vec<EvidenceGroup>,
 }
 
-/// Things that belong together.
+/// A group of candidates.
 #[derive(Clone, Debug)]
 pub struct EvidenceGroup {
     /// Property that the rows of the group share.
     pub title: String,
-    /// A sentence on it; may be empty.
+    /// A sentence on the group; may be empty.
     pub note: String,
     /// Style of its bars.
     pub style: Style,
-    /// The things, top to bottom.
+    /// The candidates, top to bottom.
     pub rows: Vec<EvidenceRow>,
 }
 
