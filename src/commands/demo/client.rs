@@ -109,7 +109,7 @@ impl Client {
         self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
-    /// Sends the request every half second until `so` holds; fails after [`ANSWER_TIMEOUT`].
+    /// Sends the request every half second until `so` holds; fails after `ANSWER_TIMEOUT`.
     fn until(
         &mut self,
         what: &str,

@@ -39,7 +39,7 @@ use client::Client;
 use live::Live;
 use schedule::Legs;
 
-/// FlightOptions of `greylag demo`.
+/// Options of `greylag demo`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Controller that flies the schedule.
