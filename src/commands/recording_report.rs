@@ -47,7 +47,7 @@ pub struct Reporter<'a> {
 }
 
 impl Reporter<'_> {
-    /// Reads the recording in `folder` and makes the report's material of it.
+    /// Makes the report on `flight`, with the loop timing of the recording in `folder`.
     pub fn report<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
         let travels = self.model.airframe.actuators.travels();
         Ok(FlightReport {

@@ -241,7 +241,7 @@ impl Bench {
         let _one_at_a_time = self.taking.lock().unwrap_or_else(PoisonError::into_inner);
         let place = PathBuf::from("logs").join(name);
         let file = self.folder.join(&place);
-        // if another log has that name, the hash is added to the new one's
+        // if another log has that name, the new one gets a name with its hash
         let place = match fs::read(&file) {
             Ok(there) if there != bytes => {
                 PathBuf::from("logs").join(format!("{}-{name}", &sha256(bytes)[..8]))

@@ -27,7 +27,7 @@ pub enum Work {
     Diagnosis,
     /// Fit of the model with the accepted effects.
     Fit,
-    /// Search of a formula for the residual that no effect explains.
+    /// Search for a formula for the residual that no effect explains.
     Proposal,
     /// Design of a flight schedule that distinguishes two effects.
     Schedule,

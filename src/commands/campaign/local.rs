@@ -140,7 +140,7 @@ impl Local<'_> {
         (0..self.states.len()).find(ready)
     }
 
-    /// Whether a waiting cell can still be run, because none of the cells that it depends on has failed.
+    /// Whether any waiting cell can still be run: none of the cells that it depends on has failed.
     fn is_waiting(&self) -> bool {
         let waits = |i: &usize| matches!(self.states[*i], State::Waiting { .. });
         (0..self.states.len()).filter(waits).any(|i| self.may_come(i))

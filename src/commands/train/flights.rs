@@ -62,7 +62,7 @@ impl FlightArguments {
     /// Reads the flights as `model` sees them.
     ///
     /// # Errors
-    /// If nothing is given, or something cannot be read.
+    /// If no flights are given, or a file cannot be read.
     pub fn read(&self, model: &GreyBox) -> Result<Flights> {
         let mut notes = Vec::new();
         let mut tracks = Vec::new();

@@ -1,4 +1,5 @@
-//! The answer of an evaluation: which controller tracks best and by how much, where each is worst, what it costs.
+//! The answer of an evaluation: which controller tracks best and by how much, how often the envelope was kept, which
+//! targets were lost, where the best controller is worst.
 
 use super::label;
 use crate::kit::numbers::number;

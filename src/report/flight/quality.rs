@@ -22,7 +22,7 @@ pub(crate) struct Kept {
     pub alpha_deg: f64,
     /// Seconds outside each limit.
     pub outside_s: OutsideS,
-    /// Whether load factor and angle of attack kept to their limits but for a transient.
+    /// Whether load factor and angle of attack stayed within their limits, apart from the permitted transient.
     pub kept: bool,
 }
 

@@ -128,7 +128,7 @@ mod tests {
         let html = Evidence { title: "e".into(), groups: vec![group] }.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the rest is nothing.
+        // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the others have no bar.
         assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
         assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be determined"));
