@@ -290,8 +290,8 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
 /// model. If no LQI can be designed, the fallback is `pid-retuned`, with a line on standard error.
 ///
 /// # Errors
-/// If the policy cannot be used, if the model does not allow `kind`, or if the model has a trim at its cruise airspeed
-/// neither in level flight nor in a glide. An LQI that cannot be designed as the fallback is no error.
+/// If the policy cannot be used, if the model does not allow `kind`, or if the model can be trimmed at its cruise
+/// airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the fallback is no error.
 pub fn companion_with(
     kind: ControllerKind,
     model: &GreyBox,

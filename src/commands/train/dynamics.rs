@@ -258,8 +258,8 @@ impl Arguments {
         Ok(prior)
     }
 
-    /// `prior`; if only logs are learned from and `--from-scratch` is not given, with the default widths of its
-    /// coefficients.
+    /// `prior`; if only logs are learned from and `--from-scratch` is not given, with the stated or default prior
+    /// width of each coefficient.
     fn narrowed(&self, prior: GreyBox) -> GreyBox {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;
