@@ -14,10 +14,10 @@ use crate::sysid::progress::{Cancelled, Stage, not_cancelled};
 
 /// Number of steps of a full progress bar.
 const STEPS: u64 = 1000;
-/// Time between looks of the bar's clock.
+/// Interval at which the bar is redrawn.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Times that Ctrl-C was pressed.
+/// Number of times that Ctrl-C was pressed.
 static PRESSED: AtomicUsize = AtomicUsize::new(0);
 static LISTENING: Once = Once::new();
 /// Whether `--quiet` was given.
@@ -33,14 +33,15 @@ pub fn is_silent() -> bool {
     SILENT.load(Ordering::Relaxed)
 }
 
-/// A bar on a terminal, a line a stage elsewhere.
+/// Progress of a task: a bar on a terminal, elsewhere one line per stage.
 pub struct Bar {
     bar: Option<ProgressBar>,
     last: Mutex<String>,
 }
 
 impl Bar {
-    /// A bar for a long task that begins; from here on Ctrl-C ends the task, a second one the program.
+    /// A bar for a long task that begins. From now on a first Ctrl-C ends the task, and a second one ends the
+    /// program.
     pub fn new() -> Bar {
         LISTENING.call_once(|| {
             let press = || {
@@ -76,7 +77,7 @@ impl Bar {
         pressed()
     }
 
-    /// An error if Ctrl-C was pressed since the last stage: what comes next writes files.
+    /// Fails if Ctrl-C was pressed. Call it before a command writes its files.
     ///
     /// # Errors
     /// Ctrl-C was pressed.
@@ -102,7 +103,8 @@ impl Bar {
     }
 }
 
-/// Shares of the progress bar: of the work, and of the report if one is requested.
+/// Start and end of the work and of the report, as fractions of the progress bar; without a report the work fills the
+/// bar.
 #[cfg(feature = "study")]
 pub fn shares(report: Option<&std::path::Path>) -> [[f64; 2]; 2] {
     let end = if report.is_some() { 0.9 } else { 1.0 };

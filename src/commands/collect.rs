@@ -1,4 +1,4 @@
-//! `greylag collect`: explore in JSBSim, to have flights to learn from.
+//! `greylag collect`: exploration flights in JSBSim, from which models are learned.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

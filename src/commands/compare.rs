@@ -101,7 +101,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The answer with the parts of tuning and of the effect, if the second of two models was made from the first.
+/// The answer split into the parts of tuning and of the added effect, if the second of two models was made from the
+/// first.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,

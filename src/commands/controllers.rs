@@ -29,8 +29,8 @@ pub fn controller(
 
 /// The policy in `folder` for the controller `kind` of `model`.
 ///
-/// `None` if the controller uses no policy. `None` too if it can work without one, and `folder` is the default folder,
-/// whose policy belongs to another airframe. Notes on the policy are printed on standard error.
+/// `None` if the controller uses no policy. `None` too if the controller can work without a policy and `folder` is the
+/// default folder, whose policy belongs to another airframe. Notes on the policy are printed on standard error.
 ///
 /// # Errors
 /// If the policy cannot be used.

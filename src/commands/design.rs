@@ -44,7 +44,7 @@ struct Document<'a> {
     between: [&'a str; 2],
     manoeuvres: Vec<Manoeuvre<'a>>,
     chosen: Option<&'a str>,
-    /// Seconds of the chosen manoeuvre that suffice.
+    /// Duration of the chosen manoeuvre that suffices, s.
     chosen_s: Option<f64>,
 }
 

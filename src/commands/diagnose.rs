@@ -27,7 +27,7 @@ use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::askew;
 use crate::sysid::progress::{Progress, Stage, part};
 
-/// Candidates in the table.
+/// Largest number of candidates in the table.
 const ROWS: usize = 12;
 
 /// Options of `greylag diagnose`.
@@ -133,10 +133,10 @@ struct Document<'a> {
     answer: &'a Answer,
 }
 
-/// Fall of the error by which tuning is worth a command, %.
+/// Smallest reduction of the error by tuning for which a tuning command is recommended, %.
 const WORTH_TUNING: f64 = 1.0;
 
-/// The command that comes next; `change_percent` is what tuning and effects change of the error.
+/// The command that comes next. `change_percent` is the change of the error by tuning and effects, %.
 fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> String {
     let model = &arguments.model;
     let out = model.parent().unwrap_or(Path::new("")).join("amended");
@@ -153,10 +153,10 @@ fn next(arguments: &Arguments, diagnosis: &Diagnosis, change_percent: f64) -> St
         (Verdict::Adequate, _) => {
             format!("greylag amend --model {model}{logs} --tune-only --out {out}")
         }
-        // a formula is tested on another flight than it is searched in
+        // a formula is tested on a flight that its search has not seen
         (Verdict::Unexplained, _) if arguments.logs.paths.len() < 2 => String::new(),
         (Verdict::Unexplained, _) => format!("greylag propose --model {model}{logs}"),
-        // the flights are in question: what the logs hold comes first
+        // the flights themselves are in doubt, so the logs are inspected first
         (Verdict::Unknown, _) => arguments
             .logs
             .paths
@@ -170,7 +170,7 @@ fn in_doubt(diagnosis: &Diagnosis) -> bool {
     diagnosis.effects.iter().any(|c| c.asserted && !c.indistinguishable_from.is_empty())
 }
 
-/// The report as HTML, with where the models fail.
+/// The report as HTML, with the errors of the models by channel and regime.
 fn page(
     arguments: &Arguments,
     (diagnosis, answer): (&Diagnosis, &Answer),

@@ -6,11 +6,12 @@ use anyhow::{Result, bail};
 
 use crate::model::residual::hash;
 
-/// Refuses a flight that is named twice in `fitted`, or in `fitted` and in `held`, by its content: a name can be
-/// spelled in several ways, and a file copied.
+/// Refuses a flight that occurs twice in `fitted`, twice in `held`, or in both. Files are compared by content,
+/// because one file can have several paths and copies.
 ///
 /// # Errors
-/// The two names. A file that cannot be read is left to whoever reads it.
+/// If two files have the same content; the error names both. A file that cannot be read is skipped: the command that
+/// reads it reports the error.
 pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
     let known = |paths: &[PathBuf]| -> Vec<(PathBuf, String)> {
         let content = |p: &PathBuf| Some((p.clone(), hash(&std::fs::read(p).ok()?)));

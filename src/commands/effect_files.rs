@@ -8,7 +8,7 @@ use crate::commands::files::shipped;
 use crate::physics::effects::Kind;
 use crate::physics::formula::register;
 
-/// The ids of `effects`, each an id, an effect file or a folder of them; files are read.
+/// The ids of `effects`, each of which is an id, an effect file or a folder of effect files. The files are read.
 ///
 /// # Errors
 /// If a file cannot be read or is no effect file.
@@ -29,12 +29,12 @@ pub fn named_effects(effects: &[String]) -> Result<Vec<String>> {
     Ok(ids)
 }
 
-/// Whether `named` is a file's name rather than an id, which has no dot.
+/// Whether `named` is a file's name rather than an id, which has neither a dot nor a slash.
 pub fn is_file(named: &str) -> bool {
     named.contains(['.', '/', '\\'])
 }
 
-/// Those of `ids` that are of files.
+/// Those of `ids` whose effects come from files.
 pub fn own_effects(ids: &[String]) -> Vec<String> {
     let own = |id: &&String| Kind::from_id(id).is_some_and(|kind| kind.written().is_some());
     ids.iter().filter(own).cloned().collect()

@@ -92,7 +92,7 @@ impl Document {
     }
 }
 
-/// The layout of what is written as JSON.
+/// Schema of the JSON output.
 const SCHEMA: &str = "greylag.effects/1";
 
 /// The catalogue as JSON.
@@ -227,7 +227,7 @@ fn named(name: &str) -> Result<(Place, Description)> {
     Ok(catalogue.swap_remove(found))
 }
 
-/// Prints what only effects of files have.
+/// Prints the properties that only effects from files have.
 fn written(effect: &Written) {
     let names: Vec<&str> = effect.variables().iter().map(|v| v.name()).collect();
     let kinks = effect.kinks();
@@ -292,7 +292,7 @@ fn print(place: Place, about: &Description, channels: &str) {
     }
 }
 
-/// The catalogue's example; for part of a prior, the values that the model has.
+/// Coefficients for the signature: the example of the catalogue, or for part of a prior the values of the model.
 fn example(model: &GreyBox, about: &Description) -> Vec<f64> {
     match about.entry {
         Some(entry) => entry.example.into(),

@@ -32,7 +32,7 @@ use crate::sim::tracking::{Tracking, track};
 use crate::sim::{Group, Simulator};
 use draws::over_draws;
 
-/// Options that a flight in a drawn model has no use for.
+/// Options that do not apply to flights in drawn models.
 const IN_JSBSIM: [&str; 11] = [
     "report",
     "aircraft",
@@ -229,8 +229,9 @@ fn page(
     report.page().render()
 }
 
-/// The command that flies what the best controller flew here, in a whole flight with its page; none where several models
-/// or policies flew, for a name does not tell their files, or an aircraft of one's own, whose options it would repeat.
+/// The command that flies the best controller in the demonstration, a whole flight with its page. It is empty if several
+/// models or policies flew, because a controller's name does not identify their files, and if the user's own aircraft
+/// flew, because the command would have to repeat its options.
 fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
     let mean = |e: &&Evaluation| {
         let of = e.groups.iter().max_by_key(|score| score.count);

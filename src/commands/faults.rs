@@ -27,7 +27,7 @@ use crate::sim::faults::{Case, Cause, CompanionFactory, Counterpart, FaultKind, 
 use ledger::{Entry, Ledger};
 use search::Search;
 
-/// The aircraft that is flown where no other is named.
+/// Name of the default aircraft.
 const AIRCRAFT: &str = "x8";
 
 /// The arguments of `greylag faults`.
@@ -169,7 +169,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// The companions that fly scenarios where nothing else is named: `kind` of the default model, with the X8.
+/// The default companions of scenarios: the controller `kind` of the default model, with the X8.
 ///
 /// # Errors
 /// If the model or the policy that are shipped cannot be used.
@@ -198,7 +198,8 @@ fn factory(
     Ok(CompanionFactory::new(companion, model)?.with_aircraft(plant.clone()))
 }
 
-/// Fault against counterpart: flights with that fault among theirs, of these the flights with a finding.
+/// Prints a table of faults by counterparts: the number of flights with the fault, and how many of them have a
+/// finding.
 fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entries: &[Entry]) {
     println!("\n{}: findings of flights of 60 s with each fault", controller.name());
     let mut table = Table::new();
@@ -238,7 +239,7 @@ fn print_findings(entries: &[Entry]) {
     }
 }
 
-/// The faults of a flight, and its messages.
+/// Prints the findings, faults and messages of a flight.
 fn show(report: &Report) {
     let mut lines = vec![format!("greylag faults {}", Entry::from(report).options())];
     for f in &report.findings {
@@ -262,8 +263,8 @@ mod tests {
     use crate::physics::Command;
     use crate::sim::faults::Finding;
 
-    /// Runs a test with a stack for the LQI's design on all cores, whose dual numbers are large where nothing is
-    /// optimised away.
+    /// Runs a test on all cores with a stack that is large enough for the LQI's design: its dual numbers are large in
+    /// a build without optimisation.
     fn roomy(test: fn()) {
         let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().unwrap();
         pool.install(test);
@@ -282,7 +283,8 @@ mod tests {
     fn a_few_flights_with_every_fault_leave_the_companion_sound() {
         roomy(|| {
             let factory = factory();
-            // Each kind of fault comes first once in so many seeds; the counterparts share them out.
+            // Over this many seeds each kind of fault is drawn first once; the seeds are spread over the
+            // counterparts.
             for seed in 0..FaultKind::DRAWN.len() as u64 {
                 let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];
                 let case = Case { seed, controller: ControllerKind::Lqi, counterpart };
@@ -312,7 +314,7 @@ mod tests {
         });
     }
 
-    /// Rolls as far as it goes, whatever is wanted.
+    /// Commands full aileron, whatever the target is.
     #[derive(Clone)]
     struct Hardover;
 

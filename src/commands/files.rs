@@ -47,7 +47,7 @@ struct Document<'a, T> {
 }
 
 impl JsonArgument {
-    /// Fails at once if it cannot be written later.
+    /// Fails at once if the JSON file could not be written later.
     pub fn writable(&self, overwrite: Overwrite) -> Result<()> {
         self.json.as_ref().map_or(Ok(()), |path| writable(path, overwrite))
     }
@@ -57,7 +57,7 @@ impl JsonArgument {
         is_stdout(self.json.as_deref())
     }
 
-    /// Writes `content` under the name of its layout where it was asked for, if it was.
+    /// Writes `content` with the name of its layout to the file of `--json`; does nothing without that option.
     pub fn write(
         &self,
         schema: &'static str,

@@ -42,7 +42,7 @@ pub struct FlownWith {
     /// Path of the flight-test schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<PathBuf>,
-    /// Profile of the vehicle's link, and the commanded quantity.
+    /// Profile of the vehicle's link.
     pub profile: ProfileName,
     /// Quantity that the flight controller was commanded.
     pub commanded: CommandName,
@@ -75,7 +75,7 @@ fn lasting(path: &Path) -> PathBuf {
 }
 
 impl FlownWith {
-    /// Writes what flies into the recording `folder`.
+    /// Writes controller, model and link of the flight into the recording `folder`.
     pub fn write(folder: &Path, chosen: &Chosen<'_>, model: &GreyBox) -> Result<()> {
         let said = FlownWith {
             schema: SCHEMA,
@@ -97,7 +97,7 @@ impl FlownWith {
         files::write(&folder.join(FILE), &text, Overwrite::Never)
     }
 
-    /// Reads it from a recording; `None` from one that was made before November 2026.
+    /// Reads the file from a recording; `None` if the recording has none, as recordings made before November 2026.
     ///
     /// # Errors
     /// If the file cannot be used.

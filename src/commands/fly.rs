@@ -37,9 +37,9 @@ use crate::model::GreyBox;
 use crate::physics::Airframe;
 use crate::physics::airframe::ActuatorFigures;
 
-/// The model that is flown where no other is named: learned from flights, from an imperfect prior.
+/// The default model: learned from flights, starting from an imperfect prior.
 pub const MODEL: &str = "params/x8/learned/model.toml";
-/// The controller that flies where no other is named.
+/// The default controller.
 pub const CONTROLLER: &str = "hybrid-ilqr";
 
 /// The arguments of `greylag fly`.
@@ -285,12 +285,13 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// A pilot with its controllers, behind the envelope limiter of `model`: `kind` flies, with the policy in `folder` as
-/// [`controllers::policy`](crate::commands::controllers::policy) finds it; an LQI of the same model is the fallback, or `pid-retuned`, with a line on standard error, where none can be designed.
+/// A pilot with its controllers, behind the envelope limiter of `model`. The controller `kind` flies, with the policy in
+/// `folder` as [`controllers::policy`](crate::commands::controllers::policy) finds it. The fallback is an LQI of the same
+/// model. If no LQI can be designed, the fallback is `pid-retuned`, with a line on standard error.
 ///
 /// # Errors
-/// If the policy cannot be used, the model does not allow `kind`, or flies straight at its cruise airspeed neither level
-/// nor in a glide. An LQI that cannot be designed as the fallback is no error.
+/// If the policy cannot be used, if the model does not allow `kind`, or if the model can be trimmed at its cruise
+/// airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the fallback is no error.
 pub fn companion_with(
     kind: ControllerKind,
     model: &GreyBox,
@@ -299,7 +300,7 @@ pub fn companion_with(
     companion_with_planner(kind, model, folder, &[])
 }
 
-/// The same with `changes` of the planner's settings.
+/// As [`companion_with`], with `changes` of the planner's settings.
 ///
 /// # Errors
 /// As [`companion_with`], and if there are changes and no planner.
@@ -352,7 +353,7 @@ fn announce(arguments: &Arguments, model: &GreyBox, flight: &Flight) {
     println!("waiting for a vehicle; Ctrl-C ends");
 }
 
-/// Prints what happens until the flight is over.
+/// Prints the events of the flight until it ends.
 fn show_events(flight: &Flight, vehicle: &Address) {
     while flight.is_flying() {
         match flight.events.recv_timeout(Duration::from_millis(50)) {

@@ -16,7 +16,7 @@ const HEAD: u64 = 4096;
 /// The model at `path`, or where the program ships it.
 ///
 /// # Errors
-/// It cannot be read, or is a flight log.
+/// If the file cannot be read, or is a flight log.
 pub fn model(path: &Path) -> Result<GreyBox> {
     let found = shipped(path);
     if is_log(&found) {
@@ -31,7 +31,7 @@ pub fn model(path: &Path) -> Result<GreyBox> {
 /// Refuses a model that is given as a log.
 ///
 /// # Errors
-/// It is one.
+/// If `path` is a `.toml` file.
 pub fn log(path: &Path) -> Result<()> {
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if named && path.is_file() {

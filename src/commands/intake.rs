@@ -206,7 +206,7 @@ impl Reading {
     }
 }
 
-/// The error of a log that cannot be read; where units explain it, with the command that puts them right.
+/// The error of a log that cannot be read. If wrong units explain it, the error names the command that corrects them.
 fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
     let hint = match &error {
         logs::LogError::Csv { hint, .. } | logs::LogError::Unusable { hint, .. } => hint,
@@ -223,7 +223,8 @@ fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
     )
 }
 
-/// Refuses a log whose figures would be wrong, with the command that writes the mapping that puts it right.
+/// Refuses a log whose figures would be wrong. If a mapping can correct the log, the error names the command that
+/// writes it.
 fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
     let problems: Vec<&Finding> =
         findings.iter().filter(|f| f.severity == Severity::Problem).collect();
@@ -231,7 +232,7 @@ fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
         return Ok(());
     }
     let log = quoted(path);
-    // of what a factor cures the column is enough: the command below says why
+    // a problem that a factor corrects is named by its column only: the command below explains it
     let said = |f: &&Finding| match &f.cure {
         Some(cure) => {
             format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)

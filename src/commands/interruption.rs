@@ -22,7 +22,7 @@ pub enum Ended {
 }
 
 impl Interruption {
-    /// The flag of this program; to be called once.
+    /// Sets the handler of Ctrl-C and returns its flag. Call it once in a program.
     ///
     /// # Errors
     /// If the handler cannot be set.

@@ -36,9 +36,10 @@ use print_to;
 
 /// Time within which the flight controller must send a heartbeat.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(4);
-/// Share of a serial port that state may take: what is left is for parameters, commands, routing.
+/// Largest share of a serial port's rate for state messages. The rest is for parameters, commands and routed
+/// messages.
 const BUDGET: f64 = 0.6;
-/// A stream below this share of its rate is missing.
+/// A stream below this share of its nominal rate counts as missing.
 const ENOUGH: f64 = 0.8;
 
 /// The arguments of `greylag link`.
@@ -187,7 +188,7 @@ struct Document {
     system: Option<u8>,
     armed: Option<bool>,
     loss: f64,
-    /// TIMESYNC there and back, the median.
+    /// Median of the round trips of TIMESYNC, ms.
     round_trip_ms: Option<f64>,
     streams: Vec<StreamRow>,
     parameters: Vec<String>,
@@ -329,7 +330,7 @@ fn streams(real: &Real, missing: &mut Vec<String>, out: &mut dyn Write) {
                     remedy(real.profile().stack)
                 )
             });
-            // One denial names all that were denied.
+            // One text names all denied streams.
             if !missing.contains(&words) {
                 missing.push(words);
             }

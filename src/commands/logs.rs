@@ -311,7 +311,7 @@ fn print_sources(info: &Info) {
     }
 }
 
-/// Phases and gaps printed; `--json` has them all.
+/// Largest number of phases and of gaps that are printed; `--json` has them all.
 const SHOWN: usize = 12;
 
 fn more(count: usize) {

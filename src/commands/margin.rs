@@ -8,8 +8,9 @@ use crate::control::{ControllerKind, Pace, build};
 use crate::flight::delay_margin;
 use crate::model::GreyBox;
 
-/// The least delay at which the loop of `kind` on `model` swings by itself. For a planner, which takes too long to ask, and for a
-/// policy, which has no design, it is that of the LQI: their fallback.
+/// The delay margin of `kind` on `model`: the smallest delay at which its loop oscillates. For planners and policies it is that
+/// of the LQI, which is their fallback: a planner takes too long to simulate, and a policy has no design. `None` if the LQI
+/// cannot be designed, or the loop is stable up to the largest delay simulated.
 ///
 /// # Errors
 /// If the controller cannot be built.

@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 
 use super::one_line::one_line;
 
-/// Remedies in error texts that do not depend on the cause; the right one replaces them.
+/// General remedies in error texts. A remedy for the actual cause replaces them.
 const ANY_CURE: [&str; 4] = [
     ": check the path and its permissions",
     "; check that its folder exists, can be written to and has room",
@@ -47,7 +47,7 @@ fn without_numbers(mut text: String) -> String {
     text
 }
 
-/// The text without cures that may not be, numbers of the system, and names of temporary files.
+/// The text without general remedies, error numbers of the system and names of temporary files.
 fn plain(text: &str) -> String {
     let mut text = ANY_CURE.iter().fold(text.to_owned(), |text, any| text.replace(any, ""));
     text = without_numbers(text);

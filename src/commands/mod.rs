@@ -1,4 +1,4 @@
-//! Subcommands: arguments, then a few lines of work.
+//! Subcommands of `greylag`: their arguments, and the calls that carry them out.
 
 mod aircraft;
 #[cfg(feature = "study")]
@@ -188,7 +188,7 @@ enum Command {
     Workbench(workbench::Arguments),
 }
 
-/// Lets a closed pipe, as in `greylag … | head`, end the program without a word.
+/// Ends the program silently when its output pipe is closed, as in `greylag … | head`.
 fn end_with_the_reader() {
     let usual = panic::take_hook();
     panic::set_hook(Box::new(move |about| {
@@ -207,8 +207,7 @@ fn parse() -> Arguments {
     <Arguments as clap::FromArgMatches>::from_arg_matches(&found).unwrap_or_else(|e| e.exit())
 }
 
-/// The command with values that may begin with a minus sign wherever one is taken: the option's
-/// parser checks the range.
+/// The command with negative numbers allowed for all options that take a value: the option's parser checks the range.
 fn with_signs(command: clap::Command) -> clap::Command {
     let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
     let command = command.mut_args(|a| if takes(&a) { a.allow_negative_numbers(true) } else { a });
@@ -225,7 +224,7 @@ pub fn main() -> ExitCode {
         (_, 1) => LevelFilter::INFO,
         (_, 2..) => LevelFilter::DEBUG,
     };
-    // warnings of the port of JSBSim on an aircraft's XML are repeated in our words
+    // the program prints its own notes in place of the warnings of the port of JSBSim on an aircraft's XML
     let port = if level == LevelFilter::WARN { LevelFilter::OFF } else { level };
     let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter =

@@ -1,4 +1,4 @@
-//! `greylag mystery`: flights of an aircraft with an effect in it that its model lacks.
+//! `greylag mystery`: flights of an aircraft that has an effect which its model lacks.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -213,7 +213,7 @@ fn answer(seed: u64, missing: &Missing) -> Answer {
     }
 }
 
-/// The unit of the amount of an effect.
+/// The unit of an effect's amplitude.
 fn unit(id: &str) -> &'static str {
     let of_file = || register::find(id).map(|e| e.about.coefficients[0].unit);
     MissingKind::from_id(id).map(|kind| kind.unit).or_else(of_file).unwrap_or_default()

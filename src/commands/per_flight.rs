@@ -1,8 +1,8 @@
-//! Options for what may differ from flight to flight.
+//! Options for constants that may differ from flight to flight.
 
 use crate::sysid::per_flight::PerFlight;
 
-/// Largest standard deviation of an angle, °: beyond it a turn is no small one.
+/// Largest standard deviation of an angle, °: beyond it the approximation of small angles fails.
 const MOST_DEG: f64 = 10.0;
 /// Largest factor on the trims' widths.
 const MOST_TIMES: f64 = 100.0;

@@ -24,9 +24,9 @@ struct Row<'a> {
     measured: [f64; 8],
 }
 
-/// The predictions of `models` for `flights` at `horizons_s` after every start, as CSV: a row a model, flight, start
-/// and horizon. A run that has diverged has no row. The 95 % interval of a state is by the errors of the same model
-/// at the same horizon over all other starts.
+/// The predictions of `models` for `flights` at `horizons_s` (s) after every start, as CSV with a row for each model,
+/// flight, start and horizon. A run that has diverged has no row. The 95 % interval of a state is computed from the
+/// errors of the same model at the same horizon over all other starts.
 pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64]) -> Result<String> {
     let longest = horizons_s.iter().copied().fold(0.0, f64::max);
     let mut text = header();
@@ -49,7 +49,7 @@ pub fn table(models: &[GreyBox], flights: &[Reconstruction], horizons_s: &[f64])
     Ok(text)
 }
 
-/// `model`, and the same without what its file knows of `flights`, where it knows anything of them.
+/// `model`, and if its file has constants of `flights`, also a copy without these constants.
 fn with_and_without(model: &GreyBox, flights: &[Reconstruction]) -> Vec<GreyBox> {
     let mut all = vec![model.clone()];
     if flights.iter().any(|f| model.known.of(&f.name).is_some()) {

@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Logs to search in, logs to test on: the last one if none are named.
+/// Logs to search in and logs to test on. If no logs are held out, the last one is tested on.
 fn divided(arguments: &Arguments) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let (logs, held) = (&arguments.logs.paths, &arguments.hold_out);
     distinct(logs, held)?;

@@ -1,13 +1,13 @@
-//! Whether this computer is on time: measured at the start of a flight, with what can be done about it.
+//! Timing jitter of this computer, measured at the start of a flight, with advice.
 
 use std::time::Duration;
 
 use crate::flight::runtime::{Class, Punctuality, take_real_time};
 
-/// How long is measured: two hundred cycles.
+/// Duration of the measurement: two hundred cycles.
 const MEASURED: Duration = Duration::from_secs(2);
 
-/// The scheduler's class of the flight: that of real time if `wanted` and permitted. Threads started later inherit it.
+/// The scheduling class of the flight: real time if `wanted` and permitted. Threads started later inherit it.
 pub fn class(wanted: bool) -> Class {
     if !wanted {
         return Class::Usual;

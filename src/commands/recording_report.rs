@@ -34,7 +34,7 @@ pub struct Reporter<'a> {
     pub controller: &'a str,
     /// The model that the controller is designed from.
     pub model: &'a GreyBox,
-    /// Its file.
+    /// Path of the model's file.
     pub model_file: &'a Path,
     /// Seed of everything random, where it is known.
     pub seed: Option<u64>,
@@ -47,7 +47,7 @@ pub struct Reporter<'a> {
 }
 
 impl Reporter<'_> {
-    /// Reads the recording in `folder` and makes the report's material of it.
+    /// Makes the report on `flight`, with the loop timing of the recording in `folder`.
     pub fn report<'f>(&self, folder: &Path, flight: &'f Flight) -> Result<FlightReport<'f>> {
         let travels = self.model.airframe.actuators.travels();
         Ok(FlightReport {
@@ -104,7 +104,7 @@ impl Reporter<'_> {
     }
 }
 
-/// Ticks after a command at which the planner's view is taken: the search has begun to move the aircraft.
+/// Ticks after a command at which the planner's rollouts are taken: by then the plan has begun to move the aircraft.
 const REPORTED_AFTER: usize = 20;
 
 /// Insight into the planner of `companion` a moment after each command, by a replay of the
@@ -164,7 +164,8 @@ pub fn segments(flight: &Flight) -> Vec<Segment> {
     runs.map(score).collect()
 }
 
-/// Whether a sample was flown towards `target`, rad: it passes through a single-precision quaternion, good to 1e-7.
+/// Whether the target of a sample is this one (roll, pitch, rad). A recorded target has passed through a quaternion
+/// in single precision, accurate to 1e-7.
 fn wants(s: &Sample, [roll, pitch]: [f64; 2]) -> bool {
     (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5
 }

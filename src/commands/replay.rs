@@ -73,7 +73,7 @@ pub struct Again {
     pub controller: ControllerKind,
     /// Model of the aircraft.
     pub model: GreyBox,
-    /// Its file.
+    /// Path of the model's file.
     pub model_file: PathBuf,
     /// Pilot and controllers, as at the start of the flight.
     pub companion: Companion,

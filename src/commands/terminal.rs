@@ -14,11 +14,11 @@ pub const NORMAL_95: f64 = 1.96;
 /// Columns of a terminal that tables fit.
 pub const WIDTH: u16 = 100;
 
-/// Letters up to which a name in the first column is never broken into lines.
+/// Length up to which a name in the first column is never broken into lines, characters.
 #[cfg(feature = "study")]
 const NAME: usize = 40;
 
-/// Lines above, under the header and below; a row a line.
+/// Borders of a table: lines above the header, below it, and below the last row.
 const LINES: TableStyle = TableStyle::new()
     .top_border(LineStyle::none().fill('─').junction('─'))
     .header_separator(LineStyle::none().fill('─').junction('─'))

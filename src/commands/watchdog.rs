@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 
-/// Feeds systemd's watchdog twice in each of its periods if `rounds` has grown since; does nothing where no watchdog
-/// watches this process. A control thread that hangs is not fed for, and systemd starts the process anew.
+/// Notifies systemd's watchdog twice in each of its periods if `rounds` has grown since the last time. Does nothing
+/// if systemd has no watchdog for this process. If the control thread hangs, the notifications stop, and systemd
+/// restarts the process.
 pub fn feed(rounds: Arc<AtomicU64>) {
     let Some(period) = sd_notify::watchdog_enabled() else { return };
     let started = std::thread::Builder::new().name("watchdog".into()).spawn(move || {

@@ -38,7 +38,7 @@ pub struct Arguments {
     reading: Reading,
 }
 
-/// The model that is named, for a new session also by the environment.
+/// The model that the option names; for a new session without the option, the one that the environment names.
 fn model(arguments: &Arguments) -> Option<PathBuf> {
     let new = !arguments.folder.join(FILE).exists();
     let environment = || std::env::var_os("GREYLAG_MODEL").filter(|_| new).map(PathBuf::from);

@@ -18,7 +18,7 @@ pub struct AircraftReport<'a> {
     pub model: &'a GreyBox,
     /// Results of the checks of the model.
     pub check: &'a AircraftCheck,
-    /// Responses to a quarter of the aileron, then of the elevator.
+    /// Responses to a step of a quarter of full aileron, then of full elevator.
     pub responses: &'a [StickResponse; 2],
     /// Path of the model's file.
     pub model_file: String,

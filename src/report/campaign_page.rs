@@ -183,7 +183,7 @@ impl CampaignReport<'_> {
     }
 }
 
-/// The interquartile mean of a column over the seeds that have a point at `steps`, if all have.
+/// The interquartile mean of a column over the seeds at `steps`; `None` unless every seed has a point there.
 fn middle(records: &[&Record], column: &str, steps: f64) -> Option<Estimate> {
     let value = |record: &&Record| {
         let at = record.curve["steps"].iter().position(|s| *s == steps)?;

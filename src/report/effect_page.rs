@@ -15,7 +15,7 @@ pub struct EffectReport<'a> {
     pub place: &'static str,
     /// Signature of the effect; `None` for an error of the measurement.
     pub signature: Option<&'a Signature>,
-    /// Name of the model whose signature is drawn.
+    /// Name of the model on which the signature is drawn.
     pub model: String,
     /// Values of the coefficients in the drawing.
     pub values: Vec<f64>,

@@ -51,7 +51,7 @@ impl EvaluationReport<'_> {
         let plain = |sentence: String| Finding { sentence, link: None };
         let mut lead: Vec<Finding> =
             answer::sentences(self.evaluations).into_iter().map(plain).collect();
-        // tracking and what it costs the aircraft are one answer
+        // the first two sentences, on tracking and on the envelope, lead together
         let rest = lead.split_off(lead.len().min(2));
         let next = self.next.clone();
         match lead.is_empty() {

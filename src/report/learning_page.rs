@@ -1,4 +1,4 @@
-//! The page of learning curves: how far trainings of policies came, over steps and over time.
+//! The page of learning curves: results of policy trainings over steps and over time.
 
 use super::Align::{Left, Right};
 use super::{
@@ -13,7 +13,7 @@ use greylag_learn::policy::learning_curve::{CurvePoint, best, knee, spread};
 pub struct Training {
     /// Name that distinguishes it from the other trainings.
     pub name: String,
-    /// Each seed's name and evaluations, in order; none is without evaluations.
+    /// Each seed's name and evaluations, in order; every seed has at least one evaluation.
     pub seeds: Vec<(String, Vec<CurvePoint>)>,
 }
 
@@ -94,7 +94,7 @@ impl LearningReport<'_> {
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// What each training came to, in a sentence; the first in large type.
+    /// The best evaluation of each seed of each training, in a sentence; the first in large type.
     fn answer(&self) -> Section {
         let all = self.trainings.iter().flat_map(|t| t.seeds.iter().map(move |s| (t, s)));
         let said = all.filter_map(|(training, (seed, points))| {
@@ -151,7 +151,7 @@ impl LearningReport<'_> {
         QUANTITIES.iter().filter_map(figure).collect()
     }
 
-    /// Where each seed of each training came to.
+    /// Table of the best and the last evaluation of each seed of each training.
     pub fn table(&self) -> Table {
         let columns = [
             ("Training", Left),

@@ -18,7 +18,7 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Roll and pitch of the candidates and of the flight.
+    /// Roll and pitch of the candidates and of the plan.
     pub(super) fn fans(&self) -> [Figure; 2] {
         [self.fan(0, "Roll"), self.fan(1, "Pitch")]
     }
@@ -62,7 +62,7 @@ impl Sight {
     }
 }
 
-/// Time of the parts of ticks, ms.
+/// Computation time of each part of the displayed ticks, ms.
 pub(super) fn phases<'a>(sights: impl IntoIterator<Item = &'a Sight>) -> Table {
     let mut sights = sights.into_iter().peekable();
     let mut columns = vec![("At (s)", Right)];

@@ -1,4 +1,4 @@
-//! The page of one training: how the loss fell, where the coefficients went, what the residual learned.
+//! The page of one training: the history of loss and coefficients, and what the residual contributes.
 
 use super::Align::{Left, Right};
 use super::{
@@ -24,7 +24,7 @@ pub struct TrainingReport<'a> {
     pub coefficients: &'a [Learned],
     /// Errors of the bare prior on the judging flights.
     pub prior: &'a [Horizon],
-    /// Errors of the learned model on the same.
+    /// Errors of the learned model on the same flights.
     pub learned: &'a [Horizon],
     /// Map of the residual's contribution; `None` for a model without one.
     pub residual: Option<&'a ResidualMap>,
@@ -32,7 +32,7 @@ pub struct TrainingReport<'a> {
     pub next: String,
     /// Notes for the reader of the page.
     pub notes: &'a [String],
-    /// Things and their values: files, hashes, options.
+    /// Names and values of the training's inputs: files, hashes, options.
     pub provenance: Vec<(String, String)>,
 }
 

@@ -66,9 +66,9 @@ pub enum Act {
         /// Id of the effect in the catalogue.
         effect: String,
     },
-    /// Keep the effect accepted last though the data refuse it.
+    /// Keep the effect accepted last although the data refuse it.
     Keep,
-    /// Take the effect accepted last back.
+    /// Take back the effect accepted last.
     Undo,
     /// Accept again the effect that was removed last.
     Redo,
@@ -182,7 +182,7 @@ impl Bench {
         })
     }
 
-    /// Keeps the effect accepted last though the data refuse it.
+    /// Keeps the effect accepted last although the data refuse it.
     fn keep(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.effects.last_mut();
@@ -193,7 +193,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Takes the effect accepted last back.
+    /// Takes back the effect accepted last.
     fn undo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.effects.pop();
@@ -241,7 +241,7 @@ impl Bench {
         let _one_at_a_time = self.taking.lock().unwrap_or_else(PoisonError::into_inner);
         let place = PathBuf::from("logs").join(name);
         let file = self.folder.join(&place);
-        // another log of that name keeps it
+        // if another log has that name, the new one gets a name with its hash
         let place = match fs::read(&file) {
             Ok(there) if there != bytes => {
                 PathBuf::from("logs").join(format!("{}-{name}", &sha256(bytes)[..8]))
@@ -287,7 +287,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Looks at the test flights: free runs of the model as given and as amended, recorded before they are shown.
+    /// Judges the model as given and as amended by free runs over the test flights. The opening is recorded before
+    /// the results are shown.
     fn judge(&self, seen: u64) -> Result<(), WorkbenchError> {
         self.same_model()?;
         let (given, amended, effects, places, flights) = {
@@ -327,7 +328,7 @@ impl Bench {
         self.change(seen, |inner| {
             inner.session.model_sha256 = read.fingerprint;
             (inner.model, inner.original) = (read.model, read.original);
-            // gravity, actuators and the least airspeed are the model's
+            // the logs are read again, because gravity, actuators and the least airspeed come from the model
             inner.reread();
             Ok(())
         })
@@ -346,7 +347,8 @@ impl Inner {
     }
 }
 
-/// The longest horizon up to that of judgement that runs reach, s, with the error there.
+/// The longest horizon that runs reach, at most that of the judgement, s, with the error there; NaN if no run reaches
+/// one.
 fn judged(scores: &[HorizonScore]) -> (f64, f64) {
     let mut reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= Options::JUDGED_AT_S);
     reached.next_back().map_or((f64::NAN, f64::NAN), |s| (s.horizon_s, s.rmse_scaled))

@@ -136,7 +136,7 @@ impl Bench {
         inner.take_mapping()?;
         inner.read_own()?;
         inner.read_designed();
-        // what another run was flying when it ended
+        // flights that an earlier run left unfinished
         let cut = inner.session.flown.iter_mut().filter(|f| f.outcome == Outcome::Flying);
         cut.for_each(|flown| flown.outcome = Outcome::CutOff);
         inner.reread();
@@ -247,7 +247,7 @@ impl Bench {
         })
     }
 
-    /// Comparison of the models as they came about with the flights that are not locked; cached by key.
+    /// Comparison of the models (given, tuned, amended) with the flights to fit to and held out; cached by key.
     pub(super) fn comparison(&self) -> Result<(Vec<Way>, Arc<Comparison>), WorkbenchError> {
         let (key, ways, models, flights) = {
             let inner = self.lock();
@@ -344,7 +344,7 @@ pub(super) struct Read {
 
 /// Reads the model at `path`.
 pub(super) fn load(path: &Path) -> Result<Read, WorkbenchError> {
-    // first, so that a file that is edited meanwhile is noticed later
+    // computed first, so that an edit of the file in the meantime is noticed later
     let fingerprint = fingerprint(path).map_err(|e| io(path, e))?;
     Ok(Read { model: GreyBox::load(path)?, original: Original::read(path)?, fingerprint })
 }
@@ -390,7 +390,7 @@ impl Inner {
         }
     }
 
-    /// The model as given; behind it as amended, by equation error as long as the fit is not done.
+    /// The model as given, then as amended: estimated by equation error until the fit is done.
     pub fn models(&self) -> Vec<GreyBox> {
         let key = self.key("fit", &self.session.effects);
         let estimate = self.estimate.as_ref().filter(|(of, _)| *of == key).map(|(_, e)| &e.model);

@@ -1,4 +1,4 @@
-//! The command that does the same as a click.
+//! The commands of `greylag` that do the same as the page.
 
 use serde::Serialize;
 
@@ -14,15 +14,15 @@ use greylag_sysid::amend::document::MODEL;
 pub struct Commands {
     /// Command that summarises the logs.
     pub flights: String,
-    /// Where the model fails.
+    /// Command that compares the models with the flights to fit to and held out.
     pub compare: String,
     /// Command that finds the effects that the model lacks.
     pub diagnose: String,
     /// The command that searches a formula for the residual; empty without a flight to test it on.
     pub propose: String,
-    /// The amended model; empty without accepted effects.
+    /// Command that amends the model; empty without accepted effects.
     pub amend: String,
-    /// Both models on the test flights; empty without any.
+    /// Command that compares both models with the test flights; empty without test flights.
     pub judge: String,
 }
 

@@ -27,7 +27,7 @@ pub struct FlightData {
     pub window_s: Vec<Option<f64>>,
     /// Value of each regime variable in each window.
     pub regimes: BTreeMap<String, Vec<Option<f32>>>,
-    /// How each of the models came about.
+    /// Origin of each of the models.
     pub ways: Vec<Way>,
     /// Channels by symbol: measured, then each model.
     pub channels: BTreeMap<&'static str, Vec<Vec<Option<f32>>>>,
@@ -115,7 +115,7 @@ fn word(variable: RegimeVariable) -> String {
     }
 }
 
-/// A number in single precision, enough for a screen; `None` if it is not finite.
+/// A number with five significant digits, enough for a screen; `None` if it is not finite.
 fn some(x: f64) -> Option<f32> {
     if x == 0.0 {
         return Some(0.0);
@@ -124,7 +124,7 @@ fn some(x: f64) -> Option<f32> {
     Some(((x * unit).round() / unit) as f32).filter(|x| x.is_finite())
 }
 
-/// A time to 0.1 ms.
+/// A time rounded to 0.1 ms, s; `None` if it is not finite.
 fn clock(time_s: f64) -> Option<f64> {
     Some((time_s * 1e4).round() / 1e4).filter(|t| t.is_finite())
 }

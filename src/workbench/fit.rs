@@ -1,4 +1,4 @@
-//! The model with the accepted effects: worked out, kept in the session's folder, saved.
+//! The model with the accepted effects: fitted, stored in the session's folder, saved.
 
 use std::fs;
 use std::path::Path;
@@ -43,7 +43,7 @@ impl Fitted {
         Some(Fitted { model, story: json(STORY)?, on_fit: json(ON_FIT)? })
     }
 
-    /// Whether effects were asked for and none of them joined the model.
+    /// Whether none of the accepted effects joined the model.
     pub fn all_refused(&self) -> bool {
         self.joined().is_empty()
     }
@@ -177,7 +177,7 @@ impl Bench {
     }
 }
 
-/// Free runs of `model` over `flights` at the usual horizons.
+/// Free-run errors of `model` over `flights` at the default horizons.
 pub(super) fn scores(model: &GreyBox, flights: &[Prepared]) -> Vec<HorizonScore> {
     let horizons = Options::default().horizons_s;
     let (runs, _) = free_run::fly(model, flights, &horizons);

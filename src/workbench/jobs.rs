@@ -1,4 +1,4 @@
-//! Long tasks in the background: how far they are, and how they are cancelled.
+//! Long tasks in the background: their progress and their cancellation.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,7 +16,7 @@ use greylag_sysid::amend::tune;
 use greylag_sysid::diagnose::{Options, diagnose};
 use greylag_sysid::progress::{FirstLook, Progress, Stage, part};
 
-/// The effects of files that a diagnosis has tried, in what the workbench keeps of it.
+/// Field of a stored diagnosis that lists the effects from files which the diagnosis has tried.
 pub(super) const TRIED: &str = "tried";
 
 /// Kind of a job.
@@ -25,11 +25,11 @@ pub(super) const TRIED: &str = "tried";
 pub enum Work {
     /// Diagnosis of the effects that the model lacks.
     Diagnosis,
-    /// The model with the accepted effects.
+    /// Fit of the model with the accepted effects.
     Fit,
-    /// A formula for what no effect explains.
+    /// Search for a formula for the residual that no effect explains.
     Proposal,
-    /// A flight schedule that distinguishes two effects.
+    /// Design of a flight schedule that distinguishes two effects.
     Schedule,
 }
 
@@ -117,12 +117,12 @@ fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), Work
 }
 
 impl Bench {
-    /// Announces that results have changed, not the session.
+    /// Announces that results have changed; the session has not.
     pub(super) fn changed(&self) {
         (self.on_event)(Event::Changed { revision: self.revision() });
     }
 
-    /// Starts a job, unless one does the same.
+    /// Starts a job, unless a job with the same key is running or all its fits exist.
     pub(super) fn start(self: &Arc<Self>, work: Work) {
         let (id, stop) = {
             let mut inner = self.lock();
@@ -187,7 +187,7 @@ impl Bench {
         self.changed();
     }
 
-    /// Notes how far a job is.
+    /// Records the progress of a job and sends it to the pages.
     fn further(&self, id: u64, stage: Stage<'_>) {
         let mut inner = self.lock();
         let Some(job) = inner.jobs.iter_mut().find(|job| job.id == id) else { return };

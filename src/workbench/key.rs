@@ -1,4 +1,5 @@
-//! Keys of results: a key names all inputs of a result, so that the result holds while they are unchanged.
+//! Keys of results. A key holds a hash over all inputs of a result, so that the result is valid while they are
+//! unchanged.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -11,7 +12,7 @@ use greylag_sysid::amend::document::sha256;
 impl Inner {
     /// Key of a result's inputs: model, options for reading logs, flights by role, effects.
     pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
-        // a result names its flights, and is of those that can be read
+        // a result contains the names of its flights and uses only flights that can be read
         let logs = |role: Role| -> String {
             let places = self.usable(&[role]);
             let named = places.iter().zip(self.names(&places));
@@ -33,7 +34,7 @@ impl Inner {
         format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
     }
 
-    /// Whether a file of the model is not what was read.
+    /// Whether a file of the model has changed since it was read.
     pub fn model_changed(&self) -> bool {
         fingerprint(&self.session.model).map_or(true, |now| now != self.session.model_sha256)
     }

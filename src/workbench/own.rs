@@ -25,7 +25,7 @@ use greylag_sysid::weak_form::prepared::Prepared;
 
 /// The folder of the effect files, below the session's.
 pub(super) const EFFECTS: &str = "effects";
-/// An effect file to begin with.
+/// An example of an effect file.
 const EXAMPLE: &str = include_str!("../../params/effects/yaw_by_throttle.toml");
 
 /// An effect that was written as text.
@@ -121,9 +121,9 @@ impl Bench {
         })
     }
 
-    /// What the accepted effect `id` makes in the channel where it makes most, over the variable that shows it best,
-    /// with what is left without it; by the fit if it is done, else by the estimate. `None` without either, and of an
-    /// effect that cannot be zero.
+    /// The contribution of the accepted effect `id` in the channel where it is largest, over the variable that shows
+    /// it best, with the residual of the model without the effect. It comes from the fit if that is done, else from
+    /// the estimate. `None` without either, and for an effect that cannot be set to zero.
     ///
     /// # Errors
     /// The flights cannot be compared.
@@ -186,7 +186,7 @@ fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -
     (!all.made.is_empty()).then_some(all)
 }
 
-/// The model with the effect's coefficients zero; `None` if it has none that could be.
+/// The model with the effect's linear coefficients set to zero; `None` if it has none.
 fn zeroed(model: &GreyBox, id: &str) -> Option<GreyBox> {
     let about = catalogue::describe(id)?;
     let linear = about.coefficients.len().checked_sub(about.shape)?;
@@ -207,7 +207,7 @@ impl Inner {
         Ok(())
     }
 
-    /// The effects of files as a diagnosis tries them now.
+    /// Ids and hashes of the session's effect files, which a diagnosis tries now.
     pub(super) fn tried(&self) -> Value {
         let text = |id: &String| register::find(id).map_or("", |effect| effect.text.as_str());
         self.session.own.iter().map(|id| json!([id, sha256(text(id).as_bytes())])).collect()

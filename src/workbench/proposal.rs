@@ -25,13 +25,13 @@ pub struct Designed {
     pub name: String,
     /// Ids of the two effects.
     pub between: [String; 2],
-    /// Name of the manoeuvre; empty if none distinguishes the two effects.
+    /// Name of the manoeuvre that distinguishes the two effects.
     pub manoeuvre: String,
     /// Purpose of the manoeuvre.
     pub description: String,
-    /// Seconds of it that suffice.
+    /// Duration of the manoeuvre that suffices, s.
     pub seconds: f64,
-    /// How often it is flown.
+    /// Number of times that the manoeuvre is flown.
     pub times: usize,
     /// Path of the schedule's file.
     pub file: PathBuf,
@@ -135,14 +135,14 @@ impl Bench {
 }
 
 impl Inner {
-    /// The flights that a formula is searched in, and those that it is tested on, as `greylag propose` takes them: the
-    /// last one to fit to if none is held out.
+    /// The flights that a formula is searched in, and those that it is tested on, as in `greylag propose`. If none is
+    /// held out, the last flight to fit to is tested on.
     pub(super) fn searched(&self) -> Result<[Vec<Reconstruction>; 2], WorkbenchError> {
         let [fit, held] = self.searched_places()?;
         Ok([self.reconstructions(&fit), self.reconstructions(&held)])
     }
 
-    /// The places of those flights.
+    /// Indices of the flights that a formula is searched in, and of those that it is tested on.
     pub(super) fn searched_places(&self) -> Result<[Vec<usize>; 2], WorkbenchError> {
         let (mut fit, held) = (self.usable(&[Role::Fit]), self.usable(&[Role::HoldOut]));
         match (&fit[..], &held[..]) {
@@ -156,7 +156,7 @@ impl Inner {
         }
     }
 
-    /// The schedules that were made in this session.
+    /// Reads the schedules that were made in this session.
     pub(super) fn read_designed(&mut self) {
         let files = fs::read_dir(self.folder.join(SCHEDULES)).into_iter().flatten().flatten();
         let mut paths: Vec<PathBuf> = files.map(|e| e.path()).collect();

@@ -16,7 +16,7 @@ use greylag_logs::sources::Asked;
 /// Options of a command line for reading logs.
 #[derive(Clone, Debug, Default)]
 pub struct Reading {
-    /// The mapping that is named there.
+    /// Path of the mapping file, if one is named.
     pub mapping: Option<PathBuf>,
     /// How many unusable rows a log may have.
     pub tolerance: Tolerance,
@@ -44,7 +44,7 @@ impl Reading {
 }
 
 impl Inner {
-    /// Takes up the mapping that was named, or the session's if it has one.
+    /// Loads the mapping that was named, or else the session's if it has one.
     pub fn take_mapping(&mut self) -> Result<(), WorkbenchError> {
         let own = Some(self.folder.join(FILE)).filter(|path| path.exists());
         let Some(file) = self.given.mapping.clone().or(own) else { return Ok(()) };

@@ -50,8 +50,7 @@ impl Inner {
         }
     }
 
-    /// Gives a log another role. A test flight that was locked is opened by this, which is
-    /// recorded.
+    /// Gives a log another role. This opens a test flight that was locked, and the opening is recorded.
     pub fn give_role(&mut self, place: usize, role: Role) -> Result<(), WorkbenchError> {
         let log = self.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
         if role != Role::Test && self.locked(log) && self.flights[place].is_ok() {

@@ -80,7 +80,7 @@ pub enum Occasion {
     OtherRole,
 }
 
-/// A look at test flights.
+/// A record of an opening of test flights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Opening {
@@ -136,7 +136,7 @@ pub struct Flown {
     /// Schedule that was flown; empty for a watched flight.
     #[serde(default)]
     pub schedule: String,
-    /// The command that flies the same; empty of a watched flight.
+    /// The command that flies the same; empty for a watched flight.
     #[serde(default)]
     pub command: String,
     /// Outcome of the flight.
@@ -169,10 +169,10 @@ pub struct Session {
     /// The accepted effects, in order.
     #[serde(default)]
     pub effects: Vec<Accepted>,
-    /// Effects that were taken back, the one that comes back first last.
+    /// Effects that were taken back. The last of them is the first to be accepted again.
     #[serde(default)]
     pub undone: Vec<Accepted>,
-    /// Looks at the test flights, in order.
+    /// Openings of the test flights, in order.
     #[serde(default)]
     pub openings: Vec<Opening>,
     /// Ids of effects that were written as text, in the folder `effects`.
@@ -235,8 +235,8 @@ impl Session {
         self.logs.iter().enumerate().filter(move |(_, log)| log.role == role).map(|(k, _)| k)
     }
 
-    /// The role that a log takes when it comes: one that is called a test is one, behind the first the last that comes
-    /// is held out, as `greylag amend` does.
+    /// The default role of a new log. A log whose name begins with `test` is a test flight. Of the others the first is
+    /// fitted to, and the one added last is held out, as in `greylag amend`.
     pub fn usual_role(&self, name: &str) -> Role {
         let has = |role| self.with(role).next().is_some();
         match name.to_lowercase().starts_with("test") {
@@ -248,15 +248,16 @@ impl Session {
         }
     }
 
-    /// Gives the log that is held out because it came last to the fit, where another comes with the role `next`.
+    /// Gives the role Fit to the log that is held out because it was added last, if a log with the role `next`
+    /// replaces it.
     pub fn make_room(&mut self, next: Role) {
         if let (Role::HoldOut, Some(place)) = (next, self.held_out_last()) {
             self.logs[place].role = Role::Fit;
         }
     }
 
-    /// The place of the only log that is held out, if it is the last of those to fit to and held out, and no effect is
-    /// accepted: then it is held out because it came last, and the next one takes its place.
+    /// Index of the log that is held out because it was added last, so that the next log replaces it: the only one
+    /// held out, the last of those to fit to and held out, with no effect accepted.
     pub fn held_out_last(&self) -> Option<usize> {
         let seen = |log: &LogEntry| matches!(log.role, Role::Fit | Role::HoldOut);
         let last = self.logs.iter().rposition(seen)?;

@@ -11,7 +11,7 @@ use greylag_model::GreyBox;
 use greylag_report::write_over;
 use greylag_sysid::amend::Fit;
 
-/// How a displayed model came about.
+/// Origin of a displayed model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {

@@ -95,11 +95,11 @@ struct StateView<'a> {
     commands: Commands,
 }
 
-/// Where the models fail.
+/// Errors of the models by channel and regime.
 #[derive(Serialize)]
 struct FailingView<'a> {
     flights: Vec<usize>,
-    /// How each of the models came about.
+    /// Origin of each of the models.
     ways: Vec<Way>,
     models: &'a [ModelResult],
     notes: &'a [String],
@@ -127,7 +127,7 @@ pub struct FreeRun {
 /// A free run of one model.
 #[derive(Clone, Debug, Serialize)]
 pub struct OneRun {
-    /// How the model came about.
+    /// Origin of the model.
     pub way: Way,
     /// Name of the model.
     pub model: String,
@@ -181,7 +181,7 @@ impl Bench {
         known.map_or(Value::Null, |(_, value)| value.as_ref().clone())
     }
 
-    /// Where the models fail on the flights to fit to and held out.
+    /// Errors of the models by channel and regime, on the flights to fit to and held out.
     ///
     /// # Errors
     /// No flight can be compared.
@@ -200,7 +200,7 @@ impl Bench {
         Ok(serde_json::to_value(&view)?)
     }
 
-    /// The flight over time, measured and by the models.
+    /// The flight over time, as measured and as predicted by the models.
     ///
     /// # Errors
     /// The flight does not exist, or is still hidden.
@@ -266,7 +266,7 @@ fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Va
     let tried = known.map_or(&Value::Null, |(_, value)| &value[TRIED]);
     json!({
         "there": known.is_some(),
-        // a diagnosis of before the last effect was written does not rank it
+        // a diagnosis made before the last effect was written does not rank that effect
         "behind": tried.is_array() && *tried != inner.tried(),
         "error": inner.failures.get(&key),
         "key": key,

@@ -73,7 +73,7 @@ pub fn status(found: &AircraftCheck) -> ExitCode {
 /// The page of the aircraft of `model`, whose file is `file`.
 ///
 /// # Errors
-/// It cannot be trimmed or stabilised at its cruise airspeed.
+/// If the aircraft cannot be trimmed or stabilised at its cruise airspeed.
 pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
     let report = AircraftReport {
         model,
@@ -85,7 +85,7 @@ pub fn page(file: &Path, model: &GreyBox) -> Result<String> {
     Ok(report.page().render())
 }
 
-/// Prints the findings.
+/// Prints trim, modes, authority and loops, then the findings.
 pub fn print(found: &AircraftCheck) {
     println!("\n{}", levels(found));
     println!("\n{}", modes(found));

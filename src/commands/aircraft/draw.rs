@@ -46,7 +46,7 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// Draws, prints, writes.
+/// Draws the aircraft, prints the quantiles of their traits and writes their files.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let population = Population::load(&shipped(&arguments.population))?;
     let mut characters = Vec::new();
@@ -119,7 +119,8 @@ fn listed(drawn: &Drawn) -> Vec<String> {
     ]
 }
 
-/// Quantiles of each trait with the numbers of `models`, then what lies outside.
+/// Prints the quantiles of each trait beside the values of `models`, then the traits in which a model lies outside
+/// the draws.
 fn print(characters: &[Character], models: &[GreyBox]) -> Result<()> {
     let own = models
         .iter()
@@ -158,7 +159,7 @@ fn print(characters: &[Character], models: &[GreyBox]) -> Result<()> {
     Ok(())
 }
 
-/// Three digits that count.
+/// Formats `value` with about three significant figures.
 fn number(value: f64) -> String {
     match value.abs() {
         x if x >= 100.0 => format!("{value:.0}"),

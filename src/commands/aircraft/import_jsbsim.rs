@@ -77,7 +77,7 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The model as it reads from files: what cannot be read back is not written.
+/// The imported model, written to a temporary folder and read back: files that cannot be read are not kept.
 fn read_back(found: &Imported) -> Result<GreyBox> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let model = folder.path().join("model.toml");

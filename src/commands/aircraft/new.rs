@@ -1,4 +1,4 @@
-//! `greylag aircraft new`: an airframe and a prior from a few measures.
+//! `greylag aircraft new`: an airframe and a prior model from mass and dimensions.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -13,7 +13,7 @@ use crate::model::plausible::Size;
 use crate::model::textbook::{Measures, Tail};
 use crate::physics::atmosphere::STANDARD_GRAVITY;
 
-/// Smallest airspeed at the envelope's end, as a multiple of the cruise airspeed.
+/// Smallest upper airspeed limit to which the envelope is reduced, as a multiple of the cruise airspeed.
 const LEAST_ABOVE_CRUISE: f64 = 1.1;
 /// Static thrust by default, as a share of the weight.
 const THRUST: f64 = 0.5;
@@ -92,7 +92,8 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     Ok(super::check::status(&found))
 }
 
-/// The airframe with its envelope limited to the airspeeds of level flight.
+/// The text of the airframe file with the upper airspeed limit reduced to the fastest level flight, unless that limit
+/// would lie within 10 % of the cruise airspeed.
 fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = scratch.path().join("model.toml");
@@ -111,7 +112,7 @@ fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     })
 }
 
-/// Writes both files into `folder`; the model's path.
+/// Writes airframe and model into `folder`. Returns the path of the model.
 pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf> {
     let airframe = flown_level(airframe, model_text)?;
     std::fs::create_dir_all(folder)
@@ -125,7 +126,7 @@ pub fn files(folder: &Path, airframe: &str, model_text: &str) -> Result<PathBuf>
     Ok(model)
 }
 
-/// The measures, each checked.
+/// Checks the dimensions that the user gives, and adds the defaults.
 pub fn measures(arguments: &Common, folder: &Path, span_m: f64, area_m2: f64) -> Result<Measures> {
     let Common { mass_kg, travel_deg, .. } = *arguments;
     let thrust = arguments.static_thrust_n.map(|n| ("--static-thrust-n", n, 1e6));

@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 
 use crate::model::GreyBox;
 
-/// A coefficient with the least and the most that it can be.
+/// A coefficient with its lower and upper bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bound {
     name: String,
@@ -27,10 +27,10 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     }
 }
 
-/// `model` with these bounds.
+/// `model` with the bounds `all` set.
 ///
 /// # Errors
-/// It has no such coefficient, or one that lies outside of its bounds.
+/// If the model has no such coefficient, or the coefficient's value lies outside the bounds.
 pub fn given(mut model: GreyBox, all: &[Bound]) -> Result<GreyBox> {
     for Bound { name, bounds: [low, high] } in all {
         let Some(c) = model.coefficients().iter().find(|c| c.name == *name) else {

@@ -1,4 +1,4 @@
-//! A diagnosis that was written before, as `greylag diagnose --json` writes it.
+//! Reads a diagnosis that an earlier `greylag diagnose --json` wrote.
 
 use std::path::Path;
 
@@ -28,7 +28,8 @@ struct Parameter {
     value: Option<f64>,
 }
 
-/// The effects that the diagnosis in `path` asserts of `model`, to be searched for near where it has them.
+/// The effects that the diagnosis in `path` asserts of `model`. The fit of each starts at the coefficients of the
+/// diagnosis.
 pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the diagnosis {}", path.display()))?;

@@ -14,11 +14,12 @@ use crate::sysid::amend::{Added, Options};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::per_flight::PerFlight;
 
-/// Default standard deviation of the measured axes, °: an installation aligned by eye.
+/// Default standard deviation of the misalignment of the measured axes, °, for an installation aligned by eye.
 const ASKEW_DEG: f64 = 3.0;
 
-/// The structures that are tried: the model as given, its coefficients fitted, these with trims and with axes of each
-/// flight, with each of `effects` and with all, and from what is physically possible alone.
+/// The structures to try: the model as given; its coefficients fitted, then also with trims of each flight, with a
+/// misalignment of each flight's axes, and with both; a fit with physical bounds as the only prior; each of
+/// `effects`, and all of them.
 pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     let of = |name: String, effects: &[Added], per_flight: PerFlight| Structure {
         name,
@@ -47,7 +48,8 @@ pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     all
 }
 
-/// Tries `structures` of `model` on `flights`, prints the table and writes it as JSON to `json` if there is one.
+/// Tries `structures` of `model` on `flights`, prints the table and writes it as JSON to the file `json` if one is
+/// given.
 pub fn run(
     model: &GreyBox,
     flights: &[Reconstruction],

@@ -221,7 +221,8 @@ fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     Ok(())
 }
 
-/// The flights that judge: those held out, else the last third of the one in `taken`, which then keeps the rest.
+/// The flights that judge the fit: those held out. If none are held out, the last third of the only flight in
+/// `taken`, which keeps the first two thirds. With `--fit-all`, all flights.
 fn tests(
     arguments: &Arguments,
     held: Vec<PathBuf>,
@@ -249,7 +250,7 @@ fn tests(
     Ok(more.flights)
 }
 
-/// The report as HTML, with how the errors grow on the flights that the fit did not see.
+/// The report as HTML, with the growth of the errors on the flights that the fit did not see.
 fn page(
     arguments: &Arguments,
     model: &GreyBox,
@@ -279,7 +280,7 @@ fn page(
     Ok(report.page().render())
 }
 
-/// Logs to fit to, logs to judge by: the last one if none are named, none of a single one.
+/// Logs to fit to and logs to judge by. If none are held out, the last log judges; a single log stays whole.
 fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf>) {
     match (logs, hold_out) {
         ([first @ .., last], []) if !first.is_empty() => (first.to_vec(), vec![last.clone()]),
@@ -310,7 +311,7 @@ fn nothing_asserted(
     )
 }
 
-/// The effects to add: those named, or those that a diagnosis of the flights asserts.
+/// The effects to add: those that a diagnosis asserts, then those named.
 fn wanted(
     arguments: &Arguments,
     effects: &[String],

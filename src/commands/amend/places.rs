@@ -40,7 +40,7 @@ impl Drop for Places {
 }
 
 impl Places {
-    /// Fails at once if something could not be written later, so that no long task is lost to it.
+    /// Reads the model file and makes the folder. Fails at once if a result could not be written after the fit.
     pub fn new(original: &Path, folder: &Path, overwrite: Overwrite) -> Result<Places> {
         let (read, made) = (Original::read(original)?, !folder.exists());
         fs::create_dir_all(folder).with_context(|| {
@@ -65,7 +65,7 @@ impl Places {
         self.folder.join(MODEL)
     }
 
-    /// Writes the model and the results. The model reads back to the bit.
+    /// Writes the model and the results, and checks that the written model reads back identical to the bit.
     pub fn write(
         &self,
         before: &GreyBox,

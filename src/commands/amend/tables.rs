@@ -6,7 +6,7 @@ use crate::commands::terminal::{NORMAL_95, print_answer, table, whole_names};
 use crate::sysid::amend::{Amendment, FittedFlight, Parameter};
 use crate::sysid::compare::{Answer, HorizonScore};
 
-/// The answer, errors, parameters, sentences, notes.
+/// Prints the answer, then errors, parameters, sentences and notes.
 pub fn print(story: &Amendment, answer: &Answer) {
     print_answer(answer);
     println!("{}\n{}", error_table(story), whole_names(parameter_table(&story.parameters)));

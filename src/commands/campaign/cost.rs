@@ -10,7 +10,7 @@ use crate::num::statistics::quantile;
 /// Cost of a cell of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// Time of a core, s.
+    /// Processor time, s.
     pub core_seconds: f64,
     /// Source of the figure.
     pub from: Source,
@@ -54,7 +54,7 @@ impl std::fmt::Display for Source {
     }
 }
 
-/// A time in words.
+/// Formats a time given in s, in s, min or h.
 pub fn time(seconds: f64) -> String {
     match seconds {
         s if s < 99.5 => format!("{s:.0} s"),

@@ -16,9 +16,9 @@ use crate::commands::bar::Bar;
 use crate::commands::status;
 use crate::sysid::progress::Stage;
 
-/// Time between two looks at the processes.
+/// Interval at which the processes are polled.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time before a cell that shall be tried again is.
+/// Pause before another attempt at a cell.
 const PAUSE: Duration = Duration::from_secs(2);
 /// Time that a process has to come to its checkpoint after Ctrl-C.
 const GRACE: Duration = Duration::from_secs(20);
@@ -90,7 +90,7 @@ fn begin(store: &Store, cell: &Cell, failed: Failed) -> Result<State> {
     })
 }
 
-/// Prints the final state of the cells; exit status by whether all are done.
+/// Prints the final state of the cells. The exit status is 0 if all are done, 1 otherwise.
 fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
     let all = gather(plan, store)?;
     println!(
@@ -140,13 +140,13 @@ impl Local<'_> {
         (0..self.states.len()).find(ready)
     }
 
-    /// Whether a cell waits for what may still come.
+    /// Whether any waiting cell can still be run: none of the cells that it depends on has failed.
     fn is_waiting(&self) -> bool {
         let waits = |i: &usize| matches!(self.states[*i], State::Waiting { .. });
         (0..self.states.len()).filter(waits).any(|i| self.may_come(i))
     }
 
-    /// Whether none of the cells before this one failed.
+    /// Whether neither this cell nor any cell that it depends on has failed.
     fn may_come(&self, index: usize) -> bool {
         self.states[index] != State::Failed
             && self.plan.cells[index].after.iter().all(|number| self.may_come(number - 1))
@@ -167,7 +167,7 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            // by its id: a file that is edited meanwhile numbers its cells anew
+            // by id, because the numbers of the cells change if the campaign file is edited meanwhile
             .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())
@@ -181,7 +181,7 @@ impl Local<'_> {
         Ok(())
     }
 
-    /// Looks which processes have ended.
+    /// Collects the processes that have ended.
     fn reap(&mut self) -> Result<()> {
         let mut ended = Vec::new();
         for (index, child) in &mut self.running {
@@ -225,7 +225,7 @@ impl Local<'_> {
         Ok(())
     }
 
-    /// The quantities of a result that the tables ask for.
+    /// The metrics of a result that the campaign's tables use, three at most.
     fn reached(&self, record: &Record) -> String {
         let file = &self.plan.file;
         let of = |choice: &str| {
@@ -242,7 +242,8 @@ impl Local<'_> {
         self.states.iter().filter(|s| **s == state).count()
     }
 
-    /// Time of all cells, and the time left of this run, s; `None` if the cost of a stage is not known.
+    /// Processor time of all cells, and the time left of this run on its parallel jobs, s; `None` if the cost of a
+    /// stage is not known.
     fn left(&self) -> Result<Option<[f64; 2]>> {
         let (mut all, mut left) = (0.0, 0.0);
         for stage in &self.plan.file.stages {
@@ -260,14 +261,14 @@ impl Local<'_> {
         Ok(Some([all, left / self.jobs as f64]))
     }
 
-    /// Shows how far it is; whether Ctrl-C was pressed.
+    /// Updates the progress bar. Returns whether Ctrl-C was pressed.
     fn show(&self) -> Result<bool> {
         let done = self.count(State::Done) as f64 / self.states.len() as f64;
         let doing = format!("running campaign {}", self.plan.file.name);
         Ok(self.bar.update(Stage::new(&doing, done)).is_break())
     }
 
-    /// Lets the processes come to their checkpoints; ends those that do not.
+    /// Waits for the processes to end at their checkpoints, and kills those that do not end in time.
     fn end(&mut self) {
         let begun = Instant::now();
         while !self.running.is_empty() && begun.elapsed() < GRACE {

@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Which {
-    /// The campaign with its cells, each command found to be one, and the folder of its results.
+    /// The campaign with its cells, whose commands are checked, and the folder of its results.
     fn open(&self) -> Result<(Plan, Store)> {
         let path = shipped(&self.file);
         let plan = campaign::plan(CampaignFile::load(&path)?, &path, &shipped)?;

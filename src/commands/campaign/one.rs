@@ -1,4 +1,4 @@
-//! One cell, in this process.
+//! `greylag campaign run --cell`: one cell, in this process.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -14,7 +14,7 @@ use crate::campaign::{Cell, Plan, Record, Standing, Store};
 use crate::commands::interruption::{Ended, Interruption};
 use crate::commands::{self, VERSION, one_line, status};
 
-/// Subcommands that a cell may be, with what a program needs to have them.
+/// Subcommands that a cell may run, whether this program has them, and the feature that they need.
 const KNOWN: [(&str, bool, &str); 3] = [
     ("collect", cfg!(feature = "demo"), "sitl"),
     ("evaluate", cfg!(feature = "demo"), "sitl"),
@@ -162,7 +162,7 @@ fn processor() -> String {
     name.map_or(std::env::consts::ARCH.into(), |(_, name)| name.trim().to_owned())
 }
 
-/// Whether the cause is one of the machine that may pass.
+/// Whether the cause is a state of the machine that may pass, such as a full disk.
 fn is_temporary(error: &anyhow::Error) -> bool {
     use ErrorKind::{
         Interrupted, OutOfMemory, QuotaExceeded, ResourceBusy, StaleNetworkFileHandle, StorageFull,

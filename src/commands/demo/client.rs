@@ -10,9 +10,9 @@ use super::schedule::{Leg, Legs};
 use crate::link::autopilot::Mode;
 use crate::link::offboard::{ARM, Heard, OffboardClient, SET_MODE};
 
-/// How long arming, or entering offboard, may take.
+/// Timeout of arming, of entering offboard and of every other request.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
-/// Between two setpoints: 50 Hz; 2 Hz would do.
+/// Interval between setpoints (50 Hz).
 const SETPOINT_PERIOD: Duration = Duration::from_millis(20);
 
 /// State of the flight as received by the client.
@@ -109,7 +109,7 @@ impl Client {
         self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
-    /// Sends the request every half second until it is fulfilled.
+    /// Sends the request every half second until `so` holds; fails after `ANSWER_TIMEOUT`.
     fn until(
         &mut self,
         what: &str,
@@ -167,7 +167,7 @@ impl Client {
     }
 
     fn send(&self, bytes: &[u8]) {
-        // a datagram that is lost, is lost: everything here is sent again
+        // a lost datagram is not retried: every message is sent periodically
         let _ = self.socket.send(bytes);
     }
 

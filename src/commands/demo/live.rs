@@ -1,4 +1,4 @@
-//! The demonstration as it is flown: an attitude indicator on a terminal, one line a target everywhere.
+//! Output of the demonstration in flight: one line per target, and on a terminal an attitude indicator.
 
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use super::schedule::{Leg, Legs};
 
 /// Time between two drawings.
 const EVERY: Duration = Duration::from_millis(100);
-/// Letters of the bar that shows how much of a leg is flown.
+/// Width of the bar that shows the flown part of a leg, characters.
 const BAR: usize = 24;
 
 /// One line per leg, written when it ends; on a terminal the attitude above it while it is flown.
@@ -24,7 +24,7 @@ pub struct Live<'a> {
 }
 
 impl Live<'_> {
-    /// Writes the head of the lines.
+    /// Prints the header of the lines.
     pub fn begin(legs: &Legs) -> Live<'_> {
         println!("   target roll/pitch     roll    pitch   error   airspeed  altitude");
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");

@@ -39,7 +39,7 @@ use client::Client;
 use live::Live;
 use schedule::Legs;
 
-/// FlightOptions of `greylag demo`.
+/// Options of `greylag demo`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Controller that flies the schedule.
@@ -137,7 +137,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(verdict(&report, trouble.as_deref()))
 }
 
-/// Why the flight ended early; a computer that was too slow is the cause that is known.
+/// The error of a flight that ended early. If this computer was too slow, its timing trouble is given as the cause.
 fn excused(why: anyhow::Error, trouble: Option<&str>) -> anyhow::Error {
     match trouble {
         Some(trouble) => why.context(trouble.to_owned()),
@@ -204,7 +204,7 @@ fn input_ends() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
     let heard = ended.clone();
     thread::spawn(move || {
-        // what is written there means nothing, and what cannot be read has ended
+        // the content of standard input is ignored, and a read error counts as its end
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         heard.store(true, Ordering::Relaxed);
     });
@@ -262,7 +262,7 @@ fn simulate(
         .context("starting the shim's thread")
 }
 
-/// Prints how each target was tracked and, where one was not, what this computer has to do with it.
+/// Prints how each target was tracked. If one was not tracked, also prints the timing trouble of this computer.
 fn verdict(report: &FlightReport<'_>, trouble: Option<&str>) -> ExitCode {
     let (tracked, all) = (report.tracked(), report.segments.len());
     let qualities = report.qualities().unwrap_or_default();
@@ -291,7 +291,7 @@ fn verdict(report: &FlightReport<'_>, trouble: Option<&str>) -> ExitCode {
     if tracked != all {
         trouble.iter().for_each(|trouble| println!("{trouble}"));
     }
-    // last, for the workbench shows a program's last words
+    // printed last, because the workbench shows the last line of a program
     println!("{}", report.page_sentence());
     if tracked == all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

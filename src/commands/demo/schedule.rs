@@ -15,7 +15,7 @@ pub struct Leg {
     pub difficulty: Difficulty,
 }
 
-/// Length of a leg, s: six of them with start-up stay under a minute.
+/// Length of a leg, s: six legs and the start-up take less than a minute.
 pub const LEG_S: f64 = 8.0;
 
 /// Largest bank for which the legs are written, degrees: that of the paper's hard targets.

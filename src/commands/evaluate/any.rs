@@ -1,4 +1,4 @@
-//! Evaluation on aircraft drawn from a distribution, and on others that were not drawn.
+//! Evaluation on aircraft drawn from a distribution, and on the aircraft of given models.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,7 +27,7 @@ pub(super) struct AnyArguments {
     beside: Vec<PathBuf>,
 }
 
-/// A controller and the information that it has about the aircraft.
+/// Information that a controller has about the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Knowledge {
@@ -123,7 +123,7 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Models from which a controller of this kind may be designed.
+/// Information from which a controller of this kind may be designed.
 fn knowledge(kind: ControllerKind) -> &'static [Knowledge] {
     match kind.needs() {
         Needs::Gains => &[Knowledge::Nothing],

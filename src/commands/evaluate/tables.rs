@@ -10,7 +10,7 @@ use crate::sim::published::published;
 
 /// Columns of a terminal that a table may take.
 const WIDTH: u16 = 100;
-/// Controllers beside each other.
+/// Largest number of controllers in a table.
 const BESIDE: usize = 4;
 
 /// The measures that a terminal shows; JSON and page have all.
@@ -42,7 +42,7 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     println!(
         "envelope kept: load factor and angle of attack, 5 % beyond the airframe file's limits at most"
     );
-    // last, where it is seen first
+    // printed last: the end of the output is what the user sees first
     println!();
     evaluation_answer(evaluations).iter().for_each(|sentence| println!("{}", broken(sentence)));
 }

@@ -10,7 +10,7 @@ use crate::sim::evaluation::{Course, courses as of_targets};
 use crate::sim::steps::steps;
 use crate::sim::targets::{Row, TargetFile};
 
-/// The targets that are asked for.
+/// The targets that the options select.
 pub(super) fn rows(arguments: &Arguments) -> Result<Vec<Row>> {
     if arguments.no_targets {
         if arguments.steps == 0 {

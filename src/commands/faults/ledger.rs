@@ -1,4 +1,4 @@
-//! The file in which a campaign notes its flights, one JSON object a line, to go on from.
+//! The file in which a campaign records its flights, one JSON object a line, so that it can be resumed.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -52,12 +52,12 @@ impl From<&Report> for Entry {
 }
 
 impl Entry {
-    /// The faults that it met.
+    /// The faults of the flight.
     pub fn faults(&self) -> Vec<Fault> {
         draw(self.seed)
     }
 
-    /// The options of `greylag faults` that fly it again.
+    /// The options of `greylag faults` that repeat the flight.
     pub fn options(&self) -> String {
         format!(
             "--controller {} --counterpart {} --first {} --flights 1",
@@ -71,7 +71,7 @@ impl Entry {
 }
 
 impl Note {
-    /// Whether it is the companion's own, which nothing excuses.
+    /// Whether the finding is a failure of the companion itself, which no fault excuses.
     pub fn is_own(&self) -> bool {
         Finding::ALL.iter().any(|f| f.name() == self.finding && f.is_own())
     }
@@ -85,7 +85,7 @@ impl Note {
         }
     }
 
-    /// Whether it fails the campaign: nothing explains it, or the controller did it without any fault.
+    /// Whether the finding fails the campaign: it has no cause, or the controller caused it without any fault.
     pub fn is_failure(&self) -> bool {
         self.cause.as_deref().is_none_or(|cause| cause == Cause::Itself.name())
     }
@@ -98,7 +98,8 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens a file, or begins it. A last line that was cut off by a kill is flown again.
+    /// Opens or creates the file. An incomplete last line, as a kill leaves it, is removed, and its flight is flown
+    /// again.
     pub fn open(path: &Path) -> Result<Self> {
         let mut known = HashMap::new();
         let mut whole = 0;

@@ -1,4 +1,4 @@
-//! `greylag faults --monitor`: how often the model monitor is wrong, and how soon it is right.
+//! `greylag faults --monitor`: false-alarm rate and detection delay of the model monitor.
 
 use std::process::ExitCode;
 
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watched};
 
-/// Share of healthy flights that may be accused: one in forty.
+/// Largest share of healthy flights with a false alarm: one in forty.
 const FALSE_ALARMS: f64 = 1.0 / 40.0;
 
 /// Flies and prints a table; the exit status shows whether too many healthy flights raised an alarm.
@@ -58,7 +58,7 @@ fn row(failure: Failure, watched: &[Watched], alarms: usize) -> Vec<String> {
     let mut delays: Vec<f64> = watched.iter().filter_map(Watched::delay_s).collect();
     delays.sort_by(f64::total_cmp);
     let at = |share: f64| {
-        // Those that were never found count as later than all.
+        // Failures that were not detected count as the longest delays.
         let index = (share * engaged.max(1) as f64).ceil() as usize;
         delays.get(index.saturating_sub(1)).map_or("-".into(), |s| format!("{s:.1} s"))
     };

@@ -33,7 +33,7 @@ struct Row<'a> {
     broken: u64,
     distance: Option<f64>,
     at_s: f64,
-    /// The flight that came nearest, made smaller if it breaks the rule.
+    /// The flight that came nearest to breaking the rule, reduced if it breaks the rule.
     scenario: Option<&'a Scenario>,
 }
 

@@ -1,4 +1,4 @@
-//! How much work a learning takes: how many flights, updates and units.
+//! Budgets of a learning: numbers of flights, updates and hidden units.
 
 use clap::ValueEnum;
 
@@ -31,7 +31,7 @@ pub struct Sizes {
     pub planned: u32,
     /// Number of planned rounds.
     pub rounds: u32,
-    /// Updates of a model that only flies the next round.
+    /// Updates of an intermediate model, which only plans the next round.
     pub passing_updates: u64,
     /// Updates of the last model.
     pub updates: u64,

@@ -38,7 +38,7 @@ struct Origin<'a> {
     model: &'a str,
     stages: Vec<String>,
     files: Vec<Content>,
-    /// In the model itself, no simulator taking part.
+    /// Scores in the learned model, without a simulator.
     imagined: &'a [Reached],
 }
 
@@ -48,7 +48,8 @@ struct Content {
     sha256: String,
 }
 
-/// Puts the files of the learning in `out` together, the model last: where it is, the others are.
+/// Copies the model and the policy of the learning in `out` into one folder. The model file is written after all
+/// others that fly, so that a folder with a model file is complete.
 ///
 /// # Errors
 /// If a file cannot be read or written.

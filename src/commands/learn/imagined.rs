@@ -1,4 +1,4 @@
-//! Scores of the controllers of a learned model and its policy in that model.
+//! Scores of the controllers that use a learned model and its policy, flown in that model.
 
 use std::path::Path;
 
@@ -15,8 +15,8 @@ use crate::sim::{Group, TargetFile};
 
 /// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
 const TARGETS: u64 = 3;
-/// One of this many targets is flown: a planner takes milliseconds a step, and the LQI needs few to
-/// be judged.
+/// Each controller flies one in this many targets: a planner takes milliseconds a step, and few targets suffice for
+/// the LQI.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
@@ -38,7 +38,8 @@ pub struct Reached {
 /// Flies the controllers in the model of `folder` with the policy in `policy`; `None` if interrupted.
 ///
 /// # Errors
-/// If a file cannot be used. A model that an LQI cannot be designed on leaves the rows of LQI and planner out.
+/// If a file cannot be used. Rows of controllers other than the policy that cannot be built, such as an LQI that
+/// cannot be designed, are left out.
 pub fn reached(
     folder: &Path,
     policy: &Path,

@@ -85,7 +85,7 @@ pub struct Arguments {
     hide: Vec<String>,
 }
 
-/// Learns; what is done already is not done again.
+/// Runs the stages of the learning. Stages that are done are skipped.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let stop = Interruption::watch()?;
     let prior = GreyBox::load(&shipped(&arguments.prior_file()?))?;
@@ -203,8 +203,8 @@ impl Arguments {
         }
     }
 
-    /// Options that select the aircraft, its hidden effects and its airspeed, that of the prior, as
-    /// the first round has no model yet.
+    /// Options that select the aircraft, its hidden effects and its airspeed. The airspeed is that of the prior,
+    /// because the first round has no model yet.
     fn aircraft_options(&self, prior: &GreyBox) -> Vec<OsString> {
         let mut words: Vec<OsString> = Vec::new();
         let mut add = |name: &str, value: OsString| words.extend([name.into(), value]);
@@ -259,7 +259,7 @@ impl Arguments {
 /// Share of the targets that a controller may lose and still be called ready to fly: the LQI loses none.
 const LOST: f64 = 0.02;
 
-/// Score of the best controller of a learning in words, with the command that flies it.
+/// Verdict on the learned policy in words, with the command that flies it.
 fn worth(reached: &[Reached], options: &str) -> String {
     let lost = |name: &str| {
         let row = reached.iter().find(|r| r.controller == name)?;

@@ -7,9 +7,9 @@ use super::budget::{Algorithm, Budget};
 
 /// Folder of the flights, below that of a learning.
 pub const FLIGHTS: &str = "flights";
-/// Folder of the last model, likewise.
+/// Folder of the last model, below that of a learning.
 pub const MODEL: &str = "model";
-/// Folder of the policy, likewise.
+/// Folder of the policy, below that of a learning.
 pub const POLICY: &str = "policy";
 
 /// Where the flights come from.

@@ -33,7 +33,7 @@ pub struct Done {
     pub what: String,
     /// Command line of the stage.
     pub command: String,
-    /// How long it took in the session that ended it, s.
+    /// Duration of the session that completed the stage, s.
     pub seconds: f64,
 }
 
@@ -45,11 +45,11 @@ pub struct Record {
 }
 
 impl Record {
-    /// The record in `folder` of the learning that has `stages` and is made of `inputs` (hashes of the files that it
-    /// begins with); where there is none an empty one, which is written before anything is flown.
+    /// Opens the record in `folder` of the learning with these `stages` and `inputs` (hashes of its input files). If
+    /// there is no record, an empty one is written before anything is flown.
     ///
     /// # Errors
-    /// If the folder holds another learning or flights of nobody knows what, or cannot be read or written.
+    /// If the folder holds another learning or flights without a record, or cannot be read or written.
     pub fn open(folder: &Path, stages: &[Stage], inputs: &[String]) -> Result<Record> {
         let path = folder.join(RECORD);
         let lines = stages.iter().map(|s| s.command() + "\n").collect::<String>();
@@ -117,7 +117,7 @@ mod tests {
         let stages = [stage("one"), stage("two")];
         let open =
             |stages: &[Stage], prior: &str| Record::open(folder.path(), stages, &[prior.into()]);
-        // what was interrupted in its first stage is no other learning's either
+        // a learning that was interrupted in its first stage keeps its folder too
         open(&stages, "p").unwrap();
         assert!(open(&stages, "q").unwrap_err().to_string().contains("another --out"));
         open(&stages, "p").unwrap().add(&stages[0], 1.5).unwrap();

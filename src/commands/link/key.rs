@@ -1,4 +1,4 @@
-//! `greylag link key`: makes the key that signs.
+//! `greylag link key`: makes a key that signs the messages of links.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -19,10 +19,10 @@ pub struct Make {
     passphrase: bool,
 }
 
-/// Makes a key file that did not exist.
+/// Makes a new key file.
 ///
 /// # Errors
-/// If the file exists or cannot be written, or no passphrase comes.
+/// If the file exists or cannot be written, or standard input holds no passphrase.
 pub fn run(make: &Make) -> Result<ExitCode> {
     let key = if make.passphrase { asked()? } else { random()? };
     key.save(&make.file)?;

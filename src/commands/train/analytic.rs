@@ -19,9 +19,9 @@ const LINE: u64 = 50;
 /// Updates of the critics between two lines of output.
 const CRITICS: u64 = 1000;
 
-/// Ascends the gradient of the reward in `model`, from the actor `from` where one is given; writes
-/// the curve of `judge`'s results into `folder`. Returns the last actor, at a learning rate of
-/// zero, or `None` if interrupted: a run of minutes is not resumed but repeated.
+/// Ascends the gradient of the reward in `model`, from the actor `from` where one is given; writes the curve of
+/// `judge`'s results into `folder`. Returns the actor of the last update, by which the learning rate has fallen to a
+/// hundredth; `None` if interrupted. An interrupted run is not resumed but repeated, because it takes minutes only.
 ///
 /// # Errors
 /// If a parameter is no longer finite or the curve cannot be written.

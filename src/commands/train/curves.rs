@@ -10,7 +10,7 @@ use crate::commands::files::{self, Overwrite};
 use crate::learn::policy::learning_curve::{self, CURVE};
 use crate::report::{LearningReport, Training};
 
-/// The folder of one seed of several begins so.
+/// Start of the name of one seed's folder in a training of several seeds.
 const SEED: &str = "seed-";
 
 /// Options of `greylag train curves`.
@@ -27,7 +27,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Prints where the trainings came to, draws their curves.
+/// Prints the results of the trainings and draws their curves.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = Overwrite::from(arguments.force);
     if let Some(path) = &arguments.report {

@@ -249,7 +249,7 @@ impl Document<'_> {
 }
 
 impl Arguments {
-    /// The prior in `path`, with the scheme that was asked for.
+    /// The prior in `path`, with the integrator that the options request.
     fn prior(&self, path: &Path) -> Result<GreyBox> {
         let mut prior = GreyBox::load(path)?;
         if let Some(scheme) = &self.integrator {
@@ -258,17 +258,18 @@ impl Arguments {
         Ok(prior)
     }
 
-    /// `prior` with the widths that its coefficients keep where logs alone are learned from.
+    /// `prior`; if only logs are learned from and `--from-scratch` is not given, with the stated or default prior
+    /// width of each coefficient.
     fn narrowed(&self, prior: GreyBox) -> GreyBox {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;
         }
-        // as `amend` has it: a flight that was not flown to be learned from shows part of the coefficients
+        // as in `amend`: a flight without identification manoeuvres determines only part of the coefficients
         prior.with_widths(|c| Some(c.width()).filter(|width| *width > 0.0))
     }
 }
 
-/// `trainer`, gone on from the checkpoint if there is one.
+/// `trainer`, resumed from the checkpoint if there is one.
 fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     for name in trainer.unseen() {
         eprintln!("the flights do not show {name} apart from others: it stays near its prior");
@@ -315,7 +316,7 @@ fn train(
         lines += 1;
         let interrupted = stop.is_set();
         if lines % KEEP == 0 || interrupted || trainer.is_done() {
-            // first what a checkpoint leaves out: more of it than the checkpoint knows does no harm
+            // the history is written first: entries beyond the checkpoint are dropped when the training is resumed
             files::write(past, &serde_json::to_string(&history)?, Overwrite::Force)?;
             trainer.checkpoint().save(kept)?;
         }
@@ -326,7 +327,7 @@ fn train(
     Ok(true)
 }
 
-/// History of the training up to `update`; empty if it cannot be read, for nothing depends on it.
+/// History of the training up to `update`; empty if it cannot be read, because the training does not depend on it.
 fn history(path: &Path, update: u64) -> Vec<Moment> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let mut history: Vec<Moment> = serde_json::from_str(&text).unwrap_or_default();

@@ -13,9 +13,9 @@ use crate::physics::{Controls, State};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// One of this many tracks is held out, where there are that many.
+/// One in this many tracks is held out, if there are at least that many.
 const HELD_OUT: usize = 10;
-/// Part of each recent flight, its end, that is held out.
+/// Share of a flight, at its end, that is held out: of each recent flight, and of each flight if there are few.
 const HELD_OUT_PART: f64 = 0.2;
 /// Most copies of a recent flight.
 const MOST_COPIES: f64 = 50.0;
@@ -53,7 +53,7 @@ pub struct Flights {
     pub notes: Vec<String>,
 }
 
-/// How many of `samples` are held out of a flight, its end.
+/// Number of samples that are held out at the end of a flight of `samples` samples.
 fn held_out(samples: usize) -> usize {
     (HELD_OUT_PART * samples as f64) as usize
 }
@@ -62,7 +62,7 @@ impl FlightArguments {
     /// Reads the flights as `model` sees them.
     ///
     /// # Errors
-    /// If nothing is given, or something cannot be read.
+    /// If no flights are given, or a file cannot be read.
     pub fn read(&self, model: &GreyBox) -> Result<Flights> {
         let mut notes = Vec::new();
         let mut tracks = Vec::new();
@@ -95,7 +95,7 @@ impl FlightArguments {
         Ok(Flights { samples: samples(&learn), learn, judge, slowest_s, notes })
     }
 
-    /// Whether all flights are logs of flights that were not flown to be learned from.
+    /// Whether all flights are ordinary logs: there are no rounds of `greylag collect` and no recent flights.
     pub fn is_logs_alone(&self) -> bool {
         self.folders.is_empty() && self.recent.is_empty()
     }
@@ -125,7 +125,7 @@ impl FlightArguments {
         Ok(all)
     }
 
-    /// The tracks `others` and the recent flights, which are repeated until they are their share of all samples.
+    /// The tracks `others` and the recent flights, which are repeated until they make up their share of all samples.
     fn with_recent(
         &self,
         others: Vec<Track>,

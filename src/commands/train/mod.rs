@@ -31,7 +31,7 @@ enum What {
     Curves(curves::Arguments),
 }
 
-/// Trains until `stop` is set; curves are no training.
+/// Trains until `stop` is set; refuses to draw curves.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::learn(arguments, stop),

@@ -15,8 +15,8 @@ pub struct AmendmentReport<'a> {
     pub amendment: &'a Amendment,
     /// The amendment's answer with the command that comes next, where that is known.
     pub answer: Option<&'a Answer>,
-    /// Models in the order in which they improve (as given, tuned, amended) against flights that no fit
-    /// has seen: the growth of their errors, where it was worked out.
+    /// Comparison of the models (as given, tuned, amended) with flights that no fit has seen; `None` if none was
+    /// made.
     pub held_out: Option<&'a Comparison>,
     /// The model's file before, then after, where one was written.
     pub model_files: Vec<String>,

@@ -9,7 +9,7 @@ pub(super) mod traces;
 use crate::Page;
 use greylag_sysid::compare::Comparison;
 
-/// A comparison of models with flights, with where it came from.
+/// A comparison of models with flights, with the files and commands that it comes from.
 #[derive(Clone, Debug)]
 pub struct ComparisonReport<'a> {
     /// Title of the page.

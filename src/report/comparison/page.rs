@@ -21,7 +21,7 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
     let words = Figure::Findings(findings(c));
-    // of one model the question is where it fails, of several by how much they differ
+    // for one model the page leads with where it fails, for several with how much they differ
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
         _ => (vec![answer], Section::new("In words", "", vec![words])),
@@ -42,7 +42,7 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     Page { title: report.title.clone(), subtitle: subtitle(c), sections }
 }
 
-/// The short section of a flight report: what its own model gets wrong about it.
+/// The short section of a flight report: the errors of the flight's own model.
 pub(crate) fn short_section(c: &Comparison) -> Section {
     let mut found = findings(c);
     // The figures that the links point to are on the page of the comparison itself.
@@ -57,7 +57,8 @@ pub(crate) fn short_section(c: &Comparison) -> Section {
 const UNEXPLAINED_NOTE: &str = "Share of each channel's variation that is neither explained by \
      the model nor by the sensors' noise. Over 100 % the model is worse than a constant.";
 
-/// The note on what is unexplained; where tuning came before the effects, what of the bars it alone takes away.
+/// The note on the unexplained share. If the second model was tuned before its effects were added, the note explains
+/// that tuning alone removes part of the first model's bars.
 fn unexplained_note(c: &Comparison) -> String {
     let tuned = c.answer.numbers.steps.iter().any(|step| step.way == Way::Tuned);
     match (tuned, &c.models[..]) {
@@ -109,7 +110,7 @@ fn findings(c: &Comparison) -> Findings {
     Findings { lead, rest, ..Findings::default() }
 }
 
-/// The way to the channel that `sentence` speaks of.
+/// Link to the regimes of the channel that `sentence` is about.
 fn link(model: &ModelResult, sentence: &str) -> Option<Link> {
     let plain = |text: &str| text.trim_end_matches('.').to_lowercase();
     let of = model.channels.iter().find(|ch| plain(&ch.worst_regime) == plain(sentence))?;
@@ -179,7 +180,7 @@ pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     ]
 }
 
-/// Alternatives by channel, those that `figures` has something for.
+/// One alternative for each channel for which `figures` returns a figure.
 pub(crate) fn by_channel(
     c: &Comparison,
     figures: impl Fn(ChannelId) -> Vec<Figure>,

@@ -3,7 +3,8 @@
 use crate::kit::numbers::number;
 use greylag_sysid::compare::{ChannelId, ModelResult};
 
-/// The channel of which the first model leaves most unexplained, with what the last one leaves of it.
+/// Sentence on the channel of which the first model leaves the largest share unexplained, with the share that the
+/// last model leaves.
 pub(crate) fn of_models(models: &[ModelResult]) -> String {
     let share = |model: &ModelResult, id: ChannelId| {
         let of = model.channels.iter().find(|ch| ch.channel == id);

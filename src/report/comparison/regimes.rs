@@ -1,4 +1,4 @@
-//! Where a model fails: its residual over each regime variable, over α with β.
+//! Where a model fails: its residual over each regime variable, and over α and β together.
 
 use crate::comparison::page::{by_channel, keys};
 use crate::{Choice, Figure, HeatCell, HeatMap, IntervalBins, IntervalPanel, Intervals, Section};
@@ -6,7 +6,7 @@ use greylag_sysid::compare::{
     ChannelId, ChannelResult, Comparison, Map, RegimeBins, RegimeVariable,
 };
 
-/// Where the sentences lead to.
+/// Anchor to which the sentences link.
 pub(crate) const ANCHOR: &str = "regimes";
 
 pub(crate) fn regimes(c: &Comparison) -> Section {
@@ -101,7 +101,7 @@ fn heat_maps(c: &Comparison, id: ChannelId) -> Vec<Figure> {
         let sizes = all.filter(move |x| x.supported || !supported_only).map(|x| x.mean.abs());
         sizes.filter(|v| v.is_finite()).fold(0.0, f64::max)
     };
-    // A thin cell may be far off by chance: it does not set the scale if another can.
+    // A cell with few samples may be far off by chance: it sets the scale only if all cells have few.
     let limit = [cells(true), cells(false)].into_iter().find(|l| *l > 0.0);
     let Some(limit) = limit else { return Vec::new() };
     let models = c.models.iter().zip(&channels);

@@ -35,7 +35,7 @@ struct Stretch {
     error: f64,
 }
 
-/// The section, if the comparison holds what was flown.
+/// The section; `None` if the comparison holds no traces of its flights.
 pub(crate) fn section(c: &Comparison) -> Option<Section> {
     let mut stretches = stretches(c);
     let mut options = Vec::new();
@@ -93,7 +93,8 @@ fn option(c: &Comparison, word: &str, s: Stretch) -> ChoiceOption {
     }
 }
 
-/// Squared error of the first model at every row: each state's by its own mean over all flights.
+/// Squared error of the first model at every row, summed over the states. Each state's squared error is divided by
+/// its mean over all flights.
 fn errors(c: &Comparison) -> Vec<Vec<f64>> {
     let Some(model) = c.models.first() else { return Vec::new() };
     let pairs: Vec<(&FlightTrace, &ModelTrace)> =
@@ -162,7 +163,7 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
         Panel::new(title, unit, series)
     });
     let mut figure = TimeFigure::default();
-    // Steps up to a second are the drawing's; the segments' own rows break the lines.
+    // No limit on gaps: thinned rows may be far apart, and the rows of NaN between segments break the lines.
     figure.add_track(&take(&trace.time_s, 1.0), f64::INFINITY, panels.collect());
     if let (Some(first), Some(last)) =
         (trace.time_s.get(rows.start), trace.time_s.get(rows.end - 1))

@@ -17,12 +17,11 @@ pub struct DiagnosisReport<'a> {
     pub title: String,
     /// Result of the diagnosis.
     pub diagnosis: &'a Diagnosis,
-    /// By how much the error falls, and by what.
+    /// The fall of the error and the changes that cause it; `None` if it is not known.
     pub answer: Option<&'a Answer>,
-    /// The model tuned, then as given, against the flights of the diagnosis: where it fails.
+    /// Comparison of the tuned model, then of the model as given, with the flights of the diagnosis.
     pub failing: Option<&'a Comparison>,
-    /// Models in the order in which they improve (as given, tuned, with the asserted effects) against
-    /// flights that no fit has seen.
+    /// Comparison of the models (as given, tuned, with the asserted effects) with flights that no fit has seen.
     pub held_out: Option<&'a Comparison>,
     /// Path of the model's file.
     pub model_file: String,

@@ -196,7 +196,7 @@ fn left(d: &Diagnosis) -> Figure {
     };
     let groups: Vec<BarGroup> = d.channels.iter().map(group).collect();
     let all = groups.iter().flat_map(|g| &g.values).copied().filter(|v| v.is_finite());
-    // Shares of a few percent are distinguished, too.
+    // The scale ends at the largest share, so that shares of a few percent can be distinguished.
     let full = all.fold(0.0, f64::max).clamp(5.0, 100.0);
     Figure::Bars(Bars { title: "Left unexplained".into(), unit: "%".into(), keys, groups, full })
 }

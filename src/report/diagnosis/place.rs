@@ -4,7 +4,8 @@ use crate::kit::numbers::number;
 use greylag_sysid::compare::ChannelId;
 use greylag_sysid::diagnose::{Candidate, ChannelLeft, Diagnosis, Verdict};
 
-/// The channel of each asserted effect with the variable that shows it; without one, the channel of which most is left.
+/// Sentence on the channel of each asserted effect with the variable that shows it. Without an asserted effect it names
+/// the channel with the largest share that is unexplained after tuning.
 pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     let asserted: Vec<&Candidate> = d.effects.iter().filter(|c| c.asserted).collect();
     let places: Vec<String> = asserted.iter().filter_map(|c| of_effect(d, c)).collect();
@@ -47,7 +48,7 @@ fn name(symbol: &str) -> &str {
     id.map_or(symbol, |id| id.name())
 }
 
-/// A variable without its unit, which is the last word if it is no word of letters alone.
+/// A variable without its unit: the last word, if it contains `°` or `/` or is a single letter.
 fn plain(variable: &str) -> &str {
     match variable.rsplit_once(' ') {
         Some((words, unit)) if unit.contains(['°', '/']) || unit.len() == 1 => words,

@@ -12,7 +12,7 @@ use greylag_sysid::diagnose::Diagnosis;
 const DRAWN: f64 = 0.1;
 /// Decoys in the table, the strongest first.
 const DECOYS: usize = 8;
-/// The horizon that the sentence speaks of, s, where there is one.
+/// Horizon of the error in the sentence, s, if the comparison has it.
 const SHOWN_S: f64 = 5.0;
 
 /// Evidence that arises by chance: under nulls that lack nothing, and for columns that cannot be
@@ -89,7 +89,7 @@ pub(crate) fn stated(c: &Comparison) -> Section {
 pub(crate) fn before_and_after(c: &Comparison) -> Section {
     let mut figures = growth(c);
     figures.push(unexplained(c));
-    // The table by horizon; state by state is for the comparison's own page.
+    // Only the table by horizon: the errors by state are on the comparison's own page.
     figures.extend(summary(c).figures.into_iter().take(1));
     let names = c.flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
     let note = format!(

@@ -113,7 +113,7 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
                 averages over about 0.4 s), and what the effect contributes as fitted, with its \
                 95 % interval.";
     let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
-    // what is only nearest to being seen must not look as if it were found
+    // candidates that are not asserted must not look like findings
     let title = match d.effects.iter().any(|c| c.asserted) {
         true => "The effect",
         false => "The nearest suspects, none of them shown",

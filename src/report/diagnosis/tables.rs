@@ -219,7 +219,7 @@ pub(crate) fn provenance(report: &DiagnosisReport) -> Section {
     Section::new("Provenance", "", vec![Figure::Table(table)])
 }
 
-/// A section of one table; none if it has no row.
+/// A section of one table; an empty section if the table has no row.
 fn section(title: &str, note: &str, table: Table) -> Section {
     match table.rows.is_empty() {
         true => Section::default(),

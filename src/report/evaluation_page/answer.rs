@@ -1,4 +1,5 @@
-//! The answer of an evaluation: which controller tracks best and by how much, where each is worst, what it costs.
+//! The answer of an evaluation: which controller tracks best and by how much, how often the envelope was kept, which
+//! targets were lost, where the best controller is worst.
 
 use super::label;
 use crate::kit::numbers::number;
@@ -68,7 +69,7 @@ fn each(ranked: &[(&Evaluation, &Score)], of: impl Fn(&Score) -> String) -> Stri
     said.join(", ")
 }
 
-/// The group in which the best one is worst, of several.
+/// Sentence on the group in which the best controller is worst; `None` with fewer than two groups.
 fn weakest(best: &Evaluation) -> Option<String> {
     let groups = || best.groups.iter().filter(|s| s.targets != ALL);
     let worst = groups().max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;

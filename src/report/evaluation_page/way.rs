@@ -8,7 +8,7 @@ use greylag_control::quality::{MEASURES, Measure};
 use greylag_sim::evaluation::{Evaluation, Score};
 use greylag_sim::summary::Spread;
 
-/// Number of controllers that get a colour each; with more, lines are wide.
+/// Number of controllers with a colour of their own. Further ones repeat the colours with wide lines.
 const COLOURS: usize = 4;
 
 /// The sections; empty if the evaluation was not measured.

@@ -22,7 +22,7 @@ pub struct FlightReport<'a> {
     pub controller: String,
     /// Name of the model it flew with.
     pub model: String,
-    /// Seed of everything random in the flight; `None` when nothing was.
+    /// Seed of everything random in the flight; `None` when nothing was random or the seed is not known.
     pub seed: Option<u64>,
     /// The command line that made the flight.
     pub command_line: String,
@@ -34,7 +34,7 @@ pub struct FlightReport<'a> {
     pub tolerance_rad: f64,
     /// The envelope that the flight is measured against; `None` when the aircraft is not known.
     pub envelope: Option<EnvelopeFlown>,
-    /// Deflections at full command, which turn commands into the unit of what acts.
+    /// Deflections at full command, with which commands are drawn as deflections.
     pub travel: SurfaceTravel,
     /// Durations of the control cycles; `None` when they were not recorded.
     pub timing: Option<LoopTiming>,

@@ -22,7 +22,7 @@ pub(crate) struct Kept {
     pub alpha_deg: f64,
     /// Seconds outside each limit.
     pub outside_s: OutsideS,
-    /// Whether load factor and angle of attack kept to their limits but for a transient.
+    /// Whether load factor and angle of attack stayed within their limits, apart from the permitted transient.
     pub kept: bool,
 }
 
@@ -50,13 +50,13 @@ pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits)
     let end = samples.partition_point(|s| s.time_s <= segment.end_s).max(first);
     let before = first.checked_sub(1).map(|k| moment(&samples[k]).command);
     let (roll, pitch) = (segment.roll_target_rad, segment.pitch_target_rad);
-    // the airspeed wanted is no column of the log format
+    // the log format has no column for the commanded airspeed
     let target = Target { roll, pitch, airspeed: f64::NAN };
     let moments = samples[first..end].iter().map(moment).collect();
     Track { moments, target, before, lost_s: 0.0 }.quality(limits)
 }
 
-/// The whole flight, from the airspeed on that counts as one.
+/// Measures of the whole flight, over the samples whose airspeed counts as flight or is unknown.
 pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     let flying = |s: &Sample| s.airspeed_mps.is_nan() || s.airspeed_mps >= envelope.flying_from_mps;
     let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
@@ -109,7 +109,7 @@ pub(super) fn most(qualities: &[Quality], of: impl Fn(&Quality) -> f64) -> f64 {
     qualities.iter().map(of).fold(f64::NAN, f64::max)
 }
 
-/// The section of what happened on the way to each target.
+/// The section on the transients to the targets; `None` without targets or limits.
 pub(crate) fn section(report: &FlightReport) -> Option<Section> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let limits = report.envelope?.limits;

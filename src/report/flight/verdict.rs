@@ -7,7 +7,7 @@ use crate::{LoopTiming, Outcome, Verdict};
 use greylag_control::quality::TRANSIENT;
 use greylag_logs::Sample;
 
-/// Targets that were not tracked up to this number are listed under the sentence.
+/// Largest number of targets not tracked that are listed under the sentence.
 const LISTED_TARGETS: usize = 6;
 
 /// From the first time to the last, s.
@@ -78,7 +78,7 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     Verdict { outcome, reason, sentence, details, next: report.next.clone() }
 }
 
-/// All that made the flight miss, in words.
+/// The requirements that the flight missed, in words.
 fn reason(not_tracked: usize, late: Option<usize>, kept: Option<bool>) -> String {
     let plural = |n: usize, one: &str| match n {
         1 => format!("1 {one}"),

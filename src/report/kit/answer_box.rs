@@ -51,7 +51,7 @@ impl AnswerBox {
         )
     }
 
-    /// Class of the colour: the usual one says that the error falls.
+    /// CSS class of the colour; empty if the error falls.
     fn tone(&self) -> &'static str {
         let change = self.answer.numbers.change_percent;
         match self.first {

@@ -97,7 +97,7 @@ mod tests {
         let html = bars.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // Cut at full, nothing, nothing below zero, nothing for what is no number.
+        // Cut at full; no bar for NaN, for a negative value and for infinity.
         assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("250 %") && html.contains("cannot be determined"));
     }

@@ -1,4 +1,4 @@
-//! Evidence for things, each as a bar against its own threshold, in groups that belong together.
+//! Evidence for candidates, each drawn as a bar against its own threshold, in groups.
 
 use crate::Style;
 use crate::kit::html::escape;
@@ -16,16 +16,16 @@ pub struct Evidence {
     pub groups: Vec<EvidenceGroup>,
 }
 
-/// Things that belong together.
+/// A group of candidates.
 #[derive(Clone, Debug)]
 pub struct EvidenceGroup {
     /// Property that the rows of the group share.
     pub title: String,
-    /// A sentence on it; may be empty.
+    /// A sentence on the group; may be empty.
     pub note: String,
     /// Style of its bars.
     pub style: Style,
-    /// The things, top to bottom.
+    /// The candidates, top to bottom.
     pub rows: Vec<EvidenceRow>,
 }
 
@@ -128,7 +128,7 @@ mod tests {
         let html = Evidence { title: "e".into(), groups: vec![group] }.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the rest is nothing.
+        // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the others have no bar.
         assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
         assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be determined"));

@@ -11,7 +11,7 @@ use crate::{
 /// One figure of a section.
 #[derive(Clone, Debug)]
 pub enum Figure {
-    /// Verdict on a flight in one sentence.
+    /// Verdict in one sentence.
     Verdict(Verdict),
     /// The answer, before anything else.
     Answer(Box<AnswerBox>),
@@ -29,7 +29,7 @@ pub enum Figure {
     Findings(Findings),
     /// Alternative figures, shown one at a time.
     Choice(Choice),
-    /// Lines over a quantity, by decades.
+    /// Lines of one quantity over another.
     Curves(Curves),
     /// Means in bins with their intervals.
     Intervals(Intervals),

@@ -23,7 +23,7 @@ pub struct Finding {
     pub link: Option<Link>,
 }
 
-/// A way to one alternative of a [`crate::Choice`].
+/// A link to one alternative of a [`crate::Choice`].
 #[derive(Clone, Debug)]
 pub struct Link {
     /// Anchor of the choice.

@@ -16,7 +16,7 @@ pub struct HeatMap {
     pub y_label: String,
     /// Unit of the cells.
     pub unit: String,
-    /// The size at which the colours end, in the unit of the cells; positive.
+    /// Magnitude at which the colour scale ends, in the unit of the cells; positive.
     pub limit: f64,
     /// Edges of the columns, ascending.
     #[serde(serialize_with = "compact")]
@@ -45,7 +45,7 @@ pub struct HeatCell {
 }
 
 fn compact_one<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    // 0.1 % of a value is finer than any colour.
+    // Single precision is finer than any colour.
     match value.is_finite() {
         true => serializer.serialize_f32(*value as f32),
         false => serializer.serialize_none(),

@@ -2,9 +2,9 @@
 
 use crate::kit::html::escape;
 
-/// Letters above which a text of the last column is broken into lines of some width.
+/// Length above which the texts of the last column are broken into lines, characters.
 const LONG: usize = 28;
-/// Columns above which cells are broken into lines, so that the table fits a screen.
+/// Number of columns above which cells are broken into lines, so that the table fits a screen.
 const WIDE: usize = 9;
 
 /// A table of text with column heads.

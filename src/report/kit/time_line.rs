@@ -9,7 +9,8 @@ use crate::kit::numbers::number;
 /// Height of a row of states, and of a panel of lines, px.
 const ROW_PX: f64 = 26.0;
 const PANEL_PX: f64 = 84.0;
-/// Widths at which a word must fit to be written, px: on a telephone, on a desk; and of a letter with its share of the margin.
+/// Widths of the figure on a telephone and on a desk, at which a word is written if it fits, and width of a letter with its
+/// share of the margin, px.
 const NARROW_PX: f64 = 330.0;
 const WIDE_PX: f64 = 800.0;
 const LETTER_PX: f64 = 8.0;

@@ -4,7 +4,7 @@ use crate::kit::html::escape;
 use crate::kit::numbers::number;
 use crate::{Scale, Style};
 
-/// Room beside the outermost intervals, in the width of all of them.
+/// Room beside the outermost intervals, as a share of the width that all intervals span.
 const ROOM: f64 = 0.06;
 
 /// Figure of values with intervals, one to a row.

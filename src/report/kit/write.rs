@@ -65,7 +65,7 @@ fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Asks the disk to keep the file; a disk that cannot is no reason to call the report unwritten.
+/// Syncs the file to disk. A failure is only a warning, because the file has been written.
 fn sync(file: File) {
     if let Err(error) = file.sync_all() {
         tracing::warn!("a written file could not be synced to disk: {error}");

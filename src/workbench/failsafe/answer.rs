@@ -9,7 +9,7 @@ use greylag_sim::faults::policies::Policy;
 /// File of the command that flies the scenario again.
 const FILE: &str = "scenario.json";
 
-/// A rule at this distance is far from broken.
+/// Distance from which a rule counts as far from broken.
 const FAR: f64 = 0.9995;
 
 /// HTML of the result of a flight.
@@ -81,7 +81,7 @@ fn rules(flown: &Flown) -> String {
     )
 }
 
-/// The command that flies the same again.
+/// The command that flies the same scenario again.
 pub(super) fn command(controller: ControllerKind) -> String {
     format!("greylag faults --controller {} --scenario {FILE}", controller.name())
 }

@@ -11,7 +11,7 @@ use greylag_sim::faults::{ControllerMode, Fault};
 /// Time before and after the first event in the close-up, s.
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
-/// Age above which a decision is not in force any more, s.
+/// Age above which a decision is stale, s.
 const STALE_S: f64 = 0.2;
 /// Drawn length of an instantaneous event, such as a request, s.
 const MOMENT_S: f64 = 0.1;
@@ -122,7 +122,7 @@ impl Flown {
     }
 }
 
-/// Each state from its first step to that of the next.
+/// Joins equal states of consecutive steps to spans. A step without a state leaves a gap.
 pub(super) fn spans(samples: &[Sample], of: impl Fn(&Sample) -> Seen) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
     for (k, sample) in samples.iter().enumerate() {

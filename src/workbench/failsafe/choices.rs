@@ -17,7 +17,7 @@ pub(super) const REQUESTS: [(&str, &str); 7] = [
     ("disarm", "Client asks to disarm"),
     ("take-over", "Ground station takes the aircraft"),
 ];
-/// Turbulence: curve of MIL-F-8785C, words.
+/// Turbulence: severity curve of MIL-F-8785C, displayed text.
 pub(super) const TURBULENCE: [(&str, &str); 4] =
     [("0", "none"), ("3", "light"), ("4", "moderate"), ("6", "severe")];
 

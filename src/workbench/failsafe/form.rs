@@ -1,4 +1,4 @@
-//! The choices of the page, and the scenario that they are.
+//! The choices of the page, and the scenario that they describe.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -11,7 +11,7 @@ use greylag_sim::faults::{
 
 /// Length of a flight, s.
 pub(super) const FLIGHT_S: f64 = 60.0;
-/// The attitude asked for is flown from this moment to that, s; level before and after.
+/// Start and end of the commanded attitude, s; level flight is commanded before and after.
 const ATTITUDE_S: [f64; 2] = [8.0, 45.0];
 /// Pitch that a client commands in level flight, degrees.
 const LEVEL_DEG: f64 = 3.0;
@@ -82,7 +82,7 @@ pub(super) struct Form {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{why}")]
 pub(super) struct Wrong {
-    /// The field; empty for one that the form has not.
+    /// The field; empty if the form has no such field.
     pub field: &'static str,
     /// Error in words, with a remedy.
     pub why: String,
@@ -96,7 +96,7 @@ pub(super) struct Chosen {
 }
 
 impl Form {
-    /// The form with the values of a query, the rest by default; and what is wrong with a name of it.
+    /// The form with the values of a query and defaults for the rest, and the error of a name that is no field.
     pub fn of(query: &[(String, String)]) -> (Form, Option<Wrong>) {
         let value = |(field, default): (&'static str, &str)| {
             let given = query.iter().rev().find(|(name, _)| name == field);
@@ -217,7 +217,7 @@ impl Form {
         Ok(asked)
     }
 
-    /// Level, the attitude asked for, level.
+    /// Level flight, the commanded attitude, level flight.
     fn legs(&self) -> Result<Vec<Leg>, Wrong> {
         let [roll_deg, pitch_deg] = [self.number("roll_deg")?, self.number("pitch_deg")?];
         let leg = |from_s, roll_deg, pitch_deg| Leg { from_s, roll_deg, pitch_deg };
@@ -225,7 +225,7 @@ impl Form {
         Ok(vec![leg(0.0, 0.0, LEVEL_DEG), leg(from, roll_deg, pitch_deg), leg(to, 0.0, LEVEL_DEG)])
     }
 
-    /// A value that is one of a type's names.
+    /// The value of a field, which must be one of the names of the type `T`.
     fn named<T: DeserializeOwned>(&self, field: &'static str, what: &str) -> Result<T, Wrong> {
         let value = Value::String(self.value(field).to_owned());
         serde_json::from_value(value).map_err(|e| {

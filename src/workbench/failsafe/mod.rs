@@ -36,7 +36,8 @@ struct Flown {
     controller: ControllerKind,
     witnessed: Witnessed,
     rules: Vec<Policy>,
-    /// For each rule that applies its least distance, 1 at most, below 0 broken, and when (s).
+    /// For each rule its least distance (at most 1, negative if broken) and the time of it, s; `None` if the rule
+    /// does not apply.
     judged: Vec<Option<(f64, f64)>>,
 }
 
@@ -45,7 +46,7 @@ struct Flown {
 pub struct Answer {
     /// The page, as HTML.
     pub html: String,
-    /// Whether a choice was none.
+    /// Whether a choice was invalid, so that nothing was flown.
     pub refused: bool,
 }
 

@@ -7,7 +7,7 @@ use super::form::{Form, NUMBERS, Wrong};
 use greylag_report::escape;
 use greylag_sim::faults::{Counterpart, FaultKind};
 
-/// Flights to begin with: their name, and what they change of the defaults.
+/// Example flights: the name, and the fields that differ from the defaults.
 const EXAMPLES: [(&str, &str); 8] = [
     ("Link cut in a turn", ""),
     ("Client dies", "fault=client&for_s=8&request=none"),
@@ -120,7 +120,7 @@ fn examples() -> String {
 
 const MODES: [(&str, &str); 2] = [("offboard", "OFFBOARD"), ("hold", "HOLD")];
 
-/// The choices of one of `options`, each its value and its words.
+/// A field that selects one of `options`, each of which is a value and its displayed text.
 fn select(
     name: &str,
     label: &str,

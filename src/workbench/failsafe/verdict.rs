@@ -10,7 +10,7 @@ use greylag_report::{Span, Tone};
 use greylag_sim::faults::policies::Sample;
 use greylag_sim::faults::{Asking, Fault, Finding, Found};
 
-/// Changes that a sentence names at most.
+/// Largest number of changes that a sentence names.
 const NAMED: usize = 4;
 /// Arming and asking for OFFBOARD within this time are one request, s.
 const TOGETHER_S: f64 = 0.2;
@@ -221,7 +221,7 @@ impl Flown {
         samples.get(((cause.at_s + LATER_S) / TICK_S) as usize).or(samples.last())
     }
 
-    /// Party left with an aircraft that nobody controls after a cause; `None` if somebody does.
+    /// Clause on an aircraft that nobody controls after a cause; `None` if somebody does.
     fn left_alone(&self, cause: &Cause) -> Option<String> {
         let later = self.later(cause).filter(|s| s.shown.is_none() && s.steered)?;
         let counterpart = self.scenario.counterpart;
@@ -266,7 +266,7 @@ impl Flown {
         }
     }
 
-    /// Altitude that was lost, where that is much.
+    /// Clause on the altitude lost, if that is much.
     fn lost(&self) -> String {
         let lost = self.witnessed.samples.iter().map(|s| s.lost_m).fold(0.0, f64::max);
         if lost < MUCH_M { String::new() } else { format!(" The aircraft lost {lost:.0} m.") }

@@ -43,7 +43,7 @@ pub struct Watched {
     pub predicted: [Column; 6],
     /// Half width of the monitor's band, two standard deviations.
     pub band: [Column; 6],
-    /// The monitor's residual divided by the half width of its band; no unit, beyond −1..1 is outside.
+    /// The monitor's residual divided by the half width of its band; dimensionless, outside the band beyond ±1.
     pub share: [Column; 6],
 }
 
@@ -52,9 +52,9 @@ pub struct Watched {
 pub struct Warning {
     /// When, s on the vehicle's clock.
     pub time_s: f64,
-    /// The model, by its place.
+    /// Index of the model.
     pub model: usize,
-    /// The channel, by its place.
+    /// Index of the channel.
     pub channel: usize,
     /// The warning in words.
     pub text: String,
@@ -253,7 +253,7 @@ fn frame(row: &Sample) -> Telemetry {
         alpha: row.alpha_rad,
         beta: row.beta_rad,
     };
-    // an aircraft without a rudder has no column of it
+    // the log of an aircraft without a rudder has no deflection of one
     let rudder = if row.rudder_rad.is_nan() { 0.0 } else { row.rudder_rad };
     let actuators = ActuatorState {
         aileron: row.aileron_rad,

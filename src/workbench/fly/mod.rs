@@ -1,5 +1,5 @@
-//! Flights in the simulator with the session's model, and recordings of other programs that are watched: what is
-//! measured is shown against what the models predict while it is flown.
+//! Flights in the simulator with the session's model, and recordings that other programs write. The measured channels
+//! are shown against the models' predictions during the flight.
 
 mod live;
 mod order;
@@ -32,12 +32,12 @@ use program::Program;
 const FLIGHTS: &str = "flights";
 /// File name of a recording's log.
 const LOG: &str = "flight.csv";
-/// Time between two looks at the recording.
+/// Interval at which the recording is polled.
 const LOOK: Duration = Duration::from_millis(100);
 /// Characters that are kept of a program's last line.
 const LINE_LENGTH: usize = 400;
 
-/// The flight that is flown or watched, or that was last.
+/// The present flight, which is flown or watched, or else the last one.
 pub struct Flying {
     /// Number of the flight, which names its folder.
     pub number: u64,
@@ -173,7 +173,7 @@ impl Bench {
             (self.folder.join(&flown.folder).join(LOG), format!("flown-{name}.csv"))
         };
         let bytes = std::fs::read(&file).map_err(|e| io(&file, e))?;
-        // results are about the flights with a role: they stay until this one is given one
+        // results depend only on flights with a role: they stay valid until this flight is given one
         self.take_as(seen, &name, &bytes, Some(Role::Unused))
     }
 
@@ -191,7 +191,7 @@ impl Bench {
         let mut trouble = None;
         let outcome = loop {
             let stopped = task.stop.answer().is_break();
-            // looked at before the last rows are read, so that none is missed
+            // checked before the last rows are read, so that no row is missed
             let ended = match &mut task.program {
                 Some(program) => {
                     if stopped {
@@ -270,7 +270,7 @@ impl Flown {
     }
 }
 
-/// The lowest number that no recording in `folder` has and none above it.
+/// The number above the largest number of a recording in `folder`.
 fn free(folder: &Path) -> u64 {
     let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let numbers = names.filter_map(|e| e.file_name().to_str()?.parse::<u64>().ok());

@@ -11,7 +11,7 @@ use greylag_control::ControllerKind;
 use greylag_logs::quoted;
 use greylag_manoeuvres::menu::{self, MENU};
 
-/// The schedule of `greylag demo` where no other is named.
+/// Name of the default schedule of `greylag demo`.
 pub const ATTITUDES: &str = "attitudes";
 /// The folder of schedules, below the session's.
 pub const SCHEDULES: &str = "schedules";
@@ -48,7 +48,7 @@ pub struct Choice {
 }
 
 impl Inner {
-    /// The schedules that can be flown: the demonstration's, the menu's, those made in this session.
+    /// The schedules that can be flown: the demonstration's, those made in this session, the menu's.
     pub fn schedules(&self) -> Vec<Choice> {
         let attitudes = Choice {
             id: ATTITUDES.into(),
@@ -89,8 +89,8 @@ pub fn controllers() -> impl Iterator<Item = &'static str> {
 }
 
 impl Order {
-    /// The words of the command that flies it with the model in `model`, recording to `record`; a schedule of the
-    /// menu is written to `folder`, the session's, first.
+    /// The words of the command that flies the order with the model file `model` and records to `record`. A schedule
+    /// of the menu is first written below `folder`, the session's folder.
     ///
     /// # Errors
     /// If the simulator does not know an option, or the schedule cannot be written.
@@ -129,7 +129,7 @@ impl Order {
         Ok(words)
     }
 
-    /// The file of its schedule; none for the attitudes of the demonstration.
+    /// The file of the order's schedule; `None` for the attitudes of the demonstration.
     fn schedule(&self, folder: &Path) -> Result<Option<PathBuf>, WorkbenchError> {
         if self.schedule == ATTITUDES {
             return Ok(None);

@@ -31,7 +31,7 @@ pub async fn page() -> Html<&'static str> {
     Html(PAGE)
 }
 
-/// One of its files.
+/// The file `name` of the page; 404 if there is none.
 pub async fn asset(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|(own, ..)| *own == name) {
         Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),

@@ -43,7 +43,7 @@ fn allowed(shared: &Shared, request: &Request) -> Result<Entry, Box<Response>> {
     let port = shared.address.port();
     let hosts = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
     let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
-    // another site's name that points here, or another site's page
+    // refuses a foreign host name that resolves to this machine, and requests of another site's page
     let host = text(HOST).is_some_and(|h| hosts.iter().any(|own| own == h));
     let origin = text(ORIGIN).is_none_or(|o| hosts.iter().any(|own| o == format!("http://{own}")));
     if !host || !origin {

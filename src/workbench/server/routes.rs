@@ -59,7 +59,7 @@ pub async fn state(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.state()).await
 }
 
-/// Where the models fail.
+/// Errors of the models by channel and regime, as JSON.
 pub async fn failing(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.failing()).await
 }
@@ -100,7 +100,7 @@ pub async fn curve(State(shared): State<Shared>, Path(effect): Path<String>) -> 
     aside(shared, move |bench| bench.curve(&effect)).await
 }
 
-/// The flight that is flown, or was last.
+/// The present flight, or else the last one.
 pub async fn flying(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.flying())).await
 }

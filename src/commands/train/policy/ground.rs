@@ -12,7 +12,7 @@ use crate::sim::evaluation::{Evaluation, Make, imagine};
 use crate::sim::targets::Row;
 use crate::sim::{Group, Outcome, TargetFile};
 
-/// Where a policy is trained, found to be whole.
+/// The checked environment in which a policy is trained: `model`, or JSBSim if it is `None`.
 pub(super) struct Ground {
     pub(super) model: Option<Arc<GreyBox>>,
     pub(super) origin: Origin,
@@ -20,8 +20,8 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// What `actor` reaches in what it is trained in, on a tenth of a target file: a policy that is trained
-    /// in a model is chosen without a flight in any simulator.
+    /// Scores `actor` in the environment of its training on a tenth of a target file. A policy that is trained in a
+    /// model is therefore chosen without a flight in any simulator.
     pub(super) fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
         let mut rows = TargetFile::generate(JUDGE_SEED).rows;
         rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);

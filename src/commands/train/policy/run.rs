@@ -37,7 +37,7 @@ struct Document<'a> {
     best: &'a Origin,
 }
 
-/// Provenance of a policy.
+/// Training method of a policy with its settings.
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Method<'a> {
@@ -55,7 +55,7 @@ pub(super) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// An actor up the reward's slope, then its critics.
+    /// Trains an actor by the analytic policy gradient, then its critics; `false` if interrupted.
     pub(super) fn climb(
         &self,
         recipe: &AnalyticRecipe,
@@ -81,7 +81,7 @@ impl Run<'_> {
     }
 
     pub(super) fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        // more steps of the same training are the same training
+        // the number of steps does not identify a training, so that one can be continued with more steps
         let of = PolicyRecipe { steps: 0, ..recipe.clone() };
         let of = (of, &self.ground.origin.model_sha256);
         let what = serde_json::to_string(&of)?;
