@@ -152,7 +152,7 @@ fn usual_widths(log: &Log) -> Values {
     width[ALPHA..=BETA].fill(5.0_f64.to_radians());
     width[SCALE] = 0.2;
     width[WIND..WIND + 2].fill(15.0);
-    // air rises and sinks, but not for the length of a flight
+    // vertical wind averages out over most of a flight
     width[WIND + 2] = 1.0;
     width[DRIFT..DRIFT + 3].fill(DRIFTING);
     let apart = log.tracks.first().map_or(0.0, |track| track.span.apart());
