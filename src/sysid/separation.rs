@@ -13,8 +13,7 @@ const RIDGE: f64 = 1e-9;
 /// Prior width of a sensor's constant error in a channel, in standard deviations of a window's noise.
 const BIAS_WIDTH: f64 = 100.0;
 
-/// Squared difference in predictions due to an effect, in noise variances, as far as a refit leaves it. The unit is that of
-/// evidence.
+/// Squared difference in predictions due to an effect that remains after a refit, in noise variances, the unit of evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
     /// Squared difference after the coefficients are refitted: whether the effect is detectable at all.

@@ -165,7 +165,7 @@ impl Levels {
                 continue;
             }
             if self.stated[channel] {
-                // the noise of a sample is stated, not how slowly the sensor errs
+                // the stated noise is that of a sample and says nothing about the errors' correlation in time
                 self.colour[channel] = self.least_colour(channel, self.measured[channel]);
                 continue;
             }
