@@ -290,8 +290,8 @@ fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     })
 }
 
-/// Prior of an initial instant: standard deviations of 10 rad and 100 m/s, hence almost none for the motion, and the
-/// gusts' level.
+/// Prior of an initial instant: standard deviations of 10 rad and 100 m/s, which hardly constrain the motion, and the level
+/// of the gusts.
 fn start<const N: usize, const W: usize>(
     gust: &Vector3<f64>,
     level: f64,
