@@ -13,7 +13,8 @@ pub const CHANNELS: [ChannelId; 4] =
 
 /// Largest motion of a rudder in `flights` for which `model` has no effect.
 ///
-/// A command that moves no rudder, such as firmware sends to aircraft without one, does not count.
+/// A rudder command does not count if the airframe states that the aircraft has no rudder: firmware sends such commands all
+/// the same.
 pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderMotion> {
     if model.has(RUDDER) {
         return None;

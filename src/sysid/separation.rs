@@ -8,23 +8,24 @@ use greylag_model::GreyBox;
 
 /// Number of channels used: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;
-/// Smallest ridge parameter of a free column relative to its squared norm, so that equal columns remain solvable.
+/// Ridge parameter of a free column relative to its squared norm, so that a system with equal columns remains solvable.
 const RIDGE: f64 = 1e-9;
 /// Prior width of a sensor's constant error in a channel, in standard deviations of a window's noise.
 const BIAS_WIDTH: f64 = 100.0;
 
-/// Remaining squared distance of a candidate over noise, in units of evidence.
+/// Squared difference in predictions due to an effect that remains after a refit, in noise variances, the unit of evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
-    /// Distance of the true effect after the coefficients are refitted: whether it is detectable at all.
+    /// Squared difference after the coefficients are refitted: whether the effect is detectable at all.
     pub visible: f64,
-    /// Distance after the other effect is fitted in its place.
+    /// Squared difference after the other effect is fitted in its place as well.
     pub apart: f64,
 }
 
-/// Distance by which `flight`, flown by the aircraft `truth`, separates it from `others`, when `base` lacks both
-/// effects: `others` are the ways in which the other effect may be fitted, each a set of models whose differences
-/// from `base` may be scaled freely.
+/// Separation, by `flight`, of the effect that `truth` has from another effect; `base` lacks both.
+///
+/// `others` holds the ways in which the other effect may be fitted. Each is a set of models whose differences from `base`
+/// are scaled freely.
 ///
 /// The coefficients of `base` are refitted within their prior widths, and so are constant errors in every channel.
 pub fn separation(

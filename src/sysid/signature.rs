@@ -1,4 +1,5 @@
-//! Signature of an effect: the change of forces and moments along airflow and controls, and of a manoeuvre.
+//! Signature of an effect: its changes of forces and moments in sweeps of flow variables and controls, and its changes
+//! of the response to a manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;
@@ -117,7 +118,8 @@ const VARIABLES: [Variable; 12] = [
 /// The signature of the effect `about` with `values` of its coefficients, on `model`.
 ///
 /// # Errors
-/// If the effect cannot join the model, or the model cannot fly level at the airframe's cruise.
+/// The effect is a measurement error or cannot join the model, or the model has no level trim at the airframe's cruise
+/// airspeed.
 pub fn signature(
     model: &GreyBox,
     about: &Description,
@@ -145,7 +147,7 @@ fn set(model: &mut GreyBox, about: &Description, values: &[f64]) {
 }
 
 fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
-    // everything moves a little, so that products show too
+    // sideslip, rates and aileron are not zero, so that products of them show too
     let state = State { beta: 0.07, p: 0.4, q: 0.3, r: 0.3, ..trim.state };
     let controls = Controls { aileron: 0.1, ..trim.controls };
     let from = Condition { state, controls, altitude: ALTITUDE };
@@ -218,7 +220,7 @@ fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
     .clamped()
 }
 
-/// The `most` pairs with the largest change, relative to the vertical quantity's range over all.
+/// The `most` pairs with the largest change, relative to the largest range of the vertical quantity without the effect.
 fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
     let extent = |values: &[f64]| {
         let fold = |f: fn(f64, f64) -> f64, start| values.iter().copied().fold(start, f);
@@ -248,8 +250,8 @@ mod tests {
     use greylag_physics::{effects, inputs};
     use std::path::Path;
 
-    /// Every effect of the catalogue is seen at its example: in a sweep, or in the manoeuvre if it acts
-    /// on how the surfaces move.
+    /// Every effect of the catalogue changes a sweep and the manoeuvre at its example; an effect of the inputs, such as
+    /// an actuator lag, changes the manoeuvre only.
     #[test]
     fn every_effect_leaves_its_signature() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
@@ -259,7 +261,7 @@ mod tests {
             let found = signature(&model, &about, about.entry.unwrap().example).unwrap();
             let first = found.sweeps.first().map(|pair| (pair.x_label, pair.y_label));
             println!("{:25} {first:?}", about.id);
-            // the manoeuvre moves no rudder, which the X8 has not
+            // the X8 has no rudder, so the manoeuvre's rudder doublet does nothing
             let moves = about.id == "rudder_linear" || !found.manoeuvre.is_empty();
             assert!(first.is_some() && moves, "{}", about.id);
         }

@@ -46,7 +46,7 @@ impl Added {
     }
 }
 
-/// Treatment of an effect that the data refuse.
+/// Treatment of an effect that the judgement rejects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// The effect is left out of the model.
@@ -72,7 +72,7 @@ pub struct Options {
     pub effects: Vec<Added>,
     /// Prior on the model's coefficients.
     pub prior: Prior,
-    /// Treatment of effects that the data refuse.
+    /// Treatment of effects that the judgement rejects.
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
@@ -152,7 +152,7 @@ pub fn amend(
     Ok(amended)
 }
 
-/// The same for flights that are already corrected by the constants in the model's file.
+/// As `amend`, for flights that are already corrected by the constants in the model's file.
 fn of_right(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -220,8 +220,8 @@ struct Right {
     notes: Vec<String>,
 }
 
-/// `flights` with the axes and sensors that the file of `model` has of them put right, unless axes are asked for anew; a
-/// flight whose trims it has keeps trims of its own.
+/// Corrects `flights` for the misalignment and the sensor errors in the file of `model`, unless misalignment is to be
+/// estimated. If the file has trims of any of the flights, trims are estimated for each flight.
 fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
     let mut notes = Vec::new();
     let (flights, named) = match asked.askew_deg {
@@ -245,7 +245,8 @@ fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> R
     Right { flights, asked, notes }
 }
 
-/// The `fit` with its scores `after`, its installation kept only where the flights held out bear it out, and what became of it.
+/// The `fit` with its scores `after`, and a note on its installation, which is kept only if the error of the held-out
+/// flights is not larger with it.
 fn installed(
     mut fit: Fit,
     after: Vec<HorizonScore>,
@@ -283,11 +284,11 @@ pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendErro
     Ok(model.join_most(&added.id, &start)?)
 }
 
-/// The middle one of the catalogue's starting points; without any, zero or the bound nearest to it.
+/// The usual starting point of an effect; without any, zero or the bound nearest to it.
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    // the first of a file's is the file's own value; of the catalogue's, the middle one is the usual amount
+    // an effect file lists its own values first; the catalogue lists the usual amount in the middle
     let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
     let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())

@@ -13,9 +13,10 @@ const CLEARLY: f64 = 1.96;
 /// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
 
-/// By how many standard errors `other` follows the shots more closely than `fit`: the mean difference of the shots'
-/// costs, two (Akaike's) off for each coefficient more, over the scatter of these differences (Vuong 1989). Each
-/// fit's weights suit itself, so the costs are means by both. Zero if fewer than three shots are in both.
+/// Standard errors by which `other` follows the shots more closely than `fit`: the mean difference of the shots' costs,
+/// less two in total for each additional coefficient (Akaike), over the standard error of that mean (Vuong 1989). Each
+/// fit's weights favour that fit, so a cost is the mean of those under both weights. Zero if fewer than three shots are
+/// common to both.
 pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
     let cost = |left: &Left| -> f64 {
         let weigh = |squares: &[f64; 8], weights: &[f64; 8]| -> f64 {
@@ -84,10 +85,10 @@ impl Convention {
         }
     }
 
-    /// Whether the alternative is adopted, given that it fits its own flights `closer` by so many standard errors and
-    /// takes the held-out error from the first to the second of `error`. Integrator and axes are choices of the
-    /// simulator or the author and need positive evidence; air does thin with height, so the standard atmosphere only
-    /// needs to be not contradicted.
+    /// Whether the alternative is adopted. It fits its own flights more closely by `closer` standard errors; `error` is
+    /// the held-out error without and with it. Integrator and axes are choices of the simulator or the author and need
+    /// positive evidence. Air density does decrease with height, so the standard atmosphere is adopted unless the data
+    /// contradict it.
     pub(super) fn is_borne_out(self, closer: f64, error: [f64; 2]) -> bool {
         let fall = 1.0 - error[1] / error[0];
         match self {

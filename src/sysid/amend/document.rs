@@ -175,7 +175,8 @@ fn short(log: &Hashed) -> String {
     format!("{name} (sha256 {})", &log.sha256[..PREFIX])
 }
 
-/// The first coefficient that differs in any bit between `read` and `meant`, or convention that differs, in words.
+/// The first difference between `read` and `meant`, in words: a convention, the number of coefficients, constants of the
+/// installation or the flights, or a coefficient that differs in any bit. `None` if there is none.
 pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
     if let Some(other) = Convention::ALL.into_iter().find(|c| c.of(read) != c.of(meant)) {
         return Some(other.key().join("."));

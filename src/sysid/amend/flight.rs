@@ -21,8 +21,8 @@ pub(super) const AIRSPEED: usize = 2;
 /// Least standard deviation of the actuators' delay estimated from forces, s (against simulated truth its root mean
 /// square error is 0.3 ms).
 pub(super) const SKEW_LEAST: f64 = 5e-4;
-/// Prior standard deviation of the actuators' delay against the gyros, s: that of ±1.5 samples, both recorded 0 to 10
-/// ms late.
+/// Prior standard deviation of the actuators' delay against the gyros, s, for a 95 % interval of ±1.5 samples: each of
+/// the two is recorded 0 to 10 ms late.
 const SKEW_SD: f64 = 7.7e-3;
 /// Prior standard deviations where the reconstruction gives none: airspeed scale (relative), body rates (rad/s), α
 /// and β (rad).
@@ -79,7 +79,7 @@ impl Flight {
     /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    /// It has no clock.
+    /// The sampling interval of `flight` lies outside 1e-6 to 1 s.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Flight, ClockError> {
         let mut doubt = [[0.0, SKEW_SD]; SENSORS];
         doubt[BLUR] = BLURRED;

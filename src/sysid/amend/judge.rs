@@ -13,10 +13,10 @@ use greylag_model::GreyBox;
 pub const JUDGED_AT_S: f64 = 5.0;
 /// Least relative fall of the held-out error for an effect to join.
 pub(super) const IMPROVED: f64 = 0.01;
-/// An effect that lowers the held-out error below this share joins although the search has not converged with it:
-/// convergence may need further effects.
+/// An effect that lowers the held-out error below this share of the previous one joins although the search has not
+/// converged with it: convergence may need further effects.
 pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
-/// An effect's coefficient must differ from zero by this many standard deviations.
+/// At least one coefficient of an effect must differ from zero by this many standard deviations.
 const CLEAR: f64 = 1.96;
 /// The same for effects of more than three coefficients, of which one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
@@ -233,7 +233,7 @@ pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// The flight whose own estimate is incompatible with the common one, and the difference.
+/// The flight whose own estimate is incompatible with the common one, and that estimate.
 fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     let far = |value: f64, sd: f64| {
         let off = (value - p.value).abs();

@@ -31,8 +31,9 @@ impl Learned<'_> {
     }
 }
 
-/// What the model's file keeps once `flights` were fitted with what is `asked` of each, `before` being known already:
-/// of every flight its own constants, of the installation the means over the flights that are clear of zero.
+/// Constants for the model's file after a fit to `flights` with the constants `asked`; `before` holds those of the file
+/// so far. Each flight keeps its own constants. The installation has the means over the flights that differ significantly
+/// from zero.
 pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> Known {
     let anew = asked.angles() > 0;
     if !anew && !asked.has_trims() {
@@ -79,8 +80,8 @@ fn installation(flights: &[Learned]) -> Option<FlightConstants> {
     Some(FlightConstants { source, axes_deg: Some(axes), trims: None, sensors: None })
 }
 
-/// The mean of estimates with their standard deviations; zero unless it exceeds its standard error clearly, by what the
-/// estimates are known to or by how they differ, whichever is worse.
+/// The mean of `estimates`, each with its standard deviation; zero unless it exceeds twice its standard error. That error
+/// follows from the standard deviations or from the scatter of the estimates, whichever is larger.
 fn common(estimates: &[[f64; 2]]) -> f64 {
     let n = estimates.len() as f64;
     let mean = estimates.iter().map(|[x, _]| x).sum::<f64>() / n;

@@ -55,7 +55,7 @@ pub struct Scored {
     pub free: usize,
     /// The flights that are long enough to be predicted.
     pub flights: Vec<String>,
-    /// Free-run error of each of them, of the reference scale, by the fit to all others; NaN where that failed.
+    /// Scaled free-run error of each of them under the fit to all others; NaN where that fit failed.
     pub errors: Vec<f64>,
     /// Mean of `errors`; infinite where a fit failed.
     pub mean: f64,
@@ -75,7 +75,8 @@ pub struct Scored {
 /// Trees, 1984, section 3.4.3, in pairs).
 ///
 /// # Errors
-/// Fewer than [`LEAST_FLIGHTS`] are long enough for the shortest horizon, an effect cannot join the model, or `progress` ended it.
+/// Fewer than [`LEAST_FLIGHTS`] are long enough for the shortest horizon, a flight cannot be resampled, an effect cannot
+/// join the model, or `progress` cancelled.
 pub fn leave_one_out(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -92,7 +93,7 @@ pub fn leave_one_out(
     };
     let right = ready(&put_right(&model.known, flights).0)?;
     let ready = ready(flights)?;
-    // every structure is judged at the same horizon: the longest that all flights reach which reach any
+    // every structure is judged at the same horizon, the longest one that all judging flights reach
     let reached = |f: &Flight| judged_at(&scores(model, std::slice::from_ref(f), horizons_s));
     let reached: Vec<Option<f64>> = ready.iter().map(reached).collect();
     let at = reached.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -116,13 +117,13 @@ pub fn leave_one_out(
     Ok(all)
 }
 
-/// The flights of a table of structures.
+/// The flights of a cross-validation.
 struct Set<'a> {
     /// All flights as they are predicted.
     judged: &'a [Flight],
     /// The same flights corrected by their constants in the model's file, as used in the fit.
     fitted: &'a [Flight],
-    /// Which of them are long enough to be predicted; the others are fitted to alone.
+    /// Indices of those long enough to be predicted; the others are only used in fits.
     judges: &'a [usize],
     /// The horizon, s.
     at: f64,

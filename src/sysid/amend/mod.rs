@@ -1,4 +1,4 @@
-//! A model refitted to flights, effects added, by output error.
+//! Refits a model to flights by output error and adds effects to it.
 //!
 //! The method is described in `docs/explanation/diagnosis.md`: an equation-error fit starts the coefficients,
 //! multi-step shooting refines them, and held-out flights judge the result.

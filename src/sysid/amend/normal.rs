@@ -36,7 +36,7 @@ pub(super) struct Place {
 /// Weights of the residuals.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
-    /// Inverse variance of each state's residual divided by its correlation length.
+    /// Inverse variance of each state's residual, divided by the common correlation length.
     pub output: [f64; 8],
     /// Inverse variance of the initial state's errors.
     pub start: [f64; 8],
@@ -145,7 +145,7 @@ pub(super) fn cost(shot: &Shot, residuals: &[[f64; 8]], start: &[f64; 8], w: &We
     0.5 * (shot.weight * output + square(start, &w.start))
 }
 
-/// `model` with the flight's trims, if the trim terms are part of it.
+/// `model` with the trims of a flight; unchanged if these are all zero.
 pub(super) fn of_flight<'a>(model: &'a GreyBox, own: &Own) -> Cow<'a, GreyBox> {
     if own.trims.iter().all(|trim| *trim == 0.0) {
         return Cow::Borrowed(model);

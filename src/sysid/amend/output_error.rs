@@ -200,8 +200,8 @@ struct Search<'a> {
     iterations: usize,
     /// Largest change of the last step in standard deviations, and the coefficient's index.
     change: (f64, usize),
-    /// Whether that step was rejected: no fraction of it lowers the cost, for example where a run that stalls or does
-    /// not makes the cost jump.
+    /// Whether that step was rejected: however much it is damped, the cost does not fall, for example because the cost
+    /// jumps where a run begins to stall.
     stuck: bool,
 }
 
@@ -265,7 +265,7 @@ impl<'a> Search<'a> {
         self.short = 0;
         for (shot, reach) in self.shots.iter_mut().zip(&reach) {
             if *reach < shot.steps {
-                // short of where it leaves, the run still carries information
+                // well before it diverges, the run still carries information
                 shot.steps = reach * 3 / 4;
                 self.short += 1;
             }

@@ -9,8 +9,8 @@ use greylag_physics::inputs;
 /// Coefficients of added effects that are held at their starting values: fractions that cannot be identified beside
 /// the shape they scale.
 const HELD: &[&str] = &["lift_stall.k"];
-/// Effects without a formula of their own (curves), whose ordinates have a narrow prior about zero where few data
-/// lie.
+/// Effects without a formula of their own (curves). Their ordinates have a narrow prior about their starting values, which
+/// decides where few data lie.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
 /// Prior width of an ordinate of those effects, as a share of its range.
 const SLIGHT_SHARE: f64 = 0.1;

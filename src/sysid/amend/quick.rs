@@ -38,7 +38,7 @@ pub fn tune(
 /// Estimates `model` with `effects` by equation error over `flights` and scores its free runs on `held_out`.
 ///
 /// # Errors
-/// An effect cannot join the model, or a flight has no clock.
+/// An effect cannot join the model, or the sampling interval of a flight is not usable.
 pub fn estimate(
     model: &GreyBox,
     flights: &[Reconstruction],

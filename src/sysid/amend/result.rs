@@ -120,7 +120,7 @@ pub struct AddedEffect {
     pub description: &'static str,
     /// Whether it joined the amended model.
     pub joined: bool,
-    /// Reasons of the data to refuse it; empty if there are none.
+    /// Reasons to reject it, from its estimates and the held-out flights; empty if there are none.
     pub refused: Vec<String>,
     /// Manoeuvre that would let the data decide.
     pub fly_next: String,

@@ -187,7 +187,7 @@ pub(super) fn residuals(
     path: &[[f64; 8]],
 ) -> Vec<[f64; 8]> {
     let segment = &flight.segments[shot.segment];
-    // a run that leaves at its first step has the error at which it counts as left
+    // a run that diverges at its first step gets the error at which a run counts as diverged
     let mut last = scale.map(|x| LEFT * x);
     (0..shot.steps)
         .map(|k| {

@@ -14,7 +14,7 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     let taken = story.conventions.iter().filter(|t| t.kept);
     let taken: Vec<String> =
         taken.map(|t| format!("{} {}", t.convention.key().join("."), t.to)).collect();
-    // tuning and effects alone are what the answer says
+    // the answer covers tuning and effects, so a sentence follows only if a convention changed
     if let (Some(before), Some(after), false) = (before, after, taken.is_empty()) {
         let joined = kept.iter().map(|id| (*id).to_owned());
         all.push(format!(
@@ -50,7 +50,7 @@ pub fn sentences(story: &Amendment) -> Vec<String> {
     all
 }
 
-/// Effect of the constants `asked` of each flight outside the fit; `None` if there are none.
+/// Sentence on the use of the constants `asked` of each flight after the fit; `None` if there are none.
 pub fn apart(asked: &PerFlight) -> Option<String> {
     let what = match (asked.has_trims(), asked.angles() > 0) {
         (false, false) => return None,

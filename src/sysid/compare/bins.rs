@@ -261,7 +261,8 @@ pub fn map(residuals: &[Residual]) -> Map {
     Map { alpha_deg: alpha, beta_deg: beta, cells }
 }
 
-/// Edges of one side of the map; the outermost enclose all values, with at least one cell.
+/// Edges of one side of the map: those between the 2 % and 98 % quantiles, and one more cell at each end. Values beyond
+/// lie outside the map. A nearly constant variable has a single cell of 1°.
 fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
     let mut edges = edges(&values, MAP_BINS, 0.02).filter(|e| e.len() > 1).unwrap_or_default();

@@ -1,9 +1,9 @@
 //! Cells in which a model fails, with a controlled false discovery rate.
 //!
-//! A cell is a channel in a bin of a regime variable. A model has some hundred cells, of which one in twenty lies
-//! outside of its own 95 % interval by chance. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p.
-//! 289) keeps the expected share of such cells among those named at the given level; cells that share windows depend
-//! positively on one another, which it allows (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p. 1165).
+//! A cell is a channel in a bin of a regime variable. A model has several hundred cells. By chance, one in twenty of them
+//! has a 95 % interval that excludes zero. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p. 289) limits
+//! the expected share of such cells among the reported ones to the given level. Cells that share windows depend
+//! positively on one another, which the procedure allows (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p. 1165).
 
 use super::doubt::NORMAL_95;
 use super::result::{Bin, RegimeBins};
@@ -87,7 +87,7 @@ mod tests {
         }
         // 0.05 × 180 / 200 is what is expected; its standard error over 200 trials is 0.004
         assert!(shares / 200.0 < 0.06, "{}", shares / 200.0);
-        // intervals of their own would name 9 false cells a trial, a third of all
+        // without this control, 95 % intervals would name 9 false cells a trial, a third of all named
         assert!(hits as f64 / (200.0 * 20.0) > 0.85, "{hits}");
     }
 

@@ -17,7 +17,7 @@ pub enum CompareError {
         "no flight to compare with: {0}; give a log in which the aircraft flies for some seconds without gaps"
     )]
     NoFlight(String),
-    /// The flight has no clock.
+    /// The sampling interval of a flight is not usable.
     #[error(transparent)]
     Clock(#[from] ClockError),
     /// The horizon is outside the range that can be flown.

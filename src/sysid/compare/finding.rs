@@ -79,7 +79,7 @@ fn excludes_zero([low, high]: [f64; 2]) -> bool {
     low > 0.0 || high < 0.0
 }
 
-/// The variable that explains most; time, altitude and flight only by `CIRCUMSTANCE_MARGIN`.
+/// The variable that explains most; time, altitude and flight must exceed the others by `CIRCUMSTANCE_MARGIN`.
 fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
@@ -105,7 +105,7 @@ fn range(bins: &[Bin]) -> Option<(usize, usize)> {
         .filter(|&k| discovery::found(&bins[k]))
         .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
     let worst = bins[peak].mean;
-    // thin neighbours may join: together with the worst bin they are supported
+    // neighbours with few samples may join: together with the worst bin they have enough
     let alike = |k: usize| bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART;
     let from = (0..peak).rev().take_while(|&k| alike(k)).last().unwrap_or(peak);
     let to = (peak + 1..bins.len()).take_while(|&k| alike(k)).last().unwrap_or(peak);

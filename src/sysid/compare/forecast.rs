@@ -29,8 +29,8 @@ enum Forecast {
     Hold,
     /// Attitude, airspeed and flow angles are held at the initial values, rates are zero.
     Straight,
-    /// A first-order linear model with the deflections as inputs (ARX), fitted by least squares to the flights it is
-    /// judged on, so its error is optimistic.
+    /// A first-order linear model with the deflections as inputs (ARX), fitted by least squares. `forecasts` fits it to
+    /// the flights it is judged on, so its error is optimistic there.
     Linear(DMatrix<f64>),
 }
 
@@ -119,7 +119,8 @@ pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec
     results(all, flights, scale, horizons)
 }
 
-/// The same with the linear model fitted to the flights `seen` instead.
+/// Errors of all forecasts on `flights` at the `horizons` (s), states over `scale`; the linear model is fitted to the
+/// flights `seen`.
 pub fn on_unseen(
     seen: &[Prepared],
     flights: &[Prepared],
@@ -212,7 +213,7 @@ mod tests {
         let [hold, straight, linear] = at_5[..] else { panic!("{at_5:?}") };
         // pitch goes up and down by a tenth of a radian; throttle and airspeed never move
         assert!(hold > 0.01 && straight > 0.01 && linear < 1e-6, "{at_5:?}");
-        // 20 s from the start on every 3 s
+        // 20 s hold 7 starts, one every 3 s
         assert_eq!(all[0].free_run[0].runs, 7);
     }
 

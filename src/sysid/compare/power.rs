@@ -2,8 +2,7 @@
 
 use super::bins::Residual;
 
-/// The channel's variance, less noise, must be at least this part of itself for a share to mean
-/// something.
+/// An unexplained share has a meaning only if at least this part of the channel's variance exceeds the noise.
 const EXCITED: f64 = 0.05;
 
 /// Mean squares of a channel.
@@ -19,7 +18,7 @@ pub struct Power {
 }
 
 impl Power {
-    /// That of `residuals` whose noise has the variance `noise`.
+    /// Mean squares of the channel with these `residuals`, whose noise has the variance `noise`.
     pub fn of(residuals: &[Residual], noise: f64) -> Power {
         let count = residuals.len() as f64;
         let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;

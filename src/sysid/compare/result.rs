@@ -373,8 +373,8 @@ pub struct ModelTrace {
 pub struct ChannelTrace {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Middle of each window, s on the log's clock, ascending; between segments a row of NaN
-    /// values stands at the segment's end.
+    /// Middle of each window, s on the log's clock, ascending. Between segments, a row of NaN values stands one sample
+    /// before the next segment's first window.
     pub time_s: Vec<f64>,
     /// Measured values, in the channel's unit.
     pub measured: Vec<f64>,

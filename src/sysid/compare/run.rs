@@ -52,8 +52,8 @@ impl Default for Options {
 /// Compares `models` with reconstructed `flights`; reports to `progress`, which may cancel.
 ///
 /// # Errors
-/// No model or flight is given, no log holds a usable flight, a flight has no clock, a horizon is not usable, or
-/// `progress` cancelled.
+/// No model or flight is given, no log holds a usable flight, the sampling interval of a flight or a horizon is not
+/// usable, or `progress` cancelled.
 pub fn compare(
     models: &[GreyBox],
     flights: &[Reconstruction],
@@ -107,7 +107,7 @@ pub fn compare(
 /// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s).
 ///
 /// # Errors
-/// A flight's clock does not fit.
+/// The sampling interval of a flight is not usable.
 pub fn scores(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -238,7 +238,7 @@ pub fn abstentions(
 
 type Measured = (Vec<Vec<Series>>, Vec<Vec<[Shift; ChannelId::ALL.len()]>>);
 
-/// Measured channels of `flights` with the shifts due to uncertain sensor errors.
+/// Measured and predicted channels of `flights`, and the shifts of their residuals due to uncertain sensor errors.
 fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Measured {
     let of = |f: &Prepared| match KnownFlight::of(model, f) {
         Some(known) => windows::channels(&known.model, &known.flight),

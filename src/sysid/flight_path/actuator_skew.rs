@@ -1,11 +1,11 @@
 //! Delay of the recorded actuators behind the gyros, estimated from the moments they cause.
 //!
 //! The kinematics do not depend on the actuators, but the angular accelerations do. Roll and pitch accelerations are
-//! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, with averages over a short
-//! kernel so that nothing is differentiated: the ratio of the last coefficient to the one before it is the delay. A
-//! lag of the surfaces that the record does not show is confounded with it. Both sides are high-pass filtered at half
-//! a second, because slower variations contain the errors of unmeasured flow angles, up to 0.2° with PX4, and no
-//! information on a delay.
+//! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, all averaged over a short
+//! kernel, which limits the noise of the derivatives. The delay is the coefficient of the rate of deflection divided by
+//! that of the deflection. A lag of the surfaces that the record does not show is confounded with it. Both sides are
+//! high-pass filtered at half a second, because slower variations contain the errors of unmeasured flow angles, up to
+//! 0.2° with PX4, and no information on a delay.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -69,7 +69,7 @@ pub fn estimate(
         information += i;
         weighted += i * skew.late;
     }
-    // roll and pitch feel the same gusts: not a mean of two
+    // the same gusts disturb roll and pitch, so two axes do not average this error
     let by_gusts = BY_GUSTS * gusts;
     let width = SKEW_SAMPLES * step;
     let deviation = information.recip().sqrt().hypot(by_gusts).min(width);
@@ -85,7 +85,7 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     let mean = again.iter().sum::<f64>() / count;
     let scatter = again.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let pulled = mean - skew.late;
-    // the draws scatter; of the pull, only its part linear in the errors' variance is known
+    // scatter of the draws, and the part of the bias that is not linear in the errors' variance
     let deviation = (skew.deviation.powi(2) + scatter / count + (CURVED * pulled).powi(2)).sqrt();
     Skew { late: skew.late - pulled, deviation }
 }
@@ -211,7 +211,7 @@ fn regress(rows: &[Vec<f64>], values: &[f64]) -> Option<Skew> {
     let (deflection, by_rate) = (columns - 2, columns - 1);
     let gain = solution[deflection] / scale[deflection];
     let late = solution[by_rate] / scale[by_rate] / gain;
-    // of the quotient, to first order
+    // gradient of the quotient of both coefficients
     let gradient = DVector::from_fn(columns, |j, _| match j {
         j if j == by_rate => 1.0 / (scale[by_rate] * gain),
         j if j == deflection => -late / (scale[deflection] * gain),

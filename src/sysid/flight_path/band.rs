@@ -253,7 +253,7 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// The band solution against a dense one of the same system, constants free or none.
+    /// The band solution equals a dense solution of the same system.
     #[test]
     fn band_equals_dense() {
         const N: usize = 6;
@@ -320,7 +320,7 @@ mod tests {
             }
         }
         assert!((p.clone() - reference.rows(COUNT * N, C)).norm() < 1e-11);
-        // what is left of the squares: Σ r² less the fall, here both of the dense system
+        // the least sum of squares: Σ r² less its reduction by the dense solution
         let least = left.corner[C][C] - b.dot(&p);
         assert!((least - (corner[C][C] - right.dot(&reference))).abs() < 1e-11);
         let log_det = left.log_det + factor.determinant().ln();

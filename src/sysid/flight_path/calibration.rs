@@ -1,9 +1,10 @@
 //! Rare instrument errors. Each is estimated only if a flight shows it significantly.
 //!
-//! Gains of gyros, accelerometers and vanes, an offset of airspeed or heading, a delay far beyond a sample: if they
-//! were free in every flight, the biases would be less certain in all of them. Each is therefore held until its
-//! estimate without a prior differs significantly from zero (a score test with the path and all other constants
-//! fitted along; Klein and Morelli, Aircraft System Identification, section 5.3.3) and large enough to matter.
+//! These are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay far beyond a
+//! sample. If they were free in every flight, the biases would be less certain in every flight. Each is therefore held
+//! until its estimate without its own prior differs from the prior mean significantly and by enough to matter (a score
+//! test with the path and all other constants fitted along; Klein and Morelli, Aircraft System Identification, section
+//! 5.3.3).
 
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
@@ -21,7 +22,7 @@ const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
 const UNUSUAL: f64 = 4.0;
 /// Least relevant size of a delay, s.
 const DELAY: f64 = 0.02;
-/// A constant is freed only if its standard deviation is below this share of its width.
+/// A constant is freed only if its standard deviation is below this share of its new prior width.
 const KNOWN: f64 = 0.25;
 
 /// The next constant to free with its new prior width; `None` if no other one is significant.

@@ -25,14 +25,14 @@ pub enum Interpolation {
 pub struct Channel {
     time: Vec<f64>,
     value: Vec<f64>,
-    /// Whether all its values are equal.
+    /// Whether more than 20 values are all equal; always false for `Interpolation::Kept`.
     pub stuck: bool,
 }
 
 impl Channel {
-    /// The finite ones of `samples` (time in s, value). If many values repeat the previous one, the log holds a
-    /// slower sensor's value, and repeats are dropped. Of a value that persists longer than that sensor's period,
-    /// such as a coarsely quantised one, some repeats are kept, always including the last one. Angles are unwrapped.
+    /// The finite ones of `samples` (time in s, value). If many values repeat the previous one, the sensor is slower
+    /// than the log's rows, and repeats are dropped. A value that persists for several of that sensor's periods, such
+    /// as a coarsely quantised one, keeps some of its repeats. The last sample is always kept. Angles are unwrapped.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Interpolation) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();
@@ -85,8 +85,8 @@ impl Channel {
         }
     }
 
-    /// The measurement for `t` (s), one for each sample of the channel: NaN without a sample within
-    /// `near` (s), else the interpolation of [`between`](Self::between), else that sample.
+    /// The measurement for `t` (s): NaN without a sample within `near` (s), else the interpolation of
+    /// [`between`](Self::between), or the nearest sample where that is NaN.
     pub fn measured(&self, t: f64, reach: f64, near: f64) -> f64 {
         let [left, right] = self.around(t);
         let distance = |s: &(f64, f64)| (s.0 - t).abs();
@@ -146,8 +146,8 @@ pub fn wrap(angle: f64) -> f64 {
 /// Value and slope (per sample) at `part`, 0 to 1, of the way from the second of four samples to the third: the cubic
 /// whose slopes at these two are those of the parabolas around them.
 ///
-/// From one interval to the next neither has a step. A parabola around the nearest sample has one half-way between two: a
-/// search for a delay cannot pass it where the samples are rough.
+/// Value and slope are continuous from one interval to the next. A parabola around the nearest sample would jump half-way
+/// between two samples. With rough samples, a search for a delay cannot pass such a jump.
 pub fn cubic<T>([a, b, c, d]: [T; 4], part: f64) -> (T, T)
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,

@@ -290,7 +290,8 @@ fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     })
 }
 
-/// Equations of an initial instant, on which only the size of gusts is known.
+/// Prior of an initial instant: standard deviations of 10 rad and 100 m/s, which hardly constrain the motion, and the level
+/// of the gusts.
 fn start<const N: usize, const W: usize>(
     gust: &Vector3<f64>,
     level: f64,
@@ -343,8 +344,8 @@ fn weigh<const N: usize, const W: usize, const D: usize>(
 }
 
 impl<const N: usize> Solved<N> {
-    /// Changes the path and the constants by a `part` of the step; returns the largest change of a constant in its
-    /// standard deviation.
+    /// Changes the path and the constants by a `part` of the step. Returns the largest change of a constant, in units of
+    /// its standard deviation.
     ///
     /// # Errors
     /// The path is not finite.

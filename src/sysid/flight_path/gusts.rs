@@ -1,8 +1,8 @@
 //! Uncertainty of the constants due to gusts of the estimated level, by simulation.
 //!
 //! The constants are fitted as if the air-data sensors had white noise, wide enough to cover the gusts. Gusts persist
-//! for many seconds, so this neither covers the error of a mean wind nor shows that a delay is better known than a
-//! bias. Draws of gusts passed through the equations of the fit do both.
+//! for many seconds, so white noise neither covers the error of a mean wind nor shows that a delay is better known than
+//! a bias. Draws of gusts passed through the equations of the fit account for both.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};

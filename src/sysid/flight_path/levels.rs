@@ -34,7 +34,8 @@ const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
 /// Slow error of a dynamic pressure sensor, Pa, and its correlation time, s: the sensor's zero drifts, and the static
 /// port errs with attitude. An assumption, 0.3 % of the airspeed at 17 m/s; no sensor was measured.
 const PITOT: (f64, f64) = (1.0, 30.0);
-/// Air density for converting it to a speed, kg/m³; sufficient because the error is known to its order only.
+/// Air density for converting that pressure to a speed, kg/m³. A typical value suffices, because only the order of magnitude
+/// of the error is known.
 const NEAR_THE_GROUND: f64 = 1.2;
 
 /// Noise levels, as standard deviations.
@@ -56,8 +57,8 @@ pub struct Levels {
     /// Whether a level is stated and therefore not estimated.
     pub stated: [bool; CHANNELS],
     /// White noise of the airspeed whose means scatter like its slow error, m/s. Zero where a vane measures α or no
-    /// velocity over ground was logged: otherwise the mean vertical wind, and with it α, follows from the change of
-    /// airspeed with climb. In 13 minutes of a PX4 flight without wind, 0.01 m/s of such an error was estimated as
+    /// velocity over ground was logged. In all other logs, the mean vertical wind, and with it α, follows from the change
+    /// of airspeed with climb: in 13 minutes of a PX4 flight without wind, 0.01 m/s of such an error was estimated as
     /// 0.18 ± 0.04 m/s of wind.
     slow_airspeed: f64,
 }
@@ -164,7 +165,7 @@ impl Levels {
                 continue;
             }
             if self.stated[channel] {
-                // the noise of a sample is stated, not how slowly the sensor errs
+                // the stated noise is that of a sample and says nothing about the errors' correlation in time
                 self.colour[channel] = self.least_colour(channel, self.measured[channel]);
                 continue;
             }

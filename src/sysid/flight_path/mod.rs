@@ -108,7 +108,7 @@ impl Options {
         }
     }
 
-    /// The same for segments of `shortest_s` (s) too, where that is less.
+    /// These options with the shortest segment reduced to `shortest_s` (s), if that is less.
     pub fn down_to(self, shortest_s: f64) -> Options {
         Options { shortest_s: self.shortest_s.min(shortest_s), ..self }
     }

@@ -85,8 +85,8 @@ const SKEW_PERIODS: f64 = 0.5;
 
 /// Usual drift of a gyro's bias, rad/s²: somewhat more than ArduPilot's SITL has (0.05°/s a minute, 1.45e-5).
 const DRIFTING: f64 = 2e-5;
-/// Time over which a drift changes by about its own size, s: the better one of 300 and 3000 on ArduPlane's logs,
-/// whose slow heading errors would otherwise be followed.
+/// Time over which a drift changes by about its own size, s: of 300 and 3000, the better value on ArduPlane's logs,
+/// because a drift that changes faster follows their slow heading errors.
 const STEADY: f64 = 3000.0;
 
 impl Span {
@@ -152,7 +152,7 @@ fn usual_widths(log: &Log) -> Values {
     width[ALPHA..=BETA].fill(5.0_f64.to_radians());
     width[SCALE] = 0.2;
     width[WIND..WIND + 2].fill(15.0);
-    // air rises and sinks, but not for the length of a flight
+    // vertical wind averages out over most of a flight
     width[WIND + 2] = 1.0;
     width[DRIFT..DRIFT + 3].fill(DRIFTING);
     let apart = log.tracks.first().map_or(0.0, |track| track.span.apart());

@@ -1,4 +1,4 @@
-//! Flight path of a stretch: motion and air at every sample, with the sensors' predicted values.
+//! Flight path of a stretch: attitude, velocity and gust at every sample, and the mean wind.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,7 +11,7 @@ pub const CHANNELS: usize = 9;
 /// Airspeed below which the flow angles are undefined, m/s.
 pub const SLOW: f64 = 2.0;
 
-/// Attitude and velocity at every sample.
+/// Attitude, velocity and gust at every sample, and the mean wind.
 #[derive(Clone, Debug)]
 pub struct Path {
     /// Rotation from body to earth axes.
@@ -25,7 +25,7 @@ pub struct Path {
 }
 
 impl Path {
-    /// Initial guess: the measurements, the previous one where one is missing.
+    /// Initial guess in air without wind: attitude, airspeed and flow angles as measured, each held where it is missing.
     pub fn guess(track: &Track) -> Path {
         let course = track.velocity.iter().find(|v| v[0].is_finite() && v[1].is_finite());
         let first = |mut values: Box<dyn Iterator<Item = f64> + '_>, default: f64| {

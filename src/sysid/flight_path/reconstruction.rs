@@ -99,7 +99,8 @@ impl Reconstruction {
         Some(found.sd).filter(|sd| sd.is_finite())
     }
 
-    /// The flight as a log, with reconstructed states and the measurements beside them.
+    /// The flight as a log: reconstructed states and specific force, altitude, air density, deflections and commands. The
+    /// rudder's are left out.
     pub fn to_flight(&self) -> Flight {
         let rate_hold_s = if self.sampling == Sampling::Held { self.step_s } else { 0.0 };
         let sample = |i: &Instant| {

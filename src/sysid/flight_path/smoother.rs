@@ -1,9 +1,9 @@
 //! The smoother: fits path and constants to all sensors by Gauss–Newton.
 //!
-//! At first, gusts count as noise of the air-data sensors, and motion and constants are fitted. If the data make
-//! gusts more likely, gusts along the path are then estimated with the constants held, and the effect of gusts of
-//! that level on the constants is added to their standard deviations. Estimating path, gusts and constants together
-//! would give an airspeed scale far above one, because that makes every gust smaller.
+//! At first, gusts count as noise of the air-data sensors, and motion and constants are fitted. If gusts are more likely
+//! than noise, gusts along the path are then estimated with the constants held, and the effect of gusts of that level
+//! on the constants is added to their standard deviations. Estimating path, gusts and constants together would give an
+//! airspeed scale far above one, because that makes every gust smaller.
 
 use nalgebra::Vector3;
 
@@ -26,7 +26,7 @@ const GUSTY: usize = 4;
 /// Number of iterations before levels are estimated from residuals, and in total.
 const FIRST: usize = 2;
 const LAST: usize = 25;
-/// Convergence tolerance: largest change of a constant in its standard deviation, and relative change of a level.
+/// Convergence tolerance: largest change of a constant in units of its standard deviation, and relative change of a level.
 const STEP_TOLERANCE: f64 = 0.05;
 const LEVEL_TOLERANCE: f64 = 0.02;
 /// Smallest share of a step that is tried.
@@ -79,7 +79,7 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
 }
 
 /// Takes the step, or its largest fraction (by halving) that lowers the merit function; no step if there is none.
-/// Returns the largest change of a constant in its standard deviation.
+/// Returns the largest change of a constant in units of its standard deviation.
 ///
 /// Without this line search a nearly straight flight, in which wind, airspeed scale and path are confounded, ends in
 /// a wrong wind of 5 m/s, as the first minute of a real ArduPlane flight did.
@@ -110,7 +110,7 @@ fn gusty(
     found: &mut Found,
     singular: &dyn Fn() -> ReconstructError,
 ) -> Result<(), ReconstructError> {
-    // an airspeed alone, filtered and late as pitots are, would be taken for vertical gusts
+    // without both vanes, the filter and the delay of the airspeed would be fitted as vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
         return Ok(());
     }

@@ -76,7 +76,7 @@ fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     let mut bare = model.clone();
     bare.known = Default::default();
     let Some(values) = own.trims else { return bare };
-    // a model that has trims already is in a fit, which finds them itself
+    // a model that has trims already belongs to a fit, which estimates them
     match trims::joined(&bare) {
         Ok(mut with) => {
             trims::set(&mut with, &values);
@@ -86,7 +86,7 @@ fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     }
 }
 
-/// `flights` with the axes and the sensors' constants that `known` has of them put right, and which these are.
+/// `flights` corrected for the axes' misalignment and the sensor errors in `known`, and the names of the corrected ones.
 pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstruction>, Vec<String>) {
     let mut named = Vec::new();
     let one = |flight: &Reconstruction| {

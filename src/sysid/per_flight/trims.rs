@@ -1,6 +1,6 @@
 //! Trims of each flight: constants added to the model's coefficients, and a relative change of its thrust.
 //!
-//! They join a model as an effect outside the catalogue, so a model needs no coefficient of such a name.
+//! They join a model as an effect outside the catalogue, so a model needs no coefficients of these names.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::formula::register;
@@ -42,14 +42,14 @@ const ID: &str = "flight_trims";
 /// # Errors
 /// The model has an effect of that id.
 pub fn joined(model: &GreyBox) -> Result<GreyBox, JoinError> {
-    // the text is part of the program; unread, its id is unknown
+    // an error in this built-in text is not lost: `join` then fails, because it does not know the id
     let _ = register::read(include_str!("flight_trims.toml"));
     let mut with = model.clone();
     with.join(ID, &[0.0; TRIMS.len()])?;
     Ok(with)
 }
 
-/// Puts the trims of a model that they have [joined] at `values`.
+/// Sets the trims of a model from [`joined`] to `values`.
 pub fn set(model: &mut GreyBox, values: &[f64]) {
     let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
     let first = all.len().saturating_sub(values.len());

@@ -69,7 +69,7 @@ impl Prepared {
     /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
     ///
     /// # Errors
-    /// It has no clock.
+    /// The sampling interval of `flight` lies outside 1e-6 to 1 s.
     pub fn new(flight: &Reconstruction, slowest: f64) -> Result<Prepared, ClockError> {
         let substeps = substeps(flight)?;
         let dt = STEP * substeps as f64;
@@ -216,8 +216,8 @@ fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
     Ok(((step_s / STEP).round() as usize).max(1))
 }
 
-/// Samples of a stretch at intervals of `dt` (s): unchanged if they have that interval, else linearly interpolated,
-/// deflections held.
+/// Samples of a stretch at intervals of `dt` (s): unchanged if they have that interval, every n-th one if `dt` is n of
+/// theirs, else linearly interpolated with the deflections held.
 fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     if (step_s / dt - 1.0).abs() < 1e-6 {
         return instants.to_vec();

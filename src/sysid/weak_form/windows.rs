@@ -209,7 +209,7 @@ fn moment(model: &GreyBox, at: &Instant, controls: &Instant) -> Vector<f64> {
     [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c))
 }
 
-/// Rates of V, α, β by the model's integrator over each step, 1/s.
+/// Rates of V (m/s²), α and β (rad/s) by the model's integrator over each step.
 fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Vec<Vector<f64>> {
     let mut memory = Memory::default();
     let mut rate = |k: usize| {
@@ -240,7 +240,7 @@ fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     variance
 }
 
-/// Part of the noise variance that comes from averaged or differentiated measurements: accelerations, rates, airspeed, α,
+/// Part of the noise variance from measurements weighted by the kernel or its slope: accelerations, rates, airspeed, α,
 /// β.
 fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);

@@ -100,9 +100,9 @@ impl Ask<'_> {
         Ok(Selection { tuned: so_far.tuned, fit: best.0, after: best.1, accepted, effects })
     }
 
-    /// Fits the effects that a diagnosis found together in one model, less those that the flights refuse even so, if
-    /// held-out flights are predicted better with them: the gain of one effect alone can be lost beside a gross error
-    /// that another one corrects. `None` if there are fewer than two.
+    /// Fits the effects that a diagnosis found in one model, without those to whose estimates there are objections. A gross
+    /// error that one effect corrects can hide the gain of another one, so that one-by-one trials would miss it. `None` if
+    /// fewer than two remain, or if held-out flights are not predicted better.
     fn together(
         &self,
         model: &GreyBox,
@@ -154,7 +154,7 @@ impl Ask<'_> {
         mut best: Selection,
     ) -> Result<(Selection, Vec<Tried>), AmendError> {
         let mut base = model.clone();
-        // each with the number of others beside which it was tried
+        // each with the number of conventions that had been adopted when it was tried
         let mut verdicts: [Option<(Tried, usize)>; Convention::ALL.len()] = Default::default();
         for _ in 0..ROUNDS {
             for (k, convention) in Convention::ALL.into_iter().enumerate() {
@@ -185,8 +185,8 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
-    /// The selection for `other`, the model under another convention, with the accepted effects; the remaining
-    /// effects are tried again only if that is promising.
+    /// The selection for `other`, the model under another convention, with the accepted effects. The remaining effects
+    /// are tried again only if the held-out error falls or the fit follows its shots more closely.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
         let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
@@ -213,7 +213,7 @@ impl Ask<'_> {
             let own = format!("{}.", added.id);
             let fitted = near.coefficients().iter().filter(|c| c.name.starts_with(&own));
             let fitted: Vec<f64> = fitted.map(|c| c.value).collect();
-            // a curve's prior is where it begins
+            // the starting values of a curve are its prior, so they must not come from an earlier fit
             let start = match fitted.is_empty() || parameters::SLIGHT.contains(&added.id.as_str()) {
                 true => added.start.clone(),
                 false => Some(fitted),

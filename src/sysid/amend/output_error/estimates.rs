@@ -76,9 +76,8 @@ impl Search<'_> {
         names
     }
 
-    /// The present estimates of the fit, with intervals.
-    /// Its model is `given`, without trims of flights.
-    /// The coefficients `held` were undetermined.
+    /// The fit at the present estimates, with intervals. Its model is `given`, which has no trims of flights, with the
+    /// estimated coefficients; `held` names the undetermined ones.
     pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {

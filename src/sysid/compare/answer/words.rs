@@ -86,8 +86,8 @@ fn one(e: &Decisive) -> String {
     text
 }
 
-/// A value and the ends of its interval to one number of places, that of two digits of the interval's width, so that
-/// none of them looks rounder than it is.
+/// A value and the ends of its interval with the same number of decimal places, enough for two digits of the interval's
+/// width.
 fn alike(value: f64, ci95: [f64; 2]) -> [String; 3] {
     let width = ci95[1] - ci95[0];
     let places = (1.0 - width.log10().floor()).max(0.0);
@@ -200,7 +200,7 @@ fn by(n: &Numbers, step: &Step) -> String {
     }
 }
 
-/// A change in percent with its sign; one more digit where rounding would give 0 or 100 %.
+/// A change in percent with its sign; one decimal place below 10 % and from 98 to 100 %.
 fn percent(p: f64) -> String {
     let sign = if p > 0.0 { "+" } else { "−" };
     match p.abs() {
@@ -229,7 +229,7 @@ fn number(x: f64) -> String {
     text.replace('-', "−")
 }
 
-/// The text with its first letter small, unless it is a word of capitals or a symbol.
+/// The text with its first letter in lower case, unless it begins with an acronym or a symbol.
 fn lower(text: &str) -> String {
     let mut letters = text.chars();
     match (letters.next(), text.chars().nth(1)) {

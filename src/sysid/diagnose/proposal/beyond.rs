@@ -21,8 +21,8 @@ const BEHIND: f64 = 0.01;
 /// A larger formula must lower the squared error by this much more than a smaller one.
 const WORTH: f64 = 10.0;
 
-/// Reason why free forms are tried, and the channels; `None` if a flexible model could not remove any of the residual that
-/// the library's formula leaves.
+/// Reason why free forms are tried, and the channels. `None` if the library's formula suffices: a flexible model removes
+/// hardly more, one shape is enough for the channel, and no significant second one was left out.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {

@@ -15,7 +15,7 @@ pub struct Term {
     pub sd: f64,
 }
 
-/// Bounds of a coefficient: ± this many times its estimate.
+/// Bounds of a coefficient: ± this many times the sum of its magnitude and three standard deviations.
 const ROOM: f64 = 10.0;
 
 /// `x` to four significant figures.

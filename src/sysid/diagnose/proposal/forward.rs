@@ -35,7 +35,7 @@ const CHANNELS: usize = 3;
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// The channels that the diagnosis leaves unexplained, the worst first.
+/// The channels that the diagnosis leaves unexplained, the one with the most removable error relative to chance first.
 pub(super) fn failing(found: &Found) -> Vec<Channel> {
     let tuned = &found.unexplained;
     let removable = |c: usize| {
@@ -103,7 +103,7 @@ pub(super) struct Ask<'a> {
     pub behind: f64,
 }
 
-/// Explanatory text of a search's result.
+/// Record of a search: formulas, alternatives, grades, objections, and the best evidence in null flights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outcome {
     pub front: Vec<Rung>,
@@ -220,7 +220,7 @@ impl Ask<'_> {
             threshold,
             chosen: false,
         });
-        // set back when the term joins
+        // reset below if the term joins
         let much = score.fall > WORTH * c.excess;
         c.significant_left_out = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
@@ -236,7 +236,7 @@ impl Ask<'_> {
             return Some(false);
         };
         let removed = held_out::removed(self.problem, given, &tuned, &self.channels)?;
-        // a term that pulls the others far off, or makes things worse, is one of them again
+        // a term that moves the others' coefficients far, or does not lower the error, duplicates one of them
         if c.terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
             c.terms.pop();
             return Some(false);

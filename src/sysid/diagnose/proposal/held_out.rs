@@ -62,7 +62,7 @@ pub(super) fn tested(
         with.join_most(effect.about.id, &values).ok()?;
     }
     let removed = removed(problem, model, &with, &channels)?;
-    // a value below zero does not count as an improvement
+    // at least zero, because a negative reduction is no improvement
     let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
     Some(HeldOut { flights, removed, fall: measured, threshold })
 }

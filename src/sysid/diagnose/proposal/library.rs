@@ -232,7 +232,7 @@ impl Form {
         ))
     }
 
-    /// The effect of this form alone with all its constants fixed.
+    /// The effect of this form alone with its constants at their values. A lag's time constant remains a parameter.
     ///
     /// # Errors
     /// As [`Form::effect`].

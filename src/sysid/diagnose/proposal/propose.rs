@@ -189,7 +189,7 @@ fn beyond_library(
     Ok(if taken { free } else { library })
 }
 
-/// Why there is nothing to propose, if the catalogue or chance explains the residual.
+/// Why nothing is proposed; `None` if the diagnosis leaves a residual unexplained.
 fn settled(found: &Found, verdict: Verdict) -> Option<String> {
     match verdict {
         Verdict::Unexplained => None,

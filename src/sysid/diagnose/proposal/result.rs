@@ -31,7 +31,7 @@ pub struct Alternative {
 pub struct Rung {
     /// Formula, as text.
     pub formula: String,
-    /// Number of terms, numbers and operations in it.
+    /// Number of variables, numbers and operations in it, its coefficients included.
     pub complexity: usize,
     /// Share of the error beyond noise in the searched channels that it removes.
     pub removed: f64,
@@ -105,7 +105,7 @@ pub struct Proposal {
     pub grades: Option<Grades>,
     /// Test on held-out flights.
     pub held_out: Option<HeldOut>,
-    /// Number of the library's shapes evaluated.
+    /// Number of the library's shapes evaluated, lagged controls included.
     pub tried: usize,
     /// Reasons not to propose the formula found; empty if it is proposed.
     pub refused: Vec<String>,

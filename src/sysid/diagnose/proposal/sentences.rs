@@ -8,7 +8,7 @@ use super::result::{HeldOut, Proposal};
 use crate::diagnose::answer::sentences::figures;
 use greylag_physics::formula::Variable;
 
-/// `text` with a capital first letter.
+/// `text` with a capital first letter and a full stop.
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect()) + "."

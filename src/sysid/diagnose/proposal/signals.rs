@@ -11,10 +11,10 @@ use crate::flight_path::reconstruction::Reconstruction;
 use greylag_model::GreyBox;
 use greylag_physics::formula::file::channel_name;
 
-/// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV: one row for each window of the
-/// weak form (0.37 s, half overlapping), with the flight, the mean of each variable over the window (SI units),
-/// dynamic pressure times wing area (`qbar_S`, N), and `left_` with the channel's name, the residual there (N or N m;
-/// empty where it is not measured).
+/// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV. Each window of the weak form (0.37 s,
+/// half overlapping) has one row: the index of the flight from 0, the mean of each variable over the window (SI units),
+/// dynamic pressure times wing area (`qbar_S`, N), and the residual of each channel (N or N m; empty where it is not
+/// measured) in the column `left_` followed by the channel's name.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).

@@ -18,7 +18,7 @@ const MOVED: f64 = 0.02;
 /// Largest change of a shape constant within which its linearisation is used, as a share of its value.
 pub const REACH: f64 = 0.35;
 
-/// Factor between the points below the least start.
+/// Factor between the points weaker than an input effect's first start.
 const SMALLER: f64 = 2.5;
 
 /// An effect that may be missing.
@@ -113,7 +113,7 @@ fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
 }
 
-/// Points below the least start of an input effect, which accurate sensors may still detect.
+/// Points at which an input effect is weaker than at its first start; accurate sensors may still detect it there.
 fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
         return Vec::new();
@@ -121,7 +121,7 @@ fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     if !entry.operator {
         return Vec::new();
     }
-    // the less of a limit, the higher it is
+    // starts that decrease are limits, whose effect is weaker the higher they are
     let factor = if first[0] < last[0] { 1.0 / SMALLER } else { SMALLER };
     vec![vec![first[0] * factor.powi(2)], vec![first[0] * factor]]
 }
@@ -143,7 +143,7 @@ pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec
             joined.push((*e, values));
         }
     }
-    // what some of them would replace is still there
+    // coefficients that some of them would replace keep their values
     for c in model.coefficients() {
         everything.set_coefficient(&c.name, c.value);
     }
@@ -174,7 +174,7 @@ impl Columns {
                 let (low, high) = model.size().bounds(c);
                 (k, next + k, [low, high])
             });
-            // what the flights do not move, as the rudder of an aircraft without one, stays at zero
+            // coefficients without effect in the flights, such as those of a missing rudder, stay at zero
             let free = free.filter(|(_, column, _)| self.acts(*column)).collect();
             let trial = Trial {
                 id: e.about.id,

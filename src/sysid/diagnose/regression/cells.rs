@@ -53,7 +53,7 @@ impl Cells {
         cells
     }
 
-    /// Block number of each window of `ready`; a rest shorter than half a block joins the previous one.
+    /// Block number of each window of `ready`: a segment is divided into equal blocks of about `BLOCK_S`.
     fn number(&mut self, flight: usize, ready: &Ready) -> Vec<usize> {
         let windows = &ready.acting.windows;
         let mut block_of = Vec::with_capacity(windows.len());

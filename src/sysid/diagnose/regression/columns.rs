@@ -45,7 +45,7 @@ impl Ready {
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
         let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 7, |place, add| {
-            // the end of a step of RK4 is close to its start
+            // derivatives are those at the start of a step, also for its end, which RK4 evaluates too
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
                 here.value

@@ -43,7 +43,7 @@ pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column
         let one = gather(&flight.acting, Integrator::Jsbsim, COUNT, |place, add| {
             let z = standard(variables(&flight.acting, place.segment, place.index), &spread);
             let pressure = model.air(&place.at.state, place.at.altitude).q_s;
-            // forces weigh by samples, moments by steps: the two sides of a window
+            // forces are averaged over samples, moments over steps: one column for each of the two
             for channel in [0, 3] {
                 for (k, z) in z.iter().enumerate() {
                     add(k, channel, pressure * z);

@@ -12,7 +12,7 @@ use crate::diagnose::regression::whiten::Whitener;
 pub struct Known {
     /// Name of the parameter.
     pub name: String,
-    /// Prior standard deviation; infinite for those of an asserted effect.
+    /// Prior standard deviation; infinite for the linear coefficients of an asserted effect.
     pub width: f64,
     /// Prior mean less the value at which the model was linearised.
     pub offset: f64,

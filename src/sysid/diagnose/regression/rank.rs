@@ -205,7 +205,7 @@ fn joint_wald(
     (wald, deviations)
 }
 
-/// The same for the amplitude of a fixed contribution.
+/// Wald statistic of the amplitude of the contribution with fixed `weights`; zero if the amplitude is not positive.
 fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, square: f64) -> f64 {
     if square <= 0.0 {
         return 0.0;

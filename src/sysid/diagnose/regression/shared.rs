@@ -46,7 +46,7 @@ pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
     let mut out = flight.clone();
     for segment in &mut out.segments {
-        // V, α, β: error of the integrated rates, then of what is measured less that
+        // V, α, β: error of the integrated rates, and the measurement's error less that one
         let mut drift: [Vec<f64>; 3] = Default::default();
         let mut measured: [Vec<f64>; 3] = Default::default();
         let mut sum = [0.0; 3];

@@ -37,8 +37,8 @@ const PRIOR_SHARE: f64 = 0.9;
 /// Number of candidates that compete in a bootstrap.
 const COMPETING: usize = 8;
 
-/// Share of the squared error beyond noise that `score` removes from segments that its amounts were not fitted to;
-/// segments have a block's length, every fifth one is held out in turn, in the channels in which the candidate acts.
+/// Share of the squared error beyond noise that the candidate removes from held-out segments, in the channels in which it
+/// acts. A segment is one block. Every fifth one is held out in turn, and the amounts are fitted to the others.
 pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     let p = &round.projected;
     let last = p.width();
@@ -139,7 +139,7 @@ pub fn correlation(round: &Round, a: &Score, b: &Score) -> f64 {
     of(a, b) / (of(a, a) * of(b, b)).sqrt()
 }
 
-/// Indices in `scores` of the effects that these data cannot distinguish from the one at `of`, itself included.
+/// Indices in `scores` of the effects that these data cannot distinguish from the one at `of`, without `of` itself.
 pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> {
     let (_, own) = &scores[of];
     (0..scores.len())
@@ -225,13 +225,13 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let by_itself = Trial { points: vec![point], ..trial.clone() };
     let grams = p.grams();
     let found = by_itself.score(&grams, &Draw::measured(&grams))?;
-    // what the flight leaves beyond noise, as another effect that is missing does, may lie anywhere
+    // a residual beyond noise, for example due to another missing effect, may bias the estimate: wider deviations
     let misfit = misfit(&p, &trial.channels, found.fall);
     let [value, sd] = [found.values[first], misfit * found.deviations[first]];
     if contribution.is_some() {
         return Some([value, sd]);
     }
-    // of what moves the columns, the sensors' noise carries no information: it only looks like excitation
+    // sensor noise in the columns looks like excitation but carries no information: its part is subtracted
     let disturbed = alone(&round.disturbed, flight, na, &columns);
     let added = less(&disturbed, &placed);
     let feint = p.others(&cells, &added, &noise.whiteners);
@@ -259,7 +259,7 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     let mut all = round.known.clone();
     for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
         let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
-        // relative to all of the effect, as sure as its evidence
+        // the change due to the effect has the same relative uncertainty as the effect, 1 / √wald
         let astray = given.powi(2) / score.wald.max(1.0);
         known.offset = p.tuned[k] - given;
         known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);

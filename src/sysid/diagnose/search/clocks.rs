@@ -27,7 +27,7 @@ pub struct Doubt {
 }
 
 impl Doubt {
-    /// Sensor doubts of `flight` at a sampling interval of `dt` (s).
+    /// Uncertainty of `flight` at a sampling interval of `dt` (s).
     pub fn of(flight: &Reconstruction, dt: f64) -> Doubt {
         Doubt { sensors: sensors::widths(flight, dt), path: shared::path_error(flight, dt) }
     }

@@ -8,7 +8,8 @@ use greylag_logs::rudder::MOVES_RAD;
 /// Least duration of flight, s.
 const LEAST_S: f64 = 10.0;
 
-/// A requirement: variable, its least standard deviation, unit, and the manoeuvre that excites it.
+/// A requirement: name and reader of a variable, its least standard deviation, the factor to the unit of that deviation,
+/// the unit, and the manoeuvre that excites the variable.
 type Need = (&'static str, fn(&Instant) -> f64, f64, f64, &'static str, &'static str);
 
 const NEEDS: [Need; 4] = [
@@ -21,7 +22,7 @@ const NEEDS: [Need; 4] = [
 /// Notes on the variables with too little excitation for a diagnosis.
 ///
 /// # Errors
-/// The flights are too short, or aileron, elevator and angle of attack all hardly move.
+/// The flights are too short, or at least three of aileron, elevator, throttle and angle of attack hardly move.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
     if seconds < LEAST_S {

@@ -48,7 +48,7 @@ pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64
 }
 
 /// The quantile 1 − `level` of the distribution of `sample`, as a Gumbel law with the sample's mean and standard
-/// deviation, which approximates the maximum of many.
+/// deviation, which approximates the maximum of many. Infinite for fewer than five finite values.
 pub fn threshold(sample: &[f64], level: f64) -> f64 {
     let finite: Vec<f64> = sample.iter().copied().filter(|x| x.is_finite()).collect();
     let count = finite.len() as f64;

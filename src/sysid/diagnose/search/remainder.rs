@@ -13,7 +13,7 @@ use greylag_num::stream::stream;
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
 /// Random stream for the null draws.
 const NULLS: u64 = 83;
-/// Least number of folds; with fewer flights, they are divided into this many parts.
+/// Number of folds into which a single flight is divided; of several flights, each one is a fold.
 const FOLDS: usize = 3;
 
 /// Removable error, channel by channel.

@@ -100,7 +100,7 @@ impl Round {
         Round::beside(problem, model, entries, Beside::default())
     }
 
-    /// The same with results of another round or model.
+    /// As `new`, with results of another round or model.
     pub fn beside(
         problem: &Problem,
         model: GreyBox,
@@ -276,7 +276,7 @@ impl Round {
     }
 }
 
-/// The columns of the list below index `place`.
+/// The columns of the list up to index `place`, that one included.
 fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
 }

@@ -155,7 +155,7 @@ fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> V
         let z = standard(variables(&flight.acting, place.segment, place.index), spread);
         let pressure = model.air(&place.at.state, place.at.altitude).q_s;
         let bends = bends(&flight.acting, place.segment, place.index);
-        // forces weigh by samples, moments by steps: the two sides of a window
+        // forces are averaged over samples, moments over steps: one column for each of the two
         for side in [0, CHANNELS / 2] {
             for (k, (i, j)) in pairs().enumerate() {
                 add(k, side, pressure * z[i] * z[j]);

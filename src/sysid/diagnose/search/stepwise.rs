@@ -116,7 +116,7 @@ fn select(
             (None, false) => "is refused",
         };
         report(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
-        // several things may be missing: a refused candidate does not prevent the next one
+        // several effects may be missing, so a refused candidate does not end the search
         if !passed && found.last.is_some() && aside.len() < MOST_ASIDE {
             found.scores.remove(0);
             aside.push(winner);

@@ -49,8 +49,8 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     })
 }
 
-/// Share of each channel's variance beyond noise that `after` explains more than `before`; negative if it explains
-/// less, 0 where the flights do not measure the channel.
+/// Share of each channel's variance beyond noise by which the mean square residual falls from `before` to `after`;
+/// negative if it rises, 0 where the flights do not measure the channel.
 pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {

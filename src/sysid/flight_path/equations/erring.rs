@@ -1,4 +1,4 @@
-//! Errors of the reconstructed path: draws of the noise of every sensor, and changes for other residuals.
+//! Errors of the path in draws of every sensor's noise, and changes of the constants for given air-data residuals.
 
 use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -75,7 +75,7 @@ impl Problem<'_> {
             (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
         let measured =
             measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
-        // as the path was found: what is coloured counts as white that is so much wider
+        // as in the fit: coloured noise counts as white noise with a larger standard deviation
         let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
         let readings: Vec<Reading> = measured
             .into_iter()

@@ -77,8 +77,8 @@ fn climb(track: &mut Track, step: f64) {
     }
 }
 
-/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and returns it once every
-/// [`CLIMB_WINDOW`], because without any measured heading that of the path would be undetermined.
+/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and enters it as a measurement once every
+/// [`CLIMB_WINDOW`]. Without any measured heading, the path's heading would be undetermined.
 fn heading(track: &mut Track, step: f64) {
     let every = (CLIMB_WINDOW / step).round().max(1.0) as usize;
     let (mut yaw, mut last) = (0.0, [0.0; 2]);
@@ -93,7 +93,7 @@ fn heading(track: &mut Track, step: f64) {
     }
 }
 
-/// The command in force at `t`; components that are not logged are NaN.
+/// The command in force at `t` (s); `None` without aileron, elevator or throttle. A rudder that is not logged is zero.
 fn command(channels: &Channels, t: f64) -> Option<Command> {
     let [aileron, elevator, throttle, rudder] =
         std::array::from_fn(|i| channels.commands[i].held(t));

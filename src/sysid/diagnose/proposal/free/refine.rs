@@ -36,7 +36,7 @@ impl Place<'_> {
         self.screen.projected(&DVector::from_vec(self.screen.column(values)))
     }
 
-    /// Fits the constants of `free` to remove most of `target`; returns the form and the reduction.
+    /// Fits the constants of `free` so that it removes as much of `target` as possible; returns the form and the reduction.
     pub fn refined(&self, free: &Free, target: &DVector<f64>) -> (Free, f64) {
         let mut best = free.constants.clone();
         let mut column = self.column(free, &best);

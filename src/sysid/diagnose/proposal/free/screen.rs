@@ -199,13 +199,13 @@ impl<'a> Screen<'a> {
         stacked(noise - &self.known * taken, prior)
     }
 
-    /// Score in the flights of a form with that many constants.
+    /// Score of a form with `constants` shape constants in the flights.
     pub fn measured(&self, kept: &Kept, constants: usize) -> Reached {
         let product = |b: usize| kept.blocks[b][0];
         self.reached(kept, kept.linear, product, constants)
     }
 
-    /// Score of a form with that many constants in a null flight.
+    /// Score of a form with `constants` shape constants in a null flight.
     pub fn by_chance(&self, kept: &Kept, null: &Null, constants: usize) -> Reached {
         let product = |b: usize| null.signs[b] * kept.blocks[b][1];
         let noise: f64 = (0..self.block_count).map(product).sum();

@@ -36,7 +36,7 @@ pub fn plain(v: Variable) -> &'static str {
     }
 }
 
-/// Typical range of the variable in flight, less than its possible range.
+/// Typical range of the variable in flight: `FLOWN` of its possible range, or all of it for a positive variable.
 fn reach(v: Variable) -> f64 {
     if positive(v) { v.range()[1] } else { FLOWN * v.range()[1] }
 }

@@ -23,7 +23,7 @@ pub(super) fn known(
     let mut placed: Vec<Placed> = vec![Vec::new(); flights.len()];
     let linear = model.linear();
     for (index, named) in model.coefficients().iter().enumerate() {
-        // a shape constant that has joined is not moved farther than its linearisation reaches
+        // the prior of a shape constant that has joined is as wide as its linearisation reaches
         let joined =
             if linear[index] { f64::INFINITY } else { catalogue::REACH * named.value.abs() };
         let (value, width) = problem.prior.get(index).copied().unwrap_or((named.value, joined));

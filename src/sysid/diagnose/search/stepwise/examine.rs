@@ -87,7 +87,7 @@ pub(super) fn examine(found: &Found, options: &Options) -> Option<Selected> {
 fn class(found: &Found) -> Vec<usize> {
     let mut class = checks::class(found.round(), &found.scores, 0);
     class.retain(|k| !found.beaten.contains(&found.scores[*k].0));
-    // settled, they are as good: their scores at the model linearised without them add no information
+    // candidates that were as good in the run-off belong to the class, whatever their scores before tuning
     let level = (1..found.scores.len()).filter(|k| found.level.contains(&found.scores[*k].0));
     let level: Vec<usize> = level.filter(|k| !class.contains(k)).collect();
     class.extend(level);

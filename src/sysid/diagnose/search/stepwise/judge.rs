@@ -13,8 +13,9 @@ const SHAPELESS: f64 = 0.1;
 const BENT: f64 = 0.02;
 
 impl Found {
-    /// Refuses effects that leave much of the removable error in their own channels, that is of their own reduction
-    /// plus what a flexible model could remove, or of the error beyond noise.
+    /// Refuses effects that leave too large a share of the error in their own channels: of the error that a flexible
+    /// model could remove, of the error beyond noise, or of the missing part that products of states or second
+    /// derivatives of the deflections explain.
     pub(super) fn judge_remainder(&mut self) {
         let (before, after) = (&self.first_remainder, &self.remainder);
         let real = |s: &&Selected| s.refused.is_empty() && !s.absorbs_prior_error;
@@ -69,7 +70,7 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses every effect that acts in one of `channels`, for `reason`.
+    /// Refuses every effect but `except` that acts in one of `channels`, for `reason`.
     pub fn refuse_in(&mut self, channels: &[ChannelId], except: &str, reason: &str) {
         let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
         let spared = |s: &&mut Selected| s.id != except && s.channels.iter().any(touched);
@@ -95,14 +96,14 @@ impl Found {
         self.selected.iter_mut().for_each(|effect| effect.refused.push(reason.to_owned()));
     }
 
-    /// Refuses the asserted effects with the ids `ids`, for `reason`.
+    /// Refuses the selected effects with the ids `ids`, for `reason`.
     pub fn refuse(&mut self, ids: &[String], reason: &str) {
         for effect in self.selected.iter_mut().filter(|s| ids.iter().any(|id| id == s.id)) {
             effect.refused.push(reason.to_owned());
         }
     }
 
-    /// Refuses effects that were found together with a refused one, since they depend on it.
+    /// Refuses effects that were selected after a refused one, since they depend on it.
     fn refuse_companions(&mut self) {
         let refused = |s: &Selected| !s.refused.is_empty() && s.trace.is_none();
         let Some(first) = self.selected.iter().position(refused) else { return };
