@@ -144,8 +144,8 @@ impl GreyBox {
 }
 
 impl GreyBox {
-    /// A model from the texts of a model file and its airframe file that lie in no folder. It has neither a residual nor
-    /// effects of files.
+    /// A model from the texts of a model file and its airframe file, without files on disk. It has neither a residual
+    /// nor effects from effect files.
     ///
     /// # Errors
     /// What is wrong with a text, as for [`GreyBox::load`].

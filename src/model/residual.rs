@@ -125,7 +125,7 @@ fn fingerprinted(airframe: &Airframe) -> String {
         let rudder = airframe.actuators.rudder;
         text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
     }
-    // it scales a residual's inputs and outputs
+    // the reference airspeed scales a residual's inputs and outputs
     if airframe.reference != Reference::OF_SCHEMA_1 {
         text += &format!(" reference airspeed {:?}", airframe.reference.airspeed);
     }
