@@ -1,4 +1,4 @@
-//! The head of a table: where its fields go, and the numbers in them.
+//! The header of a table: the columns that its fields fill, and the parser of their numbers.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ enum Share {
 /// Where the fields of a table go.
 pub(super) struct Head {
     targets: Vec<Vec<Target>>,
-    /// What the names say.
+    /// Meaning of names that are not those of the log format.
     pub dialect: Dialect,
     /// Fields of a quaternion.
     quaternion: Option<[usize; 4]>,
@@ -59,7 +59,7 @@ impl Head {
 
     /// The sample in a record; `None` when a field of it is no number, or the time is missing.
     pub fn sample(&self, record: Fields<'_>) -> Option<Sample> {
-        // A row that lacks fields is damaged, and would take many times its size.
+        // A row that lacks fields is damaged, and its sample would take many times its size in memory.
         if record.len() < self.targets.len() {
             return None;
         }

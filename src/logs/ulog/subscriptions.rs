@@ -23,7 +23,7 @@ impl Subscription {
     }
 }
 
-/// The subscriptions by their message numbers: several are looked up for each record.
+/// The subscriptions by their message numbers, for fast look-up: each record needs several.
 #[derive(Default)]
 pub(super) struct Subscriptions {
     /// Place of each number among the others, from 1 on; 0 of a number that is not there.
