@@ -42,11 +42,11 @@ struct Declared {
     instance: Option<(u8, usize)>,
     wanted: bool,
     role: Role,
-    /// What was read of it, by instance.
+    /// Samples that were read, by instance.
     read: Vec<Instance>,
 }
 
-/// What a record type is read for besides its numbers.
+/// Purpose of a record type in addition to its numbers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
     None,

@@ -106,7 +106,7 @@ impl Log {
     }
 }
 
-/// Whether a log is to be computed with, or only looked at.
+/// Whether a log is read for a computation, or only for inspection.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     Compute,

@@ -131,7 +131,7 @@ fn steps(times: &[f64]) -> Vec<f64> {
     times.windows(2).map(|w| w[1] - w[0]).collect()
 }
 
-/// Which of the `stays` (from, to, s) of one value are long for a channel that shows `values` at `times`, s.
+/// Those of the `stays` (from, to, s) of one value that are long for a channel with `values` at `times`, s.
 pub(super) fn frozen_of(
     column: &str,
     times: &[f64],
@@ -150,7 +150,7 @@ fn frozen_s(changes: &[f64]) -> Option<f64> {
     enough.then(|| FROZEN_S.max(FROZEN_STEPS * usual))
 }
 
-/// Where one value other than zero stays for much longer than is usual.
+/// Intervals in which one value other than zero stays for much longer than usual.
 fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
     let Some(limit) = frozen_s(changes) else { return Vec::new() };
     let mut out = Vec::new();

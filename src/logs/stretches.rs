@@ -22,12 +22,12 @@ pub(super) const MOST: usize = 65_536;
 pub(super) const LENGTH_S: f64 = 30.0;
 /// Largest number of halvings of the stretches.
 const LEVELS: u32 = 24;
-/// Shortest time without a sample that is noted, s, and in usual steps.
+/// Shortest time without a sample that is recorded as a gap, s, and in usual sample periods.
 const PAUSE_S: f64 = 0.1;
 const PAUSE_STEPS: f64 = 3.0;
-/// Shortest time for which a value that stays is noted, s.
+/// Shortest time for which a value must stay constant to be recorded, s.
 const STAYS_S: f64 = 0.5;
-/// Pauses of a topic and stays of a field that are noted at most.
+/// Largest number of gaps of a topic, and of constant intervals of a field, that are recorded.
 const NOTED: usize = 4096;
 /// Time between the samples that are kept throughout, s.
 const COARSE_S: f64 = 1.0;
@@ -63,7 +63,7 @@ impl Level {
     }
 }
 
-/// A value that stays.
+/// An interval in which a value stays constant.
 #[derive(Clone, Debug)]
 struct Stay {
     value: f64,

@@ -18,7 +18,7 @@ use super::{Flight, Format, Sample, assess, derive, screening};
 /// The flights of a table: one for each recording in it.
 ///
 /// # Errors
-/// The text is no table. Of each flight: it lacks a needed column, or has too many unusable rows.
+/// The text is not a table. The error of a single flight: it lacks a needed column, or has too many unusable rows.
 pub(super) fn read(
     source: &mut dyn BufRead,
     path: &Path,
@@ -107,7 +107,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     })
 }
 
-/// The usable rows of a table that lacks no column; for a look however few they are.
+/// The usable rows of a table that lacks no column; for inspection, however few they are.
 fn settled(
     raw: Raw,
     path: &Path,

@@ -148,7 +148,7 @@ impl GreyBox {
     /// nor effects from effect files.
     ///
     /// # Errors
-    /// What is wrong with a text, as for [`GreyBox::load`].
+    /// The fault of a text, as for [`GreyBox::load`].
     pub fn from_texts(model: &str, airframe: &str) -> Result<GreyBox, String> {
         let file: File = toml::from_str(model).map_err(|e| toml_error(model, &e))?;
         check_schema(file.schema, 1)?;

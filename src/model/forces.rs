@@ -378,7 +378,7 @@ impl GreyBox {
         self.rate_from(state, controls, altitude, Called)
     }
 
-    /// The same, from forces that are called or inlined.
+    /// As `rate`, with `forces` called or inlined.
     #[inline(always)]
     pub(super) fn rate_from<R: Real>(
         &self,

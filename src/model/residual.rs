@@ -247,7 +247,7 @@ impl Residual {
     /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`.
     ///
     /// # Errors
-    /// The file cannot be read, is no residual, or one of another airframe.
+    /// The file cannot be read, is not a residual, or is a residual of another airframe.
     pub fn load(
         path: &Path,
         airframe: &Airframe,

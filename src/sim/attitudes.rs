@@ -1,4 +1,4 @@
-//! A minute of random attitudes: whether an aircraft is lost, how far off it is when settled, the integral of the error.
+//! A minute of random attitudes: loss of the aircraft, settled error, and integral of the error.
 
 use rand::RngExt;
 use serde::Serialize;

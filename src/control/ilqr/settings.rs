@@ -17,7 +17,7 @@ pub struct Settings {
     pub last: f64,
     /// Soft limits on load factor, incidence and sideslip; `None` leaves them out.
     pub envelope: Option<Barrier>,
-    /// What the plan follows.
+    /// Reference that the plan follows.
     pub towards: Towards,
     /// Iterations per tick.
     pub iterations: usize,
@@ -47,7 +47,7 @@ pub enum Start {
     Policy,
 }
 
-/// What the plan follows.
+/// Reference that the plan follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Towards {
     /// The target itself, at once.

@@ -58,7 +58,7 @@ struct Given {
     attitude: [f64; 2],
     /// Last change of the integrals, rad s.
     added: [f64; 2],
-    /// Deflection of aileron and elevator by their own angle's reference, rad by rad.
+    /// Gains of the aileron on the reference roll and of the elevator on the reference pitch, rad/rad.
     by_reference: [f64; 2],
 }
 

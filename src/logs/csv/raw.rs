@@ -46,7 +46,7 @@ const BEGINS: f64 = 0.1;
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// The rows, those that could not be read included, as `take` judges them.
+    /// Applies `take` to every row, including those that could not be read.
     pub(super) fn judged(
         &self,
         take: impl Fn(&mut rows::Rows, usize, Option<Sample>),

@@ -149,7 +149,7 @@ impl<'a> Records<'a> {
         Ok(Some(Fields { bytes: self.record.as_slice(), ends: &self.ends, between: 0 }))
     }
 
-    /// Leaves the present line and those behind it to a reader that knows quotes.
+    /// Passes the present line and the following ones to a reader that handles quotes.
     fn quoted(&mut self) {
         if let Origin::Plain(mut lines) = std::mem::replace(&mut self.from, Origin::Nothing) {
             let line = Cursor::new(std::mem::take(&mut lines.line));

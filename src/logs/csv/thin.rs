@@ -12,7 +12,7 @@ const COARSE: usize = 16;
 /// Backward step of the time at which another recording may begin, s.
 const BACK_S: f64 = 1.0;
 
-/// What is kept of a table.
+/// Selection of the rows of a long table.
 #[derive(Default)]
 pub(super) struct Thin {
     keep: Keep,
