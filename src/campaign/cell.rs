@@ -49,7 +49,7 @@ impl Cell {
         self.levels.get(super::file::SEED)?.parse().ok()
     }
 
-    /// Its words with the campaign's folder for [`OUT`].
+    /// Its words with [`OUT`] replaced by the campaign's folder.
     pub fn words_in(&self, folder: &Path) -> Vec<String> {
         let folder = folder.display().to_string();
         self.words.iter().map(|word| word.replace(OUT, &folder)).collect()
@@ -99,7 +99,7 @@ impl Record {
     /// The schema that this program writes.
     pub const SCHEMA: &str = "greylag.cell/1";
 
-    /// Whether it has the given levels.
+    /// Whether it is a result of the stage `stage` with the given levels.
     pub fn has(&self, stage: &str, levels: &BTreeMap<String, String>) -> bool {
         let same = |(axis, level): (&String, &String)| self.levels.get(axis) == Some(level);
         self.stage == stage && levels.iter().all(same)

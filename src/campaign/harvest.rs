@@ -32,7 +32,7 @@ pub struct Harvest {
     pub curve: BTreeMap<String, Vec<f64>>,
 }
 
-/// The output of a cell's commands in `folder`.
+/// Extracts the output of a cell's command from `folder`.
 ///
 /// # Errors
 ///

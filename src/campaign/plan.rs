@@ -189,8 +189,8 @@ fn cell(
     cell
 }
 
-/// The files that a command names: words with a slash that are no folder of the campaign, and the additional ones of
-/// its stage.
+/// The files that a command names: words with a slash that are not folders of the campaign, and the additional ones
+/// of its stage.
 fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
     // `--env model:FOLDER`

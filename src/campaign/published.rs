@@ -1,7 +1,7 @@
 //! The paper's tables of statistics over seeds, for comparison with a campaign's.
 //!
-//! `published.csv` holds Tables IV, VIII, IX, X (with III in it) and XI of \[GSFM26\] as printed. Rows have the names of
-//! levels here: `severe/trainable`, `parallel`, `hybrid`; targets those of `greylag evaluate`.
+//! `published.csv` holds Tables IV, VIII, IX, X (with III in it) and XI of \[GSFM26\] as printed. Its rows are named
+//! by the levels of a campaign here (`severe/trainable`, `parallel`, `hybrid`), its targets as by `greylag evaluate`.
 
 use std::sync::LazyLock;
 

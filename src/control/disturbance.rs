@@ -122,7 +122,7 @@ impl Disturbance {
         self.rate
     }
 
-    /// Past commands of the integrator at the last step.
+    /// Memory of the model's integrator at the last step.
     pub fn memory(&self) -> Memory {
         self.memory
     }

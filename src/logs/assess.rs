@@ -1,4 +1,4 @@
-//! Assessment of a log's channels: which quality counts as missing, and the findings about it.
+//! Assessment of a log's channels: which are too slow or stuck to be used, and the findings about them.
 
 use super::Sample;
 use super::columns::{COLUMNS, index};
@@ -8,7 +8,7 @@ use super::phases::{self, Flying, PhaseKind};
 
 /// Sample rate of body rates and commands that a study needs, Hz.
 pub(super) const WANTED_HZ: f64 = 10.0;
-/// Below this part of it a log cannot serve: 10 Hz of a clock that is not quite even stays 10 Hz.
+/// Fraction of a required rate below which a channel is too slow. The margin is for uneven sample times.
 const SLACK: f64 = 0.8;
 /// Sample rate of attitude and airspeed that a study needs, Hz.
 const ATTITUDE_HZ: f64 = 5.0;
@@ -25,7 +25,7 @@ pub(super) fn wanted_hz(column: &str) -> Option<f64> {
     }
 }
 
-/// How often a channel really brings something new, Hz.
+/// Rate of new values of a channel, Hz.
 pub(super) fn real_hz(channel: &Channel) -> f64 {
     match channel.quality.interpolated {
         true => channel.quality.native_hz.min(channel.rate_hz),

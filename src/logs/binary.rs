@@ -1,4 +1,4 @@
-//! The topics of a binary log put onto the one table, and judged.
+//! Reads the topics of a binary log onto one table and checks it.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub(super) fn read(
     let mut findings = refused(vehicle.as_ref(), path, to)?;
     let no_wings = !findings.is_empty();
     let mut table = table::build(&topics, &o.mapping.rules(format, &topics), &o.sources);
-    // A long log need not stand in memory twice.
+    // A long log must not be in memory twice.
     topics.topics.clear();
     let flies = Flying { bridged_s: bridged_s(&table), ..o.flies };
     let stretches = table.whole.take().map(|whole| of_all(whole, &hovers, &o.flies));
@@ -77,14 +77,14 @@ pub(super) fn read(
     })
 }
 
-/// Longest time between the stretches that are kept, s; 0 where all is.
+/// Longest time between the stretches that are kept, s; 0 if the whole log is kept.
 fn bridged_s(table: &table::Table) -> f64 {
     let Some(whole) = &table.whole else { return 0.0 };
     let step = |w: &[Sample]| w[1].time_s - w[0].time_s;
     table.rows.windows(2).map(step).fold(0.0, f64::max).max(whole.stretches.length_s) + 1.0
 }
 
-/// The stretches with the phases of the whole log, hovers (start and end, s) taken out.
+/// The stretches with the phases of the whole log without the `hovers` (start and end, s).
 fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Stretches {
     whole.air.retain(|s| !hovers.iter().any(|(from, to)| (*from..*to).contains(&s.time_s)));
     let mut phases = phases::phases(&whole.air, flies);
@@ -94,7 +94,7 @@ fn of_all(mut whole: table::Whole, hovers: &[(f64, f64)], flies: &Flying) -> Str
     Stretches { phases, ..whole.stretches }
 }
 
-/// Findings on the rows that are flown on wings, beside the `hovers` (start and end, s).
+/// Findings on the rows of wing-borne flight; `hovers` (start and end, s) are the other flight.
 fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Finding> {
     match rows.is_empty() && !hovers.is_empty() {
         true => vec![Finding::problem(NEVER_ON_WINGS)],
@@ -146,7 +146,7 @@ fn lacking(
     }
 }
 
-/// Takes out the rows in which the vehicle did not fly on its wings alone.
+/// Removes the rows outside wing-borne flight.
 fn grounded(
     rows: &mut Vec<Sample>,
     hovers: &[(f64, f64)],
@@ -194,7 +194,7 @@ fn named(finding: Finding, rules: &[Rule], o: &Options) -> Finding {
     Finding { text: finding.text.replace(&cure.to_string(), &better), ..finding }
 }
 
-/// When a VTOL did not fly on its wings alone.
+/// Times (from, to, s) at which a VTOL was not in wing-borne flight.
 fn hovers(
     vehicle: Option<&Vehicle>,
     format: Format,
@@ -215,7 +215,7 @@ fn flow_angles(format: Format, o: &Options) -> FlowAngles {
     }
 }
 
-/// The rows that make the flight; an error or a finding where too few are usable.
+/// The rows of the flight; an error or a finding if too few rows are usable.
 fn kept(
     table: &mut table::Table,
     path: &Path,
@@ -240,7 +240,7 @@ fn kept(
     Ok(visible(&table.rows))
 }
 
-/// The judge of rows fit to compute with.
+/// Selection of the rows that a computation can use.
 fn usable(samples: &[Sample]) -> rows::Rows {
     let hangs = samples.iter().any(|s| s.airspeed_mps.is_nan());
     match hangs {
@@ -249,7 +249,7 @@ fn usable(samples: &[Sample]) -> rows::Rows {
     }
 }
 
-/// The rows fit to be looked at.
+/// The rows for inspection, complete or not.
 fn visible(samples: &[Sample]) -> rows::Rows {
     let mut kept = rows::Rows::default();
     samples.iter().enumerate().for_each(|(i, sample)| kept.take_incomplete(i + 1, *sample));
@@ -266,7 +266,7 @@ fn missing_column(path: &Path, topics: &Topics, missing: &table::Missing) -> Log
     LogError::Missing { path: path.to_owned(), column: missing.column, remedy }
 }
 
-/// The column with the one that would do as well.
+/// The column with its alternative, in words.
 fn either(missing: &table::Missing) -> String {
     match missing.or {
         Some(or) => format!("`{}` (or `{or}`)", missing.column),
@@ -274,7 +274,7 @@ fn either(missing: &table::Missing) -> String {
     }
 }
 
-/// Content of a log that the column needs.
+/// Records that would fill the column, in words.
 fn would_fill(topics: &Topics, missing: &table::Missing) -> String {
     match (missing.looked_for.is_empty(), topics.naming) {
         (true, Naming::Sender) if missing.or.is_some() => "record SERVO_OUTPUT_RAW with the parameters SERVOn_FUNCTION, which say what each output moves".to_owned(),

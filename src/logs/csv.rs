@@ -123,7 +123,7 @@ fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvEr
     })
 }
 
-/// Drops the unusable rows, refuses the table if they are too many.
+/// Drops the unusable rows, and refuses the table if they are too many.
 pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
     let rows = raw.judged(rows::Rows::take);
     if let Some(error) = refusal(&rows, path, tolerance) {
@@ -132,7 +132,7 @@ pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Read
     Ok(reading(raw, rows, path))
 }
 
-/// Keeps every row that is later than the last one, complete or not: for a look at the table.
+/// Keeps every row that is later than the last one, complete or not, for inspection of the table.
 pub(super) fn keep_all(raw: Raw, path: &Path) -> Reading {
     let rows = raw.judged(|rows, number, sample| match sample {
         Some(sample) => rows.take_incomplete(number, sample),

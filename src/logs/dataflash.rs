@@ -5,8 +5,8 @@
 //! so that a truncated log looks like a whole one, allocates a name and a list for every record,
 //! and knows no instances. The independent check is pymavlink (`tests/logs_crosscheck.py`).
 //!
-//! Where the time of the attitude or of the gyros begins again, another flight begins: a card that is read whole holds
-//! one log after the other.
+//! A step back in the time of the attitude or of the gyros begins another flight, because a card that is read as a
+//! whole holds one log after the other.
 //!
 //! Not read: texts but the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
 //! E L` carry their own scale, which is what pymavlink applies, too).
@@ -42,11 +42,11 @@ struct Declared {
     instance: Option<(u8, usize)>,
     wanted: bool,
     role: Role,
-    /// What was read of it, by instance.
+    /// Samples that were read, by instance.
     read: Vec<Instance>,
 }
 
-/// What a record type is read for besides its numbers.
+/// Purpose of a record type in addition to its numbers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
     None,
@@ -124,7 +124,7 @@ fn declaration(body: &[u8], wanted: &dyn Fn(&str) -> bool) -> Option<(u8, Declar
     let time = find("TimeUS")
         .map(|(letter, offset)| (letter, offset, 1e-6))
         .or_else(|| find("TimeMS").map(|(letter, offset)| (letter, offset, 1e-3)));
-    // Cores of the estimators, sensors of a kind.
+    // The instance is an estimator's core (`C`) or the number of a sensor (`I`).
     let label = if name.starts_with("XK") { "C" } else { "I" };
     let instance = find(label).filter(|(letter, _)| *letter == b'B');
     let wanted = wanted(&name);
@@ -184,7 +184,7 @@ pub(super) fn read<'a>(
         let Some(body) = view.get(HEADER..len) else {
             break view.len();
         };
-        // A record that lost or gained a byte ends where no other one begins, and its numbers are not its own.
+        // A record that lost or gained a byte ends where no other one begins, and its numbers are invalid.
         let next = &view[len..view.len().min(len + DATAFLASH_MAGIC.len())];
         if kind != FMT && !DATAFLASH_MAGIC.starts_with(next) {
             reader.damaged();
@@ -252,7 +252,7 @@ impl Reader {
         self.sample(kind, place, time_s, body);
     }
 
-    /// What was read so far belongs to a flight that is over.
+    /// Ends the present flight: the records that follow belong to another one.
     fn another_life(&mut self) {
         let topics = self.gathered();
         let parameters = self.out.parameters.clone();
@@ -270,7 +270,7 @@ impl Reader {
         topic.push(time_s, &self.values);
     }
 
-    /// The samples by the names of their types, which have none then.
+    /// Removes the samples from the declared types and returns them by the names of the types.
     fn gathered(&mut self) -> BTreeMap<(String, u16), Topic> {
         let mut out = BTreeMap::new();
         for declared in self.declared.iter_mut().flatten() {

@@ -1,8 +1,8 @@
 //! The text form of a DataFlash log (`.log`), read through the binary one.
 //!
-//! Mission Planner and older ground stations save what a card holds as lines `NAME, value, …`, which FMT lines declare
-//! as in the binary file. Each line becomes the record that it was made of. Lines that fit no declaration become a byte
-//! that the reader counts as damage.
+//! Mission Planner and older ground stations save what a card holds as lines `NAME, value, …`, which FMT lines
+//! declare as in the binary file. Each line becomes the record that it was made of. Each line that fits no
+//! declaration becomes one byte, which the reader counts as damage.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader, Read};

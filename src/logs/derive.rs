@@ -1,8 +1,8 @@
 //! Columns that a log lacks, computed from those it has, if a mapping requests it.
 //!
-//! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions
-//! around a row; body rates are that of the turns from the row's attitude; the airspeed is the velocity over
-//! ground less a known wind. The mapping states the window. A column is derived only on request.
+//! A motion capture measures position and attitude. Velocity is the slope of a parabola through the positions around
+//! a row; body rates are the slopes of the rotations from the row's attitude, fitted alike; the airspeed is the
+//! velocity over ground less a known wind. The mapping states the window. A column is derived only on request.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -13,9 +13,9 @@ use greylag_num::statistics::quantile;
 
 /// Fewest rows that a parabola is laid through.
 const FEWEST: usize = 5;
-/// Misfit of a parabola, in medians of the log's, beyond which the measurement is taken to have jumped.
+/// Residual of a parabola, as a multiple of the log's median residual, beyond which the measurement counts as a jump.
 const JUMPED: f64 = 8.0;
-/// Smallest median misfit, relative to the size of what is fitted: below it there is rounding only.
+/// Smallest median residual, relative to the size of the fitted values: smaller residuals are rounding.
 const ROUNDING: f64 = 1e-9;
 /// The columns of the body rates.
 pub(super) const RATES: [&str; 3] = ["p_radps", "q_radps", "r_radps"];
@@ -66,7 +66,7 @@ pub(super) fn apply(rows: &mut [Sample], mapping: &Mapping) -> Vec<String> {
     notes
 }
 
-/// A value that repeats the one before is none: a motion capture that has lost its object repeats it.
+/// Marks a value that repeats the previous one as missing: a motion capture that has lost its object repeats it.
 fn fresh(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut last = f64::NAN;
     let one = |(t, x): &(f64, f64)| {
@@ -169,8 +169,8 @@ fn around<T, R>(
     (0..samples.len()).map(one).collect()
 }
 
-/// The slope at 0 of the parabola through `points` (time, value), with the root mean square of what it
-/// leaves; `None` with too few of them, or with none on one side.
+/// The slope at 0 of the parabola through `points` (time, value), with the root mean square of the residuals; `None`
+/// with too few of them, or with none on one side.
 fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
     let sides = [points.iter().any(|p| p.0 < 0.0), points.iter().any(|p| p.0 > 0.0)];
     if points.len() < FEWEST || sides != [true; 2] {
@@ -188,7 +188,7 @@ fn parabola(points: &[(f64, f64)], over_s: f64) -> Option<[f64; 2]> {
     Some([fit[1] / over_s, (left / points.len() as f64).sqrt()])
 }
 
-/// The slopes, those left out whose misfit is far beyond the usual; how many these are.
+/// The slopes without those whose residual exceeds the limit, and the number of those left out.
 fn settle(fits: Vec<[f64; 2]>) -> (Vec<f64>, usize) {
     let misfits: Vec<f64> = fits.iter().map(|f| f[1]).filter(|x| x.is_finite()).collect();
     let limit = if misfits.is_empty() { f64::INFINITY } else { JUMPED * quantile(&misfits, 0.5) };

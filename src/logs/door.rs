@@ -62,7 +62,7 @@ enum Wide {
     Big,
 }
 
-/// UTF-16 by its mark, or by the zeros between its letters.
+/// Byte order of a text in UTF-16, from its byte order mark or from the zero bytes between its letters.
 fn wide(start: &[u8]) -> Option<Wide> {
     match start {
         [0xFF, 0xFE, ..] => return Some(Wide::Little),

@@ -16,7 +16,7 @@ pub enum Severity {
     Problem,
 }
 
-/// The mapping that puts a column right.
+/// The mapping that corrects a column.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cure {
     /// Name of the column to be corrected.
@@ -42,7 +42,7 @@ pub struct Finding {
     pub severity: Severity,
     /// Description of the finding, with a remedy.
     pub text: String,
-    /// The factor that puts it right, where one does.
+    /// The column and factor that correct it, if a factor does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cure: Option<Cure>,
 }

@@ -38,7 +38,7 @@ const KNOWN: [(&[u8], &str); 11] = [
     (b"%PDF", "it is a PDF document"),
 ];
 
-/// Zeros that no log begins with.
+/// Number of zero bytes with which no log begins.
 const EMPTY: usize = 256;
 
 /// Kind of the file that begins with `start`, in words; `None` if it is unknown.

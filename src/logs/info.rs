@@ -38,7 +38,7 @@ pub struct Info {
     pub phases: Vec<Phase>,
     /// The vehicle, where the log names it.
     pub vehicle: Option<Vehicle>,
-    /// When it did not fly on its wings alone, s: left out.
+    /// Times outside wing-borne flight (from, to), s; their rows are left out.
     pub hovers: Vec<(f64, f64)>,
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
@@ -59,7 +59,7 @@ pub struct Info {
 pub struct Purpose {
     /// Name of the purpose.
     pub name: &'static str,
-    /// Columns that the log lacks for it; empty if it serves.
+    /// Columns that the log lacks for it; empty if the log suffices.
     pub missing: Vec<String>,
     /// Columns that are present at too low a rate.
     pub slow: Vec<String>,
@@ -144,7 +144,7 @@ fn has(log: &Log, column: &str) -> bool {
     let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
     let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
     let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
-    // Of a long log, stretches are there.
+    // Of a long log, only stretches are in memory.
     let share = log.stretches.as_ref().map_or(1.0, |s| samples.len() as f64 / s.rows.max(1) as f64);
     let covered = rate > 0.0 && count as f64 >= PRESENT * rate * whole * share;
     count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)

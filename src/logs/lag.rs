@@ -24,12 +24,12 @@ const LONGEST_S: f64 = 300.0;
 /// Correlation above which a delay is taken as certain, and its smallest excess over the correlation without a shift.
 const CERTAIN: f64 = 0.7;
 const BETTER: f64 = 0.15;
-/// Delay from which it is named, s.
+/// Smallest delay that is reported, s.
 const NAMED_S: f64 = 0.25;
 /// Delay above which the results of a study are wrong, s.
 const WRONG_S: f64 = 0.6;
 
-/// The delays that are large enough to be named.
+/// Findings on the delays that are large enough to be reported.
 pub(super) fn check(rows: &[Sample]) -> Vec<Finding> {
     let Some(grid) = Grid::of(rows) else { return Vec::new() };
     let forces: Vec<Vector3<f64>> = grid.forces();

@@ -1,4 +1,4 @@
-//! A log file of any format read onto the one table.
+//! Reads a log file of any format onto one table.
 
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -26,9 +26,9 @@ use super::{Flight, binary, dataflash, text, tlog, ulog};
 pub struct Options {
     /// How many unusable rows a log may have.
     pub tolerance: Tolerance,
-    /// Where columns come from, where that is not the format's usual place.
+    /// Sources of columns that differ from the format's usual ones.
     pub mapping: Mapping,
-    /// From when on the aircraft flies.
+    /// Criteria for flight.
     pub flies: Flying,
     /// Instances to read instead of those that the reader would choose.
     pub sources: Vec<Asked>,
@@ -68,17 +68,17 @@ pub struct Log {
     pub dropped_rows: Vec<usize>,
     /// Findings for the log's user.
     pub findings: Vec<Finding>,
-    /// From when on the aircraft was taken to fly.
+    /// Criteria for flight that were applied.
     pub flies: Flying,
     /// The vehicle, where the log names it.
     pub vehicle: Option<Vehicle>,
-    /// When it did not fly on its wings alone, s: left out.
+    /// Times outside wing-borne flight (from, to), s; their rows are left out.
     pub hovers: Vec<(f64, f64)>,
     /// Instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
-    /// What is known of the whole, where a look at a long log kept stretches of it.
+    /// Statistics of the whole log, if the inspection of a long log kept only stretches of it.
     pub stretches: Option<Stretches>,
 }
 
@@ -106,15 +106,15 @@ impl Log {
     }
 }
 
-/// Whether a log is to be computed with, or only looked at.
+/// Whether a log is read for a computation, or only for inspection.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     Compute,
     Look,
 }
 
-/// Reads as much of a log as there is, for a look at it: missing columns with unusable rows are
-/// findings, not errors. Of several flights in it the longest is taken.
+/// Reads as much of a log as possible, for inspection: missing columns with unusable rows are findings, not errors.
+/// Of several flights in it the longest is taken.
 ///
 /// # Errors
 /// The file cannot be read, or is not a log.
@@ -122,7 +122,7 @@ pub fn inspect(path: &Path, options: &Options) -> Result<Log, LogError> {
     longest(open(path, options, Use::Look)?)
 }
 
-/// Reads all flights of a log for a look at it: one for each life of each vehicle in it.
+/// Reads all flights of a log for inspection: one for each boot of each vehicle in it.
 ///
 /// # Errors
 /// As [`inspect`].
@@ -170,7 +170,7 @@ pub fn parse(bytes: &[u8], path: &Path, options: &Options) -> Result<Log, LogErr
     longest(read(start, &mut &bytes[..], path, options, Use::Compute)?)
 }
 
-/// A life with its name and its flight.
+/// Name, boot and flight time of a flight, in words.
 fn said_of(log: &Result<Log, LogError>) -> String {
     match log {
         Ok(log) => {
@@ -222,7 +222,7 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
 /// Bytes of a table that are read at a time.
 const BUFFER: usize = 64 * 1024;
 
-/// Said of a file that is nothing known.
+/// Message for a file of unknown format.
 const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, or a MAVLink .tlog";
 
 /// Reads the flights of the log `source`, which begins with `start`.
@@ -242,7 +242,7 @@ fn read(
         let what = foreign::kind(start).unwrap_or(NONE_OF_THEM);
         return Err(LogError::Foreign { path: path.to_owned(), what });
     };
-    // Rates that are made from other columns need all of them.
+    // Columns that are derived from others need every row.
     let keep = match to {
         Use::Look if !options.mapping.derives() => Keep::Stretches,
         _ => Keep::All,

@@ -21,7 +21,7 @@ const DEFLECTIONS: [&str; 4] = ["aileron_rad", "elevator_rad", "rudder_rad", "th
 const COMMANDS: [&str; 4] = ["aileron_cmd", "elevator_cmd", "rudder_cmd", "throttle_cmd"];
 
 /// The columns that `names` make through the mixer of `mapping`: NAME_rad of a surface and NAME_throttle of a motor
-/// make deflections, NAME_cmd makes commands. What the file or the mapping has already is left as it is.
+/// make deflections, NAME_cmd makes commands. Columns that the file or the mapping already has are unchanged.
 pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
     let Some(mixer) = mapping.mixer() else { return Vec::new() };
     let deflections: Vec<[f64; 4]> = mixer.shares().collect();

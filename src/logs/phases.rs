@@ -13,7 +13,7 @@ pub struct Flying {
     pub sustained_s: f64,
     /// Shortest flight that supports a verdict, s.
     pub shortest_s: f64,
-    /// Time without rows that is no gap, s: between the stretches of a long log that are looked at.
+    /// Time without rows that does not count as a gap, s: that between the kept stretches of a long log.
     pub bridged_s: f64,
 }
 

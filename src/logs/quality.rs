@@ -1,8 +1,8 @@
 //! Quality of a channel's samples: rate of new values, interpolated values, frozen values.
 //!
-//! A table that was brought to one clock shows a sample for every row, whoever made it. Between the samples of a slow
-//! sensor a straight line was drawn, or the last value was held: the second differences are zero, or all differences
-//! are. Such rows are no measurements.
+//! A table that was resampled to one clock shows a sample in every row. Between the samples of a slow sensor a
+//! straight line was drawn, or the last value was held: the second differences are zero, or all differences are. Such
+//! rows are not measurements.
 
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ pub struct Quality {
     pub interpolated: bool,
     /// Smallest decimal step of the values; 0 where they have none.
     pub quantum: f64,
-    /// Where one value stays for much longer than usual: from, to, s.
+    /// Intervals in which one value stays for much longer than usual: from, to, s.
     pub frozen: Vec<(f64, f64)>,
     /// Short excursions far beyond the neighbours.
     pub spikes: usize,
@@ -74,7 +74,7 @@ impl Quality {
 /// The column in which spikes are looked for: water in a pitot, a loose hose.
 const SPIKY: &str = "airspeed_mps";
 
-/// Whether a column is a sensor's, which never rests in flight.
+/// Whether a column is of a sensor whose value never stays constant in flight.
 fn hangs(column: &str) -> bool {
     let inertial = ["roll_rad", "pitch_rad", "yaw_rad", "p_radps", "q_radps", "r_radps"];
     let air = ["airspeed_mps", "alpha_rad", "beta_rad"];
@@ -116,7 +116,8 @@ fn kinks(times: &[f64], values: &[f64], period: f64, quantum: f64) -> Option<f64
     let gaps: Vec<f64> = bent.windows(2).map(|w| (w[1].0 - w[0].0) as f64).collect();
     let lines = 2 * moving >= ENOUGH && straight as f64 > STRAIGHT * moving as f64;
     let sharp = quantile(&sizes, 0.5) > KINK * rounding;
-    // One kink of a held command is none of a line: there must be lines on both sides of several.
+    // A single kink, as of a held command, does not show interpolation: several kinks with straight lines between
+    // them do.
     let apart = bent.len() >= 2 && quantile(&gaps, 0.5) >= APART;
     (lines && sharp && apart).then(|| 1.0 / (quantile(&gaps, 0.5) * period))
 }
@@ -130,7 +131,7 @@ fn steps(times: &[f64]) -> Vec<f64> {
     times.windows(2).map(|w| w[1] - w[0]).collect()
 }
 
-/// Which of the `stays` (from, to, s) of one value are long for a channel that shows `values` at `times`, s.
+/// Those of the `stays` (from, to, s) of one value that are long for a channel with `values` at `times`, s.
 pub(super) fn frozen_of(
     column: &str,
     times: &[f64],
@@ -149,7 +150,7 @@ fn frozen_s(changes: &[f64]) -> Option<f64> {
     enough.then(|| FROZEN_S.max(FROZEN_STEPS * usual))
 }
 
-/// Where one value other than zero stays for much longer than is usual.
+/// Intervals in which one value other than zero stays for much longer than usual.
 fn frozen(times: &[f64], values: &[f64], changes: &[f64]) -> Vec<(f64, f64)> {
     let Some(limit) = frozen_s(changes) else { return Vec::new() };
     let mut out = Vec::new();

@@ -29,7 +29,7 @@ enum Target {
 }
 
 impl<'a> Reader<'a> {
-    /// Of a rule with its data; `limit` is the longest time (s) that it is carried over.
+    /// The reader of a rule's data; `limit` is the longest time (s) that a value is carried over.
     pub(super) fn new(
         rule: &Rule,
         times: &'a [f64],

@@ -5,7 +5,7 @@ use super::columns::{COLUMNS, NEEDED, index};
 
 /// Share of unusable rows above which a log is refused.
 const REFUSED_SHARE: f64 = 0.05;
-/// The least that a pitot at rest shows, m/s: noise about zero, as true airspeed.
+/// Smallest true airspeed that a pitot at rest shows by noise about zero, m/s.
 const PITOT_AT_REST: f64 = -5.0;
 /// A column with values in less than this share of the rows is taken as that of a slower sensor.
 const FILLED_SHARE: f64 = 0.95;
@@ -65,8 +65,8 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// No rows yet, of a table in which columns that `rows` fill only now and then, as a slow sensor beside
-    /// a fast one does, may be empty.
+    /// An empty table. Columns that `rows` fill only now and then, such as those of a slow sensor beside a fast one,
+    /// may be empty in a row.
     pub fn with_sparse_columns_of(rows: &[Sample]) -> Rows {
         let sparse = NEEDED.map(|name| {
             let get = index(name).map(|i| COLUMNS[i].1);
@@ -98,7 +98,7 @@ impl Rows {
         self
     }
 
-    /// Takes the usable ones of the rows in their own memory: of a long log there is room for one table.
+    /// Takes the usable rows in place, because memory may hold only one table of a long log.
     pub fn taken(mut self, mut rows: Vec<Sample>) -> Rows {
         let mut kept = 0_usize;
         for i in 0..rows.len() {

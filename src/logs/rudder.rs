@@ -9,8 +9,8 @@ use greylag_num::statistics::mean;
 /// Cn = 0.07/rad that is the moment of 0.2° of sideslip at Cnβ = 0.07/rad, less than a vane's noise
 /// of 0.3°. Ten seconds of doublets of 5° in ten minutes of flight are 0.6°.
 pub const MOVES_RAD: f64 = 0.0035;
-/// The same of a command, whose travel is not known: a part of it. 1 % of 25° of travel is 0.25°, and
-/// more than the dead band of a servo (some 4 µs of 500 µs).
+/// The same for a command, as a fraction of the unknown travel. 1 % of 25° of travel is 0.25°, and more than the dead
+/// band of a servo (some 4 µs of 500 µs).
 const MOVES_PART: f64 = 0.01;
 /// Smallest number of rows in flight for a decision.
 const ENOUGH: usize = 50;

@@ -1,7 +1,7 @@
 //! The sources of a log: the instance of each topic that is read, and the other instances.
 //!
 //! A vehicle may carry two pitots, a VTOL has one controller for its lift and one for its wings. The reader takes the
-//! first instance that moves, the one that the vehicle's type calls for before that, and reports its choice in a finding.
+//! first instance that moves, unless the vehicle's type calls for another one, and reports its choice in a finding.
 
 use std::collections::BTreeMap;
 

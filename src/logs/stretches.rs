@@ -1,7 +1,8 @@
-//! Stretches of a long log: a look at it keeps the fast topics in parts of its time only, and counts the rest.
+//! Stretches of a long log: an inspection keeps fast topics in parts of the time only, and counts the other samples.
 //!
-//! Units, signs, axes and delays show in some minutes of flight. What happens only once does not: steps
-//! without samples and values that stay are watched in every sample, and one sample a second stays throughout.
+//! Units, signs, axes and delays show in some minutes of flight. A single event may lie outside the kept stretches.
+//! Gaps and values that stay constant are therefore tracked in every sample, and one sample a second is kept
+//! throughout.
 
 use super::phases::Phase;
 
@@ -15,18 +16,18 @@ pub(super) enum Keep {
     Stretches,
 }
 
-/// Samples of a topic above which every other one of its stretches goes.
+/// Number of samples of a topic above which every second one of its stretches is dropped.
 pub(super) const MOST: usize = 65_536;
 /// Length of a stretch, s.
 pub(super) const LENGTH_S: f64 = 30.0;
-/// Times that the stretches are halved at most.
+/// Largest number of halvings of the stretches.
 const LEVELS: u32 = 24;
-/// Shortest time without a sample that is noted, s, and in usual steps.
+/// Shortest time without a sample that is recorded as a gap, s, and in usual sample periods.
 const PAUSE_S: f64 = 0.1;
 const PAUSE_STEPS: f64 = 3.0;
-/// Shortest time for which a value that stays is noted, s.
+/// Shortest time for which a value must stay constant to be recorded, s.
 const STAYS_S: f64 = 0.5;
-/// Pauses of a topic and stays of a field that are noted at most.
+/// Largest number of gaps of a topic, and of constant intervals of a field, that are recorded.
 const NOTED: usize = 4096;
 /// Time between the samples that are kept throughout, s.
 const COARSE_S: f64 = 1.0;
@@ -41,7 +42,7 @@ impl Level {
         self.0 > 0
     }
 
-    /// Of how many stretches one is kept.
+    /// One of this number of stretches is kept.
     pub fn every(self) -> usize {
         1 << self.0
     }
@@ -51,7 +52,7 @@ impl Level {
         (time_s / LENGTH_S).floor() as i64 % (1 << self.0) == 0
     }
 
-    /// Half of the stretches; `None` where that is no use any more.
+    /// The level with half of the stretches; `None` after `LEVELS` halvings.
     pub fn halved(self) -> Option<Level> {
         (self.0 < LEVELS).then_some(Level(self.0 + 1))
     }
@@ -62,7 +63,7 @@ impl Level {
     }
 }
 
-/// A value that stays.
+/// An interval in which a value stays constant.
 #[derive(Clone, Debug)]
 struct Stay {
     value: f64,
@@ -70,7 +71,7 @@ struct Stay {
     to_s: f64,
 }
 
-/// What is known of every sample of a topic, those that are not kept included.
+/// Statistics over every sample of a topic, kept or not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
     /// Number of samples at increasing times.
@@ -145,10 +146,10 @@ fn long(stay: &Stay) -> Option<(f64, f64)> {
     noted.then_some((stay.from_s, stay.to_s))
 }
 
-/// A log whose fast topics were looked at in stretches: what is known of the whole.
+/// Statistics of a whole long log whose fast topics were inspected in stretches only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretches {
-    /// Of how many stretches one was looked at.
+    /// One of this number of stretches was inspected.
     pub every: usize,
     /// Length of a stretch, s.
     pub length_s: f64,

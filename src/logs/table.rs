@@ -1,13 +1,13 @@
-//! Channels at their own rates put onto one table.
+//! Resampling of channels at their own rates onto one table.
 //!
 //! The table's times are those of the faster of attitude and rates. Continuous channels are
 //! interpolated linearly, angles unwrapped, quaternions before they become angles; commands hold.
 //! Nothing is carried across more than 0.1 s, or three sample periods of a slower channel. Gaps in
 //! the table's own times stay gaps.
 //!
-//! What is measured much more slowly than the table's times (velocity over ground at 10 Hz) stands
-//! in the row that follows each of its samples only: rows filled by interpolation would count as
-//! measurements that nobody made. The other rows stay empty, or hold where a row needs a value.
+//! A channel that is much slower than the table (velocity over ground at 10 Hz) fills only the row that follows each
+//! of its samples, because interpolated rows would count as measurements. The other rows stay empty; required columns
+//! hold the last value there.
 
 mod whole;
 
@@ -82,7 +82,7 @@ impl Track<'_> {
         measured && self.rate_hz > 0.0 && self.rate_hz * period < SPARSE
     }
 
-    /// What is known of all of its samples, where stretches are kept.
+    /// Statistics over all of its samples, if only stretches are kept.
     fn watch(&self) -> Option<&Watch> {
         self.topic.watch.as_deref().filter(|_| self.topic.level.thins())
     }
@@ -131,7 +131,7 @@ pub(super) struct Table {
     pub findings: Vec<Finding>,
     /// The rule that fills each column.
     pub rules: Vec<Rule>,
-    /// What is known of the whole, where stretches are kept.
+    /// Statistics of the whole log, if only stretches are kept.
     pub whole: Option<Whole>,
 }
 
@@ -312,7 +312,7 @@ fn fill_sparse(rows: &mut [Sample], track: &Track<'_>, period: f64) -> Vec<bool>
     let mut fresh = vec![false; rows.len()];
     let Some(reader) = track.reader() else { return fresh };
     for t in track.times.iter() {
-        // At or after the sample, where the next one is waited for.
+        // The first row at or after the sample.
         let next = rows.partition_point(|row| row.time_s < t - SAME_S);
         if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
             fresh[next] = true;

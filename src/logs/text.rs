@@ -1,4 +1,4 @@
-//! A CSV table read as flights, and judged.
+//! Reads the flights of a CSV table and checks them.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -18,7 +18,7 @@ use super::{Flight, Format, Sample, assess, derive, screening};
 /// The flights of a table: one for each recording in it.
 ///
 /// # Errors
-/// The text is no table. Of each flight: it lacks a needed column, or has too many unusable rows.
+/// The text is not a table. The error of a single flight: it lacks a needed column, or has too many unusable rows.
 pub(super) fn read(
     source: &mut dyn BufRead,
     path: &Path,
@@ -87,7 +87,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
         let names = reading.unknown_columns.join(", ");
         findings.push(Finding::note(format!("columns that the log format does not name: {names}")));
     }
-    // Without times every row is dropped, which is said by the missing column.
+    // Without times every row is dropped, which the finding on the missing column implies.
     findings.extend(dropped(reading.dropped, &reading.dropped_rows).filter(|_| !timeless));
     let (sensors, notes) = (options.mapping.sensors().clone(), made);
     Ok(Log {
@@ -107,7 +107,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     })
 }
 
-/// The usable rows of a table that lacks no column; for a look however few they are.
+/// The usable rows of a table that lacks no column; for inspection, however few they are.
 fn settled(
     raw: Raw,
     path: &Path,

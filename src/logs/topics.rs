@@ -16,7 +16,7 @@ pub(super) struct Topic {
     pub values: Vec<Vec<f64>>,
     /// The stretches that are kept of it.
     pub level: Level,
-    /// What is known of all of its samples, where stretches are kept.
+    /// Statistics over all of its samples, if only stretches are kept.
     pub watch: Option<Box<Watch>>,
 }
 
@@ -66,14 +66,14 @@ impl Topic {
         self.values.iter_mut().for_each(|column| column.truncate(kept));
     }
 
-    /// Its samples of one a second throughout the log, where only stretches of the others are kept.
+    /// One sample a second throughout the log, if only stretches of the topic are kept.
     pub fn coarse(&self) -> Option<Topic> {
         let watch = self.watch.as_ref().filter(|_| self.level.thins())?;
         let (time_s, values) = (watch.coarse_s.clone(), watch.coarse.clone());
         Some(Topic { time_s, values, fields: self.fields.clone(), ..Topic::default() })
     }
 
-    /// Whether a field exists and has at least two finite values.
+    /// Whether a field exists and has at least two different finite values.
     pub fn moves(&self, name: &str) -> bool {
         let Some(values) = self.field(name) else { return false };
         let mut finite = values.iter().filter(|x| x.is_finite());
@@ -124,12 +124,12 @@ impl Naming {
     }
 }
 
-/// The content of a binary log, or of one life of a vehicle in it.
+/// The content of a binary log, or of one boot of a vehicle in it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Topics {
     /// Vehicle and boot of this flight, where the file holds several.
     pub life: Option<String>,
-    /// The MAVLink system whose life it is.
+    /// The MAVLink system of this flight.
     pub system: Option<u8>,
     /// How instances are written.
     pub naming: Naming,
@@ -164,14 +164,14 @@ impl Topics {
         Some((&topic.time_s, topic.field(field)?))
     }
 
-    /// Whether the records are those of sdlog2, the log of PX4 before ULog: of the form of DataFlash, one record for the
-    /// time of all.
+    /// Whether the records are those of sdlog2, the log of PX4 before ULog: of the form of DataFlash, with one record
+    /// that holds the time of all others.
     pub fn of_sdlog2(&self) -> bool {
         let has = |name: &str| self.counts.contains_key(&(name.to_owned(), 0));
         self.topics.is_empty() && has("TIME") && has("STAT") && has("ATT")
     }
 
-    /// Keeps the same stretches of all topics of which stretches are kept.
+    /// Reduces all topics that are kept in stretches to the same stretches.
     pub fn align(&mut self) {
         let level = self.topics.values().fold(Level::default(), |l, t| l.sparser(t.level));
         let fast = self.topics.values_mut().filter(|t| t.level.thins() && t.level != level);

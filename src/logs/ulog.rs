@@ -195,7 +195,8 @@ impl Reader {
                     return false;
                 }
             }
-            // Numbers hold the letters of the other kinds, so that those show no place to go on at.
+            // Numbers may contain the letters of the other record kinds, so that only data records show where to
+            // resume.
             if kind != b'D' && undeclared == Undeclared::Refused {
                 return false;
             }

@@ -175,7 +175,7 @@ const CARRIES: f64 = 0.05;
 /// Time for which a record of QTUN, which is written while the motors may run, counts, s.
 const QTUN_HOLDS_S: f64 = 0.5;
 
-/// When the vehicle did not fly on its wings alone: from, to, s.
+/// Times outside wing-borne flight: from, to, s.
 pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
     let mut spans = Vec::new();
     match format {
@@ -252,13 +252,13 @@ fn lift_by_pulses(topics: &Topics) -> Vec<(f64, f64)> {
     merged(spans)
 }
 
-/// The hovers, those joined between which less than `shortest_s` remains: no flight on wings begins and ends so soon.
+/// The hovers, joined where less than `shortest_s` separates them: no wing-borne flight is that short.
 pub(super) fn joined(hovers: Vec<(f64, f64)>, shortest_s: f64) -> Vec<(f64, f64)> {
     let longer = hovers.into_iter().map(|(from, to)| (from, to + shortest_s)).collect();
     merged(longer).into_iter().map(|(from, to)| (from, to - shortest_s)).collect()
 }
 
-/// Spans in order, those that touch joined.
+/// The spans in order, with touching ones joined.
 fn merged(mut spans: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     spans.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<(f64, f64)> = Vec::new();

@@ -112,8 +112,9 @@ pub struct Excitation {
     pub start: f64,
     /// Waveform of the excitation.
     pub shape: Shape,
-    /// Fraction (0..=1) of the controller's reaction on this axis that is applied meanwhile: a good controller would
-    /// cancel an excitation before the aircraft has responded. Unrelated to control authority on a real vehicle.
+    /// Fraction (0..=1) of the controller's reaction on this axis that is applied during the excitation: a good
+    /// controller would cancel an excitation before the aircraft has responded. Unrelated to control authority on a
+    /// real vehicle.
     pub authority: f64,
 }
 

@@ -66,7 +66,7 @@ fn drawn(
     Schedule { name: name.into(), description: about.into(), steps }
 }
 
-/// Small sines on every control in addition to any manoeuvre.
+/// Small sines on aileron, elevator and throttle in addition to any manoeuvre.
 fn shake(step: &mut Step, draw: &mut Draw) {
     let amplitudes = [(Aileron, 0.035), (Elevator, 0.03), (Throttle, 0.08)];
     for (axis, amplitude) in amplitudes {

@@ -35,7 +35,7 @@ pub struct Step {
     pub duration: f64,
     /// Target of the step.
     pub target: Target,
-    /// Excitations, all at once.
+    /// Excitations, all active during the same step.
     pub excitations: Vec<Excitation>,
 }
 

@@ -211,7 +211,7 @@ pub(super) fn stall(depth: f64) -> Step {
     step.with(pulse(Pitch, (-20.0_f64).to_radians(), up, 1.2))
 }
 
-/// Pushes to a clearly negative angle of attack, of `depth` 0..1.
+/// Pushes to a clearly negative angle of attack; `depth` (0..1) scales the elevator pulses.
 pub(super) fn push(depth: f64) -> Step {
     let step = Step::hold(4.0, 0.0, 10.0, 18.0);
     step.with(pulse(Elevator, 0.35 * depth, 1.2, 0.35)).with(pulse(

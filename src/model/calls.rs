@@ -1,7 +1,7 @@
-//! How the long equations enter a function: as a call of the one copy for a scalar, or inlined.
+//! Access to the long equations from a function: by calling the copy compiled for a scalar, or inlined.
 //!
-//! Kernels compiled for several instruction sets inline them, to stay within their own. Elsewhere inlining only increases the
-//! program's size and the time to compile it.
+//! Kernels that are compiled for several instruction sets inline the equations, because a called copy would not use
+//! the kernel's instruction set. Elsewhere inlining only increases the program's size and the time to compile it.
 
 use super::{GreyBox, Residual};
 use greylag_num::Real;

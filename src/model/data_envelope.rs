@@ -2,8 +2,9 @@
 //!
 //! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples lie within 1. The
 //! leverage is that of a linear regression on 1, the network's inputs and the units of its last hidden layer, x̂ᵀ
-//! (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the data and where units are active that were
-//! hardly active on it; the variance of a Bayesian last layer is proportional to it.
+//! (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the range of the training data, and where
+//! units are active that were hardly active on that data; the variance of a Bayesian last layer is proportional to
+//! it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,7 +15,8 @@ use greylag_num::dense::ON_STACK;
 /// Largest number of features: 1, the inputs, the widest hidden layer.
 const MOST: usize = 1 + INPUTS + ON_STACK;
 
-/// Ridge on the features' second moments, as a share of their mean, because a unit that was never active has none.
+/// Ridge on the features' second moments, as a share of their mean, because a unit that was never active has a second
+/// moment of zero.
 const RIDGE: f64 = 1e-4;
 
 /// Share of the training samples within a distance of 1.

@@ -144,11 +144,11 @@ impl GreyBox {
 }
 
 impl GreyBox {
-    /// A model from the texts of a model file and its airframe file that lie in no folder. It has neither a residual nor
-    /// effects of files.
+    /// A model from the texts of a model file and its airframe file, without files on disk. It has neither a residual
+    /// nor effects from effect files.
     ///
     /// # Errors
-    /// What is wrong with a text, as for [`GreyBox::load`].
+    /// The fault of a text, as for [`GreyBox::load`].
     pub fn from_texts(model: &str, airframe: &str) -> Result<GreyBox, String> {
         let file: File = toml::from_str(model).map_err(|e| toml_error(model, &e))?;
         check_schema(file.schema, 1)?;

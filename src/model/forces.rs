@@ -1,7 +1,7 @@
 //! Forces and moments, accelerations and state rates of a model.
 //!
-//! Effects that need only the point are summed first, in separate code, where a planner spends most of its time. Only
-//! a model with other effects also computes their input, [`Base`].
+//! Effects that need only the point are summed first, in separate code; a planner spends most of its time there. A
+//! model computes the input of the other effects, [`Base`], only if it has such effects.
 //!
 //! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several instruction sets
 //! stays within its own; other callers use the plain ones, which are compiled once.
@@ -378,7 +378,7 @@ impl GreyBox {
         self.rate_from(state, controls, altitude, Called)
     }
 
-    /// The same, from forces that are called or inlined.
+    /// As `rate`, with `forces` called or inlined.
     #[inline(always)]
     pub(super) fn rate_from<R: Real>(
         &self,

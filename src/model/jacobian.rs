@@ -1,7 +1,8 @@
 //! Jacobians by forward differentiation, four inputs at a time.
 //!
-//! Four derivatives fill a vector register. The model's equations are compiled for this one width, not for each number of inputs:
-//! each width takes seconds of the compiler. A derivative does not depend on the width, to the bit.
+//! Four derivatives fill a vector register. The model's equations are compiled for this one width instead of every
+//! number of inputs, because each further width takes the compiler seconds. Derivatives are bit-identical for every
+//! width.
 
 use greylag_num::{Dual, Real};
 

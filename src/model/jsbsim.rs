@@ -60,7 +60,7 @@ pub fn export_in_conditions(models: &[GreyBox], name: &str) -> Result<Exported, 
 fn left_out(model: &GreyBox) -> Vec<String> {
     let effect = |full: &str| full.split('.').next().unwrap_or_default().to_owned();
     let known = |name: &str| aerodynamics::knows(name) || engine::knows(name);
-    // what changes mass and inertia has changed the body
+    // effects on mass and inertia are part of the exported mass and inertia
     let of_body = |name: &str| name.starts_with("mass_error.") || name.starts_with("inertia_xz.");
     let lost = model
         .coefficients()

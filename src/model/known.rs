@@ -1,7 +1,7 @@
 //! Constants of the sensors' installation and of single flights in a model file.
 //!
 //! ```toml
-//! [installation]                       # holds for every flight without an entry of its own
+//! [installation]                       # for every flight, unless its own entry states other axes or sensors
 //! source = "greylag amend: 3 flights"
 //! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes against the body's
 //!
@@ -18,16 +18,17 @@ use serde::Deserialize;
 
 /// Names of the trims that a flight may have of its own.
 pub const TRIMS: [&str; 7] = ["CD0", "CL0", "CY0", "Cl0", "Cm0", "Cn0", "thrust_share"];
-/// Names of what sensors add to the reconstructed state: a share of the airspeed, then body rates, α and β.
+/// Names of the sensor errors in the reconstructed state: a fraction of the airspeed, then offsets of body rates, α
+/// and β.
 pub const SENSORS: [&str; 6] =
     ["airspeed_share", "p_radps", "q_radps", "r_radps", "alpha_rad", "beta_rad"];
-/// Largest angle of measured axes against the body's, °: farther round a mapping's `[board]` turns them.
+/// Largest rotation of the measured axes against the body axes, °; a mapping's `[board]` states larger ones.
 pub const MOST_DEG: f64 = 30.0;
 
-/// Constants of a flight, or of the installation that flights share; what is not stated is not known.
+/// Constants of a flight, or of the installation that flights share; a constant that is not stated is unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlightConstants {
-    /// Where they come from.
+    /// Source of the constants.
     pub source: String,
     /// The small rotation from body axes to the measured ones, about x, y and z of the body, °.
     pub axes_deg: Option<[f64; 3]>,
@@ -59,7 +60,7 @@ impl Known {
         self.installation.is_none() && self.flights.is_empty()
     }
 
-    /// Constants of `flight`: its own, or those of the installation if it has none.
+    /// Constants of `flight`: its own; axes and sensor errors that it does not state are those of the installation.
     pub fn of(&self, flight: &str) -> Option<FlightConstants> {
         let shared = self.installation.as_ref();
         let Some(own) = self.flights.get(flight) else { return shared.cloned() };

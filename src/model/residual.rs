@@ -125,7 +125,7 @@ fn fingerprinted(airframe: &Airframe) -> String {
         let rudder = airframe.actuators.rudder;
         text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
     }
-    // it scales a residual's inputs and outputs
+    // the reference airspeed scales a residual's inputs and outputs
     if airframe.reference != Reference::OF_SCHEMA_1 {
         text += &format!(" reference airspeed {:?}", airframe.reference.airspeed);
     }
@@ -247,7 +247,7 @@ impl Residual {
     /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`.
     ///
     /// # Errors
-    /// The file cannot be read, is no residual, or one of another airframe.
+    /// The file cannot be read, is not a residual, or is a residual of another airframe.
     pub fn load(
         path: &Path,
         airframe: &Airframe,

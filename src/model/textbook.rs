@@ -49,11 +49,11 @@ pub struct Measures {
 pub struct Drives {
     /// Natural frequency of the servos, rad/s.
     pub frequency: f64,
-    /// Their damping ratio.
+    /// Damping ratio of the servos.
     pub damping: f64,
     /// Lag of the thrust, s.
     pub lag: f64,
-    /// Where these come from.
+    /// Source of these values.
     pub source: &'static str,
 }
 
@@ -129,13 +129,14 @@ impl Measures {
         self.airframe_of(f.chord, [self.slope(&f), self.zero_lift()], drives)
     }
 
-    /// Airspeed at which it cruises, m/s, and incidence there, rad.
+    /// Cruise airspeed, m/s, and angle of attack at cruise, rad.
     pub(crate) fn cruise(&self) -> [f64; 2] {
         let f = self.figures();
         [f.cruise, (f.lift - self.zero_lift()) / self.slope(&f)]
     }
 
-    /// The same with the mean chord (m), the slope of the lift (1/rad) and the lift at α = 0 of another source.
+    /// The airframe file with the mean chord (m), the lift slope (1/rad) and the lift coefficient at α = 0 from
+    /// another source.
     pub(crate) fn airframe_with_chord(&self, chord: f64, lift: [f64; 2]) -> String {
         self.airframe_of(chord, lift, &Drives::HOBBY)
     }
@@ -192,7 +193,7 @@ impl Measures {
         self.model_with(&self.inertia(), sections, description)
     }
 
-    /// The same with other moments of inertia.
+    /// As `model_of`, with other moments of inertia.
     pub(crate) fn model_with(
         &self,
         inertia: &[Estimate; 4],
@@ -248,7 +249,7 @@ impl Measures {
         effects
     }
 
-    /// Radii of gyration relative to half span, half length and half their mean.
+    /// Moments of inertia, from radii of gyration relative to half the span, half the length and half their mean.
     pub(crate) fn inertia(&self) -> [Estimate; 4] {
         let length =
             if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };

@@ -48,7 +48,7 @@ pub fn to_bytes(
             Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
-    // one entry: the format writes several in no fixed order, and equal networks are equal files
+    // a single entry, because the format writes several in no fixed order, and equal networks must give equal files
     let origin = serde_json::to_string(origin)?;
     safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), origin)])))
 }

@@ -167,7 +167,7 @@ impl Dense {
     /// Output of the network.
     ///
     /// # Panics
-    /// If the network has not `IN` inputs and `OUT` outputs, or a layer wider than [`ON_STACK`].
+    /// If the network does not have `IN` inputs and `OUT` outputs, or has a layer wider than [`ON_STACK`].
     #[inline(always)]
     pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
         // initialising unused buffer space costs time

@@ -118,7 +118,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        // the slope is infinite at zero; zero in its place, since a zero gradient times ∞ would be NaN
+        // at zero the slope is infinite; it is set to zero, since a zero gradient times ∞ would be NaN
         let slope = T::where_less(T::zero(), root, T::from_f64(0.5) / root, T::zero());
         self.chain(root, slope)
     }

@@ -11,12 +11,12 @@ use std::arch::x86_64::{__m128, __m256, __m512};
 
 /// `N` lanes in a register `V`, one for each candidate of a batch.
 ///
-/// With an array (`V = [f32; N]`) the compiler must vectorise by itself, which is slow and poor for AVX-512; with
-/// registers of an instruction set it need not.
+/// With an array (`V = [f32; N]`) the compiler must vectorise by itself, which is slow and poor for AVX-512. With the
+/// registers of an instruction set, each operation is an intrinsic.
 ///
-/// With `FUSED`, [`Real::mul_add`] rounds once: twice the speed where the processor has the instruction and the
-/// kernel is compiled for it, very slow elsewhere, and other last bits. Otherwise all kinds of lanes give
-/// bit-identical results.
+/// With `FUSED`, [`Real::mul_add`] rounds once, so that the last bits of results differ. It doubles the speed where
+/// the processor has the instruction and the kernel is compiled for it; elsewhere it is very slow. Without `FUSED`,
+/// all kinds of lanes give bit-identical results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes<const N: usize, const FUSED: bool = false, V = [f32; N]>(pub V);

@@ -9,7 +9,7 @@ pub(super) const ROUND: f32 = 12_582_912.0;
 /// Single-precision numbers that one instruction processes. Each operation rounds once as in IEEE 754, so that all
 /// kinds of register give bit-identical results.
 ///
-/// Those of an instruction set may only be used in functions compiled for it.
+/// The registers of an instruction set may only be used in functions that are compiled for it.
 pub trait Register: Copy + Debug + Send + Sync + 'static {
     /// Number of lanes.
     const LANES: usize;
@@ -70,7 +70,7 @@ macro_rules! entries {
 /// An array of numbers, to be vectorised by the compiler.
 impl<const N: usize> Register for [f32; N] {
     const LANES: usize = N;
-    // of a block of 16 lanes 24 of NEON's 32 registers
+    // six sums of 16 lanes take 24 of NEON's 32 registers
     const SUMS: usize = 6;
     #[inline(always)]
     fn splat(x: f32) -> Self {

@@ -3,8 +3,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// A reproducible random stream. ChaCha8 is specified bit for bit, so a seed means the same
-/// flight in every version of every machine.
+/// A reproducible random stream. ChaCha8 is specified bit for bit, so that a seed gives the same flight in every
+/// version of the program on every machine.
 pub type Stream = ChaCha8Rng;
 
 /// Random stream of `seed` for one purpose, for example `stream(seed, &[episode, tick])`: streams with different

@@ -1,4 +1,4 @@
-//! Actuators: from commands to the deflections that act on the airframe, exact at 0.01 s.
+//! Actuators: filters from commands to the deflections that act on the airframe, exact at a time step of 0.01 s.
 //!
 //! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step, so a
 //! recurrence with the same coefficients reproduces it to rounding.
@@ -228,9 +228,9 @@ impl<R: Real> Actuators<R> {
 
     /// The filter memories consistent with an observed `state` after the commands `previous` (newest first).
     ///
-    /// Exact unless a surface is at its stop, where the filter's own output is not observed: the
-    /// first step after leaving it may then be off by up to 8 % of the travel. Likewise where a
-    /// surface moves at its largest rate.
+    /// Exact unless a surface is at its stop, where the filter's own output is not observed: the first step after
+    /// leaving it may then be off by up to 8 % of the travel. The same applies to a surface that moves at its rate
+    /// limit.
     #[inline(always)]
     pub fn from_observed(
         state: &ActuatorState<R>,

@@ -4,8 +4,8 @@
 pub const SEA_LEVEL_DENSITY: f64 = 1.225;
 /// Standard gravity (ISO 80000-3), the unit g of accelerations, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Effective gravity at middle latitudes, m/s², for use without a model of the aircraft. It is JSBSim's at 46.8° and
-/// 600 m, and within 0.03 of that anywhere.
+/// Effective gravity at middle latitudes, m/s², for use without a model of the aircraft. It is JSBSim's at 46.8°
+/// latitude and 600 m; near sea level, gravity at any latitude is within 0.03 m/s² of it.
 pub const MIDDLE_GRAVITY: f64 = 9.806;
 
 /// Density law of the air.

@@ -1,10 +1,10 @@
 //! The mixer: maps the four virtual controls to named surfaces and motors, and their positions back to the controls.
 //!
 //! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have others: two
-//! elevons, a V-tail, several motors. Effector i is given u_i = Σ_j g_ij c_j, c the commands of the controls; a
-//! surface goes to its deflection at u_i, −1..1. The inverse is c = g⁺ u, by least squares, where u_i is the
-//! deflection over half the travel. Forces that are linear in the surfaces' deflections are then linear in those of
-//! the controls.
+//! elevons, a V-tail, several motors. Effector i receives the command u_i = Σ_j g_ij c_j, where c_j are the commands
+//! of the controls. A surface moves to its deflection at u_i, limited to −1..1. The inverse is c = g⁺ u, by least
+//! squares, where u_i is the deflection over half the travel. Forces that are linear in the surfaces' deflections are
+//! then linear in those of the controls.
 
 use crate::Command;
 use crate::servos::{Travel, Travels};
@@ -191,7 +191,7 @@ impl Mixer {
     pub fn travels(&self) -> Travels {
         let travel = |j: usize| {
             let at = |value: f64| {
-                // in the middle of their range motors can turn the aircraft either way
+                // at half throttle, differential thrust can yaw the aircraft either way
                 let given = |e: &Effector| e.limited(e.gains[j] * value + 0.5 * e.gains[3]);
                 let positions: Vec<f64> =
                     self.effectors.iter().map(|e| e.position(given(e))).collect();

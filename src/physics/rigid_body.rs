@@ -29,8 +29,8 @@ impl RigidBody {
     }
 
     /// Whether an iteration may step from this body to `next`: `next` must be physical and keep a third of the mass
-    /// and of the inertia's distance from that of a rod. A longer step from a wrong inertia leads to nearly infinite
-    /// accelerations.
+    /// and a third of 1 − Jxz²/(Jx Jz), which is zero for a singular inertia matrix. A longer step from a wrong
+    /// inertia leads to nearly infinite accelerations.
     pub fn may_become(&self, next: &RigidBody) -> bool {
         let room = |b: &RigidBody| 1.0 - b.jxz * b.jxz / (b.jx * b.jz);
         next.is_physical() && 3.0 * next.mass >= self.mass && 3.0 * room(next) >= room(self)

@@ -59,7 +59,7 @@ const FARTHEST: f64 = 100.0;
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Known {
-    /// Mean, in the unit of [`CONSTANTS`]; an airspeed scale is measured over true.
+    /// Mean, in the unit of [`CONSTANTS`]; an airspeed scale is measured airspeed divided by true airspeed.
     pub value: f64,
     /// Standard deviation; 0 holds the constant.
     pub sd: f64,

@@ -33,15 +33,17 @@ impl Size {
     }
 
     /// The size with the lift coefficient that an aircraft of `body` and `geometry` needs at its smallest `airspeed`
-    /// (m/s): the weight there, times `PULL` in a pull-up.
+    /// (m/s): the lift coefficient of level flight at sea level times `PULL`, at least 1.
     pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
         let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
         let level = body.mass * GRAVITY / (pressure * geometry.area);
         Size { lift: (PULL * level).max(1.0), ..self }
     }
 
-    /// Physical bounds of `coefficient`: those of the catalogue, which are dimensionless or per angle, or grow with
-    /// forces, lengths, moments, angular momenta and inertias. Those of an effect file are unchanged.
+    /// Physical bounds of `coefficient`. Bounds that are dimensionless or per angle are those of the catalogue,
+    /// except for `CL0`, whose bounds grow with the required lift coefficient. Bounds in units of force, length,
+    /// moment, angular momentum or inertia grow with the aircraft. A coefficient without `grows`, the default in
+    /// effect files, keeps its bounds.
     pub fn bounds(&self, coefficient: &Coefficient) -> (f64, f64) {
         if !coefficient.grows {
             return coefficient.bounds;

@@ -1,4 +1,4 @@
-//! A minute of random attitudes: whether an aircraft is lost, how far off it is when settled, the integral of the error.
+//! A minute of random attitudes: loss of the aircraft, settled error, and integral of the error.
 
 use rand::RngExt;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use greylag_num::statistics::mean;
 use greylag_num::stream;
 use greylag_physics::Airframe;
 
-/// Attitudes of a flight.
+/// Number of attitudes in a flight.
 pub const LEGS: usize = 12;
 /// Number of steps for which each attitude is commanded: 5 s.
 const LEG: usize = 500;
@@ -19,13 +19,13 @@ const LEG: usize = 500;
 const SETTLED: usize = 100;
 /// Largest commanded roll and pitch, degrees, if the airframe's envelope allows them.
 const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
-/// Purpose of the random stream.
+/// Number of the random stream.
 const ATTITUDES: u64 = 60;
 
-/// Beyond these an aircraft counts as lost: it is on its back or stands on its tail, or no model is believed there. Roll,
-/// pitch, angle of attack and sideslip, rad.
+/// Largest |roll|, |pitch|, |angle of attack| and |sideslip|, rad. Beyond them an aircraft counts as lost: it is
+/// inverted or near vertical, or outside the validity of models.
 const LOST: [f64; 4] = [1.75, 1.2, 0.5, 0.7];
-/// Airspeed over that of cruise between which it is not lost.
+/// Range of airspeed over cruise airspeed outside of which an aircraft counts as lost.
 const LOST_SPEED: [f64; 2] = [0.45, 2.5];
 
 /// Result of one minute of flight.

@@ -64,7 +64,7 @@ impl Imagined {
         Imagined::starting(model, start)
     }
 
-    /// The same that starts at its cruise airspeed in place of the reference airspeed.
+    /// An aircraft simulated by `model` that starts at its cruise airspeed instead of its reference airspeed.
     pub fn cruising(model: GreyBox) -> Imagined {
         let airspeed = model.airframe.envelope.airspeed_cruise_mps;
         let start = State { airspeed, ..model.airframe.start() };

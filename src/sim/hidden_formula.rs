@@ -199,7 +199,7 @@ fn call(function: Function, all: &[String]) -> String {
             let low = element("product", &[number(-1.0), width]);
             element("difference", &[all[0].clone(), element("max", &[held, low])])
         }
-        // separate filters whose inputs are settled
+        // lags and delays are separate filters, which settle at their argument
         Function::Lag | Function::Delay => all[0].clone(),
     }
 }

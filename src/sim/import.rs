@@ -185,7 +185,7 @@ impl Polar {
     }
 }
 
-/// Residual of the linear coefficients.
+/// Effects in addition to the linear coefficients.
 struct Beside {
     alpha_rate: Coefficients,
     propeller: Propeller,

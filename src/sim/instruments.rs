@@ -19,7 +19,7 @@ const NOISE: u64 = 71;
 pub enum Group {
     /// Attitude as Euler angles.
     Attitude,
-    /// Rate gyros; their time is the log's.
+    /// Rate gyros, whose sample times are the times of the log.
     Gyros,
     /// Accelerometer triad.
     Accelerometers,
@@ -45,7 +45,7 @@ pub struct Instruments {
     pub gyro_bias: [f64; 3],
     /// Biases of the accelerometers, m/s².
     pub force_bias: [f64; 3],
-    /// Factor of the measured on the true airspeed.
+    /// Ratio of measured to true airspeed.
     pub airspeed_scale: f64,
     /// Bias of α, rad.
     pub alpha_bias: f64,

@@ -72,8 +72,8 @@ impl Craft {
         self.has.iter().any(|has| has == id)
     }
 
-    /// All effects that can be missing, at this aircraft's sizes. One that replaces the aircraft's own requires that
-    /// the model has it.
+    /// All effects that can be missing, at this aircraft's sizes. An effect that replaces one of the aircraft's own
+    /// requires that the model has that one.
     pub fn kinds(&self) -> Vec<MissingKind> {
         let own = |kind: &&MissingKind| match kind.id {
             "lift_stall" => self.has("lift_table"),
@@ -175,7 +175,7 @@ pub const KINDS: [MissingKind; 26] = [
     kind("backlash", "rad", [0.02, 0.06]),
     kind("rate_limit", "rad/s", [1.6, 2.4]),
     kind("mass_error", "", [0.1, 0.2]),
-    // downward, the X8's inertia is all but singular at −0.1 and nothing flies it
+    // positive only: at −0.1 the X8's inertia matrix is nearly singular, and no controller can fly it
     kind("inertia_xz", "kg m²", [0.06, 0.1]),
     both("asymmetry", "", [0.002, 0.004]),
     both("dihedral_alpha", "1/rad²", [0.3, 0.6]),
@@ -206,7 +206,7 @@ impl MissingKind {
             "rate_limit" => self.clear[0],
             // beyond it the inertia matrix is not positive definite
             "inertia_xz" => largest,
-            // −29 N would be all the thrust there is
+            // −29 N would cancel the whole thrust
             "thrust_scale" | "mass_error" => 2.0 * largest,
             _ => 3.0 * largest,
         }

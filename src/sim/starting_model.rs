@@ -110,7 +110,8 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
             let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
             let unit: f64 = StandardNormal.sample(&mut random);
             let wrong = possible(id, name, value * (1.0 + WRONG * unit.clamp(-2.0, 2.0)));
-            // a width that is narrower than the error would hold the fit to the error; without one it is 15 %
+            // a prior standard deviation below the error would hold the fit at the wrong value; an unstated one is 15
+            // %
             if number
                 .get("sd")
                 .and_then(toml::Value::as_float)

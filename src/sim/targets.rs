@@ -210,7 +210,7 @@ impl TargetFile {
     ///
     /// # Errors
     ///
-    /// If it cannot be read, is no such table, is empty, or has a row whose roll and pitch are outside its group's
+    /// If it cannot be read, is not such a table, is empty, or has a row whose roll and pitch are outside its group's
     /// bounds (see [`Group`]).
     pub fn load(path: &Path) -> Result<TargetFile, TargetError> {
         let fail = |why: String| TargetError { path: path.display().to_string(), why };

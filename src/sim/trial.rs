@@ -74,7 +74,7 @@ pub struct Trial {
     pub subject: Subject,
     /// Seed of schedules, wind, instruments and noise.
     pub seed: u64,
-    /// The effect that the aircraft has and its model lacks; `None` for a null case.
+    /// The effects that the aircraft has and its model lacks; empty for a null case.
     pub missing: Vec<Missing>,
     /// Severity of the turbulence, 1 to 7; `None` for still air.
     pub turbulence: Option<u8>,

@@ -40,8 +40,9 @@ pub(super) struct Estimate {
 /// Measurements of one axis at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// Body rate, rad/s. `command` was in force, −1..1, positive for positive rates.
+    /// Body rate, rad/s.
     pub rate: f64,
+    /// Command in force, −1..1, positive for positive rates.
     pub command: f64,
     /// Estimate of the incidence angle of the axis, rad; zero for an axis without stiffness.
     pub incidence: f64,

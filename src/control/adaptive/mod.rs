@@ -1,5 +1,5 @@
-//! Attitude hold of an aircraft that nobody has modelled: cascaded loops whose gains are divided by control powers that
-//! are estimated in flight. It needs the cruise airspeed, and to know whether there is a rudder.
+//! Attitude hold of an aircraft that nobody has modelled: cascaded loops whose gains are divided by control powers
+//! that are estimated in flight. It needs the cruise airspeed and whether there is a rudder.
 //!
 //! Times and rates count in V/g at the cruise airspeed V (Froude's scaling), so that one set of numbers serves a toy and a
 //! light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`); the loops' gains were
@@ -15,7 +15,7 @@ use greylag_physics::{Airframe, Command};
 
 /// Prior of the roll axis: twice the median control power, because a gain that is too low costs less than one too high.
 const ROLL: Prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
-/// The same of the pitch axis.
+/// Prior of the pitch axis.
 const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], least: 10.0 };
 /// Lift slope −Z_α, in g/V: cruise at about half the lift of the stall makes it nearly the same for all.
 const LIFT_SLOPE: f64 = 9.0;
@@ -34,17 +34,18 @@ const STIFFNESS_SHARE: f64 = 0.7;
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
 
-/// Throttle: at cruise; by parts of airspeed missing; its integral by V/g; by the sine of the pitch.
+/// Throttle law: throttle at cruise; gain on the relative airspeed error; gain on its integral over time in V/g; gain
+/// on the sine of the pitch angle.
 const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
 /// Shares of the cruise airspeed between which the nose is lowered, by up to [`NOSE_DOWN`] (rad).
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
-/// Rudder by the yaw rate beyond that of a coordinated turn, V/g; and at most.
+/// Gain of the rudder on the yaw rate beyond that of a coordinated turn, V/g, and the largest rudder command.
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
-/// Estimate of the aircraft at its cruise airspeed. The control powers are those that act within a tenth of a second: a
-/// slow servo and a delay look like missing power, so that they lie below the aerodynamic ones.
+/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a
+/// second: a slow servo or a delay reduces them below the aerodynamic values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Belief {
     /// Roll acceleration at full aileron, rad/s².
@@ -71,7 +72,7 @@ impl Axis {
         Axis { estimate: Estimate::new(prior), integral: 0.0 }
     }
 
-    /// The command (−1..1) for a `rate` where `wanted` is wanted (rad/s); `feed` maps damping (1/s) and stiffness (1/s²) to
+    /// The command (−1..1) that drives `rate` to `wanted` (rad/s); `feed` maps damping (1/s) and stiffness (1/s²) to
     /// the acceleration that holds the wanted rate (rad/s²).
     fn command(
         &mut self,
@@ -95,7 +96,7 @@ impl Axis {
     }
 }
 
-/// The controller.
+/// The adaptive attitude controller of one aircraft.
 #[derive(Clone, Debug)]
 pub struct Adaptive {
     /// Cruise airspeed, m/s.
@@ -161,7 +162,7 @@ impl Adaptive {
     }
 }
 
-/// The attitude to fly to, rad: too slow, with the nose lower and less bank.
+/// The attitude to fly to, rad: below the airspeeds of `SLOW`, the nose is lowered and the bank reduced.
 fn wanted(target: &Target, speed: f64) -> [f64; 2] {
     let slow = ((SLOW[0] - speed) / (SLOW[0] - SLOW[1])).clamp(0.0, 1.0);
     let lower = target.pitch * (1.0 - slow) - slow * NOSE_DOWN;
@@ -190,7 +191,7 @@ impl Controller for Adaptive {
         let speed = (state.airspeed / self.cruise).clamp(0.3, 3.0);
         let (sin, cos) = state.roll.sin_cos();
         let level = state.pitch.cos();
-        // of a coordinated turn, about the vertical, rad/s
+        // turn rate of a coordinated turn about the vertical, rad/s
         let turn = state.roll.clamp(-1.2, 1.2).tan() * level / (speed * time);
         let slope = LIFT_SLOPE * speed / time;
         let pull = turn * sin * level;

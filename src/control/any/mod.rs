@@ -1,6 +1,6 @@
-//! One recurrent policy for any fixed wing: a GRU that was trained by analytic gradients through the flight of aircraft
-//! drawn from a distribution (`params/any/train.py`). Like [`adaptive`](crate::adaptive) it needs the cruise airspeed, and
-//! to know whether there is a rudder; its recurrent state adapts to all other properties in flight.
+//! One recurrent policy for any fixed wing: a GRU that was trained by analytic gradients through the flight of
+//! aircraft drawn from a distribution (`params/any/train.py`). Like [`adaptive`](crate::adaptive) it needs the cruise
+//! airspeed and whether there is a rudder; its recurrent state adapts to all other properties in flight.
 
 mod network;
 
@@ -10,8 +10,9 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 use network::{HIDDEN, INPUTS, Network};
 
-/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s. The policy was
-/// trained with them (`params/any/train.py`), so they are not those of another controller.
+/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s. The policy
+/// was trained with them (`params/any/train.py`), so they must not be changed together with those of another
+/// controller.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
 /// Largest integral of the attitude errors, rad s, and of the airspeed's, parts of the cruise airspeed times s.
@@ -30,7 +31,7 @@ struct Memory {
 const NOTHING: Memory =
     Memory { hidden: [0.0; HIDDEN], reference: None, integral: [0.0; 2], speed_integral: 0.0 };
 
-/// The controller.
+/// The controller that flies the shipped policy for any aircraft.
 #[derive(Clone, Debug)]
 pub struct AnyPolicy {
     network: &'static Network,
@@ -73,7 +74,7 @@ impl AnyPolicy {
         memory.speed_integral = (memory.speed_integral + (1.0 - speed) * STEP)
             .clamp(-SPEED_INTEGRAL_MOST, SPEED_INTEGRAL_MOST);
         let (sin, cos) = s.roll.sin_cos();
-        // of a coordinated turn, about the vertical, then about the body's y and z axes, rad/s
+        // turn rate of a coordinated turn about the vertical, then about the body's y and z axes, rad/s
         let turn = s.roll.clamp(-1.2, 1.2).tan() * s.pitch.cos() / (speed * time);
         let [pull, swing] = [sin, cos].map(|part| turn * part * s.pitch.cos());
         let inputs = [

@@ -8,11 +8,11 @@ use crate::SetupError;
 
 /// Number of inputs of the network.
 pub(super) const INPUTS: usize = 24;
-/// Its memory.
+/// Number of recurrent units.
 pub(super) const HIDDEN: usize = 32;
-/// Aileron, elevator, throttle, rudder, −1..1 each.
+/// Number of outputs: aileron, elevator, throttle, rudder, each −1..1.
 const OUTPUTS: usize = 4;
-/// Reset, update and candidate of each unit.
+/// Number of gate rows: update, reset and candidate of each unit.
 const GATES: usize = 3 * HIDDEN;
 
 static FILE: &[u8] = include_bytes!("../../../params/any/policy.safetensors");

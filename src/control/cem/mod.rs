@@ -159,7 +159,7 @@ impl Cem {
         }
     }
 
-    /// Runs the iterations of a tick; the plan they end with.
+    /// Runs the iterations of a tick and returns their final plan.
     fn search(&mut self, seen: &Observation, target: &Target) -> Option<Plan> {
         let mut rng = stream::stream(self.seed, &[self.tick]);
         self.tick += 1;
@@ -242,7 +242,7 @@ impl Cem {
             }
             first = 0;
         }
-        // the mean has less of the sampling's noise than its best member
+        // the mean of the distribution has less sampling noise than the best candidate
         self.put(0, 0, &mean);
         self.fly(seen, target, Actions::Given, [0, 1]);
         let middle = self.candidate(0);

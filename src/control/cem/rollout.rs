@@ -231,7 +231,7 @@ impl<R: Packed> Flight<R> {
         }
     }
 
-    /// Advances by one step in the simulator's order; returns the reward.
+    /// Advances by one step in the simulator's order and adds the discounted reward to the return.
     #[inline(always)]
     fn advance(&mut self, scene: &Scene, command: Command<R>) {
         let Scene { model, task, seen, .. } = scene;

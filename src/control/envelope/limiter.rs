@@ -61,7 +61,7 @@ pub struct Limited {
 }
 
 impl Limited {
-    /// What the controller must learn where the command flown is not `wanted`.
+    /// The change that the controller must be told of, if a limit changed the command `wanted`; `None` otherwise.
     pub fn overruled(&self, wanted: Command) -> Option<Overruled> {
         let wanted = wanted.clamped();
         let limited = self.by.is_some_and(|by| by != Limit::Distrust);
@@ -187,16 +187,18 @@ impl EnvelopeLimiter {
         }
         let bounds = self.bounds.within(PART);
         let travel = self.model.airframe.actuators.elevator.travel;
-        // the load factor is that with the elevator which holds the angle of attack: a surface in motion adds its own lift
+        // the load factor is computed with the elevator that holds the angle of attack, because a moving surface adds
+        // lift of its own
         let held = (motion.deflection - motion.acceleration / motion.effect)
             .clamp(travel.least, travel.most);
         let law = |side: usize| motion.law(at.incidence_limit(&bounds, side, held), PITCH_POLE);
         let [least, most] = [law(0), law(1)];
-        // the elevator's own lift, which is there before the angle of attack follows
+        // the elevator's own lift acts before the angle of attack responds
         let [push, pull] = at.lift_limits(&self.bounds, motion.deflection);
         let low = if pull > most.0 { (pull.min(least.0), Limit::Load) } else { most };
         let high = if push < least.0 { (push.max(most.0), Limit::Load) } else { least };
-        // the lower bound is the most nose-up and has the last word: the stall before the negative load factor
+        // the lower bound limits nose-up commands and has priority: stall and largest load factor before the smallest
+        // load factor
         clamp(&mut out.command.elevator, &mut out.by, travel, [low, high]);
     }
 }

@@ -1,8 +1,9 @@
 //! The attitude that a plan follows: a path to the target that the aircraft can fly.
 //!
-//! Each axis is driven by a cascade of limited rate and acceleration, as a flight controller drives its rate loops from its
-//! attitude loops. Pitch is limited by the load factor n: in coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid
-//! body's force equations with V and α constant. The path goes on from tick to tick, and waits for an aircraft that falls behind.
+//! Each axis is driven by a cascade of limited rate and acceleration, as a flight controller drives its rate loops
+//! from its attitude loops. Pitch is limited by the load factor n: in coordinated flight θ̇ = (g / V) (n cos φ − cos
+//! θ), from the rigid body's force equations with V and α constant. The path continues from tick to tick, and is held
+//! back while the aircraft lags behind it.
 
 use super::STEPS;
 use crate::envelope::G0;
@@ -10,24 +11,25 @@ use greylag_model::{GreyBox, STEP};
 use greylag_physics::State;
 use std::f64::consts::TAU;
 
-/// Bank (rad) beyond which body rates of the path are no longer derived from its turn.
+/// Largest bank (rad) for the body rates of the path; at a steeper bank those of this one are used.
 const STEEP: f64 = 1.4;
 /// Largest roll and pitch rates, rad/s: 70 and 60 °/s, the defaults of PX4's FW_R_RMAX and FW_P_RMAX_POS.
 const MOST: [f64; 2] = [1.22, 1.05];
 /// How far the path may be ahead of the aircraft, rad.
 const AHEAD: f64 = 0.02;
-/// Banks on the way that are tried, as fractions of the target's, and for how many ticks.
+/// Intermediate banks that are tried, as fractions of the target bank, and the numbers of ticks for which they are
+/// held.
 const PARTS: [f64; 3] = [0.0, 0.35, 0.7];
 const TICKS: [usize; 6] = [30, 60, 100, 150, 210, 300];
-/// Ticks of a trial and of its steps.
+/// Duration of a trial and its integration step, ticks.
 const TRIAL: usize = 600;
 const COARSE: usize = 5;
-/// Part of the cost of the bank on the way that is flown, below which another takes its place.
+/// Another intermediate bank replaces the one being flown if its cost is below this fraction of the present cost.
 const BETTER: f64 = 0.97;
-/// Bank and pitch-up (rad) from which a bank on the way is considered.
+/// Smallest target bank and pitch-up (rad) for which an intermediate bank is considered.
 const STEEP_ENOUGH: f64 = 0.5;
 const UP_ENOUGH: f64 = 0.1;
-/// Part of the acceleration that is planned for slowing down.
+/// Fraction of the largest acceleration that is used for braking.
 const BRAKING: f64 = 0.7;
 
 /// How fast a path approaches its target.
@@ -39,17 +41,17 @@ pub(super) struct Approach {
     rates: [f64; 2],
     /// Largest roll and pitch accelerations, rad/s².
     accelerations: [f64; 2],
-    /// Part of the roll rate that is left where a steep bank takes all of the load factor.
+    /// Fraction of the largest roll rate that remains where a steep bank takes all of the load factor.
     steep: f64,
     /// Scale of the roll error to the path, rad.
     pub roll: f64,
 }
 
 impl Approach {
-    /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder adverse yaw goes into
-    /// pitch, which the load factor may not be left to correct: it rolls slowly, and the roll yields before the pitch does.
-    /// Its values were chosen on steps of the Skywalker X8, those with a rudder on steps of the Aerosonde (`results/flight-quality.txt` holds
-    /// others).
+    /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder, adverse yaw
+    /// disturbs pitch, and the load-factor limit may not leave room to correct it. Such an aircraft therefore rolls
+    /// slowly, and its roll errors cost less. The values without a rudder were chosen on steps of the Skywalker X8,
+    /// those with a rudder on steps of the Aerosonde (`results/flight-quality.txt` holds other steps).
     pub fn of(model: &GreyBox, full: f64) -> Approach {
         if model.has_rudder() {
             let rates = [full, MOST[1]];
@@ -117,7 +119,7 @@ impl Point {
     }
 }
 
-/// A bank on the way: where the target's bank takes the load factor that pitching up needs, it comes later.
+/// An intermediate bank: the target bank is delayed where it would take the load factor that the pitch-up needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct First {
     /// The bank as a fraction of the target's.
@@ -129,7 +131,7 @@ struct First {
 impl First {
     const NONE: First = First { part: 1.0, ticks: 0 };
 
-    /// The same a tick later.
+    /// The intermediate bank one tick later.
     fn later(self) -> First {
         First { ticks: self.ticks.saturating_sub(1), ..self }
     }
@@ -140,7 +142,7 @@ impl First {
     }
 }
 
-/// What a path is made for.
+/// Conditions that a path must meet.
 struct Task<'a> {
     /// g / V, 1/s.
     turn: f64,
@@ -167,7 +169,7 @@ impl Task<'_> {
         Point { attitude: [roll[0], pitch[0]], rates: [roll[1], pitch[1]] }
     }
 
-    /// Integral of the absolute errors of roll and pitch with a bank on the way, rad s.
+    /// Integral of the absolute errors of roll and pitch with the intermediate bank `first`, rad s.
     fn cost(&self, from: &Point, first: First) -> f64 {
         let span = COARSE as f64 * STEP;
         let mut now = *from;
@@ -180,8 +182,8 @@ impl Task<'_> {
         sum
     }
 
-    /// The bank on the way with the least integral of the error. One that is being flown is left only for one that is
-    /// clearly better.
+    /// The intermediate bank with the smallest integral of the error. The one being flown is replaced only by a
+    /// clearly better one.
     fn choose(&self, from: &Point, flown: First) -> First {
         let [bank, pitch] = self.target;
         if bank.abs() < STEEP_ENOUGH || pitch - from.attitude[1] < UP_ENOUGH {
@@ -200,7 +202,7 @@ impl Task<'_> {
     }
 }
 
-/// The path of a tick, which goes on in the next.
+/// The path of a tick, which the next tick continues.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
     points: Vec<Point>,
@@ -221,7 +223,7 @@ impl Course {
         }
     }
 
-    /// Begins anew at the aircraft's attitude.
+    /// Restarts the path at the aircraft's attitude.
     pub fn reset(&mut self) {
         self.next = None;
         self.first = First::NONE;
@@ -257,7 +259,7 @@ impl Course {
         }
     }
 
-    /// Where the path goes on: at most [`AHEAD`] from the aircraft in each axis.
+    /// The point at which the path continues: at most [`AHEAD`] from the aircraft in each axis.
     fn begin(&self, seen: &State) -> Point {
         let here = Point::of(seen);
         let Some(mut now) = self.next else { return here };
@@ -337,7 +339,7 @@ mod tests {
         let first = steep.choose(&dive, First::NONE);
         assert!(first.ticks > 0 && first.part < 1.0, "{first:?}");
         assert!(steep.cost(&dive, first) < BETTER * steep.cost(&dive, First::NONE));
-        // it is kept while it is flown, and nothing is put off where the bank takes no load factor
+        // the bank being flown is kept, and a bank that takes little load factor is not delayed
         assert_eq!(steep.choose(&dive, first), first);
         assert_eq!(task([0.3, 0.49]).choose(&dive, First::NONE), First::NONE);
     }

@@ -32,12 +32,12 @@ use solve::Solver;
 /// Horizon in steps of 10 ms.
 const STEPS: usize = 50;
 
-/// Ticks for which the LQI flies after a prediction that was wrong: longer than the mean that judges the model, so that a model
-/// that is wrong now and then does not fly in between.
+/// Ticks for which the LQI flies after a wrong prediction. They exceed the averaging time of the prediction check, so
+/// that an intermittently wrong model is not used in between.
 const WAIT: usize = 500;
 
-/// Ticks from one try of the LQI's flight as a start to the next. Without it, steps with 40 ms of delay overshoot more often
-/// (18 in place of 10 %); at every tick it takes a sixth of the time.
+/// Ticks between trials of the LQI's flight as a starting point. Without these trials, steps with 40 ms of delay
+/// overshoot more often (18 instead of 10 %); at every tick they would take a sixth of the time.
 const EVERY: usize = 5;
 
 /// Aileron and elevator commands as fractions of the largest deflection.
@@ -68,7 +68,8 @@ impl Ilqr {
         Ilqr::with("ilqr", model, lqi, None, Settings::PLAIN)
     }
 
-    /// A planner with other settings and its own name, and a policy as a further start where there is one.
+    /// A planner with `settings`, registered under `name`. The policy of `agent`, if there is one, is a further
+    /// starting point.
     pub fn with(
         name: &'static str,
         model: &GreyBox,
@@ -141,8 +142,9 @@ struct Starts<'a> {
 }
 
 impl Desk {
-    /// The last plan a step on, with its cost; every [`EVERY`] ticks and for another target the LQI's flight in the model if
-    /// that is cheaper, for another target also the policy's. `None` if none is finite.
+    /// The cheapest starting plan with its cost: the last plan shifted by a step, or the LQI's flight in the model
+    /// (tried every [`EVERY`] ticks and for a new target), or the policy's (tried for a new target). `None` if no
+    /// cost is finite.
     fn begin(&mut self, problem: &Problem, starts: Starts) -> Option<([Surfaces; STEPS], f64)> {
         let mut best = None;
         if let Some(last) = &self.plan {
@@ -203,7 +205,7 @@ impl Controller for Ilqr {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // a plan begins anew from what is seen; the LQI has integrals
+        // a plan restarts from the observation, but the LQI has integrators
         if self.desk.plan.is_none() {
             self.lqi.overruled(by);
         }

@@ -41,7 +41,7 @@ pub(super) struct Problem<'a> {
     pub goal: Goal,
     /// Attitude to follow over the plan.
     pub course: &'a Course,
-    /// How it approaches the target; `None` where it is the target.
+    /// Dynamics of the path to the target; `None` if the plan follows the target itself.
     pub approach: Option<&'a Approach>,
     /// Constant throttle over the plan, 0..1.
     pub throttle: f64,

@@ -1,6 +1,6 @@
 //! Settings of iLQR: cost scales and starting points.
 
-/// Cost scales by Bryson's rule: errors of these sizes cost the same. Also the work per tick.
+/// Cost scales by Bryson's rule (errors of these sizes cost the same), and the number of iterations per tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Attitude error scale, rad.
@@ -17,7 +17,7 @@ pub struct Settings {
     pub last: f64,
     /// Soft limits on load factor, incidence and sideslip; `None` leaves them out.
     pub envelope: Option<Barrier>,
-    /// What the plan follows.
+    /// Reference that the plan follows.
     pub towards: Towards,
     /// Iterations per tick.
     pub iterations: usize,
@@ -47,7 +47,7 @@ pub enum Start {
     Policy,
 }
 
-/// What the plan follows.
+/// Reference that the plan follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Towards {
     /// The target itself, at once.
@@ -57,8 +57,8 @@ pub enum Towards {
 }
 
 impl Settings {
-    /// Settings of `ilqr`. Of a few variants on every seventh target they settle as fast as any and are the steadiest
-    /// in moderate turbulence.
+    /// Settings of `ilqr`. Among a few variants, flown on every seventh target, they settle as fast as any and are
+    /// the steadiest in moderate turbulence.
     pub const PLAIN: Settings = Settings {
         attitude: 0.05,
         far: None,

@@ -30,7 +30,7 @@ pub(super) struct Filter {
 }
 
 impl Filter {
-    /// About a deflection after the step and the deflection that is commanded, rad.
+    /// The filter, linear about the deflection after the step and the commanded deflection, rad.
     pub fn new(of: &Surface, deflection: f64, commanded: f64) -> Filter {
         let [b0, a1, a2] = of.filter;
         let unit = of.travel.slope(commanded);
@@ -44,7 +44,7 @@ impl Filter {
 }
 
 impl Transition {
-    /// `value` A.
+    /// The product `value` A.
     pub fn after(&self, value: &Square) -> Square {
         let mut out = Square::zeros();
         let dense = value.fixed_columns::<8>(0) * self.aircraft;
@@ -59,7 +59,7 @@ impl Transition {
         out
     }
 
-    /// Aᵀ `right`.
+    /// The product Aᵀ `right`.
     pub fn before<const N: usize>(&self, right: &Columns<N>) -> Columns<N> {
         let mut out = Columns::<N>::zeros();
         let dense = self.aircraft.transpose() * right.fixed_rows::<8>(0);
@@ -74,7 +74,7 @@ impl Transition {
         out
     }
 
-    /// `value` B.
+    /// The product `value` B.
     pub fn after_commands(&self, value: &Square) -> Columns<2> {
         let mut out = Columns::<2>::zeros();
         for (surface, (at, Filter { gain, unit, .. })) in self.surfaces().enumerate() {
@@ -83,7 +83,7 @@ impl Transition {
         out
     }
 
-    /// Bᵀ `right`.
+    /// The product Bᵀ `right`.
     pub fn before_commands<const N: usize>(&self, right: &Columns<N>) -> SMatrix<f64, 2, N> {
         let mut out = SMatrix::<f64, 2, N>::zeros();
         for (surface, (at, Filter { gain, unit, .. })) in self.surfaces().enumerate() {

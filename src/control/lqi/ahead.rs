@@ -128,7 +128,7 @@ impl Law {
         [ailerons.command(u[0]), elevators.command(u[1]), rudder]
     }
 
-    /// Deflection of aileron and elevator (rad) by the reference roll and pitch (rad) of their own axes.
+    /// Gains of the aileron on the reference roll and of the elevator on the reference pitch, rad/rad.
     pub(super) fn by_reference(&self) -> [f64; 2] {
         [self.gain[0][0], self.gain[1][1]]
     }

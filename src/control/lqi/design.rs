@@ -90,8 +90,8 @@ impl Weights {
         deflection: 0.3,
     };
     /// Weights of softer loops with more delay margin: 104 ms in pitch where the default has 46, and 78 where it has
-    /// 32 (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Softer weights still (0.15, 0.1,
-    /// 0.15) have 200 ms.
+    /// 32 (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Even softer weights (0.15, 0.1, 0.15)
+    /// have 200 ms.
     pub const DAMPED: Weights =
         Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }

@@ -58,7 +58,7 @@ struct Given {
     attitude: [f64; 2],
     /// Last change of the integrals, rad s.
     added: [f64; 2],
-    /// Deflection of aileron and elevator by their own angle's reference, rad by rad.
+    /// Gains of the aileron on the reference roll and of the elevator on the reference pitch, rad/rad.
     by_reference: [f64; 2],
 }
 
@@ -179,8 +179,9 @@ impl Controller for Lqi {
         self.last = None;
     }
 
-    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987): the reference goes back to where it would
-    /// have led to what was flown, but no further than to the aircraft, and the integral to where it was.
+    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987): the reference moves back to
+    /// the value that would have given the command flown, but not past the aircraft's attitude, and the last
+    /// increment of the integral is undone.
     fn overruled(&mut self, by: &Overruled) {
         let (Some(last), Some(reference)) = (self.last.take(), &mut self.reference) else { return };
         let Overruled { wanted, flown } = by;

@@ -7,7 +7,7 @@ use crate::Format;
 use crate::mapping::{Mapping, format_rules};
 use crate::topics::Topics;
 
-/// One name for a column: the column, the name, factor and offset.
+/// Another name for a column: the column, the name, and the factor to the column's unit.
 struct Alias(&'static str, &'static str, f64);
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -112,7 +112,7 @@ const QUATERNIONS: [[&str; 4]; 6] = [
     ["q.w", "q.x", "q.y", "q.z"],
 ];
 
-/// Where a column is found under another name.
+/// A column that the file has under another name.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Found {
     /// The column of the log format.
@@ -207,7 +207,7 @@ impl Dialect {
     }
 }
 
-/// Length of the time's unit, s, from its median step.
+/// Unit of the time column, s, from its median step.
 pub(super) fn unit_of(step: f64) -> f64 {
     match step {
         s if s >= 5e6 => 1e-9,
@@ -217,7 +217,7 @@ pub(super) fn unit_of(step: f64) -> f64 {
     }
 }
 
-/// A time as a number of its unit: seconds of the day and date in one of ISO 8601 (2026-11-27T07:42:01.25Z).
+/// Seconds since 1970-01-01 of a date and time in ISO 8601 (2026-11-27T07:42:01.25Z).
 pub(super) fn time(text: &str) -> Option<f64> {
     let (date, clock) = text.split_once(['T', ' '])?;
     let mut date = date.split('-').map(|part| part.parse::<i64>().ok());

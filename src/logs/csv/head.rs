@@ -1,4 +1,4 @@
-//! The head of a table: where its fields go, and the numbers in them.
+//! The header of a table: the columns that its fields fill, and the parser of their numbers.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ enum Share {
 /// Where the fields of a table go.
 pub(super) struct Head {
     targets: Vec<Vec<Target>>,
-    /// What the names say.
+    /// Meaning of names that are not those of the log format.
     pub dialect: Dialect,
     /// Fields of a quaternion.
     quaternion: Option<[usize; 4]>,
@@ -57,9 +57,9 @@ impl Head {
         (Head { targets, dialect, quaternion, decimal }, table)
     }
 
-    /// The sample in a record; `None` when a field of it is no number, or the time is missing.
+    /// The sample in a record; `None` if one of its fields is not a number, or the time is missing.
     pub fn sample(&self, record: Fields<'_>) -> Option<Sample> {
-        // A row that lacks fields is damaged, and would take many times its size.
+        // A row that lacks fields is damaged, and its sample would take many times its size in memory.
         if record.len() < self.targets.len() {
             return None;
         }
@@ -68,7 +68,7 @@ impl Head {
         sample.time_s.is_finite().then_some(sample)
     }
 
-    /// Puts field `i` where it belongs; `None` when it is no number.
+    /// Writes field `i` into its columns; `None` if it is not a number.
     fn field(&self, record: Fields<'_>, i: usize, sample: &mut Sample) -> Option<()> {
         let targets = &self.targets[i];
         if targets.is_empty() {

@@ -33,20 +33,20 @@ pub(crate) struct Raw {
     pub(super) cut_short: bool,
     /// Notes on columns that were found under other names.
     pub notes: Vec<String>,
-    /// What is known of the whole, where stretches of it are kept.
+    /// Statistics of the whole table, if only stretches of it are kept.
     pub(crate) whole: Option<Whole>,
 }
 
 /// Backward jump of time that begins another recording: in median sample periods, and in s.
 const BACK_PERIODS: f64 = 10.0;
 const BACK_S: f64 = 1.0;
-/// How far from the beginning of the recording before another one begins, in parts of its length.
+/// A new recording starts within this fraction of the previous recording's duration after that one's start.
 const BEGINS: f64 = 0.1;
-/// Rows that a recording has at least.
+/// Smallest number of rows of a recording.
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// The rows, those that could not be read included, as `take` judges them.
+    /// Applies `take` to every row, including those that could not be read.
     pub(super) fn judged(
         &self,
         take: impl Fn(&mut rows::Rows, usize, Option<Sample>),
@@ -64,7 +64,7 @@ impl Raw {
         rows
     }
 
-    /// Takes out rows on purpose, which count as none of the file's.
+    /// Leaves out rows deliberately; they do not count as dropped.
     pub fn leave_out(&mut self, is: impl Fn(&Sample) -> bool) {
         if self.rows.iter().any(&is) {
             let places = std::mem::take(&mut self.places);
@@ -81,18 +81,18 @@ impl Raw {
         left_out.map(|(rows, _)| (rows[0].time_s, rows[1].time_s))
     }
 
-    /// Longest time between the stretches that are kept, s; 0 where all is.
+    /// Longest time between the stretches that are kept, s; 0 if the whole table is kept.
     pub fn bridged_s(&self) -> f64 {
         self.pauses().map(|(from, to)| 1.01 * (to - from)).fold(0.0, f64::max)
     }
 
-    /// What is known of the whole table, where stretches of it are kept.
+    /// Stretches of the table with statistics of the whole, if only stretches of it are kept.
     pub fn stretches(&self, flies: &Flying) -> Option<Stretches> {
         let times: Vec<f64> = self.rows.iter().map(|s| s.time_s).collect();
         self.whole.as_ref()?.stretches(period_s(&times), flies)
     }
 
-    /// Makes a channel of the stretches one of the whole table.
+    /// Extends the statistics of a channel from the stretches to the whole table.
     pub fn of_all(&self, stretches: &Stretches, channel: &mut Channel) {
         let share = self.rows.len() as f64 / stretches.rows.max(1) as f64;
         channel.samples = (channel.samples as f64 / share).round() as usize;
@@ -113,7 +113,7 @@ impl Raw {
         for i in 1..times.len() {
             let whole = i - bounds[bounds.len() - 1] >= RECORDING && times.len() - i >= RECORDING;
             let goes_back = times[i] < times[i - 1] - back;
-            // A clock that is set jumps back by some seconds; a new recording starts again at the first time.
+            // A clock that is corrected jumps back by some seconds; a new recording starts again near the first time.
             let start = times[bounds[bounds.len() - 1]];
             let begins = times[i] < start + (BEGINS * (times[i - 1] - start)).max(back);
             let stays = || times[i..i + RECORDING].iter().all(|t| *t < times[i - 1] - 0.5 * back);
@@ -166,7 +166,7 @@ pub(crate) fn read(
     let names: Vec<String> = (0..count).filter_map(name).map(|n| n.trim().to_owned()).collect();
     let (head, mut out) = Head::of(&names, records.delimiter, path, mapping);
     let mut quaternions: Vec<[f64; 4]> = Vec::new();
-    // A row has its place among the stretches by its number, but pauses are found by times whose unit is known.
+    // Stretches are selected by row numbers, but gaps are found by times, whose unit must be known.
     let mut thin = Thin::new(if head.dialect.time_by_steps { Keep::All } else { keep });
     let mut number = 0;
     while let Some(record) = records.next().map_err(text)? {
@@ -202,7 +202,7 @@ pub(crate) fn read(
     Ok(out)
 }
 
-/// Turns times of a unit that their steps show into seconds.
+/// Converts times to seconds; their unit follows from their steps.
 fn in_seconds(rows: &mut [Sample]) {
     let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
     let unit = dialect::unit_of(period_s(&times));

@@ -1,4 +1,4 @@
-//! The records of a table, line by line: most tables quote nothing, and their fields stand where they are.
+//! The records of a table, line by line. Most tables have no quotes, so that their fields are read in place.
 
 use std::io::{self, BufRead, Cursor, Read};
 
@@ -96,7 +96,7 @@ fn separator(header: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
-/// Mark of UTF-8 at the beginning of a text.
+/// Byte order mark of UTF-8 at the beginning of a text.
 const MARK: &[u8] = b"\xEF\xBB\xBF";
 
 impl<'a> Records<'a> {
@@ -149,7 +149,7 @@ impl<'a> Records<'a> {
         Ok(Some(Fields { bytes: self.record.as_slice(), ends: &self.ends, between: 0 }))
     }
 
-    /// Leaves the present line and those behind it to a reader that knows quotes.
+    /// Passes the present line and the following ones to a reader that handles quotes.
     fn quoted(&mut self) {
         if let Origin::Plain(mut lines) = std::mem::replace(&mut self.from, Origin::Nothing) {
             let line = Cursor::new(std::mem::take(&mut lines.line));

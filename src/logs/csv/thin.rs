@@ -1,4 +1,4 @@
-//! Stretches of a long table: a look at it parses every row, and keeps some.
+//! Stretches of a long table: an inspection parses every row and keeps only some.
 
 use crate::Sample;
 use crate::columns::COLUMNS;
@@ -7,12 +7,12 @@ use crate::stretches::{Keep, Level, MOST, Stretches, Watch};
 
 /// Rows of a stretch.
 pub(super) const STRETCH: usize = 4096;
-/// Of how many rows one airspeed is read throughout.
+/// One airspeed in this number of rows is kept for the whole table.
 const COARSE: usize = 16;
-/// How far a time goes back where another recording may begin, s.
+/// Backward step of the time at which another recording may begin, s.
 const BACK_S: f64 = 1.0;
 
-/// What is kept of a table.
+/// Selection of the rows of a long table.
 #[derive(Default)]
 pub(super) struct Thin {
     keep: Keep,
@@ -52,7 +52,7 @@ impl Thin {
         }
     }
 
-    /// Whether `rows` are too many; the stretches are fewer then.
+    /// Whether `rows` are too many; if so, half of the stretches are dropped.
     pub fn is_full(&mut self, rows: usize) -> bool {
         let fewer = (self.keep == Keep::Stretches && rows > MOST).then(|| self.level.halved());
         self.level = fewer.flatten().unwrap_or(self.level);
@@ -65,14 +65,14 @@ impl Thin {
         all.retain(|_| place.next().is_some_and(|place| self.keeps(*place)));
     }
 
-    /// What is known of the whole table; `None` if all of it is kept.
+    /// Statistics of the whole table; `None` if all of it is kept.
     pub fn whole(self) -> Option<Whole> {
         let every = self.level.every();
         self.level.thins().then_some(Whole { watch: self.watch, air: self.air, every })
     }
 }
 
-/// What is known of a table of which stretches are kept.
+/// Statistics of a whole table of which only stretches are kept.
 pub(crate) struct Whole {
     pub(crate) watch: Watch,
     air: Vec<(f64, f64)>,

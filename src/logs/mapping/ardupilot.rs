@@ -54,7 +54,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out.push(Rule::density("BARO", ("Press", 1.0), ("Temp", 1.0)).noting(
         "air density is from BARO's pressure with its sensor's temperature, which runs warm",
     ));
-    // Positive elevator is nose up there, positive rudder nose right.
+    // In AETR, positive elevator is nose up and positive rudder nose right.
     for (column, field, gain) in [
         ("aileron_cmd", "Ail", 1.0 / FULL),
         ("elevator_cmd", "Elev", -1.0 / FULL),

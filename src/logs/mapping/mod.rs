@@ -124,10 +124,10 @@ impl Mapping {
         Mapping::parse(&text, path)
     }
 
-    /// Reads a mapping from text; `path` is what errors call it.
+    /// Reads a mapping from text; `path` appears in errors.
     ///
     /// # Errors
-    /// The text is no mapping.
+    /// The text is not a mapping.
     pub fn parse(text: &str, path: &Path) -> Result<Mapping, MappingError> {
         let wrong = |text: String| MappingError::Text { path: path.to_owned(), text };
         let written: Written = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
@@ -158,7 +158,8 @@ impl Mapping {
         self.board.as_ref()
     }
 
-    /// Criteria for flight: those of the `model` if it is known, else those of the mapping, else the default ones.
+    /// Criteria for flight: those of the `model` if it is known, else those of the mapping, else the default ones. A
+    /// `shortest_s` of the mapping applies in every case.
     pub fn flies(&self, model: Option<Flying>) -> Flying {
         let mut flies = model.unwrap_or_else(|| match self.flight.from_mps {
             Some(from) => Flying::from(from),
@@ -171,7 +172,7 @@ impl Mapping {
         flies
     }
 
-    /// Whether any column is made from the rows of others around it.
+    /// Whether any column is differentiated over several rows of another one.
     pub(super) fn derives(&self) -> bool {
         self.body_rates_over_s.is_some() || self.slopes().next().is_some()
     }

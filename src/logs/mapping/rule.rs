@@ -128,7 +128,7 @@ pub struct Rule {
     pub fill: Fill,
     /// Note to the user if this rule is used.
     pub note: Option<String>,
-    /// Whether the airspeed is equivalent, to be made true by the density.
+    /// Whether the airspeed is equivalent airspeed, to be converted to true airspeed with the density.
     pub equivalent: bool,
 }
 
@@ -195,7 +195,7 @@ impl Rule {
         Rule { preferred, ..self }
     }
 
-    /// With something to know.
+    /// The rule with a note to the user.
     pub fn noting(self, note: impl Into<String>) -> Rule {
         Rule { note: Some(note.into()), ..self }
     }

@@ -1,4 +1,4 @@
-//! ArduPilot's servo outputs undone into commands by the SERVOn parameters.
+//! ArduPilot's servo outputs converted back to commands with the SERVOn parameters.
 
 use super::rule::{Rule, Shape, Term};
 use crate::topics::Topics;
@@ -19,8 +19,9 @@ const ELEVON_RIGHT: f64 = 78.0;
 /// Positive elevator is nose up in ArduPilot, nose down in the log format. Elevons: left =
 /// g (elevator − aileron), right = g (elevator + aileron), g = MIXING_GAIN (0.5).
 ///
-/// Where the airframe's `mixer` assigns the channels, the commands are g⁺ of the pulses. A command of one is
-/// the longest pulse there: the airframe describes the servos, not the functions that the controller has for them.
+/// Where the airframe's `mixer` assigns the channels, the commands are g⁺ of the pulses. There, a command of one is
+/// the longest pulse, because the airframe describes the servos and not the functions that the flight controller
+/// assigns to them.
 pub fn rules(
     topics: &Topics,
     topic: &str,

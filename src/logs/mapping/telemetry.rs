@@ -58,7 +58,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
         ("elevator_cmd", "controls1"),
         ("throttle_cmd", "controls2"),
     ];
-    // A real autopilot sends it to a simulator at most, and in an order of its own.
+    // A real autopilot sends HIL_ACTUATOR_CONTROLS at most to a simulator, and in another order.
     let real = autopilots(topics, system).any(|a| EQUIVALENT.contains(&a));
     for (column, field) in of_sitl.into_iter().filter(|_| !real) {
         commands.push(
@@ -79,7 +79,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out
 }
 
-/// The instance that sends most attitudes, of the system whose life this is.
+/// The instance that sends most attitudes, of the system whose flight is read.
 fn vehicle(topics: &Topics) -> Option<u16> {
     let both = topics.instances("ATTITUDE_QUATERNION").chain(topics.instances("ATTITUDE"));
     let own = both.filter(|(i, _)| topics.system.is_none_or(|s| i.to_be_bytes()[0] == s));
@@ -164,7 +164,7 @@ fn deflections(topics: &Topics, system: u8) -> Vec<Rule> {
         .collect()
 }
 
-/// Travel of aileron, elevator and rudder as the vehicle sends it, rad; zero of a rudder that it lacks.
+/// Travel of aileron, elevator and rudder as the vehicle sends it, rad; zero without a rudder.
 fn sent_travel(topics: &Topics, system: u8) -> Option<[f64; 3]> {
     let (_, topic) = topics
         .instances("ACTUATOR_OUTPUT_STATUS")

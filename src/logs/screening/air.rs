@@ -23,7 +23,8 @@ const CERTAIN: f64 = 0.8;
 /// Angle of attack that no aircraft exceeds for a twentieth of the time, rad.
 const VANE_LARGE: f64 = 1.0;
 
-/// Everything about the air; vanes turn as they like on the ground, so that they are judged by the rows `flown` only.
+/// Checks of airspeed, vanes, climb and density. Vanes turn freely on the ground, so that they are checked on the
+/// rows `flown` only.
 pub fn check(rows: &[Sample], flown: &[Sample]) -> Vec<Finding> {
     let airspeed = airspeed(rows);
     let speed_is_right = airspeed.is_none();

@@ -5,7 +5,7 @@ use super::relation::{near, quantile, through_origin, values};
 use crate::Sample;
 use crate::finding::Finding;
 
-/// Median time between rows above which the clock is looked at, s. A log of 1 Hz is unusable anyway.
+/// Median time between rows above which the clock is checked, s. A log of 1 Hz is unusable anyway.
 const SUSPICIOUS_S: f64 = 0.9;
 /// Rows over which a turn is compared with the rates.
 const SPAN: usize = 20;

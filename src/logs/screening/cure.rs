@@ -1,4 +1,4 @@
-//! Cures are tried before they are printed: the column is rescaled and looked at again.
+//! Corrections are verified before they are reported: the column is rescaled and checked again.
 
 use crate::Sample;
 use crate::columns::{COLUMNS, index};
@@ -13,7 +13,7 @@ const LIKEWISE: [&[&str]; 3] = [
 /// Text between the problem and its cure.
 const BETWEEN: &str = ": ";
 
-/// The findings, without the cures that do not cure: those after which the same column is found wrong again.
+/// The findings without ineffective cures: those after which the check finds the same column wrong again.
 pub fn tried(
     findings: Vec<Finding>,
     rows: &[Sample],
@@ -36,7 +36,7 @@ pub fn tried(
     findings.into_iter().map(one).collect()
 }
 
-/// The rows as the cure would have them.
+/// The rows after the correction.
 fn mended(rows: &[Sample], cure: &Cure) -> Vec<Sample> {
     let group = LIKEWISE.iter().find(|group| group[0] == cure.column && cure.scale > 0.0);
     let own = [cure.column.as_str()];

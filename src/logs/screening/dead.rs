@@ -50,7 +50,8 @@ pub fn commands(flown: &[Sample]) -> Option<Finding> {
     )))
 }
 
-/// Commands rest, rudders are often absent, targets and a declared sampling hold.
+/// Whether a column may be constant in a good log, such as a command, a target, an absent rudder or a declared
+/// sampling.
 fn may_rest(name: &str) -> bool {
     name.ends_with("_cmd")
         || name.ends_with("_target_rad")

@@ -1,4 +1,4 @@
-//! What is known of a whole log of which stretches are kept.
+//! Statistics of a whole log of which only stretches are kept.
 
 use super::{Track, fill, make_true, track_of};
 use crate::Sample;
@@ -14,7 +14,7 @@ pub(crate) struct Whole {
 }
 
 impl Whole {
-    /// What is known of the whole log, where stretches of the topic of the table's times are kept.
+    /// Statistics of the whole log, if only stretches of the topic of the table's times are kept.
     pub(super) fn of(base: &Track<'_>, topics: &Topics, tracks: &[Track<'_>]) -> Option<Whole> {
         let watch = base.watch()?;
         let stretches = Stretches {

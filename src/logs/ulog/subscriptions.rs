@@ -23,7 +23,7 @@ impl Subscription {
     }
 }
 
-/// The subscriptions by their message numbers: several are looked up for each record.
+/// The subscriptions by their message numbers, for fast look-up: each record needs several.
 #[derive(Default)]
 pub(super) struct Subscriptions {
     /// Place of each number among the others, from 1 on; 0 of a number that is not there.
@@ -45,7 +45,7 @@ impl Subscriptions {
         Some(&mut self.all[place].1)
     }
 
-    /// Sets the subscription of a number; returns the one that it had. The last of 65,536 numbers has no place.
+    /// Sets the subscription of a number and returns the previous one. After 65,535 numbers a further one is ignored.
     pub fn insert(&mut self, number: u16, new: Subscription) -> Option<Subscription> {
         if let Some(old) = self.get_mut(number) {
             return Some(std::mem::replace(old, new));

@@ -64,7 +64,7 @@ impl<'a> Flat<'a> {
                 }
                 Value::Object(inner) => self.gather(inner)?,
                 Value::String(text) if name == "tool" => self.tool = Some(text),
-                // Python writes NaN, which is no JSON, or null for it
+                // for a missing number Python writes NaN, which is not valid JSON, or null
                 Value::Null => return Err(no_number(name, value)),
                 Value::Array(all) if name == "XYZref" => {
                     let at = |k: usize| all.get(k).and_then(Value::as_f64);

@@ -17,7 +17,7 @@ impl Numbers {
                 // XFLR5 writes "…the weight...VInf = 8.6"
                 let name = name.rsplit("...").next().unwrap_or_default();
                 let value = pair[1].split_whitespace().next().unwrap_or_default();
-                // words of a title may stand around a sign of equality
+                // a title in words may contain an equals sign
                 if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || value.is_empty() {
                     continue;
                 }

@@ -2,8 +2,8 @@
 //!
 //! `params/widths/widths.csv` holds them: the tool's errors on aircraft whose derivatives were identified in flight
 //! or measured in a wind tunnel (`params/widths/measured.csv`, with sources), combined with a prior guess that counts
-//! as two aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n). `cargo run --no-default-features --example
-//! derivative_widths` computes them.
+//! as two aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n), with the guess g and the relative errors e
+//! of n aircraft. `cargo run --no-default-features --example derivative_widths` computes them.
 
 use std::fmt;
 use std::sync::LazyLock;

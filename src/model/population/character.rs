@@ -6,12 +6,13 @@ use crate::modes::{Rates, rates};
 use crate::{GreyBox, Trim, TrimError};
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// A number of an aircraft without a unit. Time counts in V/g at the cruise airspeed V, as in Froude's scaling.
+/// A dimensionless characteristic of an aircraft. Times are in units of V/g at the cruise airspeed V (Froude
+/// scaling).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trait {
-    /// Its name in tables.
+    /// Name in tables.
     pub name: &'static str,
-    /// What it is.
+    /// Definition in words.
     pub meaning: &'static str,
 }
 
@@ -40,7 +41,7 @@ pub const TRAITS: [Trait; 14] = [
 /// The traits of one aircraft at its cruise airspeed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Character {
-    /// In the order of [`TRAITS`].
+    /// Values of the traits, in the order of [`TRAITS`].
     pub values: [f64; TRAITS.len()],
 }
 
@@ -66,8 +67,8 @@ impl Cruise {
         Ok(Cruise { trim, rates: rates(model, &trim, altitude), excess, time })
     }
 
-    /// The short period: how fast its faster growing part grows (1/s; below zero it decays), and the frequency of its
-    /// faster part (rad/s).
+    /// The short period: the largest growth rate (1/s; negative if it decays) and the largest natural frequency
+    /// (rad/s) of the eigenvalues over q and α.
     pub(super) fn short_period(&self) -> [f64; 2] {
         let a = &self.rates.a;
         let short = Matrix2::new(a[(4, 4)], a[(4, 6)], a[(6, 4)], a[(6, 6)]);
@@ -93,10 +94,10 @@ impl Character {
         let speed = model.airframe.envelope.airspeed_cruise_mps;
         let figures = &model.airframe.actuators;
         let weight = body.mass * STANDARD_GRAVITY;
-        // moment per incidence over lift per incidence and chord; thrust and drag count as lift here
+        // pitching moment slope over lift slope times chord; the lift slope here includes thrust and drag
         let margin = a[(4, 6)] * body.jy / (a[(6, 6)] * body.mass * speed * geometry.chord);
         let [b0, a1, a2] = figures.aileron.filter;
-        // the bilinear transform turned round: 4 b0 / (1 - a1 + a2) is (w step / 2)^2
+        // inverse of the bilinear transform: 4 b0 / (1 - a1 + a2) is (w step / 2)^2
         let servo = 2.0 * (4.0 * b0 / (1.0 - a1 + a2)).sqrt() / figures.step;
         let square = time * time;
         Ok(Character {

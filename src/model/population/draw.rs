@@ -1,4 +1,4 @@
-//! One aircraft out of a distribution: its measures by the ranges, its coefficients about the textbook's.
+//! Draws of aircraft from a distribution: measures within their ranges, coefficients about textbook values.
 
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
@@ -9,15 +9,15 @@ use crate::textbook::{Drives, Estimate, Measures, Section, Tail};
 use greylag_num::stream::{Stream, stream};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Purpose of the random stream.
+/// Number of the random stream.
 const AIRCRAFT: u64 = 49;
-/// Draws of one aircraft before the distribution counts as one of nothing that flies.
+/// Number of attempts at one aircraft before the distribution is rejected as unflyable.
 const TRIES: u64 = 200;
-/// Log-normal factors are cut off here, standard deviations.
+/// Truncation of log-normal factors, standard deviations.
 const CUT: f64 = 2.5;
 /// Lift coefficient of the textbook's cruise: that of its stall over 1.6².
 const CRUISE_LIFT: f64 = 0.47;
-/// The rudder of a V-tail rolls the aircraft so much more than one on a fin.
+/// Ratio of the rolling moment by the rudder of a V-tail to that by a rudder on a fin.
 const V_TAIL_ROLL: f64 = 4.0;
 const SOURCE: &str = "drawn";
 
@@ -26,7 +26,7 @@ const SOURCE: &str = "drawn";
 pub enum Layout {
     /// Tailplane, fin, rudder.
     Conventional,
-    /// Two surfaces that are elevator and rudder.
+    /// Two surfaces that act as elevator and rudder.
     VTail,
     /// Tailplane and fin, no rudder.
     WithoutRudder,
@@ -35,7 +35,7 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// Its name in tables.
+    /// Name of the layout in tables.
     pub fn name(self) -> &'static str {
         match self {
             Layout::Conventional => "conventional",
@@ -49,17 +49,17 @@ impl Layout {
 /// A drawn aircraft.
 #[derive(Clone, Debug)]
 pub struct Drawn {
-    /// Its place among the draws of its seed.
+    /// Index among the draws of its seed.
     pub number: u64,
-    /// Its layout.
+    /// Layout of the surfaces.
     pub layout: Layout,
-    /// Static margin, parts of the chord.
+    /// Static margin as a fraction of the chord.
     pub static_margin: f64,
-    /// Delay between a command and the surface's answer, servo aside, s.
+    /// Delay between a command and the surface's response, in addition to the servo's lag, s.
     pub delay_s: f64,
-    /// Its measures, as a user could take them.
+    /// Measures of the aircraft, as a user could take them.
     pub measures: Measures,
-    /// The aircraft as it is.
+    /// The exact model of the aircraft.
     pub exact: GreyBox,
     /// The textbook model made from the measures.
     pub textbook: GreyBox,
@@ -70,10 +70,10 @@ pub struct Drawn {
 /// Why no aircraft could be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
-    /// What was drawn is no model.
+    /// The drawn values do not form a valid model.
     #[error("a drawn aircraft is no model: {0}; correct the distribution")]
     Model(String),
-    /// What was drawn does not fly.
+    /// No drawn aircraft meets the conditions of `[flyable]`.
     #[error(
         "of {} aircraft drawn none meets [flyable]; widen the distribution or its conditions",
         TRIES
@@ -96,10 +96,10 @@ fn log_normal(rng: &mut Stream, width: f64) -> f64 {
 }
 
 impl Population {
-    /// Aircraft `number` of `seed`: the same whatever else is drawn.
+    /// Aircraft `number` of `seed`. It does not depend on other draws.
     ///
     /// # Errors
-    /// If what the distribution holds cannot fly.
+    /// If no drawn aircraft is a valid model that meets the conditions of `[flyable]`.
     pub fn draw(&self, seed: u64, number: u64) -> Result<Drawn, DrawError> {
         let mut why = DrawError::NoneFlies;
         for attempt in 0..TRIES {
@@ -107,7 +107,7 @@ impl Population {
             match self.one(&mut rng, seed, number) {
                 Ok(drawn) if self.flies(&drawn.exact) => return Ok(drawn),
                 Ok(_) => {}
-                // a coefficient beyond what the catalogue takes for physical
+                // a coefficient is outside the physical bounds of the catalogue
                 Err(error) => why = error,
             }
         }
@@ -204,7 +204,7 @@ impl Population {
         sections
     }
 
-    /// Moments about all axes: the static margin, the cruise's elevator, and what is crooked.
+    /// Sets the moments about all axes: static margin, elevator at cruise, and asymmetry in roll and yaw.
     fn balanced(
         &self,
         rng: &mut Stream,
@@ -223,7 +223,7 @@ impl Population {
         change(sections, "yaw_linear", "Cn0", |_| crooked[1]);
     }
 
-    /// Moments of inertia; that of yaw is less than the sum of the others, as of any body.
+    /// Moments of inertia; Jz is less than Jx + Jy, as for every rigid body.
     fn inertia(&self, rng: &mut Stream, measures: &Measures) -> [Estimate; 4] {
         let [(_, jx, ..), (_, jy, ..), (_, jz, ..), _] = measures.inertia();
         let width = self.shape.inertia_width;
@@ -239,7 +239,7 @@ impl Population {
     }
 }
 
-/// The airframe with room for a pitch of 20° down as well as up: manoeuvres of a test, not of a first flight.
+/// Widens the airframe's pitch limit to 20° down, for test manoeuvres instead of a first flight.
 fn deeper(airframe: &str) -> String {
     airframe.replace("pitch_min_deg = -10.0", "pitch_min_deg = -20.0")
 }

@@ -12,7 +12,7 @@ use greylag_physics::airframe::{FileError, check_schema, toml_error};
 pub use character::{Character, TRAITS, Trait};
 pub use draw::{DrawError, Drawn, Layout};
 
-/// The least and the most of a number.
+/// Smallest and largest value of a quantity.
 type Range = [f64; 2];
 
 /// A distribution of aircraft, read from `params/any/aircraft.toml`. Comments in that file explain each number.
@@ -94,7 +94,7 @@ impl Population {
     /// Reads a distribution (`schema = 1`).
     ///
     /// # Errors
-    /// If the file cannot be read, is no such TOML, or has a range whose ends are no numbers in order.
+    /// If the file cannot be read, is not TOML of this schema, or has a range whose ends are not finite and in order.
     pub fn load(path: &Path) -> Result<Population, FileError> {
         let what = "distribution of aircraft";
         let text = greylag_physics::text_file::read(path).map_err(|why| FileError::Read {
@@ -106,7 +106,7 @@ impl Population {
         Population::parse(&text).map_err(|why| FileError::Content { what, path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error is what is wrong with it.
+    /// [`load`](Self::load) from the file's text; the error describes the fault.
     pub fn parse(text: &str) -> Result<Population, String> {
         let read: Population = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(read.schema, 1)?;

@@ -10,7 +10,7 @@ impl Register for __m128 {
         _mm_sqrt_ps _mm_set1_ps _mm_loadu_ps _mm_storeu_ps);
     #[inline(always)]
     fn neg(self) -> Self {
-        // SAFETY: as the trait demands; so below
+        // SAFETY: as the trait demands, the processor has the instructions; this applies below as well
         unsafe { _mm_xor_ps(self, _mm_set1_ps(-0.0)) }
     }
     #[inline(always)]
@@ -74,7 +74,7 @@ impl Register for __m256 {
         _mm256_max_ps _mm256_sqrt_ps _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps);
     #[inline(always)]
     fn neg(self) -> Self {
-        // SAFETY: as the trait demands; so below
+        // SAFETY: as the trait demands, the processor has the instructions; this applies below as well
         unsafe { _mm256_xor_ps(self, _mm256_set1_ps(-0.0)) }
     }
     #[inline(always)]
@@ -123,7 +123,7 @@ impl Register for __m512 {
         _mm512_max_ps _mm512_sqrt_ps _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps);
     #[inline(always)]
     fn neg(self) -> Self {
-        // SAFETY: as the trait demands; so below
+        // SAFETY: as the trait demands, the processor has the instructions; this applies below as well
         unsafe {
             let sign = _mm512_set1_epi32(i32::MIN);
             _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(self), sign))

@@ -18,7 +18,7 @@ const PLACES: usize = 25;
 /// Indices of the knots at which a curve is zero, 0° and 4°, the usual range of flight.
 const ZERO: [usize; 2] = [4, 6];
 
-/// Coefficients of a curve: its ordinate at every other knot, named like `CL_m8` or `CL_p20`.
+/// Coefficients of a curve: its ordinates at the knots that are not fixed at zero, named like `CL_m8` or `CL_p20`.
 macro_rules! heights {
     ($letter:literal, $bounds:expr) => {
         super::curve::heights!($letter, $bounds,

@@ -7,8 +7,8 @@ use crate::{Channel, Point, rigid_body};
 /// A constant force at the centre of gravity along gravity.
 ///
 /// A tether or a tow also pulls along the ground, in a direction fixed there; the state has no heading, so only the
-/// vertical part of such a force is modelled. It has no mass of its own: a load that moves with the aircraft
-/// corresponds to `mass_error` instead.
+/// vertical part of such a force is modelled. The load adds no mass: a load that moves with the aircraft corresponds
+/// to `mass_error` instead.
 pub struct ExternalLoad;
 
 impl Effect for ExternalLoad {

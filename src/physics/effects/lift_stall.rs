@@ -50,8 +50,8 @@ impl Effect for LiftStall {
     fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let &[alpha0, sharpness] = own.shape else { return };
         let alpha = at.state.alpha;
-        // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), the exponents held
-        // where e stays finite in f32
+        // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), with the exponents limited so that
+        // the exponential stays finite in f32
         let above = power(R::from_f64(alpha0) - alpha, sharpness);
         let below = power(R::from_f64(alpha0) + alpha, sharpness);
         let one = R::from_f64(1.0);

@@ -396,7 +396,7 @@ fn starts(
             }
         }
     }
-    // an amount of the other sign bends the other way
+    // the same starting points with the coefficients' signs reversed
     let mirrored = |start: &Vec<f64>| {
         let mut other = start.clone();
         for k in 0..linear {

@@ -103,7 +103,8 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
             other.name()
         ));
     }
-    // a number has no bounds, and a search puts all effects without shape constants into one model
+    // a literal number has no bounds, and an effect without a shape constant would share one model with all such
+    // effects in a search
     let Node::Parameter(k) = time.node else {
         return Some(format!("the time of {name} must be a parameter in s, so that it has bounds"));
     };

@@ -7,7 +7,7 @@ use super::parser::Fault;
 pub type Parts = Vec<(usize, Expression)>;
 
 /// Marks which of `count` parameters all of `formulas` are linear in: those that occur in no function or denominator,
-/// and in no product with another one, of which the leftmost counts.
+/// and in no product with another such parameter. Of the parameters of a product, the leftmost stays linear.
 pub fn linear(formulas: &[Expression], count: usize) -> Vec<bool> {
     let mut linear = vec![true; count];
     loop {

@@ -1,7 +1,7 @@
 //! A formula compiled to a list of operations, generic over the scalar.
 //!
-//! It is a stack machine whose top is kept in a register. Derivatives come from running it with
-//! [`Dual`](greylag_num::Dual) numbers: of eight states and three controls at once.
+//! It is a stack machine whose top is kept in a register. Derivatives by states and controls come from running it
+//! with [`Dual`](greylag_num::Dual) numbers.
 
 use super::expression::{Expression, Function, Node};
 use super::memory::Memory;
@@ -37,7 +37,7 @@ enum Operation {
     Sqrt,
     Smoothstep,
     Deadband,
-    /// Replaces the top by the lag or delay of that index if the past is known; else keeps it, the value it settles to.
+    /// Replaces the top by the lag or delay of that index if the past is known; else keeps it: the settled value.
     Remembered(u16),
     Square,
     Power(i16),
@@ -220,7 +220,7 @@ impl Tape {
         if function.has_memory() {
             return self.remembered(function, all, places);
         }
-        // a leaf to the right, or to the left of what may change its side, needs no place on the stack
+        // an addend that is a number or a variable is added directly, without a place on the stack
         if let ([left, right], F::Add) = (all, function) {
             for (leaf, other) in [(right, left), (left, right)] {
                 if let Some(direct) = direct(function, &leaf.node) {

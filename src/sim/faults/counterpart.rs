@@ -150,7 +150,8 @@ impl Aircraft {
         }
     }
 
-    /// Sets the flight controller's loiter mode as a ground station does; whether there is a flight controller.
+    /// Sets the flight controller's loiter mode as a ground station does; returns whether there is a flight
+    /// controller.
     pub(super) fn take_over(&mut self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,

@@ -162,7 +162,8 @@ impl CompanionFactory {
         Ok(Report { case, faults: scenario.faults, findings, texts: flight.texts })
     }
 
-    /// Flies `scenario`; its samples of every 10 ms and the findings of the judge. The samples end with a panic.
+    /// Flies `scenario` and returns its samples of every 10 ms and the findings of the judge. The samples end at a
+    /// panic.
     ///
     /// # Errors
     ///
@@ -274,7 +275,7 @@ struct Flight {
     /// Sum of the jumps of the vehicle's clock, µs.
     clock_us: i64,
     armed: bool,
-    /// Whether the companion has ended, and its successors.
+    /// Whether the companion has been killed; `spares` are its successors.
     killed: bool,
     spares: Vec<Desk>,
     /// Time of the last arrival, while controlling through a real controller.

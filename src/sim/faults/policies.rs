@@ -370,7 +370,7 @@ fn of_reports() -> Vec<Policy> {
             ..policy(
                 "hand-back-reported",
                 "the end of steering is reported within 1 s, unless a fault keeps it from the companion",
-                // the companion learns of it through its link
+                // the companion notices the change only through its link
                 is(|s| s.disturbed).once(1.0).or(reported(is(|s| !s.steered))),
             )
         },

@@ -9,7 +9,7 @@ use super::counterpart::Counterpart;
 use super::mix::{FIRST_S, Fault, FaultKind, LAST_S, draw, one};
 use greylag_link::autopilot::Mode;
 
-/// Smallest and largest numbers of faults, requests and legs of a random scenario.
+/// Largest number of faults, and of requests, in a random scenario.
 const MOST: usize = 4;
 /// Largest steady wind, m/s, and turbulence (curve of MIL-F-8785C) of a scenario.
 const WIND_MPS: f64 = 8.0;
@@ -228,7 +228,7 @@ impl Scenario {
                 fault.strength = (fault.strength + random.random_range(-0.3..0.3)).clamp(0.0, 1.0);
             }
             7 if changed.legs.len() > 1 => {
-                // the last leg is level, which the end is judged by
+                // the last leg stays level, because the end of the flight is judged against it
                 let place = random.random_range(0..changed.legs.len() - 1);
                 let leg = &mut changed.legs[place];
                 leg.roll_deg = random.random_range(-60.0..60.0);

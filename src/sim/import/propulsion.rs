@@ -8,7 +8,7 @@ use greylag_model::textbook::Estimate;
 use greylag_num::{Grid, least_squares};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Fraction of a channel's variation that is reported when it is left.
+/// Fraction of the largest thrust above which the rms residual of the thrust polynomial is reported.
 const REPORTED_FROM: f64 = 0.02;
 /// Throttle before and after the step that measures the engine's lag.
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];

@@ -24,7 +24,7 @@ impl Flight {
         }
     }
 
-    /// Ends the companion, and starts another when the fault ends; whether one is running.
+    /// Ends the companion, and starts another when the fault ends; returns whether one is running.
     pub(super) fn is_alive(&mut self, acting: &[Fault]) -> bool {
         let killed = acting.iter().any(|fault| fault.kind == FaultKind::Killed);
         if killed && !self.killed {
