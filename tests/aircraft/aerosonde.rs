@@ -196,6 +196,15 @@ fn a_turn_is_trimmed_without_sideslip_where_there_is_a_rudder() {
 }
 
 #[test]
+fn a_reconstructed_flight_keeps_its_rudder() {
+    let rebuilt = &FLIGHTS[0];
+    let instants = rebuilt.segments.iter().flat_map(|s| &s.instants);
+    let written: Vec<f64> = rebuilt.to_flight().samples.iter().map(|s| s.rudder_rad).collect();
+    assert_eq!(written, instants.map(|i| i.controls.rudder).collect::<Vec<_>>());
+    assert!(written.iter().any(|deflection| deflection.abs() > 0.02));
+}
+
+#[test]
 fn a_missing_rudder_is_said_first_and_named() {
     let found = asked(&changed(|text| without(&text, "rudder_linear")));
     assert!(found.sentences[0].starts_with("The rudder moves"), "{:?}", found.sentences[0]);

@@ -99,10 +99,11 @@ impl Reconstruction {
         Some(found.sd).filter(|sd| sd.is_finite())
     }
 
-    /// The flight as a log: reconstructed states and specific force, altitude, air density, deflections and commands. The
-    /// rudder's are left out.
+    /// The flight as a log: reconstructed states and specific force, altitude, air density, deflections and commands; those of the
+    /// rudder if it moves.
     pub fn to_flight(&self) -> Flight {
         let rate_hold_s = if self.sampling == Sampling::Held { self.step_s } else { 0.0 };
+        let of_rudder = |x: f64| if self.rudder.is_some() { x } else { f64::NAN };
         let sample = |i: &Instant| {
             let (s, z) = (&i.state, &i.controls);
             let command = i.command.unwrap_or(Command {
@@ -124,9 +125,11 @@ impl Reconstruction {
                 aileron_rad: z.aileron,
                 elevator_rad: z.elevator,
                 throttle: z.throttle,
+                rudder_rad: of_rudder(z.rudder),
                 aileron_cmd: command.aileron,
                 elevator_cmd: command.elevator,
                 throttle_cmd: command.throttle,
+                rudder_cmd: of_rudder(command.rudder),
                 rate_hold_s,
                 ..Sample::default()
             }
