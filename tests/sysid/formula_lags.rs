@@ -100,7 +100,7 @@ fn what_cannot_be_remembered_is_refused_with_its_cure() {
         ("k*lag(alpha, tau)", "[0.0, 3.0]", "alpha_dot"),
         ("k*lag(throttle, throttle) + 0*k*tau", "[0.0, 3.0]", "a parameter in s"),
         ("k*lag(throttle, 0.3) + 0*k*tau", "[0.0, 3.0]", "so that it has bounds"),
-        ("k*lag(lag(throttle, tau), tau)", "[0.0, 3.0]", "write one of them"),
+        ("k*lag(lag(throttle, tau), tau)", "[0.0, 3.0]", "write only one"),
         ("k*lag(throttle, tau)", "[-1.0, 3.0]", "bounds"),
         ("k*delay(throttle, tau)", "[0.0, 3.0]", "0.22 s"),
         ("k*lag(throttle)", "[0.0, 3.0]", "2 arguments"),
