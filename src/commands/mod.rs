@@ -224,7 +224,7 @@ pub fn main() -> ExitCode {
         (_, 1) => LevelFilter::INFO,
         (_, 2..) => LevelFilter::DEBUG,
     };
-    // the program prints its own notes in place of the warnings of the port of JSBSim on an aircraft's XML
+    // our notes replace the warnings of the JSBSim library on an aircraft's XML
     let port = if level == LevelFilter::WARN { LevelFilter::OFF } else { level };
     let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter =
@@ -306,7 +306,7 @@ fn command_of(line: &[OsString]) -> Result<Command> {
     Ok(Arguments::try_parse_from(words)?.command)
 }
 
-/// Refuses a line that is no stage of a learning and no cell of a campaign.
+/// Rejects lines that are neither a learning stage nor a campaign cell.
 #[cfg(feature = "study")]
 fn check_line(line: &[OsString]) -> Result<()> {
     match command_of(line)? {
@@ -318,7 +318,7 @@ fn check_line(line: &[OsString]) -> Result<()> {
     }
 }
 
-/// Carries a stage of a learning or a cell of a campaign out, until `stop` is set.
+/// Runs a learning stage or a campaign cell until `stop` is set; an evaluation does not look at `stop`.
 #[cfg(feature = "study")]
 #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {

@@ -9,14 +9,15 @@ use greylag_model::{GreyBox, Integrator, Trim, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
-/// Step and largest value of the delays that are tried, ms; a loop that is stable at the largest
-/// has enough margin.
+/// Step of the delays that are tried, ms.
 const STEP_MS: usize = 4;
+/// Largest delay that is tried, ms; a loop that is stable with it has enough margin.
 const LONGEST_MS: usize = 120;
-/// Length of a simulation in ticks, with a full-deflection pulse in this range; the last two seconds are judged, as
-/// `examples/delay_margin.rs` does in JSBSim.
+/// Length of a simulation, ticks.
 const TICKS: usize = 1000;
+/// Ticks of the full-deflection pulse.
 const PULSE: std::ops::Range<usize> = 100..110;
+/// First tick that is judged: the last two seconds count, as in JSBSim with `examples/delay_margin.rs`.
 const END: usize = 800;
 /// Peak-to-peak rate at the end of a simulation that counts as an oscillation, rad/s (10 °/s).
 const SWING: f64 = 0.17;
@@ -24,9 +25,9 @@ const SWING: f64 = 0.17;
 const TICK_MS: usize = 10;
 
 /// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate after a pulse of
-/// full deflection, in level flight at the cruise airspeed; `None` if it is stable up to 0.12 s.
+/// full deflection, in level flight at the cruise airspeed. `None` if it is stable up to 0.12 s, or if the trim fails.
 ///
-/// The observed surface positions are undelayed, as with a real flight controller, which does not report them.
+/// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
 /// The search takes about a second for a controller that computes its command in microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
     // JSBSim's Euler steps delay the attitude by one cycle, which no aircraft does

@@ -4,15 +4,15 @@ use super::columns::{COLUMNS, Place, index};
 use super::mapping::Mapping;
 use greylag_physics::mixer::{Does, Mixer};
 
-/// The share of one column of a file in one of the log format.
+/// Contribution of one file column to one log-format column.
 pub(super) struct Share {
-    /// The column of the file, by its place.
+    /// Index of the file column.
     pub field: usize,
-    /// The column that it is a part of.
+    /// Name of the log-format column.
     pub column: &'static str,
     /// Place of that column in a sample.
     pub place: Place,
-    /// Factor of the column's value.
+    /// Factor on the file column.
     pub share: f64,
 }
 
@@ -20,8 +20,8 @@ pub(super) struct Share {
 const DEFLECTIONS: [&str; 4] = ["aileron_rad", "elevator_rad", "rudder_rad", "throttle"];
 const COMMANDS: [&str; 4] = ["aileron_cmd", "elevator_cmd", "rudder_cmd", "throttle_cmd"];
 
-/// The columns that `names` make through the mixer of `mapping`: NAME_rad of a surface and NAME_throttle of a motor
-/// make deflections, NAME_cmd makes commands. Columns that the file or the mapping already has are unchanged.
+/// Log-format columns computable from `names` with the mixer of `mapping`: NAME_rad and NAME_throttle give deflections and
+/// throttle; NAME_cmd gives commands. Columns that the file or the mapping already has are left out.
 pub(super) fn columns(names: &[String], mapping: &Mapping) -> Vec<Share> {
     let Some(mixer) = mapping.mixer() else { return Vec::new() };
     let deflections: Vec<[f64; 4]> = mixer.shares().collect();

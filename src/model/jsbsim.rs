@@ -39,7 +39,7 @@ const ELEVATOR: &str = "fcs/elevator-pos-rad";
 const RUDDER: &str = "fcs/rudder-pos-rad";
 const THROTTLE: &str = "fcs/throttle-pos-norm";
 
-/// Files of `model` as the aircraft `name`, always in the condition of the model's airframe.
+/// Files of `model` as the aircraft `name` in a single condition, that of the model's airframe.
 pub fn export(model: &GreyBox, name: &str) -> Exported {
     written(&Conditions::one(model), name)
 }
@@ -148,7 +148,7 @@ fn coefficient(model: &GreyBox, name: &str) -> f64 {
 
 fn product(value: f64, factors: &[&str], indent: &str) -> String {
     if factors.is_empty() {
-        // JSBSim warns of a product of one
+        // JSBSim warns about a product with a single factor
         return format!("{indent}<value>{value:?}</value>\n");
     }
     let properties: String = factors.iter().map(|f| format!(" <property>{f}</property>")).collect();

@@ -2,11 +2,11 @@
 //!
 //! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
 //! [`Page::render`] turns them into one string with style, script and data inside.
-//! There is a page for each kind of result: a flight ([`FlightReport`]), models compared with flights
-//! ([`ComparisonReport`]), a missing effect ([`DiagnosisReport`]), the amended model ([`AmendmentReport`]), a trained model
-//! (`TrainingReport`), the training of policies (`LearningReport`), controllers (`EvaluationReport`), and a campaign
-//! (`CampaignReport`). The plots are drawn in the reader's browser by uPlot 1.6.32 (MIT,
-//! `kit/assets/uPlot.LICENSE`), which is embedded.
+//! There is a page for each kind of result: an aircraft's model (`AircraftReport`), an effect of the catalogue
+//! (`EffectReport`), a flight ([`FlightReport`]), models compared with flights ([`ComparisonReport`]), a missing effect
+//! ([`DiagnosisReport`]), the amended model ([`AmendmentReport`]), a trained model (`TrainingReport`), the training of
+//! policies (`LearningReport`), controllers (`EvaluationReport`), and a campaign (`CampaignReport`). The plots
+//! are drawn in the reader's browser by uPlot 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`), which is embedded.
 //!
 //! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
 

@@ -20,7 +20,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Reads an answer; `None` when a control that is used is not a finite number.
+    /// Reads an answer; `None` when aileron, elevator or throttle is not finite. A non-finite rudder becomes 0.
     pub fn read(message: &HilActuatorControls) -> Option<Self> {
         let [aileron, elevator, throttle, rudder, ..] = message.controls;
         if ![aileron, elevator, throttle].iter().all(|control| control.is_finite()) {

@@ -39,7 +39,7 @@ impl Faults {
     }
 }
 
-/// A duration from milliseconds that are known to be finite, positive and bounded.
+/// A duration from milliseconds that are known to be finite, positive or zero, and bounded.
 pub(super) fn milliseconds(ms: f64) -> Duration {
     Duration::from_secs_f64(ms * 1e-3)
 }

@@ -37,7 +37,7 @@ const STEPS: usize = 50;
 const WAIT: usize = 500;
 
 /// Ticks between trials of the LQI's flight as a starting point. Without these trials, steps with 40 ms of delay
-/// overshoot more often (18 instead of 10 %); at every tick they would take a sixth of the time.
+/// overshoot more often (18 instead of 10 %). At every tick, the trial takes one sixth of the controller's computing time.
 const EVERY: usize = 5;
 
 /// Aileron and elevator commands as fractions of the largest deflection.
@@ -68,8 +68,8 @@ impl Ilqr {
         Ilqr::with("ilqr", model, lqi, None, Settings::PLAIN)
     }
 
-    /// A planner with `settings`, registered under `name`. The policy of `agent`, if there is one, is a further
-    /// starting point.
+    /// A planner with `settings`, registered under `name`. The policy of `agent` is a further starting point, but only
+    /// with `Start::Policy`.
     pub fn with(
         name: &'static str,
         model: &GreyBox,
@@ -101,7 +101,8 @@ impl Ilqr {
         }
     }
 
-    /// The first `N` steps (at most 50) of this tick's plan, aileron and elevator; `None` if no plan is finite.
+    /// The first `N` steps (at most 50) of this tick's plan, aileron and elevator. `None` if no plan is finite, and
+    /// while the LQI flies after a wrong prediction.
     pub(crate) fn plan<const N: usize>(
         &mut self,
         seen: &Observation,
@@ -112,7 +113,8 @@ impl Ilqr {
     }
 }
 
-/// How `model` approaches a target along a path; `None` if the plan follows the target itself.
+/// How `model` approaches a target along a path. `None` if the plan follows the target itself, or if the model has no
+/// roll rate at cruise.
 fn approach(model: &GreyBox, towards: Towards) -> Option<Approach> {
     match towards {
         Towards::Target => None,
@@ -205,7 +207,7 @@ impl Controller for Ilqr {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // a plan restarts from the observation, but the LQI has integrators
+        // a plan holds no integrators; the LQI has them and is informed only while it flies
         if self.desk.plan.is_none() {
             self.lqi.overruled(by);
         }

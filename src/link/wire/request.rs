@@ -124,7 +124,7 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     Some(found)
 }
 
-/// Decodes the messages without enumerations, which the codec never rejects.
+/// Decodes messages without enum fields; the codec rejects unknown enum values.
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {

@@ -109,7 +109,8 @@ pub struct Turn {
     pub topic: String,
     /// Fields of the four components, in the order of the file.
     pub fields: [String; 4],
-    /// Order of the components; if `None`, it is found from body rates and gravity.
+    /// Order of the components. If `None`, that of a CSV table is found from body rates and gravity; other formats have
+    /// wxyz.
     pub order: Option<Order>,
 }
 
@@ -172,7 +173,7 @@ impl Mapping {
         flies
     }
 
-    /// Whether any column is differentiated over several rows of another one.
+    /// Whether any column is computed by differentiating another over several rows.
     pub(super) fn derives(&self) -> bool {
         self.body_rates_over_s.is_some() || self.slopes().next().is_some()
     }
@@ -211,7 +212,7 @@ impl Mapping {
         }
     }
 
-    /// The mapping with the mixer of an aircraft whose surfaces and motors the log names.
+    /// Sets the mixer; the log names this aircraft's surfaces and motors.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Mapping {
         Mapping { mixer, ..self }
     }

@@ -2,9 +2,10 @@
 //!
 //! A simulator with explicit Euler steps logs the rate that it holds until the next sample. Interpreted as a sample
 //! at an instant, that rate is half a sample period early, and every other sensor seems delayed by as much. A log
-//! that does not state its sampling is therefore first interpreted as samples at instants. If all its clocks then
-//! agree on half a period, and agree on zero with held rates, the rates are held. Means over a sample period need no
-//! case of their own: their gyros are delayed by half a period, which the estimated clock skews absorb.
+//! that does not state its sampling is therefore first interpreted as samples at instants. If the known time offset
+//! of every sensor is half a period under samples at instants, and zero under held rates, the rates are held. Means over
+//! a sample period need no case of their own: their gyros are delayed by half a period, which the estimated clock skews
+//! absorb.
 
 use crate::flight_path::ReconstructError;
 use crate::flight_path::equations::{Found, Problem};
@@ -22,7 +23,7 @@ const KNOWN: f64 = 0.1;
 /// Largest difference between the clocks of one simulator, as a share of the sample period, due to interpolation
 /// errors.
 const AGREE: f64 = 0.03;
-/// The same limit in standard deviations of each clock.
+/// Further tolerance in standard deviations of each clock; it is added to `AGREE`.
 const DEVIATIONS: f64 = 3.0;
 
 /// The sampling of a log with the path estimated under it, and a note on the choice.

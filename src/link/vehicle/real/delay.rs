@@ -20,7 +20,7 @@ pub struct Delays {
     stack: Stack,
     /// Cut-off of the gyros' low-pass, Hz, and its delay, s.
     gyros: (f64, f64),
-    /// Rate of the controller's loop, Hz, and its period, s; `None` where it is as fast as the streams.
+    /// Loop rate (Hz) and period (s) of the flight controller; `None` if its delay is negligible (PX4).
     cycle: Option<(f64, f64)>,
     /// Sampling period of the channels, s.
     channels_s: f64,

@@ -109,7 +109,7 @@ impl Answer {
             .filter(|l| !l.is_empty())
     }
 
-    /// The answer as a short phrase: `error at 5 s 0.0873 → 0.00083 (−99 %)`.
+    /// The answer as a short phrase: `error at 5 s 0.0873 → 0.00083 (−99.0 %)`.
     pub fn summary(&self) -> String {
         words::summary(&self.numbers)
     }
@@ -180,7 +180,7 @@ mod tests {
             "On 2 flights not fitted the error at 5 s falls from 0.0873 to 0.0234 by tuning (−73 %) and to 0.00083 with \
              drag_beta2 (another −96 %)."
         );
-        // the airspeed's error falls most by the effect, 0.05 to 0.002 of its scale; sideslip's is left, 0.0067 of its own
+        // the effect lowers the scaled error of airspeed most, from 0.05 to 0.002; the largest one left is sideslip's, 0.0067
         assert_eq!(
             answer.effect,
             "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \

@@ -14,8 +14,9 @@ pub enum Verdict {
     Adequate,
     /// Something is missing, but no effect of the catalogue explains it.
     Unexplained,
-    /// The flights allow no verdict: one of their figures is impossible, or remaining sensor errors may account for
-    /// the whole residual.
+    /// The flights allow no verdict. A figure is physically impossible; or remaining sensor errors may account for the
+    /// residual in every channel; or the given model has no certain error; or a flexible model of the states removes
+    /// little of the residual.
     Unknown,
 }
 
@@ -60,9 +61,9 @@ pub struct Diagnosis {
     pub tuned: Vec<Tuned>,
     /// Advice on the next flight, the most useful first.
     pub advice: Vec<Advice>,
-    /// Null flights, which lack no effect, that determine the thresholds.
+    /// Evidence in the null flights, in which no effect is missing; it determines the thresholds.
     pub nulls: Nulls,
-    /// Decoys, columns that cannot be effects, as a check on the level of chance.
+    /// Decoy regressors, as a check on false detections.
     pub decoys: Vec<Decoy>,
     /// Share of the residual's variance beyond noise that a flexible model, trained on the other flights, could still
     /// remove after the asserted effects; NaN (null) if it was not computed.
@@ -121,7 +122,7 @@ pub enum Status {
     Small,
     /// The evidence exceeds the threshold, but a further check failed.
     Refused,
-    /// The flights do not show it, although they would have shown its smallest detectable amount.
+    /// Evidence is below the threshold, so at most a small effect is present.
     NotShown,
 }
 
@@ -213,7 +214,7 @@ pub struct FlightTrim {
     pub flight: String,
     /// Name of the trim: `CD0`, `CL0`, `CY0`, `Cl0`, `Cm0`, `Cn0`, or `thrust_share`, a share of the model's thrust.
     pub name: String,
-    /// Prior standard deviation, about zero.
+    /// Prior standard deviation (prior mean zero).
     pub prior_sd: f64,
     /// Estimate, dimensionless, to be added to the model's coefficient.
     pub value: f64,
@@ -251,8 +252,9 @@ pub struct Advice {
     pub between: Option<[String; 2]>,
 }
 
-/// Null flights, which determine the thresholds: the flights under the tuned model with the noise of the richest fit,
-/// its sign drawn at random block by block, and with prior errors drawn within the prior's widths.
+/// Null flights, which determine the thresholds. Each is the set of flights under the tuned model with the noise of the
+/// richest fit. The sign of this noise is drawn at random block by block, and errors of the coefficients are drawn from
+/// their prior.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
     /// Number of null flights.

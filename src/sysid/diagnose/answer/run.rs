@@ -27,19 +27,21 @@ use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics as physics;
 
-/// Least share of the error beyond noise that must be learnable before the verdict is that something is missing;
-/// errors of the reconstruction leave less.
+/// Smallest learnable share of the error beyond noise for the verdict that something is missing; reconstruction errors
+/// stay below it.
 const WORTH_SAYING: f64 = 0.1;
-/// The same share where an effect of the catalogue was refused for its shape or its flights.
+/// The same threshold after a catalogue effect was refused for a reason other than its small size.
 const REFUSED: f64 = 0.01;
-/// Reason to refuse effects beside a physically impossible figure.
+/// Reason for refusing every effect when any figure is physically impossible.
 const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
 /// Reason to refuse an effect whose contribution another one accounts for.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
-/// Determines which effects of the catalogue `model` lacks according to `flights`, which must have been reconstructed
-/// with their deflections as recorded; reports to `progress`, which may cancel.
+/// Determines which effects of the catalogue `model` lacks according to `flights`.
+///
+/// The flights must have been reconstructed with their deflections as recorded. Progress goes to `progress`, which may
+/// cancel.
 ///
 /// # Errors
 /// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or `progress`
@@ -76,7 +78,7 @@ pub fn diagnose(
     Ok(diagnosis)
 }
 
-/// The diagnosis of flights of which the file of `model` knows nothing.
+/// Diagnosis without the constants of single flights in the model file.
 fn of_unknown(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -147,10 +149,10 @@ fn settings(options: &Options) -> Settings {
     }
 }
 
-/// Objections to effects beyond the search's own checks.
+/// Objections to effects beyond the search's own checks, and the tuned coefficients.
 struct Judged {
     abstained: [Option<String>; 6],
-    /// Whether `compare` finds no sure error of the model as given in any channel.
+    /// Whether `compare` finds no certain error of the model as given in any channel.
     faultless: bool,
     tuned: Vec<Tuned>,
     doubtful: Vec<String>,
@@ -178,9 +180,10 @@ fn judge(
 
 /// The verdict and, if it is [`Verdict::Unknown`] for lack of evidence, the reason.
 ///
-/// No effect is asserted if figures are impossible, if no channel can be judged, if the given model has no certain error,
-/// or if a flexible model of the states removes little of the residual: it is then not a function of the states, for
-/// example timing errors or filtered sensors.
+/// Impossible figures override any verdict. Three further conditions turn only `Unexplained` into `Unknown`: no
+/// channel can be judged, the given model has no certain error, or a flexible model of the states removes little of the
+/// residual. In the last case the residual is not a function of the states; timing errors or filtered sensors leave such
+/// residuals.
 fn spoken(
     found: &Found,
     doubtful: &[String],
@@ -201,8 +204,7 @@ fn spoken(
     }
 }
 
-/// Why these flights cannot judge `model` as given in a channel, and whether they show no sure error of it in any, as
-/// `compare` has it.
+/// From `compare`: why each channel cannot be judged, and whether no channel has a certain error.
 fn compared(
     model: &GreyBox,
     flights: &[&Reconstruction],

@@ -1,4 +1,4 @@
-//! Free forms, for residuals that the library's formula does not explain or explains only in part.
+//! Free forms: formulas searched freely in a grammar, where the library's shapes leave a residual.
 
 use super::forward::{Ask, Climbed, ORDER, candidates};
 use super::free::search::{Fitted, Searched, searched};
@@ -12,17 +12,18 @@ use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// A formula is doubtful if a flexible model can remove further error, at least this share of the error that the formula
-/// removed.
+/// Free forms are tried if a flexible model could remove a further error of more than this share of the error that the
+/// library's formula already removes.
 const MATERIAL: f64 = 0.02;
-/// A simpler form may remove less than the best one by this share: even an exact formula of a strong effect leaves a
-/// residual of that order, from errors of the reconstructed path.
+/// The simplest form whose error reduction is within this share of the best one's is chosen, because even an exact
+/// formula of a strong effect leaves a residual of that order, from errors of the reconstructed path.
 const BEHIND: f64 = 0.01;
-/// A larger formula must lower the squared error by this much more than a smaller one.
+/// Minimum further reduction of the squared whitened error that justifies a larger formula.
 const WORTH: f64 = 10.0;
 
 /// Reason why free forms are tried, and the channels. `None` if the library's formula suffices: a flexible model removes
-/// hardly more, one shape is enough for the channel, and no significant second one was left out.
+/// hardly more, one shape is enough for the channel, and no significant second one was left out. `None` also if the model
+/// cannot be evaluated over the flights, or if no channel counts.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {
@@ -57,8 +58,8 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Searches free forms in `channels` of the residual of `tuned`, together with the library's best ones. `None` if the
-/// model cannot be evaluated over the flights.
+/// Searches free forms for `channels` in the residual of `tuned`, then selects among them and the library's best forms.
+/// `None` if the library's search tried nothing, or if the model cannot be evaluated over the flights.
 ///
 /// # Errors
 /// `progress` cancelled.
@@ -95,7 +96,7 @@ pub(super) fn beyond(
         ..*ask
     };
     let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
-    // the reduction by a form includes that by coefficients which had compensated for its absence
+    // a form's reduction includes that from coefficients which no longer compensate for its absence
     let falls = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| f.fall));
     let whole = falls.fold(library.excess, f64::max);
     let rung = |f: &Fitted, threshold: f64| Rung {
@@ -121,8 +122,12 @@ fn as_of_library(form: Form) -> Form {
     of.into_iter().find(same).unwrap_or(form)
 }
 
-/// Whether the formula with free forms replaces the library's: it removes more, or it removes as much and is simpler,
-/// or it is the same with other constants, which the library takes from quantiles of the flights and does not fit.
+/// Whether the formula `free` replaces the library's.
+///
+/// - With the same structure and other constants, it must reduce the error by more than `WORTH` beyond the library's,
+///   which takes its constants from quantiles of the flights and does not fit them.
+/// - If it is simpler, it may reduce the error less, by `WORTH` or the share `BEHIND`, whichever is larger.
+/// - Otherwise it must reduce the error more by that amount.
 pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     let taken = |c: &Climbed| c.removed() * library.excess;
     let more = taken(free) - taken(library);
