@@ -122,7 +122,7 @@ pub enum Status {
     Small,
     /// The evidence exceeds the threshold, but a further check failed.
     Refused,
-    /// Evidence is below the threshold, so at most a small effect is present.
+    /// The evidence is below the threshold.
     NotShown,
 }
 
