@@ -86,6 +86,7 @@ impl Bar {
     }
 
     /// Prints a line of the result above the bar.
+    #[cfg(feature = "study")]
     pub fn print(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| println!("{line}")),

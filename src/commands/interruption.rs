@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+#[cfg(any(feature = "demo", feature = "study"))]
 use anyhow::{Context, Result};
 
 use crate::commands::status;
@@ -26,6 +27,7 @@ impl Interruption {
     ///
     /// # Errors
     /// If the handler cannot be set.
+    #[cfg(any(feature = "demo", feature = "study"))]
     pub fn watch() -> Result<Interruption> {
         let flag = Interruption::default();
         let seen = flag.0.clone();

@@ -4,6 +4,7 @@
 /// one another.
 pub const IN_DOUBT: u8 = 3;
 /// Not done, and a later attempt may succeed: `EX_TEMPFAIL` of sysexits.h.
+#[cfg(feature = "study")]
 pub const TRY_AGAIN: u8 = 75;
 /// Exit status after Ctrl-C: 128 plus the number of SIGINT.
 pub const INTERRUPTED: u8 = 130;

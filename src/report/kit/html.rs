@@ -1,10 +1,12 @@
 //! Text and data escaped for an HTML page.
 
+#[cfg(feature = "study")]
 use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
 /// Number of files that a line names.
+#[cfg(feature = "study")]
 const NAMED: usize = 6;
 
 /// `text` with the five characters that mean something to HTML replaced; safe as element text
@@ -27,6 +29,7 @@ pub fn escape(text: &str) -> String {
 }
 
 /// Names of the files without their folders, the first ones of many; the provenance has the paths.
+#[cfg(feature = "study")]
 pub(crate) fn file_names(paths: &[String]) -> String {
     let name = |path: &String| {
         Path::new(path).file_name().map_or(path.clone(), |name| name.to_string_lossy().into_owned())
