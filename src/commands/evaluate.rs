@@ -25,7 +25,7 @@ use crate::control::quality::Limits;
 use crate::control::{Controller, ControllerKind, Needs, Source, Target, build};
 use crate::logs::quoted;
 use crate::model::GreyBox;
-use crate::report::EvaluationReport;
+use crate::report::{EvaluationReport, evaluation_best};
 use crate::sim::episode::STEPS;
 use crate::sim::evaluation::{Course, Evaluation, evaluate_courses};
 use crate::sim::tracking::{Tracking, track};
@@ -233,12 +233,7 @@ fn page(
 /// models or policies flew, because a controller's name does not identify their files, and if the user's own aircraft
 /// flew, because the command would have to repeat its options.
 fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
-    let mean = |e: &&Evaluation| {
-        let of = e.groups.iter().max_by_key(|score| score.count);
-        of.map_or(f64::INFINITY, |score| score.mean_deg)
-    };
-    let best = evaluations.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)));
-    match (best, &arguments.models[..], &arguments.policies[..]) {
+    match (evaluation_best(evaluations), &arguments.models[..], &arguments.policies[..]) {
         (Some(best), [model], [policy]) if plant.aircraft_dir.is_none() => format!(
             "greylag demo --aircraft {} --controller {} --model {} --policy {}",
             plant.aircraft,

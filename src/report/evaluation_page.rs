@@ -286,6 +286,27 @@ mod tests {
         assert!(answer::sentences(&[]).is_empty());
     }
 
+    #[test]
+    fn who_leaves_the_envelope_more_often_is_not_the_best() {
+        let mut all = [evaluated("lqi", 0.002), evaluated("hybrid-ilqr", 0.005)];
+        for (e, kept) in all.iter_mut().zip([0.5, 1.0]) {
+            e.groups.iter_mut().for_each(|s| s.kept_rate = kept);
+        }
+        assert_eq!(answer::best(&all).unwrap().controller, "hybrid-ilqr");
+        let said = answer::sentences(&all);
+        assert!(
+            said[0].starts_with("Best of those that keep the envelope: hybrid-ilqr"),
+            "{said:?}"
+        );
+        assert!(
+            said[0].ends_with("leaving the envelope more often: lqi (exact <model>) 0.00200°."),
+            "{said:?}"
+        );
+        // a flight in twenty does not rank a controller behind
+        all[0].groups.iter_mut().for_each(|s| s.kept_rate = 0.96);
+        assert_eq!(answer::best(&all).unwrap().controller, "lqi");
+    }
+
     /// Every controller is drawn with its interval and the paper's result. The page of a flight that ends early holds no
     /// NaN.
     #[test]

@@ -48,7 +48,7 @@ pub use effect_page::{EffectReport, facts as effect_facts};
 #[cfg(feature = "sitl")]
 pub use evaluation_page::EvaluationReport;
 #[cfg(feature = "sitl")]
-pub use evaluation_page::answer::sentences as evaluation_answer;
+pub use evaluation_page::answer::{best as evaluation_best, sentences as evaluation_answer};
 pub use flight::{
     Difficulty, EnvelopeFlown, Event, EventKind, FlightReport, Segment, SurfaceTravel,
 };

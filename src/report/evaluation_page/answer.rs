@@ -1,4 +1,4 @@
-//! The answer of an evaluation: which controller tracks best and by how much, how often the envelope was kept, which
+//! The answer of an evaluation: which controller tracks best inside the envelope and by how much, how often the envelope was kept, which
 //! targets were lost, where the best controller is worst.
 
 use super::label;
@@ -7,15 +7,34 @@ use greylag_sim::evaluation::{Evaluation, Score};
 
 /// Group over which controllers are ranked, where it was flown.
 const ALL: &str = "all";
+/// A controller that keeps the envelope in fewer flights than the steadiest one, by more than this share, ranks behind those
+/// that keep it: a smaller settled error does not make up for a load factor beyond the limit.
+const KEPT_APART: f64 = 0.05;
+
+/// The evaluation that ranks first; `None` if nothing was flown.
+pub fn best(evaluations: &[Evaluation]) -> Option<&Evaluation> {
+    let [keeping, _] = ranked(evaluations, &ranked_over(evaluations)?);
+    keeping.first().map(|(e, _)| *e)
+}
+
+/// Evaluations with their scores over `group` by settled error: those that keep the envelope, then the others.
+fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<(&'a Evaluation, &'a Score)>; 2] {
+    let mut all: Vec<(&Evaluation, &Score)> =
+        evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
+    all.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
+    let most = all.iter().map(|(_, s)| s.kept_rate).fold(f64::NAN, f64::max);
+    // without measurement the share is NaN, and nobody ranks behind
+    let (leaving, keeping) = all.into_iter().partition(|(_, s)| s.kept_rate < most - KEPT_APART);
+    [keeping, leaving]
+}
 
 /// The sentences of the answer, the first of them the ranking; none if nothing was flown.
 pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
     let Some(group) = ranked_over(evaluations) else { return Vec::new() };
-    let mut ranked: Vec<(&Evaluation, &Score)> =
-        evaluations.iter().filter_map(|e| Some((e, e.score(&group)?))).collect();
-    ranked.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
-    let Some((best, rest)) = ranked.split_first() else { return Vec::new() };
-    let mut all = vec![ranking(*best, rest)];
+    let [keeping, leaving] = ranked(evaluations, &group);
+    let Some((best, rest)) = keeping.split_first() else { return Vec::new() };
+    let mut all = vec![ranking(*best, rest, &leaving)];
+    let ranked = [&keeping[..], &leaving[..]].concat();
     let measured = ranked.iter().any(|(_, score)| score.kept_rate.is_finite());
     if measured {
         all.push(format!(
@@ -42,7 +61,11 @@ fn ranked_over(evaluations: &[Evaluation]) -> Option<String> {
     Some(all.unwrap_or(most).targets.clone())
 }
 
-fn ranking((best, score): (&Evaluation, &Score), rest: &[(&Evaluation, &Score)]) -> String {
+fn ranking(
+    (best, score): (&Evaluation, &Score),
+    rest: &[(&Evaluation, &Score)],
+    leaving: &[(&Evaluation, &Score)],
+) -> String {
     let [low, high] = score.mean_ci95_deg.map(number);
     let targets = match score.count {
         1 => "1 target".into(),
@@ -50,7 +73,11 @@ fn ranking((best, score): (&Evaluation, &Score), rest: &[(&Evaluation, &Score)])
     };
     let mut text = format!(
         "{}{}: settled error {}° on average over {targets} (95 %: {low} to {high}°)",
-        if rest.is_empty() { "" } else { "Best: " },
+        match (rest, leaving) {
+            ([], []) => "",
+            (_, []) => "Best: ",
+            _ => "Best of those that keep the envelope: ",
+        },
         label(best),
         number(score.mean_deg)
     );
@@ -59,6 +86,10 @@ fn ranking((best, score): (&Evaluation, &Score), rest: &[(&Evaluation, &Score)])
         let than = if apart { "next" } else { "not distinguished by these targets from" };
         text += &format!("; {than} {} {}°", label(next), number(other.mean_deg));
         others.iter().for_each(|(e, s)| text += &format!(", {} {}°", label(e), number(s.mean_deg)));
+    }
+    let behind = |s: &Score| format!("{}°", number(s.mean_deg));
+    if !leaving.is_empty() {
+        text += &format!("; leaving the envelope more often: {}", each(leaving, behind));
     }
     text + "."
 }
