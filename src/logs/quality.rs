@@ -35,7 +35,7 @@ const KINK: f64 = 10.0;
 /// Fewest samples from kink to kink.
 const APART: f64 = 3.0;
 /// Shortest time that one value must stay to be called frozen, s; and in usual times between changes.
-const FROZEN_S: f64 = 0.5;
+pub(super) const FROZEN_S: f64 = 0.5;
 const FROZEN_STEPS: f64 = 20.0;
 /// Samples on both sides whose median a spike is compared with.
 const AROUND: usize = 4;

@@ -5,6 +5,7 @@
 //! throughout.
 
 use super::phases::Phase;
+use super::quality::FROZEN_S;
 
 /// How much of a log is kept in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,8 +26,6 @@ const LEVELS: u32 = 24;
 /// Shortest time without a sample that is recorded as a gap, s, and in usual sample periods.
 const PAUSE_S: f64 = 0.1;
 const PAUSE_STEPS: f64 = 3.0;
-/// Shortest time for which a value must stay constant to be recorded, s.
-const STAYS_S: f64 = 0.5;
 /// Largest number of gaps of a topic, and of constant intervals of a field, that are recorded.
 const NOTED: usize = 4096;
 /// Time between the samples that are kept throughout, s.
@@ -142,7 +141,7 @@ impl Watch {
 
 /// The span of a stay that is long enough to be noted.
 fn long(stay: &Stay) -> Option<(f64, f64)> {
-    let noted = stay.value != 0.0 && stay.to_s - stay.from_s > STAYS_S;
+    let noted = stay.value != 0.0 && stay.to_s - stay.from_s > FROZEN_S;
     noted.then_some((stay.from_s, stay.to_s))
 }
 

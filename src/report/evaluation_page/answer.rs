@@ -7,8 +7,8 @@ use greylag_sim::evaluation::{Evaluation, Score};
 
 /// Group over which controllers are ranked, where it was flown.
 const ALL: &str = "all";
-/// A controller that keeps the envelope in fewer flights than the steadiest one, by more than this share, ranks behind those
-/// that keep it: a smaller settled error does not make up for a load factor beyond the limit.
+/// Largest difference in the share of flights within the envelope that does not matter: one flight in twenty. A controller
+/// further below the largest share ranks behind, since a small settled error does not make up for a load factor beyond the limit.
 const KEPT_APART: f64 = 0.05;
 
 /// The evaluation that ranks first; `None` if nothing was flown.
@@ -23,7 +23,7 @@ fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<(&'a Evaluatio
         evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
     all.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
     let most = all.iter().map(|(_, s)| s.kept_rate).fold(f64::NAN, f64::max);
-    // without measurement the share is NaN, and nobody ranks behind
+    // without measurement the share is NaN, and no controller ranks behind
     let (leaving, keeping) = all.into_iter().partition(|(_, s)| s.kept_rate < most - KEPT_APART);
     [keeping, leaving]
 }
