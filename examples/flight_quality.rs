@@ -18,11 +18,14 @@
 //! | `delay=N` | commands arrive N ticks of 10 ms late |
 //! | `trace=FILE` | appends every tick: controller, time, target, roll, pitch, p, q, r (°, °/s), airspeed, α, load factor, commands |
 //! | `seed=N` | seed of the steps and of the air |
+//! | `draws=N` | the controllers are built from N models drawn from the coefficients' widths, each with flights of its own |
+//!
+//! Times are processor time of the thread, so that other programs count little.
 
 use std::collections::VecDeque;
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use greylag::control::envelope::{Bounds, Guarded};
@@ -38,6 +41,7 @@ use greylag::sim::episode::settled_error_deg;
 use greylag_sitl::air::Turbulence;
 use greylag_sitl::plant::{Inputs, Plant, PlantOptions, Start as Begin, Truth};
 use rand::RngExt;
+use rustix::time::{ClockId, clock_gettime};
 
 const STEP: f64 = 0.01;
 /// Standard gravity, m/s².
@@ -50,6 +54,7 @@ const SHORT: usize = 500;
 /// Steps flown in a row.
 const ROW: usize = 10;
 
+#[derive(Clone)]
 struct Options {
     model: PathBuf,
     policy: PathBuf,
@@ -59,6 +64,7 @@ struct Options {
     turbulence: u8,
     delay: usize,
     seed: u32,
+    draws: u32,
     trace: Option<PathBuf>,
     names: Vec<String>,
 }
@@ -73,6 +79,7 @@ fn options() -> Result<Options> {
         turbulence: 0,
         delay: 0,
         seed: 1,
+        draws: 0,
         trace: None,
         names: Vec::new(),
     };
@@ -87,6 +94,7 @@ fn options() -> Result<Options> {
             Some(("delay", x)) => o.delay = x.parse()?,
             Some(("trace", x)) => o.trace = Some(x.into()),
             Some(("seed", x)) => o.seed = x.parse()?,
+            Some(("draws", x)) => o.draws = x.parse()?,
             Some((key, _)) if !key.contains(':') => bail!("there is no {key}"),
             _ => o.names.push(word),
         }
@@ -220,6 +228,12 @@ fn note(o: &Options, name: &str, tick: usize, target: &Target, world: &World) ->
     Ok(())
 }
 
+/// Processor time of this thread.
+fn processor_time() -> Duration {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+}
+
 fn load_factor(t: &Truth) -> f64 {
     -t.specific_force_mps2[2] / G0
 }
@@ -241,9 +255,9 @@ fn leg(
     };
     for tick in 0..ticks {
         let seen = world.see();
-        let begun = Instant::now();
+        let begun = processor_time();
         let command = controller.command(&seen, target);
-        times.push(begun.elapsed().as_secs_f64() * 1e3);
+        times.push((processor_time() - begun).as_secs_f64() * 1e3);
         track.moments.push(Moment::new(&seen, load_factor(&world.truth), &command));
         if world.step(command).is_err() || !world.truth.roll_rad.is_finite() {
             track.lost_s = (ticks - tick) as f64 * STEP;
@@ -346,7 +360,6 @@ fn print(name: &str, all: &[Flown], times: &[f64]) {
         // the ranks between which the median of such a sample lies in 95 % (binomial, normal approximation)
         let half = 0.98 / (flights.len() as f64).sqrt();
         let interval = [0.5 - half, 0.5 + half].map(|q| of(&integral, q.clamp(0.0, 1.0)));
-        let mean = flights.iter().map(|m| integral(&m.quality)).sum::<f64>() / flights.len() as f64;
         println!(
             "{name:<34} {group:<8} {:>4} {:>7.3} {:>7.3} {:>5.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>4.0}% {:>6.2} {:>6.2} {:>5.2} {:>5.2} {:>6.2} {:>6.2} {:>6} {:>6.1} {:>6.1} {:>5.1} {:>5.1} {:>5} {:>6.3} {:>6.3}",
             flights.len(),
@@ -356,7 +369,7 @@ fn print(name: &str, all: &[Flown], times: &[f64]) {
             of(&integral, 0.5),
             interval[0],
             interval[1],
-            mean,
+            mean(flights.iter()),
             of(&|q| q.overshoot_deg[0], 0.95),
             of(&|q| q.overshoot_deg[1], 0.95),
             100.0 * count(&Quality::overshoots_little) as f64 / flights.len() as f64,
@@ -412,12 +425,73 @@ fn main() -> Result<()> {
         "ms50",
         "ms99.9"
     );
+    let models = models(&o, model);
+    let mut first: Vec<f64> = Vec::new();
     for name in &o.names {
-        let mut controller = entrant(name, &model, agent.as_ref())?;
-        let (all, times) = fly(&o, &model.airframe, controller.as_mut())?;
+        let (mut all, mut times, mut means) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, model) in models.iter().enumerate() {
+            let mut controller = entrant(name, model, agent.as_ref())?;
+            // each drawn model flies steps of its own
+            let own = Options { seed: o.seed + 1000 * k as u32, ..o.clone() };
+            let (flown, of) = fly(&own, &model.airframe, controller.as_mut())?;
+            means.push(mean(flown.iter().flat_map(|f| &f.flights)));
+            times.extend(of);
+            merge(&mut all, flown);
+        }
         print(name, &all, &times);
+        if first.is_empty() {
+            first = means;
+        } else if o.draws > 0 {
+            let ratios: Vec<f64> =
+                means.iter().zip(&first).map(|(own, first)| own / first).collect();
+            println!(
+                "# {name}: mean integral above {}'s in {} of {} models; ratio median {:.3}, largest {:.3}",
+                o.names[0],
+                ratios.iter().filter(|r| **r > 1.0).count(),
+                ratios.len(),
+                quantile(ratios.clone(), 0.5),
+                quantile(ratios.clone(), 1.0),
+            );
+            for (model, ratio) in models.iter().zip(&ratios).filter(|(_, ratio)| **ratio > 1.1) {
+                println!("#   {}: {ratio:.2}", model.name);
+            }
+        }
     }
     Ok(())
+}
+
+/// The model itself, or the drawn ones of which an LQI can be built.
+fn models(o: &Options, model: GreyBox) -> Vec<GreyBox> {
+    if o.draws == 0 {
+        return vec![model];
+    }
+    let drawn = (0..o.draws).map(|k| model.drawn(o.seed.into(), k.into()));
+    drawn
+        .filter(|drawn| match Lqi::new(drawn) {
+            Ok(_) => true,
+            Err(why) => {
+                println!("# left out: {}: {why}", drawn.name);
+                false
+            }
+        })
+        .collect()
+}
+
+/// Adds flights to those of their group.
+fn merge(all: &mut Vec<Flown>, more: Vec<Flown>) {
+    for Flown { group, flights } in more {
+        match all.iter_mut().find(|f| f.group == group) {
+            Some(f) => f.flights.extend(flights),
+            None => all.push(Flown { group, flights }),
+        }
+    }
+}
+
+/// Mean integral of the error, ° s.
+fn mean<'a>(flights: impl Iterator<Item = &'a Measured>) -> f64 {
+    let (sum, count) = flights
+        .fold((0.0, 0.0), |(sum, count), m| (sum + m.quality.error_integral_deg_s, count + 1.0));
+    sum / count
 }
 
 /// The controller of a word: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings; `+free` leaves the envelope limiter out.

@@ -465,7 +465,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--greylag", default=str(ROOT / "target/release/greylag"))
     parser.add_argument("--rates", default=str(ROOT / "target/release/examples/model_rates"))
-    parser.add_argument("--controllers", nargs="+", default=["lqi", "ilqr", "hybrid-lqi"])
+    parser.add_argument("--controllers", nargs="+", default=["lqi", "hybrid-ilqr", "ilqr", "hybrid-lqi"])
     parser.add_argument("--every", type=int, default=7)
     parser.add_argument("--steps", type=int, default=50)
     parser.add_argument("--blocks", type=int, default=25, help="blocks after partial condensing")

@@ -1,5 +1,6 @@
 //! The grey-box model: physical effects, integrators, trim and linearisation.
 
+#[cfg(feature = "learn")]
 pub mod block;
 mod calls;
 pub mod data_envelope;

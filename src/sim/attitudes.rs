@@ -3,6 +3,7 @@
 use rand::RngExt;
 use serde::Serialize;
 
+use crate::changes::{CHANGE_S, Change, Elevons};
 use crate::environment::{Environment, Imagined};
 use crate::episode::{attitude_error_deg, settled_error_deg};
 use greylag_control::{Controller, Observation, Target};
@@ -54,8 +55,14 @@ pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] 
     })
 }
 
-/// Flies `controller` for a minute in `model`, towards the [`attitudes`] of flight `number` of `seed`.
-pub fn fly(model: &GreyBox, controller: &mut dyn Controller, seed: u64, number: u64) -> Minute {
+/// Flies `controller` for a minute in `model`, towards the [`attitudes`] of flight `number` of `seed`. The aircraft
+/// changes by `change` after [`CHANGE_S`].
+pub fn fly(
+    model: &GreyBox,
+    controller: &mut dyn Controller,
+    [seed, number]: [u64; 2],
+    change: Option<(Change, Elevons)>,
+) -> Minute {
     let mut world = Imagined::cruising(model.clone());
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
     let lost =
@@ -63,11 +70,22 @@ pub fn fly(model: &GreyBox, controller: &mut dyn Controller, seed: u64, number: 
     let (mut integral, mut settled) = (0.0, Vec::with_capacity(LEGS));
     let Ok(mut seen) = world.reset() else { return lost(0.0, integral) };
     controller.reset(seed);
+    let changes_at = (CHANGE_S / STEP).round() as usize;
+    let mut at_change = None;
     for (leg, target) in attitudes(&model.airframe, seed, number).iter().enumerate() {
         let mut errors = Vec::with_capacity(SETTLED);
         for step in 0..LEG {
-            let now = (leg * LEG + step) as f64 * STEP;
-            match world.step(controller.command(&seen, target)) {
+            let tick = leg * LEG + step;
+            let now = tick as f64 * STEP;
+            let mut command = controller.command(&seen, target);
+            if let Some((change, elevons)) = change.filter(|_| tick >= changes_at) {
+                if at_change.is_none() {
+                    world.change(change.of(model));
+                }
+                let before = *at_change.get_or_insert(seen.previous[0]);
+                command = change.command(command, before, elevons);
+            }
+            match world.step(command) {
                 Ok(next) if is_flown(&next, cruise) => seen = next,
                 _ => return lost(now, integral),
             }

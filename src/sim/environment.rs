@@ -47,7 +47,7 @@ pub trait Environment {
 }
 
 /// One aircraft simulated by a model, with the exact actuator filters as its state. For many at once, in training,
-/// see [`Imagination`](crate::imagined::Imagination).
+/// see `sim::imagined`.
 #[derive(Clone, Debug)]
 pub struct Imagined {
     model: GreyBox,
@@ -74,6 +74,11 @@ impl Imagined {
     fn starting(model: GreyBox, start: State) -> Imagined {
         let twin = Twin::new(start, model.airframe.reference.altitude);
         Imagined { model, start, twin, previous: [Command::IDLE; 2], steps: 0 }
+    }
+
+    /// Goes on with the equations of `model` from the present state.
+    pub fn change(&mut self, model: GreyBox) {
+        self.model = model;
     }
 
     fn observe(&self) -> Observation {

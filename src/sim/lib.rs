@@ -7,6 +7,7 @@ pub mod described;
 #[cfg(all(feature = "sitl", feature = "study"))]
 pub mod design;
 pub mod attitudes;
+pub mod changes;
 pub mod environment;
 pub mod episode;
 pub mod evaluation;
@@ -14,10 +15,11 @@ pub mod evaluation;
 pub mod faults;
 #[cfg(feature = "sitl")]
 pub mod flight_test;
-#[cfg(feature = "sitl")]
+#[cfg(all(feature = "sitl", feature = "learn"))]
 pub mod flown;
 #[cfg(feature = "sitl")]
 mod hidden_formula;
+#[cfg(feature = "learn")]
 pub mod imagined;
 #[cfg(feature = "sitl")]
 pub mod import;
@@ -40,6 +42,7 @@ pub mod targets;
 pub mod tracking;
 #[cfg(feature = "sitl")]
 pub mod trial;
+#[cfg(feature = "learn")]
 pub mod world;
 
 pub use environment::{Environment, Imagined, Trouble};

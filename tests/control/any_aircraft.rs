@@ -31,7 +31,7 @@ fn aircraft_that_were_never_drawn_are_flown_without_their_models() {
         let model = GreyBox::load(&params(path)).unwrap();
         for kind in WITHOUT_MODEL {
             let mut controller = build(kind, &model).unwrap();
-            let minute = attitudes::fly(&model, controller.as_mut(), 5, 0);
+            let minute = attitudes::fly(&model, controller.as_mut(), [5, 0], None);
             println!("{path}, {kind}: {minute:?}");
             // 2 degrees is what the project asks of an aircraft that nobody has modelled
             let kept = minute.lost_s.is_none() && minute.settled_deg < 2.0;
@@ -46,7 +46,7 @@ fn most_drawn_aircraft_are_kept_and_the_same_seed_flies_the_same_flight() {
     for kind in WITHOUT_MODEL {
         let fly = |d: &Drawn| {
             let mut controller = build(kind, &d.exact).unwrap();
-            attitudes::fly(&d.exact, controller.as_mut(), 11, d.number)
+            attitudes::fly(&d.exact, controller.as_mut(), [11, d.number], None)
         };
         let flown: Vec<_> = all.iter().map(fly).collect();
         let lost = flown.iter().filter(|m| m.lost_s.is_some()).count();
@@ -66,7 +66,7 @@ fn control_power_is_learned_in_flight() {
     for d in drawn(12, 40) {
         let time = d.exact.airframe.envelope.airspeed_cruise_mps / STANDARD_GRAVITY;
         let mut adaptive = Adaptive::new(&d.exact.airframe);
-        if attitudes::fly(&d.exact, &mut adaptive, 12, d.number).lost_s.is_some() {
+        if attitudes::fly(&d.exact, &mut adaptive, [12, d.number], None).lost_s.is_some() {
             continue;
         }
         truths.push(Character::of(&d.exact).unwrap().values[place].ln());
@@ -87,9 +87,9 @@ fn control_power_is_learned_in_flight() {
 fn a_clone_and_a_reset_begin_anew() {
     let model = GreyBox::load(&params("x8/jsbsim.toml")).unwrap();
     let mut adaptive = Adaptive::new(&model.airframe);
-    let first = attitudes::fly(&model, &mut adaptive, 3, 1);
+    let first = attitudes::fly(&model, &mut adaptive, [3, 1], None);
     let mut again = adaptive.boxed_clone();
-    assert_eq!(attitudes::fly(&model, again.as_mut(), 3, 1), first);
+    assert_eq!(attitudes::fly(&model, again.as_mut(), [3, 1], None), first);
 }
 
 #[test]

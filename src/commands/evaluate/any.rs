@@ -10,11 +10,12 @@ use serde::Serialize;
 
 use super::{Arguments, progress};
 use crate::commands::files::{self, shipped};
-use crate::control::{Controller, ControllerKind, Needs, build};
+use crate::control::{ControllerKind, Needs, build};
 use crate::model::GreyBox;
-use crate::model::population::{Drawn, Population};
+use crate::model::population::{Drawn, Layout, Population};
 use crate::num::statistics::quantile;
 use crate::sim::attitudes::{self, Minute};
+use crate::sim::changes::{Change, Elevons};
 
 /// Options of `--any`.
 #[derive(clap::Args)]
@@ -22,6 +23,10 @@ pub(super) struct AnyArguments {
     /// Distribution that --any draws from.
     #[arg(long, value_name = "FILE", default_value = "params/any/aircraft.toml", requires = "any")]
     population: PathBuf,
+    /// Change each drawn aircraft after 30 s, by all of these in turn: half the aileron, mass +30 %, centre of gravity 5 % of
+    /// the chord aft, one elevon or aileron stuck.
+    #[arg(long, requires = "any")]
+    change: bool,
     /// Models whose aircraft --any flies too; a controller that needs a model is designed from them.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "any")]
     beside: Vec<PathBuf>,
@@ -55,6 +60,9 @@ struct Flight {
     aircraft: String,
     controller: &'static str,
     knows: Knowledge,
+    /// What changed after 30 s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    change: Option<&'static str>,
     /// `None` where no controller could be designed.
     minute: Option<Minute>,
 }
@@ -80,6 +88,8 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     let population = Population::load(&shipped(&arguments.of_any.population))?;
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let beside = arguments.of_any.beside.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let after = Change::ALL.into_iter().filter(|_| arguments.of_any.change).map(Some);
+    let changes: Vec<Option<Change>> = [None].into_iter().chain(after).collect();
     let bar = progress(count.into(), "aircraft", "drawn aircraft");
     let seed = u64::from(arguments.seed);
     let flown: Result<Vec<Vec<Flight>>> = (0..u64::from(count))
@@ -87,10 +97,12 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         .map(|number| {
             let drawn = population.draw(seed, number)?;
             bar.inc(1);
-            Ok(of_drawn(kinds, &drawn, seed))
+            let flights = of_drawn(kinds, &drawn, seed, &changes);
+            Ok(flights)
         })
         .collect();
-    let drawn: Vec<Flight> = flown?.into_iter().flatten().collect();
+    let (drawn, changed): (Vec<Flight>, Vec<Flight>) =
+        flown?.into_iter().flatten().partition(|f| f.change.is_none());
     bar.finish_and_clear();
     let others: Vec<Vec<Flight>> =
         beside.par_iter().map(|model| of_model(kinds, model, seed)).collect();
@@ -103,11 +115,17 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         println!(
             "the first controller that knows the aircraft's own model, aircraft by aircraft; medians, then the 90th percentile"
         );
+        if !changed.is_empty() {
+            println!("{}", after_changes(kinds, &drawn, &changed));
+            println!(
+                "kept: after a change at 30 s, of the aircraft that the controller keeps without it; settled: over the whole minute"
+            );
+        }
         if !others.is_empty() {
             println!("{}", one_by_one(&others));
         }
     }
-    let flights: Vec<Flight> = drawn.into_iter().chain(others).collect();
+    let flights: Vec<Flight> = drawn.into_iter().chain(changed).chain(others).collect();
     if let Some(path) = &arguments.json {
         let document = AnyDocument {
             schema: "greylag.any-aircraft/1",
@@ -131,29 +149,80 @@ fn knowledge(kind: ControllerKind) -> &'static [Knowledge] {
     }
 }
 
-fn of_drawn(kinds: &[ControllerKind], drawn: &Drawn, seed: u64) -> Vec<Flight> {
+fn of_drawn(
+    kinds: &[ControllerKind],
+    drawn: &Drawn,
+    seed: u64,
+    changes: &[Option<Change>],
+) -> Vec<Flight> {
+    let elevons = match drawn.layout {
+        Layout::Elevons => Elevons::Yes,
+        _ => Elevons::No,
+    };
+    let changes: Vec<_> = changes.iter().map(|c| c.map(|change| (change, elevons))).collect();
     let all =
         kinds.iter().flat_map(|kind| knowledge(*kind).iter().map(move |knows| (*kind, *knows)));
-    all.map(|(kind, knows)| {
+    all.flat_map(|(kind, knows)| {
         let from = if knows == Knowledge::Textbook { &drawn.textbook } else { &drawn.exact };
-        one(kind, knows, [from, &drawn.exact], [seed, drawn.number])
+        of_controller((kind, knows), [from, &drawn.exact], [seed, drawn.number], &changes)
     })
     .collect()
 }
 
 fn of_model(kinds: &[ControllerKind], model: &GreyBox, seed: u64) -> Vec<Flight> {
-    kinds.iter().map(|kind| one(*kind, knowledge(*kind)[0], [model; 2], [seed, 0])).collect()
+    let of = |kind: &ControllerKind| {
+        of_controller((*kind, knowledge(*kind)[0]), [model; 2], [seed, 0], &[None])
+    };
+    kinds.iter().flat_map(of).collect()
 }
 
-fn one(
-    kind: ControllerKind,
-    knows: Knowledge,
+/// Flies a controller designed from the first model in the second one, once for each change.
+fn of_controller(
+    (kind, knows): (ControllerKind, Knowledge),
     [from, exact]: [&GreyBox; 2],
-    [seed, number]: [u64; 2],
-) -> Flight {
-    let fly = |mut c: Box<dyn Controller>| attitudes::fly(exact, c.as_mut(), seed, number);
-    let minute = build(kind, from).ok().map(fly);
-    Flight { aircraft: exact.airframe.name.clone(), controller: kind.name(), knows, minute }
+    flight: [u64; 2],
+    changes: &[Option<(Change, Elevons)>],
+) -> Vec<Flight> {
+    // the design of an LQI takes longer than its flight
+    let mut controller = build(kind, from).ok();
+    let mut fly = |change: &Option<(Change, Elevons)>| Flight {
+        aircraft: exact.airframe.name.clone(),
+        controller: kind.name(),
+        knows,
+        change: change.map(|(c, _)| c.name()),
+        minute: controller.as_mut().map(|c| attitudes::fly(exact, c.as_mut(), flight, *change)),
+    };
+    changes.iter().map(&mut fly).collect()
+}
+
+/// A table of the aircraft kept after each change: one row for each controller and its information.
+fn after_changes(kinds: &[ControllerKind], before: &[Flight], after: &[Flight]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(["controller", "knows", "change", "aircraft", "kept %", "settled °", "90 %"]);
+    for kind in kinds {
+        for knows in knowledge(*kind) {
+            let own = |f: &&Flight| f.controller == kind.name() && f.knows == *knows;
+            let unchanged: Vec<&Flight> = before.iter().filter(own).collect();
+            for change in Change::ALL {
+                let changed = after.iter().filter(own).filter(|f| f.change == Some(change.name()));
+                // the flights are in the order of the aircraft in both
+                let pairs = unchanged.iter().zip(changed).filter(|(u, _)| kept(u).is_some());
+                let flights: Vec<&Flight> = pairs.map(|(_, c)| c).collect();
+                let minutes: Vec<f64> =
+                    flights.iter().filter_map(|f| Some(kept(f)?.settled_deg)).collect();
+                let share = 100.0 * minutes.len() as f64 / flights.len() as f64;
+                let mut row = [kind.name(), knows.name(), change.name()].map(String::from).to_vec();
+                row.extend([flights.len().to_string(), format!("{share:.1}")]);
+                row.extend([0.5, 0.9].map(|q| match minutes.is_empty() {
+                    true => "-".to_owned(),
+                    false => format!("{:.2}", quantile(&minutes, q)),
+                }));
+                table.add_row(row);
+            }
+        }
+    }
+    table
 }
 
 /// A table over all drawn aircraft: one row for each controller and its information.

@@ -137,7 +137,9 @@ struct Desk {
 
 /// Starting points of a tick other than the last plan.
 struct Starts<'a> {
-    lqi: &'a Ahead,
+    /// The LQI before this tick's command, and where its gains over the plan go.
+    lqi: &'a Lqi,
+    ahead: &'a mut Ahead,
     actor: Option<&'a Actor>,
     units: &'a mut Units<f32>,
     target: &'a Target,
@@ -163,14 +165,15 @@ impl Desk {
             return best;
         }
         self.until_lqi = EVERY;
-        let Starts { lqi, actor, units, target } = starts;
+        let Starts { lqi, ahead, actor, units, target } = starts;
         let mut compete = |desk: &mut Desk, (plan, cost): ([Surfaces; STEPS], f64)| {
             if cost.is_finite() && best.is_none_or(|(_, least)| cost < least) {
                 best = Some((plan, cost));
                 desk.solver.swap(&mut desk.flown);
             }
         };
-        let found = problem.follow(lqi, self.solver.spare());
+        lqi.look_ahead(problem.seen, target, ahead);
+        let found = problem.follow(ahead, self.solver.spare());
         compete(self, found);
         if let Some(actor) = actor.filter(|_| new) {
             let found = problem.follow_policy(actor, units, target, self.solver.spare());
@@ -225,7 +228,6 @@ impl Controller for Ilqr {
 
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
         self.disturbance.update(&self.model, seen);
-        self.lqi.look_ahead(seen, target, &mut self.ahead);
         let before = self.lqi.clone();
         let alone = self.lqi.command(seen, target);
         // a model whose predictions are wrong must not be planned with
@@ -259,7 +261,8 @@ impl Controller for Ilqr {
             bounds: self.bounds,
         };
         let starts = Starts {
-            lqi: &self.ahead,
+            lqi: &before,
+            ahead: &mut self.ahead,
             actor: self.actor.as_deref(),
             units: &mut self.units,
             target,

@@ -102,8 +102,7 @@ impl Solver {
                 let (stage, curvature) = problem.stage_terms(trajectory, step);
                 let answered = q_uu * change + q_u;
                 slope = q_x + stage + gain.tr_mul(&answered) + q_ux.tr_mul(&change);
-                let cross = gain.tr_mul(&q_ux);
-                value = q_xx + gain.tr_mul(&(q_uu * gain)) + cross + cross.transpose();
+                value = reduced(q_xx, &q_uu, &q_ux, &gain);
                 for i in 0..STATES {
                     value[(i, i)] += curvature[i];
                 }
@@ -112,6 +111,22 @@ impl Solver {
         }
         Some(())
     }
+}
+
+/// Curvature of the value with the commands at their answer K δx: Q_xx + Kᵀ Q_uu K + Kᵀ Q_ux + Q_uxᵀ K.
+fn reduced(q_xx: Square, q_uu: &Matrix2<f64>, q_ux: &Gain, gain: &Gain) -> Square {
+    // column by column, without 16 × 16 temporaries
+    let mut value = q_xx;
+    let answered = q_uu * gain + q_ux;
+    let (by, across) = (gain.transpose(), q_ux.transpose());
+    for j in 0..STATES {
+        let [a, b, c, d] = [answered[(0, j)], answered[(1, j)], gain[(0, j)], gain[(1, j)]];
+        for i in 0..STATES {
+            value[(i, j)] +=
+                by[(i, 0)] * a + by[(i, 1)] * b + across[(i, 0)] * c + across[(i, 1)] * d;
+        }
+    }
+    value
 }
 
 /// Box-constrained minimiser within −1..1 and its feedback gain, zero for a command at its limit (Tassa et al. 2014;
@@ -154,6 +169,17 @@ fn limited(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_reduced_curvature_is_the_sum_of_its_products() {
+        let q_xx = Square::from_fn(|i, j| ((i * j) as f64).cos());
+        let q_uu = Matrix2::new(2.0, 0.6, 0.6, 1.0);
+        let q_ux = Gain::from_fn(|i, j| (3.0 * i as f64 + j as f64).sin());
+        let gain = Gain::from_fn(|i, j| (i as f64 - 2.0 * j as f64).sin());
+        let cross = gain.transpose() * q_ux;
+        let sum = q_xx + gain.transpose() * q_uu * gain + cross + cross.transpose();
+        assert!((reduced(q_xx, &q_uu, &q_ux, &gain) - sum).amax() < 1e-12);
+    }
 
     /// The change that costs least within the limits, found by a grid.
     #[test]
