@@ -1,4 +1,4 @@
-//! The network of the policy for any aircraft: a GRU and a parallel linear path.
+//! The network of the policy for all aircraft: a GRU with a linear path from the inputs to the outputs in parallel.
 
 use std::sync::LazyLock;
 
@@ -18,7 +18,7 @@ const GATES: usize = 3 * HIDDEN;
 static FILE: &[u8] = include_bytes!("../../../params/any/policy.safetensors");
 static SHIPPED: LazyLock<Result<Network, String>> = LazyLock::new(|| Network::read(FILE));
 
-/// The weights, rows by outputs.
+/// The weights of the network, in rows: one row per gate or per output.
 #[derive(Clone, Debug)]
 pub(super) struct Network {
     input: Vec<f64>,
@@ -43,7 +43,7 @@ fn sigmoid(x: f64) -> f64 {
 }
 
 impl Network {
-    /// Reads a safetensors file of single precision.
+    /// Reads the network from a safetensors file with values in single precision.
     fn read(bytes: &[u8]) -> Result<Network, String> {
         let file = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
         let tensor = |name: &str, shape: &[usize]| {
@@ -96,7 +96,7 @@ impl Network {
 mod tests {
     use super::*;
 
-    /// Inputs and outputs of five steps of the program that trained it, in single precision.
+    /// The file holds inputs and outputs of five steps of the training program, in single precision.
     #[test]
     fn the_network_is_the_one_that_was_trained() {
         let text = include_str!("../../../tests/data/any/policy.trace.csv");
@@ -108,7 +108,7 @@ mod tests {
                 network.step(&mut hidden, x.try_into().unwrap());
             let ours = [aileron, elevator, 0.5 + 0.5 * throttle, rudder];
             for (ours, theirs) in ours.iter().zip(u) {
-                // single precision, inputs of six decimals
+                // the outputs are single precision, the inputs have six decimals
                 assert!((ours - theirs).abs() < 1e-5, "step {steps}: {ours} {theirs}");
             }
             steps += 1;
