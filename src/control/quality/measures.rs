@@ -1,4 +1,4 @@
-//! The quality measures by name, with units and definitions, as tables, pages and JSON show them.
+//! The quality measures with the names, units and definitions used in tables, pages and JSON.
 
 use super::Quality;
 
@@ -9,17 +9,17 @@ pub struct Measure {
     pub id: &'static str,
     /// Title in a table.
     pub title: &'static str,
-    /// Unit; empty if dimensionless.
+    /// Unit. Empty if the measure is dimensionless.
     pub unit: &'static str,
-    /// Definition, with its source.
+    /// Definition and its source.
     pub definition: &'static str,
-    /// Direction in which the measure is worse.
+    /// Direction in which the measure gets worse.
     pub worse: Worse,
     /// Reads the value from a [`Quality`].
     pub get: fn(&Quality) -> f64,
 }
 
-/// Direction in which a measure is worse.
+/// Direction in which a measure gets worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worse {
     /// The larger value is worse.
@@ -29,7 +29,7 @@ pub enum Worse {
 }
 
 impl Measure {
-    /// The worst of `values`; NaN if it is empty.
+    /// The worst of `values`. NaN if there are none.
     pub fn worst(&self, values: &[f64]) -> f64 {
         let pick = match self.worse {
             Worse::More => f64::max,
@@ -39,14 +39,14 @@ impl Measure {
     }
 }
 
-/// The measure with this JSON key.
+/// The measure with this JSON key. `None` if there is no such measure.
 pub fn measure(id: &str) -> Option<&'static Measure> {
     MEASURES.iter().find(|m| m.id == id)
 }
 
 macro_rules! measures {
     ($($id:ident, $title:literal, $unit:literal, $worse:ident, $get:expr, $definition:literal;)*) => {
-        /// All measures, the main ones first.
+        /// All measures, with the main ones first.
         pub const MEASURES: &[Measure] = &[$(Measure {
             id: stringify!($id), title: $title, unit: $unit, definition: $definition,
             worse: Worse::$worse, get: $get,
