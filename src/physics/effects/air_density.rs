@@ -1,10 +1,10 @@
-//! Air density different from the model's.
+//! Air density that differs from the model's.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// A common relative change of every aerodynamic force and moment.
+/// The same relative change of every aerodynamic force and moment.
 pub struct AirDensity;
 
 impl Effect for AirDensity {

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Constant roll, yaw and side force coefficients.
+/// Constant coefficients of rolling moment, yawing moment and side force.
 pub struct Asymmetry;
 
 impl Effect for Asymmetry {

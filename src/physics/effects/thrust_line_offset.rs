@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Pitching moment of thrust acting below the centre of gravity.
+/// Pitching moment of a thrust that acts below the centre of gravity.
 pub struct ThrustLineOffset;
 
 impl Effect for ThrustLineOffset {

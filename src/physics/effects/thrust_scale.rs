@@ -1,4 +1,4 @@
-//! Thrust larger or smaller than the model's.
+//! Thrust that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
