@@ -64,7 +64,7 @@ pub struct AircraftCheck {
     pub findings: Vec<String>,
 }
 
-/// Reason why [`check`] has no result for a model.
+/// Reason why a model cannot be checked.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// No trim exists at the cruise airspeed.
@@ -166,7 +166,7 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
     out
 }
 
-/// All findings as sentences, most severe first; empty if there are none.
+/// All findings as sentences, with the most severe first.
 fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String> {
     let mut out = Vec::new();
     let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = check.authority;

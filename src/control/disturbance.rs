@@ -1,7 +1,7 @@
 //! Estimate of the disturbance: the state rate that the model does not explain, constant over a plan.
 //!
 //! The method is offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the disturbance on
-//! the states. When the aircraft is in steady state, the planner's model with the disturbance is too, whatever its error.
+//! the states. In steady flight the planner's model with the disturbance is also steady, at any model error.
 
 use crate::Observation;
 use greylag_model::{GreyBox, Memory, STEP};

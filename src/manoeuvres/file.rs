@@ -108,7 +108,7 @@ impl Schedule {
         Schedule::new(named(file.name)?, file.description, steps)
     }
 
-    /// The text of a schedule file from which [`parse`](Self::parse) gives the same schedule.
+    /// The text of a schedule file from which `Schedule::parse` gives the same schedule.
     pub fn to_toml(&self) -> String {
         let quoted = |text: &str| toml::Value::String(text.into()).to_string();
         let mut out = format!("schema = 1\nname = {}\n", quoted(&self.name));

@@ -113,7 +113,7 @@ impl Schedule {
 
     /// Target and excitation at `t` (s after the start).
     ///
-    /// Before the start, it is the target of the first step. After the end, it is the target of [`after`](Self::after). Both
+    /// Before the start, it is the target of the first step. After the end, it is the target of `Schedule::after`. Both
     /// are without excitation.
     pub fn at(&self, t: f64) -> Demand {
         let mut begins = 0.0;

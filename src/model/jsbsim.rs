@@ -39,7 +39,7 @@ const ELEVATOR: &str = "fcs/elevator-pos-rad";
 const RUDDER: &str = "fcs/rudder-pos-rad";
 const THROTTLE: &str = "fcs/throttle-pos-norm";
 
-/// Exports `model` as the aircraft `name` in a single condition, the one of the model's airframe.
+/// Exports `model` as the aircraft `name` in a single condition, that of the model's airframe.
 pub fn export(model: &GreyBox, name: &str) -> Exported {
     written(&Conditions::one(model), name)
 }

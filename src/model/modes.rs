@@ -143,7 +143,7 @@ mod tests {
         let modes = modes(&model, 25.0, 100.0).unwrap();
         let names: Vec<_> = modes.iter().map(|m| m.name).collect();
         assert_eq!(names, ["short period", "phugoid", "roll", "Dutch roll", "spiral"]);
-        // by Lanchester the phugoid's frequency is sqrt(2) g / V; the roll time constant from the textbook's damping is
+        // by Lanchester the phugoid's frequency is sqrt(2) g / V, and the roll time constant from the textbook's damping is
         // 1/Lp = Jx 4 V / (rho V^2 S b^2 |Clp|), about 0.05 s
         let (phugoid, roll) = (&modes[1], &modes[2]);
         assert!((phugoid.frequency() / (2.0_f64.sqrt() * 9.806 / 25.0) - 1.0).abs() < 0.25);

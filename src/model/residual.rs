@@ -146,7 +146,8 @@ pub fn hash(bytes: &[u8]) -> String {
 
 impl Scales {
     /// Scales of an aircraft. Airspeed is relative to V0 in units of V0/4, rates are in units of their fraction of x_c in brisk
-    /// flight, angles in units of 0.2 rad (about the stall), and deflections in units of the largest travel.
+    /// flight, angles in units of 0.2 rad (about the stall), deflections in units of the largest travel. Throttle is
+    /// relative to 0.5 in units of 0.5.
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
@@ -187,7 +188,7 @@ impl Residual {
     /// A residual with `network` on an aircraft whose reference scale is `x_c`, eq. (21).
     ///
     /// # Errors
-    /// If the network has not [`INPUTS`] inputs and [`OUTPUTS`] outputs, or has a layer that is too wide.
+    /// If the network does not have `INPUTS` inputs and `OUTPUTS` outputs, or a layer is too wide.
     pub fn new(
         network: Dense,
         airframe: &Airframe,

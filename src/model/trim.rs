@@ -68,7 +68,7 @@ impl Trim {
 
     /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m). It is level if a throttle within 0..1 holds
     /// level flight. Otherwise it is the descent at full throttle if it is shallower than the glide at idle, or else the
-    /// glide. If neither has a trim, the result is that of [`Trim::level`].
+    /// glide. If neither has a trim, the result is that of `Trim::level`.
     ///
     /// # Errors
     /// If neither level flight nor a descent has a trim.

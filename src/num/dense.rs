@@ -118,7 +118,7 @@ impl Dense {
     /// initialise them. Those of the last layer are zero.
     ///
     /// # Errors
-    /// If `sizes` has fewer than two layers or a layer outside 1..=[`WIDEST`] units.
+    /// If `sizes` has fewer than two layers or a layer outside 1..=`WIDEST` units.
     pub fn silent(sizes: &[usize], rng: &mut impl Rng) -> Result<Self, DenseError> {
         let mut parameters = Vec::new();
         for (k, s) in sizes.windows(2).enumerate() {
@@ -153,7 +153,7 @@ impl Dense {
     /// A network initialised as in PyTorch and burn, with all parameters of a layer uniform in ±1/√in.
     ///
     /// # Errors
-    /// If `sizes` has fewer than two layers or a layer outside 1..=[`WIDEST`] units.
+    /// If `sizes` has fewer than two layers or a layer outside 1..=`WIDEST` units.
     pub fn uniform(sizes: &[usize], rng: &mut impl Rng) -> Result<Self, DenseError> {
         let mut parameters = Vec::new();
         for s in sizes.windows(2) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Least-squares solution of `rows` · x = `values`. If the solution is not unique, the one of minimum norm. `None` if an
+/// Least-squares solution of `rows` · x = `values`. If it is not unique, the solution of minimum norm. `None` if an
 /// input is not finite.
 pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> Option<[f64; N]> {
     if !rows.iter().flatten().chain(values).all(|x| x.is_finite()) {

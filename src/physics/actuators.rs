@@ -210,7 +210,7 @@ impl<R: Real> SurfaceFilter<R> {
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls`, with commands that hold them there. The rudder has a filter too.
+    /// Actuators at rest at `controls`, with commands that hold them there. Without rudder data the rudder keeps its position.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),

@@ -45,7 +45,7 @@ pub(super) struct Seen {
     pub rate: f64,
     /// Command in force, −1..1, positive for positive rates.
     pub command: f64,
-    /// Estimate of the incidence angle of the axis, rad; zero for an axis without stiffness.
+    /// Estimate of the axis's incidence angle, rad. Zero for an axis without stiffness.
     pub incidence: f64,
     /// Airspeed divided by the cruise airspeed.
     pub speed: f64,

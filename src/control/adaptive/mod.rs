@@ -45,8 +45,8 @@ const NOSE_DOWN: f64 = 0.15;
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
-/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a second. A slow
-/// servo or a delay reduces them below the aerodynamic values.
+/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a second. A
+/// slow servo or a delay reduces them below the aerodynamic values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Belief {
     /// Roll acceleration at full aileron, rad/s².

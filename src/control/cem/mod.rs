@@ -61,7 +61,7 @@ struct Valued {
     doubt: f32,
 }
 
-/// The CEM-MPC planner. All memory is allocated when it is built; the work per plan is constant.
+/// The CEM-MPC planner. All memory is allocated when the planner is built. The work per plan is constant.
 #[derive(Clone, Debug)]
 pub struct Cem {
     name: &'static str,
@@ -69,7 +69,7 @@ pub struct Cem {
     settings: Settings,
     agent: Option<Agent>,
     base: Option<Base>,
-    /// [`SIDESLIP`] where the base controller uses a rudder, else `None`.
+    /// [`SIDESLIP`] if the base controller uses a rudder. Otherwise `None`.
     sideslip: Option<f64>,
     ilqr: Option<Ilqr>,
     /// Observer of the model's one-step prediction errors.

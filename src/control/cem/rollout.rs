@@ -42,7 +42,7 @@ pub(super) struct Scene<'a> {
     pub disturbance: State,
     /// Law of the base controller. It flies the steps after the plan and commands throttle and rudder during the plan too.
     pub ahead: Option<&'a Ahead>,
-    /// Number of steps of a rollout without a base controller. The policy flies the steps after the fifth.
+    /// Number of steps without a base controller. The policy flies the steps after the fifth. Without a policy, five steps.
     pub steps: usize,
     /// Sideslip that costs a reward of 1 per step where a rudder is flown, rad.
     pub sideslip: Option<f64>,

@@ -151,7 +151,7 @@ impl Settings {
         steps: 40,
         ..Settings::HYBRID
     };
-    /// MPPI with the rollouts of [`Settings::PAPER`].
+    /// MPPI with the rollouts of `Settings::PAPER`.
     pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };
     /// The hybrid controller over an LQI. The LQI flies the steps after each plan, which replaces the critics' terminal value.
     /// The steady-state attitude error is zero.

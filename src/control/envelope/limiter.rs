@@ -151,7 +151,7 @@ impl EnvelopeLimiter {
         out
     }
 
-    /// The predicted state at the time at which a new command acts. Until then the previous command is held.
+    /// The predicted state at the time at which a new command acts. Until this time the previous command is held.
     fn when_it_acts(&self, seen: &Observation) -> Moment<'_> {
         let figures = &self.model.airframe.actuators;
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);

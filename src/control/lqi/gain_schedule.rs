@@ -83,7 +83,7 @@ pub(super) struct Schedule {
 impl Axis {
     /// The grid of an angle, from `low` to `high` in spacings.
     fn attitude(low: f64, high: f64) -> Axis {
-        // the first angle is computed from multiples of 30°, which are exact
+        // in units of 30°, in which multiples of 30° are exact
         let first = low / 3.0 * std::f64::consts::FRAC_PI_6;
         Axis { first, step: std::f64::consts::PI / 18.0, count: (high - low) as usize + 1 }
     }

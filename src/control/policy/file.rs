@@ -12,7 +12,7 @@ use greylag_model::weights;
 use greylag_num::Dense;
 use greylag_physics::Airframe;
 
-/// The files of a policy folder. The actor is written last: its presence shows that the others are complete.
+/// The files of a policy folder. The actor is written last: its presence shows that the files before it are complete.
 const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
 
 /// Index of the actor in [`FILES`].

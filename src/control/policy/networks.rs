@@ -65,7 +65,7 @@ impl Actor {
     ///
     /// # Errors
     ///
-    /// If the network has not [`OBSERVATIONS`] inputs and [`ACTIONS`] outputs.
+    /// If the network does not have `OBSERVATIONS` inputs and `ACTIONS` outputs.
     pub fn new(network: Dense) -> Result<Actor, ShapeError> {
         check("an actor", OBSERVATIONS, ACTIONS, network).map(|network| Actor { network })
     }
@@ -157,7 +157,7 @@ impl Critic {
     ///
     /// # Errors
     ///
-    /// If the network has not [`OBSERVATIONS`] + [`ACTIONS`] inputs and one output.
+    /// If the network does not have `OBSERVATIONS` + `ACTIONS` inputs and one output.
     pub fn new(network: Dense) -> Result<Critic, ShapeError> {
         check("a critic", OBSERVATIONS + ACTIONS, 1, network).map(|network| Critic { network })
     }

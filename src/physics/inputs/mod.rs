@@ -17,7 +17,7 @@ use greylag_num::Real;
 /// Time between two calls of [`InputEffect::act`], s.
 pub const STEP: f64 = 0.01;
 
-/// Number of past inputs that an effect stores, one per [`STEP`].
+/// Number of past inputs that an effect stores, one per `STEP`.
 pub const PAST: usize = 24;
 
 /// Largest number of input effects of a model.
