@@ -154,7 +154,7 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
             100.0 * elevator.abs()
         ));
     }
-    // above the cruise airspeed, a descent at full throttle is no finding
+    // above the cruise airspeed, a descent at full throttle is not reported
     let cruises = airspeed <= model.airframe.envelope.airspeed_cruise_mps;
     if cruises && throttle == 1.0 && path < 0.0 {
         out.push(format!(

@@ -5,7 +5,7 @@ use serde::Serialize;
 use greylag_model::modes::rates;
 use greylag_model::{GreyBox, Trim};
 
-/// Control authority about a trim, at the smaller of a surface's two travels. Rates and accelerations are about the body
+/// Control authority about a trim, at the smaller of a surface's two travel limits. Rates and accelerations are about the body
 /// axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Authority {

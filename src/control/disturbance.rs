@@ -72,7 +72,7 @@ impl Disturbance {
             - std::f64::consts::PI;
         let step = seen.state.advance(&last.state, -1.0);
         self.compare(model, &error.advance(&self.rate, -STEP), &step);
-        // e is the deviation from the model's prediction after one step: its rate is e / STEP
+        // e is the deviation from the model's prediction after one step, and e / STEP is the corresponding rate
         let part = STEP / self.time_constant;
         let moved = self.rate.advance(&self.rate, -part).advance(&error, part / STEP);
         if moved.is_finite() {

@@ -147,7 +147,8 @@ impl Excitation {
         }
     }
 
-    /// Value at `t` (s) after the start of a step of `duration` (s). `None` before the excitation's start and after its end.
+    /// Value at `t` (s) after the start of a step of `duration` (s). `None` before the start and after the end of the
+    /// excitation.
     pub(super) fn at(&self, t: f64, duration: f64) -> Option<f64> {
         let into = t - self.start;
         if into < 0.0 || into >= self.length() {

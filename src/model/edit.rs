@@ -39,7 +39,7 @@ pub struct Edit {
     pub airframe: String,
     /// New values of existing coefficients.
     pub changed: Vec<Number>,
-    /// Coefficients of new effects, those of one effect in sequence. Each has the source of the effect's formula.
+    /// Coefficients of new effects. The coefficients of one effect are adjacent. Each has the source of the effect's formula.
     pub added: Vec<(Number, String)>,
     /// Coefficients set to zero, each with the effect that replaces its term.
     pub dropped: Vec<(String, &'static str)>,

@@ -1,7 +1,7 @@
 //! Jacobians by forward-mode differentiation, four inputs at a time.
 //!
 //! Four derivatives fill a vector register. The model's equations are compiled only for this number of derivatives, because
-//! each further number adds seconds to the compilation. Derivatives do not depend on this number, to the bit.
+//! each further number adds seconds to the compilation. Derivatives are bit-identical for every number.
 
 use greylag_num::{Dual, Real};
 

@@ -3,11 +3,11 @@
 //! ```toml
 //! [installation]                       # for every flight, unless its own entry states other axes or sensors
 //! source = "greylag amend: 3 flights"
-//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes against the body's
+//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes relative to the body's
 //!
 //! [flights."flight-1.csv"]
 //! source = "greylag amend"
-//! axes_deg = [0.3, -9.0, 0.1]          # in place of the installation's
+//! axes_deg = [0.3, -9.0, 0.1]          # replaces the installation's axes
 //! trims = { CL0 = 0.021, Cm0 = -0.004 }
 //! sensors = { airspeed_share = 0.01, alpha_rad = -0.002 }
 //! ```

@@ -25,7 +25,7 @@ pub struct Linear {
 /// Linearises one step of `model` about `trim` at `altitude` (m).
 ///
 /// The integrator's memory is taken as steady: its last acceleration equals the present one. The controls are the acting
-/// ones. The model's input effects (lag, delay, dead zone) are omitted, because they have their own memory.
+/// deflections and throttle. The model's input effects (lag, delay, dead zone) are omitted, because they have their own memory.
 pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
     linearise_step(model, &trim.state, &trim.controls, altitude)
 }

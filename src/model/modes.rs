@@ -25,7 +25,7 @@ pub struct Rates {
 pub struct Mode {
     /// Usual name of the mode.
     pub name: &'static str,
-    /// Eigenvalue, 1/s. For a complex pair, the one with the positive imaginary part.
+    /// Eigenvalue, 1/s. A complex pair is represented by the eigenvalue with the positive imaginary part.
     #[serde(serialize_with = "parts")]
     pub eigenvalue: Complex<f64>,
 }
@@ -90,7 +90,7 @@ pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>,
     Ok(all)
 }
 
-/// Eigenvalues from fast to slow. Of a complex pair, the one with the positive imaginary part.
+/// Eigenvalues from fast to slow. A complex pair is represented by the eigenvalue with the positive imaginary part.
 fn eigenvalues(a: &Matrix4<f64>) -> Vec<Complex<f64>> {
     let mut all: Vec<Complex<f64>> = a.complex_eigenvalues().iter().copied().collect();
     // rounding may leave a small imaginary part in a real eigenvalue

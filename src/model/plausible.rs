@@ -187,8 +187,8 @@ mod tests {
         let size = Size { mass: 2.1, span: 1.6, area: 0.32 };
         assert_eq!(size.doubt_of_thrust(10.0, 25.0), None);
         assert!(size.doubt_of_thrust(0.5, 25.0).unwrap().contains("9.81 N"));
-        // a pitch speed in km/h is accepted, because some propellers reach the same number in m/s
-        // ten times this number is rejected
+        // a pitch speed in km/h is accepted, because some propellers reach the same number in m/s. Ten times this number is
+        // rejected.
         assert!(size.doubt_of_thrust(10.0, 900.0).unwrap().contains("--pitch-speed-mps"));
     }
 }

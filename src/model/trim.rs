@@ -119,9 +119,9 @@ impl Trim {
     }
 }
 
-/// The trim that is found from the initial throttle `start`. If its throttle is outside 0..1, the trim that is found from full
-/// throttle, if its throttle is within. A thrust that falls before it rises with throttle, as for a windmilling propeller, has
-/// two trims.
+/// The trim found from the initial throttle `start`. If its throttle is outside 0..1, the search is repeated from full
+/// throttle. The second trim is used if its throttle is within 0..1. A thrust that falls before it rises with throttle, as for
+/// a windmilling propeller, has two trims.
 fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> {
     let holds = |trim: &Trim| (0.0..=1.0).contains(&trim.controls.throttle);
     let first = from(start);

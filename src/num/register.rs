@@ -44,8 +44,7 @@ pub trait Register: Copy + Debug + Send + Sync + 'static {
     fn greater(self, other: Self) -> Self;
     /// Selection in each lane: `a < b ? then : otherwise`.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
-    /// Sine and cosine of an angle plus n quarter turns. The integer n is the one that the addition of 1.5 · 2²³ rounded into
-    /// `shifted`.
+    /// Sine and cosine of an angle plus n quarter turns. The addition of 1.5 · 2²³ has rounded n into `shifted`.
     fn quarters(shifted: Self, sine: Self, cosine: Self) -> (Self, Self);
     /// The power 2ⁿ of an integer n in −126..=127.
     fn power(n: Self) -> Self;

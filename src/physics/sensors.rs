@@ -2,9 +2,9 @@
 //!
 //! ```toml
 //! [sensors]
-//! wind = "still"                                # the air stands still: the three wind_… are 0, held
-//! clocks = "one"                                # all sensors sample together: the skew_… are 0, held
-//! airspeed_scale = { value = 1.0, sd = 0.02 }   # measured by true airspeed; sd = 0 holds it
+//! wind = "still"                                # no wind: the three wind_… are fixed at 0
+//! clocks = "one"                                # all sensors sample at the same time: the skew_… are fixed at 0
+//! airspeed_scale = { value = 1.0, sd = 0.02 }   # ratio of measured to true airspeed; sd = 0 fixes it
 //! alpha_bias_rad = { value = 0.01, sd = 0.005 }
 //! vanes_sd_rad = 0.005                          # noise of the vanes
 //! vanes_at_m = [0.6, 0.0, -0.02]                # from the centre of gravity: forward, right, down

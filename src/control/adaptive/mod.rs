@@ -1,5 +1,5 @@
 //! Adaptive attitude hold for an aircraft without a model. The gains of its cascaded loops are divided by control powers
-//! that are estimated in flight. It needs the cruise airspeed and whether the aircraft has a rudder.
+//! that are estimated in flight. The controller needs two facts: the cruise airspeed, and whether the aircraft has a rudder.
 //!
 //! Times and rates are scaled by V/g at the cruise airspeed V (Froude scaling). One set of gains therefore serves toys
 //! and light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`), except the mean of the
@@ -41,7 +41,7 @@ const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
 /// Fractions of the cruise airspeed between which the nose is lowered progressively, by up to [`NOSE_DOWN`] (rad).
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
-/// Rudder gain on the yaw rate in excess of a coordinated turn's, in V/g, and the largest rudder command.
+/// Rudder gain on the part of the yaw rate that exceeds a coordinated turn's, in V/g, and the largest rudder command.
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 

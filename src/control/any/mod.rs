@@ -45,7 +45,7 @@ impl AnyPolicy {
     /// The policy shipped with the program, for the aircraft described by `airframe`.
     ///
     /// # Errors
-    /// If the shipped file lacks a tensor of the network, or one has the wrong shape or a value that is not finite.
+    /// If the shipped file lacks a tensor of the network, or a tensor has the wrong shape or a value that is not finite.
     pub fn new(airframe: &Airframe) -> Result<AnyPolicy, SetupError> {
         Ok(AnyPolicy {
             network: network::shipped()?,

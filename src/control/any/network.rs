@@ -18,7 +18,7 @@ const GATES: usize = 3 * HIDDEN;
 static FILE: &[u8] = include_bytes!("../../../params/any/policy.safetensors");
 static SHIPPED: LazyLock<Result<Network, String>> = LazyLock::new(|| Network::read(FILE));
 
-/// The weights of the network, in rows: one row per gate or per output.
+/// The weights of the network, as matrices with one row per gate or per output.
 #[derive(Clone, Debug)]
 pub(super) struct Network {
     input: Vec<f64>,

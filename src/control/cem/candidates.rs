@@ -26,7 +26,7 @@ impl Cem {
         }
     }
 
-    /// Roll and pitch (rad) at every step along `plan`. Without a plan, along the base controller's commands.
+    /// Roll and pitch (rad) at every step along `plan`. Without a plan, they follow the base controller's commands.
     fn path(&self, seen: &Observation, plan: Option<&Plan>) -> Path {
         let model = &self.model;
         let figures = &model.airframe.actuators;

@@ -207,7 +207,7 @@ impl Cem {
     }
 
     /// Searches around the base controller's plan. Returns the best plan only if its return exceeds the base's by the margin
-    /// plus the critics' disagreement, of which the larger of the two plans counts.
+    /// plus the critics' disagreement. The larger disagreement of the two plans counts.
     fn search_around_base(
         &mut self,
         seen: &Observation,

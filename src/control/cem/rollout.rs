@@ -285,8 +285,8 @@ fn rollout<R: Packed>(
         None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
-    // plain loops, because an iterator that is not inlined is compiled without the vector instructions
-    // only one call of the model, because a second inlined copy doubles a compile time of minutes
+    // plain loops, because an iterator that is not inlined is compiled without the vector instructions. Only one call of the
+    // model, because a second inlined copy doubles a compile time of minutes
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];

@@ -31,7 +31,7 @@ pub enum Value {
     /// The critics value every candidate.
     Critics,
     /// A plane fitted to the critics' values of the tick's first 128 candidates values the others. The critics value the
-    /// best 64 of the last iteration again. It is available only without a base controller.
+    /// best 64 of the last iteration again. The setting is available only without a base controller.
     Fitted,
 }
 
@@ -97,7 +97,7 @@ pub struct Settings {
     pub known: Option<f64>,
     /// Vector instruction set of the rollouts.
     pub instructions: Instructions,
-    /// Number of cores used by the rollouts, one or two. It does not change the commands.
+    /// Number of cores used by the rollouts, one or two. The number does not change the commands.
     pub cores: usize,
 }
 

@@ -9,8 +9,8 @@ use super::rollout::Worth;
 use crate::policy::OBSERVATIONS as N;
 use greylag_num::Real;
 
-/// Ridge regularisation as a fraction of each observation's variance. It is needed because terminal states may lie on a
-/// plane, across which they determine no slope.
+/// Ridge regularisation as a fraction of each observation's variance. Without it, terminal states that lie on a plane would not
+/// determine the slope across the plane.
 const RIDGE: f64 = 1e-4;
 
 /// The fitted plane v(o) ≈ level + slope · (o − centre) of observations o as in eq. (28) of \[GSFM26\].

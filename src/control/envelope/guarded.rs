@@ -1,4 +1,4 @@
-//! A controller with the envelope limiter behind it, as the pilot flies it.
+//! A controller whose commands pass through the envelope limiter, in the form in which the pilot flies it.
 
 use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;

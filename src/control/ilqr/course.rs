@@ -2,7 +2,8 @@
 //!
 //! Each axis is driven by a cascade with limited rate and acceleration, like the attitude and rate loops of a flight
 //! controller. The load factor n limits pitch. In coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid body's
-//! force equations with V and α constant. The path continues from tick to tick. It waits while the aircraft lags behind.
+//! force equations with V and α constant. The path continues from tick to tick. The path waits while the aircraft lags behind
+//! it.
 
 use super::STEPS;
 use crate::envelope::G0;

@@ -29,7 +29,7 @@ pub(super) type Square = SMatrix<f64, STATES, STATES>;
 /// A vector over the states.
 pub(super) type Vector = SVector<f64, STATES>;
 
-/// Angle of attack from which it adds to the cost if the envelope sets no limit, and the scale of the excess, rad.
+/// Angle of attack above which it adds to the cost if the envelope sets no limit, and the scale of the excess, rad.
 const STALL: [f64; 2] = [0.16, 0.02];
 
 /// The optimal control problem of one tick.

@@ -1,6 +1,6 @@
 //! Settings of iLQR: cost scales, the reference, iterations and starting points.
 
-/// Settings of iLQR. The cost scales follow Bryson's rule: each error has the same cost at the size of its scale.
+/// Settings of iLQR. The cost scales follow Bryson's rule: an error of the size of its scale has the same cost in every term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Attitude error scale, rad.

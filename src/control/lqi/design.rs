@@ -89,9 +89,9 @@ impl Weights {
         sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
-    /// Weights of softer loops with a larger delay margin. In pitch it is 104 ms where the default has 46 ms, and 78 ms where
-    /// the default has 32 ms (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Still softer weights (0.15,
-    /// 0.1, 0.15) have 200 ms.
+    /// Weights of softer loops with a larger delay margin. In pitch the margin is 104 ms where the default has 46 ms, and 78 ms
+    /// where the default has 32 ms (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Still softer weights
+    /// (0.15, 0.1, 0.15) have 200 ms.
     pub const DAMPED: Weights =
         Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }

@@ -185,7 +185,7 @@ impl Schedule {
 }
 
 /// The lowest airspeed (m/s) of a column at which the angle of attack is at most `alpha` (rad), linear between designs. If no
-/// design meets the limit, the grid's highest airspeed.
+/// design meets the limit, the result is the grid's highest airspeed.
 fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
     let airspeeds = grid.airspeed;
     let needs = |k: usize| column[k].map(|entry| entry.steady[5]);

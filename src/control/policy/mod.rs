@@ -21,7 +21,7 @@ use greylag_physics::Command;
 pub struct Agent {
     /// The actor network π.
     pub actor: Arc<Actor>,
-    /// The two critics Q1 and Q2. `None` if the folder has none, with which only the actor can fly.
+    /// The two critics Q1 and Q2. `None` if the folder has none. Without critics only the actor can fly.
     pub critics: Option<Arc<[Critic; 2]>>,
     /// Provenance stored in the policy's files.
     pub origin: Origin,

@@ -263,7 +263,7 @@ fn overshoot(mut errors: impl Iterator<Item = f64>) -> f64 {
     errors.map(beyond).filter(|e| e.is_finite()).fold(0.0, f64::max)
 }
 
-/// Minimum and maximum without NaN values. NaN if there are no others.
+/// Minimum and maximum without NaN values. NaN if all values are NaN.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::NAN; 2], |[least, most], x| [least.min(x), most.max(x)])
 }

@@ -1,9 +1,9 @@
 //! Reader of results of OptVL and AeroSandbox in Python, written as JSON.
 //!
-//! The tools' names are under a few keys of this program, see docs/how-to/add-an-aircraft.md for the ten lines that write
-//! the file. OptVL has `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), and controls per degree.
-//! AeroSandbox has `CLa`, and moments about body axes. Its control derivatives are differences per degree that the script
-//! computes.
+//! The quantities have the tools' names, under a few keys of this program. The ten lines that write the file are in
+//! docs/how-to/add-an-aircraft.md. OptVL has `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), and controls
+//! per degree. AeroSandbox has `CLa`, and moments about body axes. Its control derivatives are differences per degree that the
+//! script computes.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, positive, to_body};
 
-/// Numbers of a document at any depth, except those of `controls`, and its other entries.
+/// Content of a document: its numbers at any depth (except those of `controls`), and its other entries.
 struct Flat<'a> {
     numbers: BTreeMap<&'a str, f64>,
     controls: Option<&'a Map<String, Value>>,

@@ -11,7 +11,7 @@ use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Number of the random stream for aircraft.
 const AIRCRAFT: u64 = 49;
-/// Largest number of attempts at one aircraft. After it the draw fails.
+/// Largest number of attempts at one aircraft, after which the draw fails.
 const TRIES: u64 = 200;
 /// Truncation of log-normal factors, in standard deviations.
 const CUT: f64 = 2.5;

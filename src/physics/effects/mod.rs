@@ -94,7 +94,7 @@ pub struct Entry {
 
 /// Receiver of the terms that an effect reports.
 ///
-/// It is a trait because its method can always be inlined. A call, as of a closure, would leave a planner's vectorised code.
+/// It is a trait because its method can always be inlined. The call of a closure would leave a planner's vectorised code.
 pub trait Terms<R> {
     /// Receives the contribution of one unit of the effect's coefficient `index` to `channel`, in N or N m per unit.
     fn add(&mut self, index: usize, channel: Channel, amount: R);

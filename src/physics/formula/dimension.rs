@@ -48,7 +48,7 @@ impl Dimension {
         Dimension(self.0.map(|x| x.saturating_mul(exponent)))
     }
 
-    /// Dimension of the square root. `None` if its exponents are not multiples of a half.
+    /// Dimension of the square root. `None` if an exponent of this dimension is not a whole number.
     pub fn root(self) -> Option<Dimension> {
         self.0.iter().all(|x| x % 2 == 0).then(|| Dimension(self.0.map(|x| x / 2)))
     }

@@ -72,7 +72,7 @@ pub struct Tape {
 pub type Places = [Option<u16>];
 
 impl Tape {
-    /// Appends the evaluation of `part` for coefficient `index` in `channel`, times `factor` or else the kept factor.
+    /// Appends the evaluation of `part` times `factor` (`None`: the kept factor) for coefficient `index` in `channel`.
     ///
     /// # Errors
     /// If the stack would be too deep, there would be too many operations, or the formula contains an invalid term.
