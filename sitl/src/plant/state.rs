@@ -17,7 +17,7 @@ pub struct Start {
     pub airspeed_mps: f64,
     /// Angle of attack, rad.
     pub alpha_rad: f64,
-    /// Sideslip angle, rad; positive when the air comes from the right.
+    /// Sideslip angle, rad; positive if the relative wind comes from the right.
     pub beta_rad: f64,
     /// Roll rate, body axes, rad/s.
     pub p_radps: f64,
@@ -30,8 +30,8 @@ pub struct Start {
 }
 
 impl Start {
-    /// The start of an episode: wings level, no incidence, 16.67 m/s, 600 m, not trimmed
-    /// (section V-A of \[GSFM26\]).
+    /// The start of an episode: wings level, zero angle of attack and sideslip, 16.67 m/s, 600 m, not trimmed (section V-A of
+    /// \[GSFM26\]).
     pub const NEUTRAL: Start = Start {
         roll_rad: 0.0,
         pitch_rad: 0.0,
@@ -108,13 +108,13 @@ pub struct Truth {
     pub q_radps: f64,
     /// Yaw rate over the ground, body axes, rad/s.
     pub r_radps: f64,
-    /// True airspeed, relative to the air with its turbulence, m/s.
+    /// True airspeed, relative to the air including turbulence, m/s.
     pub airspeed_mps: f64,
     /// Angle of attack relative to the air, rad.
     pub alpha_rad: f64,
-    /// Sideslip angle relative to the air, rad.
+    /// Sideslip angle relative to the air, rad; positive if the relative wind comes from the right.
     pub beta_rad: f64,
-    /// Specific force at the centre of gravity, forward-right-down, m/s²; −9.81 on z in level flight.
+    /// Specific force at the centre of gravity, body axes (forward-right-down), m/s²; −9.81 on z in level flight.
     pub specific_force_mps2: [f64; 3],
     /// Velocity over the ground, north-east-down, m/s.
     pub velocity_ned_mps: [f64; 3],
@@ -130,21 +130,21 @@ pub struct Truth {
     pub air_density_kgpm3: f64,
     /// Static pressure of the air, Pa.
     pub static_pressure_pa: f64,
-    /// Deflection of the aileron, rad.
+    /// Deflection of the aileron, rad; positive rolls right.
     pub aileron_rad: f64,
     /// Aileron rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub aileron_rate_radps: f64,
-    /// Deflection of the elevator, rad.
+    /// Deflection of the elevator, rad; positive pitches down.
     pub elevator_rad: f64,
     /// Elevator rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub elevator_rate_radps: f64,
     /// Position of the throttle, 0..1.
     pub throttle: f64,
-    /// Deflection of the rudder, rad.
+    /// Deflection of the rudder, rad; positive yaws left; 0 for an aircraft without a rudder.
     pub rudder_rad: f64,
     /// Rudder rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub rudder_rate_radps: f64,
-    /// Thrust along the body x axis, N, hidden effects on it included.
+    /// Thrust along the body x axis, N, including hidden effects on the thrust.
     pub thrust_n: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Why a run of the shim could not begin or had to end.
+//! Errors that prevent or end a run of the shim.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ pub enum ShimError {
     /// An option has an invalid value.
     #[error("cannot start the shim: {rule}; correct the option")]
     Option {
-        /// The rule that is broken.
+        /// The violated rule.
         rule: &'static str,
     },
     /// The simulated stack has no parameter of that name.
@@ -25,7 +25,7 @@ pub enum ShimError {
         /// Parameters that the stack has.
         known: String,
     },
-    /// A place without a known magnetic field.
+    /// The World Magnetic Model has no field for the start.
     #[error(
         "the World Magnetic Model has no field at {latitude_deg}°, {longitude_deg}°, {altitude_m} m; \
          start between -1 and 850 km"
