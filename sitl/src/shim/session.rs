@@ -101,7 +101,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends an additional heartbeat while simulated time is stopped.
+    /// Sends an additional heartbeat, for use while simulated time is stopped.
     pub fn send_heartbeat(&mut self) {
         self.send_slow(encode_heartbeat);
     }

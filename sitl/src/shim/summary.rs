@@ -16,7 +16,7 @@ pub enum Event {
     Open(Address, Option<SocketAddr>),
     /// A note on the aircraft.
     Note(String),
-    /// No companion has sent a message yet, or the last one was lost.
+    /// No companion has sent a message yet, or the companion was lost.
     Waiting(Address),
     /// The first message of the companion has arrived.
     Found,
@@ -137,9 +137,9 @@ impl Latency {
 /// Counts and times of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// State frames made, repetitions not counted.
+    /// State frames, without repetitions.
     pub frames: u64,
-    /// State frames that were sent again because no answer came.
+    /// State frames sent again because no answer arrived.
     pub repeated_frames: u64,
     /// State frames dropped by the fault rule.
     pub dropped_frames: u64,
