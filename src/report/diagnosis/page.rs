@@ -121,7 +121,7 @@ fn maps(c: &Comparison) -> Option<Figure> {
     (!choice.options.is_empty()).then_some(Figure::Choice(choice))
 }
 
-/// Map of channels over regime variables: how far each variable explains a model's residual.
+/// Map of channels over regime variables: the share of a model's residual that each variable explains.
 fn map(model: &ModelResult) -> Option<Figure> {
     let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS

@@ -12,7 +12,7 @@ use greylag_sysid::diagnose::Diagnosis;
 const DRAWN: f64 = 0.1;
 /// Number of decoys in the table, in order of decreasing evidence.
 const DECOYS: usize = 8;
-/// Preferred horizon for the error in the sentence, s; without it, the longest horizon is used.
+/// Preferred horizon for the error in the sentence, s; without it, the last horizon is used.
 const SHOWN_S: f64 = 5.0;
 
 /// Section on the evidence that chance produces: in nulls without a missing effect, and for decoys.
