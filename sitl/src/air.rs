@@ -92,6 +92,7 @@ const MAX_AIR_MPS: f64 = 100.0;
 
 impl Air {
     /// Checks the air and returns it with its gusts sorted by start time.
+    ///
     /// # Errors
     /// [`AirError`] if a wind or turbulence figure is out of range, a gust has an invalid shape, or two gusts overlap.
     pub fn checked(mut self) -> Result<Self, AirError> {

@@ -94,6 +94,7 @@ impl Resolver for Tree {
 }
 
 /// Loads the aircraft `name` into `fdm`, with `effects` written into its XML and the properties `held` declared.
+///
 /// With `dir`, the file is `dir/NAME/NAME.xml`. JSBSim then searches an engine first in `dir/NAME/Engines`, then in
 /// `dir/../engine`, as in a JSBSim tree. Set the time step before this call: JSBSim's filters keep the step that is set at
 /// loading.

@@ -66,6 +66,7 @@ impl Effector {
 
 /// Sets the mixing and the held properties of `plant` from the airframe file at `path`. If no entry of the file has a `position`,
 /// the plant keeps the control channels of the JSBSim aircraft.
+///
 /// # Errors
 /// If the file cannot be read or parsed, a surface has no travel, an entry has no position, or the mixing is invalid.
 pub fn apply(path: &Path, plant: &mut PlantOptions) -> Result<(), AirframeError> {

@@ -1,4 +1,5 @@
 //! Hidden effects: terms of the flight dynamics that JSBSim simulates and that no message to the companion reports.
+//!
 //! An effect is written into the aircraft's XML before JSBSim loads it, as further aerodynamic functions, flight-control
 //! components, external forces, or changed mass properties. Without an effect, or at amplitude 0, the XML stays identical byte
 //! for byte.
@@ -108,6 +109,7 @@ pub enum Place {
 
 impl Hidden {
     /// The effect `id` of the catalogue with `amplitude`, in the effect's unit; an amplitude of 0 changes nothing.
+    ///
     /// # Errors
     /// [`HiddenError::Unknown`] if the catalogue has no effect `id`, and [`HiddenError::Amplitude`] if `amplitude` is out of
     /// bounds.

@@ -42,8 +42,10 @@ pub enum ParameterFileError {
 }
 
 /// Reads the names and values of the file at `path`, in the order of its lines.
+///
 /// A line has one of two forms. The first is `NAME VALUE`, separated by white space, a comma or `=` (ArduPilot, MAVProxy, Mission
 /// Planner). The second is system, component, name, value and type (QGroundControl). A `#` begins a comment.
+///
 /// # Errors
 /// If the file cannot be read, is longer than 1 MiB, or has a line of another form.
 pub fn read(path: &Path) -> Result<Vec<(String, f64)>, ParameterFileError> {

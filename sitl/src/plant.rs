@@ -152,6 +152,7 @@ pub struct Plant {
 
 impl Plant {
     /// Loads the aircraft and puts it at [`Start::NEUTRAL`].
+    ///
     /// # Errors
     /// [`PlantError`] if the step is too short or too long, the aircraft cannot be loaded or started, a property is missing, or a
     /// hidden effect or the air is invalid.
@@ -175,6 +176,7 @@ impl Plant {
     }
 
     /// Puts the aircraft at `start` with centred surfaces and closed throttle, and sets its time to zero.
+    ///
     /// # Errors
     /// [`PlantError::Start`] if `start` is outside the accepted range. `PlantError::Engine` if an engine does not run, and
     /// `PlantError::Undefined` if the aircraft reads an undefined property. [`PlantError::Jsbsim`] and [`PlantError::NonFinite`]
@@ -213,6 +215,7 @@ impl Plant {
     }
 
     /// Simulates one step of [`PlantOptions::step_s`] with `inputs`, limited to their ranges.
+    ///
     /// # Errors
     /// [`PlantError::Inputs`] if a command is not finite; the plant then makes no step. [`PlantError::NonFinite`] if the state is
     /// no longer finite. [`PlantError::Jsbsim`] if JSBSim fails.

@@ -8,6 +8,7 @@ use std::path::Path;
 const LONGEST: u64 = 1 << 20;
 
 /// Reads the text of the file at `path`.
+///
 /// # Errors
 /// A reason with its remedy if the file cannot be read, is not UTF-8, or is longer than 1 MiB.
 pub fn read(path: &Path) -> Result<String, String> {

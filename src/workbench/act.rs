@@ -102,7 +102,7 @@ pub enum Act {
         /// Ids of the two effects.
         between: [String; 2],
     },
-    /// Fly the model in the simulator.
+    /// Fly the model in the simulator as ordered.
     Fly(Order),
     /// Display a recording while another program writes it.
     Watch {
@@ -120,6 +120,7 @@ pub enum Act {
 
 impl Bench {
     /// Executes the request.
+    ///
     /// # Errors
     /// [`WorkbenchError::Conflict`] if the session has changed since the page read it; another error if the request cannot be
     /// executed.
@@ -218,6 +219,7 @@ impl Bench {
     }
 
     /// Adds a log with the name `name` and the content `bytes`, which a page has sent.
+    ///
     /// # Errors
     /// If `name` is invalid, `bytes` are not a usable log, the session already contains the log, the session is not at revision
     /// `seen`, or the file cannot be written.

@@ -3,6 +3,7 @@
 //! Candidates are the properties that the aircraft's systems read and do not write. The aircraft is held in its state while a
 //! candidate is set to full command, until lags, delays and hysteresis have settled. Both signs are tried if both give finite
 //! values (a negative flap command may give NaN).
+//!
 //! The aileron is the command, or the pair of a left and a right command, that rolls the aircraft most with the least pitching
 //! and yawing moment. Usual names score higher. Elevator and rudder are selected by pitching and yawing moment in the same way.
 //! The position of a surface is a property that the aerodynamics read and that the command moves.
@@ -57,6 +58,7 @@ impl Found {
 }
 
 /// Finds the commands and surfaces of the aircraft of `options`.
+///
 /// # Errors
 /// If the aircraft cannot be loaded or simulated, or no command rolls or pitches it; the error then names that axis.
 pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
@@ -236,8 +238,10 @@ impl Bench {
 }
 
 /// Loads the aircraft of `options` with its named or default properties.
+///
 /// If defaults are missing, move no surface or deflect one to the wrong side, the properties that `discover` finds replace them
 /// and are returned with the plant. Properties named in `options` are never replaced.
+///
 /// # Errors
 /// If the aircraft cannot be loaded, or no command steers it.
 pub fn steered(options: &PlantOptions) -> Result<(super::Plant, Option<Found>), PlantError> {

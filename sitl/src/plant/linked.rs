@@ -1,4 +1,5 @@
 //! A control that is linked to one or several properties, written `NAME` or `[-]NAME[*SCALE],…`.
+//!
 //! An example is an aircraft whose left and right aileron have separate commands, in rad up to 0.52. Its aileron is
 //! `fcs/left_rad*0.52,-fcs/right_rad*0.52`. A write gives each property the value times its factor. A read gives the mean of the
 //! properties times their factors.

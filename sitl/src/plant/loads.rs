@@ -41,8 +41,10 @@ const SETTLED: f64 = 1e-4;
 
 impl Plant {
     /// Thrust along body x, N, and the state after the engines have settled at `throttle` (0..1).
+    ///
     /// The aircraft is held in `start`. Engines that have not settled after 60 s give their values at that time. Reset the plant
     /// before it is stepped.
+    ///
     /// # Errors
     /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn settled_thrust(
@@ -54,9 +56,11 @@ impl Plant {
     }
 
     /// Response of the engines to a sequence of throttle commands: thrust along body x, N, and throttle position, 0..1.
+    ///
     /// The first element is the response after the engines have settled at the first of the `throttles` (0..1). Each further
     /// element is the response after one step at the next of them. The aircraft is held in `start`. Reset the plant before it is
     /// stepped.
+    ///
     /// # Errors
     /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn thrust_response(
@@ -79,7 +83,9 @@ impl Plant {
     }
 
     /// Loads and thrust along body x (N) after the engines have settled at `inputs`, with the surfaces at their commands.
+    ///
     /// The aircraft is held in `start`. Reset the plant before it is stepped.
+    ///
     /// # Errors
     /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn powered_loads(
@@ -147,6 +153,7 @@ impl Plant {
     }
 
     /// Loads in `start` with the surfaces at rest at the commands `inputs`. Reset the plant before it is stepped.
+    ///
     /// # Errors
     /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn loads(&mut self, start: &Start, inputs: &Inputs) -> Result<Loads, PlantError> {

@@ -1,4 +1,5 @@
 //! Mixer of an aircraft whose surfaces and motors are commanded one by one.
+//!
 //! The shim shares no code with the companion, which makes each a check of the other. This mixer therefore computes the controls
 //! from the positions by least squares (normal equations).
 
@@ -54,6 +55,7 @@ const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
 
 impl Mixing {
     /// Makes the mixing of the surfaces and motors `moved`.
+    ///
     /// # Errors
     /// A message for the user if nothing moves the aileron, elevator or throttle, or if two controls move the surfaces in the
     /// same way.

@@ -276,6 +276,7 @@ pub(crate) fn to_body(attitude: [f64; 3], [north, east, down]: [f64; 3]) -> [f64
 }
 
 /// A seed for JSBSim, 0 to 2³¹ − 2, far from the results for neighbouring seeds.
+///
 /// JSBSim's generator is multiplicative: small seeds give multiples of each other's numbers and thus similar turbulence. The hash
 /// is that of SplitMix64 (Steele, Lea, Flood 2014).
 fn scattered(seed: u32) -> f64 {

@@ -30,6 +30,7 @@ pub(super) fn hold(fdm: &mut Fdm, held: &[(NodeId, f64)]) -> Result<(), Error> {
 }
 
 /// Evaluates the derivatives in the present air and fills the integrators' histories with them.
+///
 /// JSBSim's initial condition accepts no vertical wind, so the wind is set after it. Five frames fill the longest history
 /// (Adams-Bashforth 3 needs three).
 pub(super) fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {

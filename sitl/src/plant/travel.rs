@@ -66,6 +66,7 @@ impl Default for Travel {
 impl Plant {
     /// Measures the travel of the surfaces by full commands in both directions, with the aircraft held in its state. The state is
     /// then restored.
+    ///
     /// # Errors
     /// [`PlantError::Travel`] if the aileron or elevator does not follow its command.
     pub fn travel(&mut self) -> Result<Travel, PlantError> {

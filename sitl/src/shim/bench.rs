@@ -30,6 +30,7 @@ pub struct Bench {
 
 impl Bench {
     /// Puts the aircraft at its start.
+    ///
     /// # Errors
     /// If the aircraft cannot be loaded or started, or a file of the options cannot be used.
     pub fn new(options: &ShimOptions) -> Result<Self, ShimError> {
@@ -80,6 +81,7 @@ impl Bench {
     }
 
     /// Makes one step with the newest answer.
+    ///
     /// # Errors
     /// If the plant cannot be stepped, or the truth file cannot be written.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {

@@ -21,6 +21,7 @@ enum Phase {
 }
 
 /// A plant that starts at rest on the ground, as an estimator needs for its alignment.
+///
 /// The catapult accelerates the aircraft along a straight line to the start state, in the attitude of that state. JSBSim takes
 /// over there. Every quantity except acceleration is continuous at that moment.
 pub struct Launcher {
@@ -36,6 +37,7 @@ pub struct Launcher {
 
 impl Launcher {
     /// Puts the aircraft on its stand, or in flight if `launch` is immediate.
+    ///
     /// # Errors
     /// If the aircraft cannot be loaded, or `start` is outside the accepted range.
     pub fn new(options: &PlantOptions, start: &Start, launch: Launch) -> Result<Self, PlantError> {
@@ -56,6 +58,7 @@ impl Launcher {
     }
 
     /// Puts the aircraft back to its start.
+    ///
     /// # Errors
     /// If the aircraft cannot be evaluated at its start.
     pub fn begin_anew(&mut self) -> Result<(), PlantError> {
@@ -69,6 +72,7 @@ impl Launcher {
     }
 
     /// Measures the travel of the aircraft's surfaces.
+    ///
     /// # Errors
     /// If the aileron or elevator does not follow its command.
     pub fn travel(&mut self) -> Result<Travel, PlantError> {
@@ -100,6 +104,7 @@ impl Launcher {
     }
 
     /// Advances the aircraft by one step and returns its state.
+    ///
     /// # Errors
     /// If the plant cannot be stepped.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Truth, PlantError> {

@@ -57,6 +57,7 @@ use session::Session;
 
 /// Runs until `stop` is set (polled about every 20 ms), the flight is over, or the plant fails. Reports every change of state to
 /// `observer`. Blocks the calling thread.
+///
 /// The options are checked and the link is opened before the truth file is created. A run that cannot begin therefore leaves no
 /// file.
 pub fn run(

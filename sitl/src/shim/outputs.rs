@@ -63,6 +63,7 @@ struct Output {
 }
 
 /// Assignment of outputs to aileron, elevator, rudder and throttle.
+///
 /// The written form is `left-aileron=6,right-aileron=7,elevator=8,throttle=5`. The number is that of PX4's PWM_MAIN_FUNCn or of
 /// ArduPilot's SERVOn_FUNCTION, 1 to 32. A minus before the number reverses the output.
 #[derive(Clone, Debug, PartialEq)]

@@ -27,6 +27,7 @@ impl Sensors {
     }
 
     /// Measurement of `truth`: scale error, then bias, then noise.
+    ///
     /// The number of random draws does not depend on the options. A change of one sensor's noise therefore leaves the noise of
     /// the others unchanged.
     pub fn measure(&mut self, truth: &Truth) -> Truth {

@@ -1,4 +1,5 @@
 //! Converts measured quantities to the messages that `sitl/PROTOCOL.md` specifies.
+//!
 //! This module converts SI units and radians to the units of the messages.
 
 use super::codec::{

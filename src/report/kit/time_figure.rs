@@ -118,6 +118,7 @@ pub struct Mark {
 
 impl TimeFigure {
     /// Adds panels with the sample times `time_s`, s, which should ascend. Rows out of time order are omitted.
+    ///
     /// Series without a finite value and panels without a series are omitted. A gap longer than `gap_s`, s, interrupts the lines.
     /// More than 20,000 rows are thinned to the extremes of equal groups. The notes state what was omitted or thinned, except for
     /// gaps.

@@ -1,4 +1,5 @@
 //! States and curves over one time axis, as SVG that fits any width without a script.
+//!
 //! Horizontal positions are percentages of the width, so the text keeps its size. Colours are CSS classes, `tone-…` and `line-…`,
 //! for the style sheet of the page.
 

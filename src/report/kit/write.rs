@@ -28,6 +28,7 @@ pub enum WriteError {
 }
 
 /// Writes `text` to a new file at `path`. Another process never sees a partial file.
+///
 /// # Errors
 /// [`WriteError::Exists`] if `path` exists, and `WriteError::Io` if the operating system reports an error.
 pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
@@ -39,6 +40,7 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
 }
 
 /// Writes `content` to `path` and replaces an existing file. Another process sees either the old or the new file.
+///
 /// # Errors
 /// `WriteError::Io` if the operating system reports an error.
 pub fn write_over(path: &Path, content: impl AsRef<[u8]>) -> Result<(), WriteError> {

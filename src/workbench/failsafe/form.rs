@@ -117,6 +117,7 @@ impl Form {
     }
 
     /// The scenario and the controller that the form describes.
+    ///
     /// # Errors
     /// [`Wrong`] for the first invalid value.
     pub fn chosen(&self) -> Result<Chosen, Wrong> {

@@ -43,6 +43,7 @@ struct Imu {
 
 /// The JSON line of `truth` at `timestamp_s`, s, between the line feeds that ArduPilot requires. Positions are relative to
 /// `home`.
+///
 /// # Errors
 /// If serialisation fails, which does not occur with a finite state.
 pub fn line(timestamp_s: f64, truth: &Truth, home: &Home) -> serde_json::Result<String> {

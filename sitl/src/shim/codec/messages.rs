@@ -1,4 +1,5 @@
 //! Definitions of the MAVLink messages that the shim uses, each with its fields in wire order.
+//!
 //! In wire order, larger field types come first, fields of equal size keep the order of their declaration, and extension fields
 //! come last. Identifiers, CRC_EXTRA and orders are those of pymavlink 2.4.50 (`ardupilotmega`, MAVLink 2); `tests/shim/codec.rs`
 //! checks them.

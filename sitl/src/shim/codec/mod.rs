@@ -1,4 +1,5 @@
 //! MAVLink 2 codec of the shim, independent of the companion's codec.
+//!
 //! The companion uses rust-mavlink. This codec shares no code with it, which makes an error in either codec visible as a
 //! disagreement. The codec follows the serialisation guide <https://mavlink.io/en/guide/serialization.html> and is checked
 //! against byte vectors from pymavlink (`tests/shim_vectors.py`).

@@ -1,4 +1,5 @@
 //! ArduPlane's failsafes, after its sources (`events.cpp`, `radio.cpp`, `system.cpp` of 4.6 to 4.8-dev).
+//!
 //! One state holds the active failure. A failure triggers one action when it is detected. While it is active, it masks failures
 //! of lower priority.
 

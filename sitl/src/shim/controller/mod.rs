@@ -137,6 +137,7 @@ pub struct FlightController {
 
 impl FlightController {
     /// A controller in an autonomous mode, armed and in the air, with the aircraft of the options.
+    ///
     /// # Errors
     /// If the aircraft cannot be loaded, the truth file cannot be created, or an option names a parameter that the stack does not
     /// have.
@@ -228,6 +229,7 @@ impl FlightController {
     }
 
     /// Makes one step with the messages received so far.
+    ///
     /// # Errors
     /// If the plant cannot be stepped, or the truth file cannot be written.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {

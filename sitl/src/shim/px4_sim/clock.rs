@@ -29,6 +29,7 @@ pub enum Answers {
 impl Clock {
     /// Finds the step that a message with the time stamp `time_us` answers. Steps were sent from `begun_us`, which is at least
     /// [`FIRST_US`], to `shown_us`; all times are in µs.
+    ///
     /// Simulated time begins at [`FIRST_US`]. An offset of 0 and an offset of `begun_us` are therefore distinguishable until the
     /// same time has passed again.
     pub fn judge(&mut self, time_us: u64, begun_us: u64, shown_us: u64) -> Answers {

@@ -13,8 +13,10 @@ use super::super::error::ShimError;
 const DATE: (i32, u16) = (2026, 1);
 
 /// Magnetic field by the World Magnetic Model 2025, north-east-down, gauss.
+///
 /// The altitude is above the model's reference surface, m. The field is computed once, at the start: 100 km away, its error is
 /// about 1 %.
+///
 /// # Errors
 /// [`ShimError::Magnetism`] for a place outside the range of the model.
 pub fn field_ned_gauss(

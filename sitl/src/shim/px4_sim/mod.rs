@@ -2,6 +2,7 @@
 //!
 //! PX4 is the TCP client, port 4560. The shim sends HIL_SENSOR at 250 Hz and HIL_GPS at 10 Hz of simulated time, and
 //! HIL_STATE_QUATERNION on request. PX4 answers with HIL_ACTUATOR_CONTROLS.
+//!
 //! Until the first answer, time advances freely, because PX4 has to boot. After an answer with the lockstep flag, each step waits
 //! for the answer, for at most 3 s. The protocol is that of PX4's public documentation (Simulator MAVLink API), as its module
 //! `simulator_mavlink` implements it.

@@ -1,4 +1,5 @@
 //! Sensor messages for PX4: HIL_SENSOR, HIL_GPS, HIL_STATE_QUATERNION.
+//!
 //! This module converts SI units to the units of these messages.
 
 use rand::SeedableRng;
@@ -66,6 +67,7 @@ impl Px4Noise {
     };
 
     /// Noise of PX4's simulators.
+    ///
     /// The inertial noise follows from the noise densities of Gazebo's IMU plugin, 0.00186 m/s²/√Hz and 0.00018665 rad/s/√Hz,
     /// times √250 Hz; the plugin's bias drift is left out. The other values are those of PX4's modules sensor_mag_sim (0.02,
     /// 0.02, 0.03 gauss), sensor_baro_sim (1 Pa), sensor_airspeed_sim (0.01 hPa) and sensor_gps_sim (0.2 m, 0.5 m; 0.06, 0.077,
