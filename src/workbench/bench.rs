@@ -41,21 +41,20 @@ pub struct Given {
 
 /// A session with the results computed from it: logs and their roles, the model, accepted effects, jobs, flights.
 ///
-/// The value is shared as an `Arc`, may be called from any thread and has no network access. Its methods are of four kinds:
+/// It is shared as an `Arc`, may be called from any thread and has no network access. Its methods are of four kinds:
 ///
 /// - [`Bench::open`] reads or creates the session of a folder and claims the folder until the value is dropped.
-/// - Requests are [`Bench::act`] and [`Bench::take`] (a log). Each contains the revision on which it is based. If the session has
-///   another revision, a request that edits the session fails with [`WorkbenchError::Conflict`] and changes nothing. Otherwise
-///   the edit is on disk when the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`, `Cancel` and `StopFlight` edit
-///   nothing that a page displays, and are accepted at any revision.
+/// - Requests are [`Bench::act`] and [`Bench::take`] (a log). Each contains the revision on which it is based. If this revision
+///   is outdated, a request that edits the session fails with [`WorkbenchError::Conflict`]. Otherwise the edit is on disk when
+///   the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`, `Cancel` and `StopFlight` are accepted at any revision.
 /// - Views do not change the session: [`Bench::state`], [`Bench::diagnosis`], [`Bench::failing`], [`Bench::flight`],
 ///   [`Bench::free_run`] and others. `failing` and `flight` block while they compute a comparison that is not cached. `flight`
 ///   and `free_run` refuse test flights that have not been opened.
-/// - Events go to the callback of [`Bench::open`], on the thread that causes them. The lock is not held meanwhile, so the
-///   callback may call the bench. Events contain progress; for other data, call the views again.
+/// - Events go to the callback of [`Bench::open`], on the thread that causes them. The callback may call the bench.
 ///
-/// After `open`, requests and views may be called in any order. Each job runs on a separate thread, and `state` lists a job until
-/// it ends. A new job replaces a running job of the same kind. The replaced job ends at its next stage, like a cancelled job. No
+/// After `open`, requests and views may be called in any order. Each job runs on a separate thread. A new job replaces a running
+/// job of the same kind, which ends at its next stage like a cancelled job. Each result is stored under a key of its inputs, so
+/// an undone edit restores it. The system clock is used only for time stamps of records in the session.
 /// periodic calls are needed. Each result is stored under a key of its inputs, so an undone edit restores it. The system clock is
 /// used only for time stamps of records in the session.
 pub struct Bench {
@@ -105,8 +104,7 @@ impl Bench {
     /// Opens the session of a folder, or creates one. `on_event` is called for every event, on the thread that causes the event.
     ///
     /// # Errors
-    /// If another workbench has the folder open, the session, its model or a log cannot be read, a new session has no model, or a
-    /// file cannot be written.
+    /// If the folder is locked, a file is invalid or cannot be read or written, or a new session has no model.
     pub fn open(
         given: Given,
         on_event: impl Fn(Event) + Send + Sync + 'static,
