@@ -55,8 +55,6 @@ pub struct Given {
 /// After `open`, requests and views may be called in any order. Each job runs on a separate thread. A new job replaces a running
 /// job of the same kind, which ends at its next stage like a cancelled job. Each result is stored under a key of its inputs, so
 /// an undone edit restores it. The system clock is used only for time stamps of records in the session.
-/// periodic calls are needed. Each result is stored under a key of its inputs, so an undone edit restores it. The system clock is
-/// used only for time stamps of records in the session.
 pub struct Bench {
     pub(super) folder: PathBuf,
     pub(super) on_event: Box<dyn Fn(Event) + Send + Sync>,

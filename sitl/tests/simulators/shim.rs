@@ -20,8 +20,7 @@ fn sends_a_hundred_frames_a_second_without_drift() {
         count += 1;
         companion.answer(last.time_us(), [0.0, 0.0, 0.3]);
     }
-    // Absolute deadlines: simulated time equals wall time to within one frame, plus what a busy
-    // machine adds to the one frame at the end.
+    // With absolute deadlines, simulated time equals wall time within one frame, plus delays of a busy machine in the last frame.
     let (wall, simulated) =
         (begun.elapsed().as_secs_f64(), (last.time_us() - first.time_us()) as f64 * 1e-6);
     assert!((wall - simulated).abs() < 0.03, "{wall} s of wall time, {simulated} s simulated");
@@ -32,13 +31,13 @@ fn sends_a_hundred_frames_a_second_without_drift() {
 }
 
 fn time_runs_without_anybody_there() {
-    // Nobody listens on the port: every datagram is refused.
+    // No program listens on the port, so every datagram is refused.
     let (companion, link) = listening();
     drop(companion);
     let shim = Shim::start(real_time(&link));
     std::thread::sleep(Duration::from_millis(1000));
     let summary = shim.stop();
-    // 100 frames, give or take what the thread's start and a busy machine cost.
+    // 100 frames, with a tolerance for the start of the thread and a busy machine.
     assert!((85..=103).contains(&summary.frames), "{} frames", summary.frames);
     assert_eq!((summary.answers, summary.flown_s), (0, 0.0), "held until armed");
 }
