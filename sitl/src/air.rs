@@ -13,9 +13,9 @@ pub struct Air {
 
 /// Dryden turbulence of MIL-F-8785C in the discretisation of MIL-STD-1797A (JSBSim `ttMilspec`).
 ///
-/// Below 1000 ft the intensity is 0.1 of `wind_20ft_mps`; above 2000 ft it is read from the
-/// standard's table by `severity` alone; between them the two are blended linearly. An episode that
-/// starts at 600 m (1969 ft) therefore depends almost only on `severity`.
+/// Below 1000 ft the intensity is 0.1 of `wind_20ft_mps`. Above 2000 ft it is read from the standard's table, as a function of
+/// `severity` alone. Between these altitudes it is interpolated linearly. An episode that starts at 600 m (1969 ft) therefore
+/// depends almost only on `severity`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turbulence {
     /// Wind speed 20 ft above ground, m/s, not negative: 7.6 light, 15 moderate, 23 severe.

@@ -49,7 +49,7 @@ pub enum AircraftError {
          {name}/{name}.xml with --aircraft-dir"
     )]
     NotBuiltIn {
-        /// The name asked for.
+        /// The requested name.
         name: String,
     },
     /// The aircraft's file does not exist or cannot be read.
@@ -60,7 +60,7 @@ pub enum AircraftError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// JSBSim refused the aircraft.
+    /// JSBSim cannot load the aircraft.
     #[error("JSBSim cannot load the aircraft '{name}': {source}; correct its XML")]
     Load {
         /// Name of the aircraft.

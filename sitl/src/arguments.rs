@@ -197,7 +197,7 @@ impl Cli {
     /// Converts the command line into the options of a run.
     ///
     /// # Errors
-    /// [`CliError`] if the airframe file or the parameter file cannot be read, or its content is invalid.
+    /// `CliError` if the airframe file or the parameter file cannot be read, or its content is invalid.
     pub fn options(&self) -> Result<ShimOptions, CliError> {
         let personality = self.personality.map(Personality::from);
         let (mut parameters, unplayed) = match (&self.parameters, personality) {

@@ -1,4 +1,4 @@
-//! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
+//! The plant: one aircraft that JSBSim simulates in this process, step by step in simulated time.
 
 pub mod discovery;
 mod linked;
@@ -57,7 +57,7 @@ pub enum PlantError {
     Engine {
         /// Name of the aircraft.
         aircraft: String,
-        /// The engine, from 0.
+        /// Index of the engine, from 0.
         engine: usize,
     },
     /// A surface does not follow its command, so its travel is unknown.
@@ -322,8 +322,8 @@ fn jsbsim(doing: &'static str) -> impl Fn(jsbsim::Error) -> PlantError {
     move |source| PlantError::Jsbsim { doing, source }
 }
 
-/// Maps an error of JSBSim's start to [`PlantError::Undefined`] if it names a missing property,
-/// else to [`PlantError::Jsbsim`].
+/// Maps an error of JSBSim's start to [`PlantError::Undefined`] if it names a missing property, otherwise to
+/// [`PlantError::Jsbsim`].
 fn starting(aircraft: &str) -> impl Fn(jsbsim::Error) -> PlantError {
     let aircraft = aircraft.to_owned();
     move |source| {

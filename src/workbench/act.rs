@@ -122,7 +122,7 @@ impl Bench {
     /// Executes the request.
     ///
     /// # Errors
-    /// [`WorkbenchError::Conflict`] if the session has changed since the page read it; another error if the request cannot be
+    /// `WorkbenchError::Conflict` if the session has changed since the page read it; another error if the request cannot be
     /// executed.
     pub fn act(self: &Arc<Self>, request: Request) -> Result<(), WorkbenchError> {
         let seen = request.revision;

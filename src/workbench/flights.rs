@@ -84,7 +84,7 @@ impl Loaded {
     /// Reads the log of `entry`; a relative path is relative to `folder`.
     ///
     /// # Errors
-    /// [`WorkbenchError::LogChanged`] if the content has changed, and the errors of reading and of `parse`.
+    /// `WorkbenchError::LogChanged` if the content has changed, and the errors of reading and of `parse`.
     pub fn read(
         entry: &LogEntry,
         folder: &Path,

@@ -63,7 +63,7 @@ pub fn grammar() -> Value {
 /// Parses `text` as an effect file, without storing it.
 ///
 /// # Errors
-/// [`WorkbenchError::EffectText`] with the error, its line and a remedy.
+/// `WorkbenchError::EffectText` with the error, its line and a remedy.
 pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
     let written = file::parse(text).map_err(WorkbenchError::EffectText)?;
     let Description { id, description, formula, .. } = written.about;
@@ -163,7 +163,7 @@ impl Made {
     }
 }
 
-/// Difference of the second model's prediction to the first model's in a channel; `None` if the channel is not measured.
+/// The second model's prediction minus the first model's in a channel; `None` if the channel is not measured.
 fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -> Option<Made> {
     let mut all = Made { id, made: Vec::new(), left: Vec::new(), regimes: Vec::new() };
     let [without, with] = &comparison.models[..] else { return None };

@@ -125,7 +125,7 @@ pub enum Outcome {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flown {
-    /// Begin of the flight, s since 1970 (UTC).
+    /// Start of the flight, s since 1970 (UTC).
     pub unix_s: u64,
     /// Folder of the recording; a relative path is relative to the session's folder.
     pub folder: PathBuf,
@@ -275,7 +275,7 @@ impl Claim {
     /// Locks `folder`, and creates it if it does not exist.
     ///
     /// # Errors
-    /// [`WorkbenchError::Open`] if another workbench has locked the folder, and `WorkbenchError::Io` if it cannot be created.
+    /// `WorkbenchError::Open` if another workbench has locked the folder, and `WorkbenchError::Io` if it cannot be created.
     pub fn of(folder: &Path) -> Result<Claim, WorkbenchError> {
         fs::create_dir_all(folder.join("logs")).map_err(|e| io(folder, e))?;
         let path = folder.join(".lock");

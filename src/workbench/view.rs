@@ -203,7 +203,7 @@ impl Bench {
     /// One flight over time, as measured and as predicted by the models.
     ///
     /// # Errors
-    /// [`WorkbenchError::NoFlight`] if the flight does not exist, and [`WorkbenchError::Locked`] if it has not been opened.
+    /// `WorkbenchError::NoFlight` if the flight does not exist, and `WorkbenchError::Locked` if it has not been opened.
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
         let flight = self.may_be_seen(place)?;
         let missing = WorkbenchError::NoFlight(place);
@@ -229,7 +229,7 @@ impl Bench {
     /// Free runs of the models from one time of a flight.
     ///
     /// # Errors
-    /// [`WorkbenchError::Locked`] if the flight has not been opened, and `WorkbenchError::NotFlown` if the aircraft is not in
+    /// `WorkbenchError::Locked` if the flight has not been opened, and `WorkbenchError::NotFlown` if the aircraft is not in
     /// flight at that time.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
         let flight = self.may_be_seen(request.flight)?;

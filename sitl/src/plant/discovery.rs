@@ -80,7 +80,7 @@ pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
     })
 }
 
-/// A loaded aircraft that is held at rest in the air.
+/// A loaded aircraft that is held in a constant state in the air.
 struct Bench {
     fdm: Fdm,
     start: Snapshot,

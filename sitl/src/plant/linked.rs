@@ -3,7 +3,6 @@
 //! An example is an aircraft whose left and right aileron have separate commands, in rad up to 0.52. Its aileron is
 //! `fcs/left_rad*0.52,-fcs/right_rad*0.52`. A write gives each property the value times its factor. A read gives the mean of the
 //! properties times their factors.
-//! times its factor; a read gives the mean of the properties times their factors.
 
 use jsbsim::{Error, Fdm, NodeId};
 

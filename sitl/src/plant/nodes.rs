@@ -33,9 +33,9 @@ pub(super) struct Nodes {
     place: [NodeId; 3],
     density: NodeId,
     pressure: NodeId,
-    /// Thrust of each engine.
+    /// Thrust of each engine, lbf.
     thrusts: Vec<NodeId>,
-    /// Whether each engine runs; empty when none has to be started.
+    /// Whether each engine runs; empty if no engine has a starter.
     running: Vec<NodeId>,
     hidden_thrust: Option<NodeId>,
 }
@@ -88,7 +88,7 @@ impl Nodes {
         self.steering.is_glider()
     }
 
-    /// Whether two controls share a property.
+    /// Whether two controls may share a property.
     pub(super) fn is_shared(&self) -> bool {
         self.steering.is_shared()
     }

@@ -7,23 +7,23 @@ pub const FULL_DEFLECTION_RAD: f64 = 0.5235;
 /// The state at which an episode starts; velocities are relative to the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
-    /// Roll angle φ, rad.
+    /// Roll angle φ, rad; right wing down positive.
     pub roll_rad: f64,
-    /// Pitch angle θ, rad.
+    /// Pitch angle θ, rad; nose up positive.
     pub pitch_rad: f64,
-    /// Yaw angle ψ from true north, rad.
+    /// Yaw angle ψ from true north, rad; clockwise positive.
     pub yaw_rad: f64,
     /// True airspeed, m/s, positive.
     pub airspeed_mps: f64,
-    /// Angle of attack, rad.
+    /// Angle of attack, rad; positive if the relative wind comes from below.
     pub alpha_rad: f64,
     /// Sideslip angle, rad; positive if the relative wind comes from the right.
     pub beta_rad: f64,
-    /// Roll rate, body axes, rad/s.
+    /// Roll rate, body axes, rad/s; right wing down positive.
     pub p_radps: f64,
-    /// Pitch rate, body axes, rad/s.
+    /// Pitch rate, body axes, rad/s; nose up positive.
     pub q_radps: f64,
-    /// Yaw rate, body axes, rad/s.
+    /// Yaw rate, body axes, rad/s; nose right positive.
     pub r_radps: f64,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
@@ -96,21 +96,21 @@ impl Inputs {
 pub struct Truth {
     /// Time since the reset, s.
     pub time_s: f64,
-    /// Roll angle φ, rad.
+    /// Roll angle φ, rad; right wing down positive.
     pub roll_rad: f64,
-    /// Pitch angle θ, rad.
+    /// Pitch angle θ, rad; nose up positive.
     pub pitch_rad: f64,
-    /// Yaw angle ψ from true north, rad.
+    /// Yaw angle ψ from true north, rad; clockwise positive.
     pub yaw_rad: f64,
-    /// Roll rate over the ground, body axes, rad/s.
+    /// Roll rate relative to the earth, body axes, rad/s; right wing down positive.
     pub p_radps: f64,
-    /// Pitch rate over the ground, body axes, rad/s.
+    /// Pitch rate relative to the earth, body axes, rad/s; nose up positive.
     pub q_radps: f64,
-    /// Yaw rate over the ground, body axes, rad/s.
+    /// Yaw rate relative to the earth, body axes, rad/s; nose right positive.
     pub r_radps: f64,
     /// True airspeed, relative to the air including turbulence, m/s.
     pub airspeed_mps: f64,
-    /// Angle of attack relative to the air, rad.
+    /// Angle of attack relative to the air, rad; positive if the relative wind comes from below.
     pub alpha_rad: f64,
     /// Sideslip angle relative to the air, rad; positive if the relative wind comes from the right.
     pub beta_rad: f64,
@@ -118,7 +118,7 @@ pub struct Truth {
     pub specific_force_mps2: [f64; 3],
     /// Velocity over the ground, north-east-down, m/s.
     pub velocity_ned_mps: [f64; 3],
-    /// Velocity of the air over the ground with gusts and turbulence, north-east-down, m/s.
+    /// Velocity of the air over the ground including gusts and turbulence, north-east-down, m/s.
     pub wind_ned_mps: [f64; 3],
     /// Geodetic latitude, deg, north positive.
     pub latitude_deg: f64,

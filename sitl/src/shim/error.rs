@@ -38,13 +38,13 @@ pub enum ShimError {
         /// Altitude of the start above mean sea level, m.
         altitude_m: f64,
     },
-    /// The plant could not be built, or could not go on.
+    /// The plant could not be loaded, started or stepped.
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// The link could not be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The truth file exists.
+    /// The truth file exists, and the options do not allow its replacement.
     #[error("the truth file {} exists; choose another name with --truth, or allow overwriting with --force", path.display())]
     TruthExists {
         /// Path of the truth file.

@@ -84,7 +84,7 @@ impl Flight {
         self.plant.notes()
     }
 
-    /// Altitude of the start, m.
+    /// Altitude of the start above mean sea level, m.
     pub fn home_m(&self) -> f64 {
         self.home_m
     }

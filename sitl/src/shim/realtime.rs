@@ -31,7 +31,7 @@ const ARRIVALS: usize = 500;
 /// Number of frames whose sending times are kept.
 const SENT: usize = 64;
 
-/// The running state of the real-time loop.
+/// State of the real-time loop.
 struct Cycle<'s, 'o> {
     session: &'s mut Session<'o>,
     /// Frames that wait to be sent: sending time, time stamp of the frame, bytes.

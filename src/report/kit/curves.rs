@@ -30,7 +30,7 @@ pub struct Curves {
 /// A shaded range in the colour of its curve.
 #[derive(Clone, Debug, Serialize)]
 pub struct Range {
-    /// Index of the curve in [`Curves::series`].
+    /// Index of the curve in `Curves::series`.
     pub of: usize,
     /// Lower edge, one value for each of [`Curves::x`].
     #[serde(serialize_with = "compact")]

@@ -54,7 +54,7 @@ pub(crate) fn compact<S: Serializer>(values: &[f64], serializer: S) -> Result<S:
     serializer.collect_seq(values.iter().map(|&v| six_digits(v)))
 }
 
-/// Serialises times, s, with a resolution of 0.1 ms, for which six digits do not suffice after 1000 s.
+/// Serialises times, s, with a resolution of 0.1 ms. Six significant digits would not suffice after 1000 s.
 pub(crate) fn compact_time<S: Serializer>(times: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(times.iter().map(|t| (t * 1e4).round() / 1e4))
 }

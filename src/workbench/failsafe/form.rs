@@ -119,7 +119,7 @@ impl Form {
     /// The scenario and the controller that the form describes.
     ///
     /// # Errors
-    /// [`Wrong`] for the first invalid value.
+    /// `Wrong` for the first invalid value.
     pub fn chosen(&self) -> Result<Chosen, Wrong> {
         let counterpart: Counterpart = self.named("counterpart", "flight controller")?;
         let controller = self.controller()?;

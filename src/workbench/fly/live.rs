@@ -52,7 +52,7 @@ pub struct Watched {
 pub struct Warning {
     /// Time of the warning, s, on the vehicle's clock.
     pub time_s: f64,
-    /// Index of the model in [`Live::models`].
+    /// Index of the model in `Live::models`.
     pub model: usize,
     /// Index of the channel in [`Live::measured`].
     pub channel: usize,

@@ -93,7 +93,7 @@ impl Order {
     /// manoeuvre of the list, its file is first written below the session's folder `folder`.
     ///
     /// # Errors
-    /// [`WorkbenchError::Order`] if an option is unknown, and an error if the schedule cannot be written.
+    /// `WorkbenchError::Order` if an option is unknown, and an error if the schedule cannot be written.
     pub fn words(
         &self,
         folder: &Path,

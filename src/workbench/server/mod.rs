@@ -56,7 +56,7 @@ struct Shared {
 /// When the server listens, it calls `ready` with the address of the page.
 ///
 /// # Errors
-/// [`ServeError::Bench`] if the session cannot be opened, and `ServeError::Socket` if the port cannot be used.
+/// `ServeError::Bench` if the session cannot be opened, and `ServeError::Socket` if the port cannot be used.
 pub fn serve(
     given: Given,
     port: u16,

@@ -120,8 +120,8 @@ impl Law {
         Law { stack, travel, wanted: [0.0; 2], integral: [0.0, level], slow: 0.0, altitude: None }
     }
 
-    /// Resets the loops for a new mode. ArduPlane always resets its integrators; PX4 does so only after a mode without rate
-    /// control.
+    /// Resets the airspeed and altitude loops for a new mode, and with `forgets` also the integrators of the rate loops.
+    /// ArduPlane resets these integrators at every mode change, PX4 only after a mode without rate control.
     pub(super) fn begin(&mut self, forgets: bool) {
         (self.slow, self.altitude) = (0.0, None);
         if forgets {

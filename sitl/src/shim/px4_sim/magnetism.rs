@@ -14,8 +14,8 @@ const DATE: (i32, u16) = (2026, 1);
 
 /// Magnetic field by the World Magnetic Model 2025, north-east-down, gauss.
 ///
-/// The altitude is above the model's reference surface, m. The field is computed once, at the start: 100 km away, its error is
-/// about 1 %.
+/// Latitude and longitude are in degrees, the altitude is above mean sea level, m. The field is computed once, at the start: 100
+/// km away, its error is about 1 %.
 ///
 /// # Errors
 /// [`ShimError::Magnetism`] for a place outside the range of the model.
