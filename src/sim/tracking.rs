@@ -48,7 +48,7 @@ pub fn track(
     Ok(flight)
 }
 
-/// Duration of a step, s.
+/// Time of a step after the start, s.
 pub fn seconds(step: usize) -> f64 {
     step as f64 * STEP
 }

@@ -14,10 +14,10 @@ pub trait World {
     ///
     /// # Errors
     ///
-    /// If the environment cannot continue; losing an aircraft is not an error.
+    /// If the environment cannot continue. The loss of an aircraft is not an error.
     fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble>;
-    /// Starts new episodes. Their targets continue the random sequence after its first `targets`, as when training is
-    /// resumed.
+    /// Starts new episodes. Their targets skip the first `targets` of the random sequence, as resumed training
+    /// requires.
     ///
     /// # Errors
     ///

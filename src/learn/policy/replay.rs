@@ -19,7 +19,7 @@ pub struct Transition {
     pub goes_on: f32,
 }
 
-/// Length of a transition.
+/// Numbers per transition.
 const NUMBERS: usize = 2 * OBSERVATIONS + ACTIONS + 2;
 
 /// A minibatch, row after row.
@@ -54,8 +54,8 @@ impl Replay {
         Replay { capacity, numbers: Vec::new(), added: 0 }
     }
 
-    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added); `None` if they are of
-    /// another capacity.
+    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added); `None` if their count
+    /// does not fit the capacity.
     pub fn restore(capacity: usize, numbers: Vec<f32>, added: u64) -> Option<Replay> {
         let held = (capacity as u64).min(added) as usize;
         (numbers.len() == held * NUMBERS).then_some(Replay { capacity, numbers, added })

@@ -18,13 +18,13 @@ use greylag_model::GreyBox;
 pub enum Counterpart {
     /// The shim of the simulator.
     Sitl,
-    /// PX4, commanded surfaces.
+    /// PX4, to which the companion commands surfaces.
     Px4,
-    /// PX4, commanded attitudes.
+    /// PX4, to which the companion commands attitudes.
     Px4Attitude,
-    /// ArduPilot, commanded surfaces by channels.
+    /// ArduPilot, to which the companion commands surfaces by RC channels.
     Ardupilot,
-    /// ArduPilot, commanded attitudes.
+    /// ArduPilot, to which the companion commands attitudes.
     ArdupilotAttitude,
 }
 
@@ -150,8 +150,8 @@ impl Aircraft {
         }
     }
 
-    /// Sets the flight controller's loiter mode as a ground station does; returns whether there is a flight
-    /// controller.
+    /// Sets the flight controller's loiter mode, as a ground station does. Returns `false` for the shim, which has no
+    /// modes.
     pub(super) fn take_over(&mut self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,
@@ -179,7 +179,8 @@ impl Aircraft {
         }
     }
 
-    /// Whether the flight controller holds its own attitude in the companion's mode, as targets are missing.
+    /// Whether the flight controller is in the companion's mode but holds its own attitude, because targets are
+    /// missing.
     pub(super) fn turns_back(&self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,

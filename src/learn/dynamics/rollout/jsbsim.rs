@@ -18,7 +18,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         let mut last = None;
         for step in 0..=self.steps() {
             let at = self.at(step, state);
-            // this scheme integrates accelerations only, so that the residual has no rates of the angles
+            // this scheme integrates accelerations only; the residual's rates of roll and pitch angle are zero
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
             let outputs = self.ask(&at);

@@ -51,11 +51,11 @@ pub enum TrainError {
 pub struct Progress {
     /// Number of updates made.
     pub update: u64,
-    /// Length of the rollouts.
+    /// Length of the rollouts, steps of 10 ms.
     pub steps: usize,
-    /// Mean over the updates since the last report.
+    /// Mean loss over the updates since the last report; `lost` is a sum.
     pub loss: Loss,
-    /// L_pred/L_prior, eq. (23), mean over the same updates.
+    /// L_pred/L_prior, eq. (23), mean over the updates since the last report.
     pub normalised: f64,
     /// Penalty weight λ of eq. (24).
     pub lambda: f64,
@@ -83,8 +83,8 @@ pub struct Learned {
     pub name: String,
     /// Value in the prior's file.
     pub start: f64,
-    /// Its present value.
+    /// Present value of the coefficient.
     pub value: f64,
-    /// The true value, where it is known.
+    /// The true value; `None` if it is unknown.
     pub truth: Option<f64>,
 }

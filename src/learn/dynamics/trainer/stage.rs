@@ -13,7 +13,7 @@ use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::GreyBox;
 use greylag_num::stream;
 
-/// Number of windows for the bare prior's error, L_prior of eq. (23).
+/// Largest number of windows from which the bare prior's error, L_prior of eq. (23), is computed.
 const PRIOR_WINDOWS: usize = 4096;
 const SHUFFLE: u64 = 2;
 
@@ -58,7 +58,7 @@ impl Stage {
             return Err(TrainError::Prior(bare.prior.name.clone()));
         }
         let prior_error = match recipe.criterion {
-            // a prior without any error gives no scale
+            // without any error of the prior the divisor would be zero
             Criterion::Scaled => loss.prediction.max(1e-12),
             Criterion::Plain => 1.0,
         };
@@ -80,12 +80,12 @@ impl Stage {
     }
 }
 
-/// Weights of `all` by [`Recipe::floor`]; their mean is 1.
+/// Sets the weights of `all` by [`Recipe::floor`], scaled to a mean of 1.
 fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
     let mut weights: Vec<f64> =
         all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // a prior without any error gives no scale
+    // without any error of the prior the divisor would be zero
     let unit = mean(&weights).max(f64::MIN_POSITIVE);
     weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
     let unit = mean(&weights);
