@@ -4,13 +4,13 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::control::ControllerKind;
 
-/// The controllers of [`crate::control`].
+/// Option values: the names of the controllers.
 pub fn controller() -> impl TypedValueParser<Value = ControllerKind> {
     PossibleValuesParser::new(ControllerKind::ALL.iter().map(|kind| kind.name()))
         .try_map(|name| name.parse::<ControllerKind>())
 }
 
-/// The groups of targets.
+/// Option values: the names of the groups of targets.
 #[cfg(feature = "demo")]
 pub fn group() -> impl TypedValueParser<Value = crate::sim::Group> {
     use crate::sim::Group;
