@@ -1,4 +1,4 @@
-//! `greylag faults`: a campaign of seeded flights under faults, judged automatically.
+//! `greylag faults`: flies a campaign of seeded flights under faults and checks them automatically.
 
 mod ledger;
 mod monitor;
@@ -106,11 +106,11 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     })
 }
 
-/// Flies the campaign; the exit status is 0 if the companion itself never failed and every
-/// aircraft that left its envelope is explained.
+/// Flies the campaign. The exit status is 0 if the companion itself never failed and every other finding has a fault as
+/// its cause.
 ///
 /// # Errors
-/// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
+/// If an aircraft or a controller cannot be built, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
     let quiet = arguments.json.takes_stdout();
@@ -169,7 +169,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// The default companions of scenarios: the controller `kind` of the default model, with the X8.
+/// Factory of the default companions of scenarios: the controller `kind` of the default model, with the X8.
 ///
 /// # Errors
 /// If the model or the policy that are shipped cannot be used.

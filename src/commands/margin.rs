@@ -8,9 +8,9 @@ use crate::control::{ControllerKind, Pace, build};
 use crate::flight::delay_margin;
 use crate::model::GreyBox;
 
-/// The delay margin of `kind` on `model`: the smallest delay at which its loop oscillates. For planners and policies it is that
-/// of the LQI, which is their fallback: a planner takes too long to simulate, and a policy has no design. `None` if the LQI
-/// cannot be designed, or the loop is stable up to the largest delay simulated.
+/// The delay margin of `kind` on `model`: the smallest delay at which its loop oscillates. For planners and policies it
+/// is the delay margin of the LQI, which is their fallback. A planner takes too long to simulate, and a policy has no
+/// loop design. `None` if the LQI cannot be designed, or the loop is stable up to the largest delay simulated.
 ///
 /// # Errors
 /// If the controller cannot be built.

@@ -1,4 +1,4 @@
-//! `greylag aircraft draw`: aircraft from a distribution, and whether others lie among them.
+//! `greylag aircraft draw`: draws aircraft from a distribution, and compares models with them.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! `greylag aircraft export`: a model as an aircraft of another program.
+//! `greylag aircraft export`: writes a model as an aircraft of another program.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! `greylag aircraft import`: an aircraft of another program as airframe and model.
+//! `greylag aircraft import`: imports an aircraft of another program as airframe and model.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! `greylag aircraft import jsbsim`: a JSBSim aircraft as airframe and model.
+//! `greylag aircraft import jsbsim`: imports a JSBSim aircraft as airframe and model.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -77,7 +77,7 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The imported model, written to a temporary folder and read back: files that cannot be read are not kept.
+/// Writes the imported files to a temporary folder and reads the model back. Files that cannot be read are not kept.
 fn read_back(found: &Imported) -> Result<GreyBox> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let model = folder.path().join("model.toml");

@@ -51,7 +51,7 @@ fn own_table(flights: &[FittedFlight]) -> Table {
     table
 }
 
-/// Factor to the unit in which a constant of a flight is shown, and that unit.
+/// Factor to the display unit of a constant of a flight, and this unit.
 fn own_unit(name: &str) -> (f64, &'static str) {
     match name {
         name if name.starts_with("askew") => (1f64.to_degrees(), "°"),

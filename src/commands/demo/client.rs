@@ -67,8 +67,9 @@ impl Client {
         })
     }
 
-    /// Arms, enters offboard, flies every leg, and goes to hold. `watch` sees the view with the
-    /// number of the leg and the seconds flown on it. Once `ended`, the rest of the legs is left out.
+    /// Arms, enters offboard, flies every leg, and goes to hold. `watch` receives the number of the leg, the time on
+    /// the leg (s) and the view. If `ended` becomes true, the remaining legs are skipped. Returns the companion's texts
+    /// with their times, s.
     pub fn fly(
         &mut self,
         legs: &Legs,
@@ -109,7 +110,7 @@ impl Client {
         self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
-    /// Sends the request every half second until `so` holds; fails after `ANSWER_TIMEOUT`.
+    /// Sends the request every half second until `so` holds. Fails after `ANSWER_TIMEOUT`.
     fn until(
         &mut self,
         what: &str,

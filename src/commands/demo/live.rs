@@ -7,12 +7,12 @@ use super::client::View;
 use super::indicator::{self, ROWS};
 use super::schedule::{Leg, Legs};
 
-/// Time between two drawings.
+/// Interval between two drawings, on the time of the leg.
 const EVERY: Duration = Duration::from_millis(100);
 /// Width of the bar that shows the flown part of a leg, characters.
 const BAR: usize = 24;
 
-/// One line per leg, written when it ends; on a terminal the attitude above it while it is flown.
+/// Prints one line per leg when the leg ends. A terminal also shows the attitude during the leg.
 pub struct Live<'a> {
     legs: &'a Legs,
     terminal: bool,

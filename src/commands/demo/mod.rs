@@ -1,4 +1,4 @@
-//! `greylag demo`: shim, companion and client in one program, over real sockets.
+//! `greylag demo`: runs shim, companion and client in one program, over real sockets.
 
 mod client;
 mod indicator;
@@ -79,7 +79,7 @@ pub struct Arguments {
 /// Flies the schedule; the exit status is 0 if every target was tracked.
 ///
 /// # Errors
-/// If something cannot be opened, or the flight ends before the schedule does.
+/// If a file, a link or the simulator cannot be opened, or the flight ends before the schedule does.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
     let Arguments { controller, policy, changes, .. } = arguments;
@@ -174,7 +174,8 @@ fn chosen(arguments: &Arguments) -> Chosen<'_> {
     }
 }
 
-/// Flies the legs as a client of the companion at `to`; the texts that it received.
+/// Flies the legs as a client of the companion at `to`. Returns the texts that the client received, with their times,
+/// s.
 fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(f64, String)>> {
     let mut table = Live::begin(legs);
     let ended = arguments.attached.then(input_ends).unwrap_or_default();
@@ -184,7 +185,7 @@ fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(
     flown
 }
 
-/// Candidates of the planner, replayed from the recording with `again`. Without them the flight is still reported.
+/// Candidates of the planner, replayed from the recording with `again`. The list is empty if the replay fails.
 fn sights(
     folder: &Path,
     mut again: Companion,
@@ -199,7 +200,7 @@ fn sights(
     })
 }
 
-/// Becomes true when standard input ends.
+/// A flag that becomes true when standard input ends.
 fn input_ends() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
     let heard = ended.clone();
