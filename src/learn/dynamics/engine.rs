@@ -19,7 +19,7 @@ pub enum Arithmetic {
     Double,
 }
 
-/// Computes losses and gradients of minibatches. Memory is allocated only by [`new`](Engine::new).
+/// Computes losses and gradients of minibatches. Memory is allocated only by `new`.
 #[derive(Clone, Debug)]
 pub struct Engine(Kind);
 

@@ -125,11 +125,11 @@ impl CompanionFactory {
 
     /// Flies `case`. A panic of the companion is a finding. A finding on the aircraft is attributed to a cause if the
     /// aircraft was exposed to this cause, and if the finding vanishes when the flight is repeated without the faults
-    /// that produce the cause. The cause is [`Cause::Itself`] if the finding remains without any faults.
+    /// that produce the cause. The cause is `Cause::Itself` if the finding remains without any faults.
     ///
     /// # Errors
     ///
-    /// If the flight cannot be set up; [`FaultsError`] lists the reasons.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
         let scenario = Scenario::of_seed(case.counterpart, case.seed);
         let mut report = self.fly_under(case, scenario.faults)?;
@@ -167,7 +167,7 @@ impl CompanionFactory {
     ///
     /// # Errors
     ///
-    /// If the flight cannot be set up; [`FaultsError`] lists the reasons.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn trace(&self, scenario: &Scenario) -> Result<(Vec<Sample>, Vec<Found>), FaultsError> {
         self.witness(scenario).map(|flown| (flown.samples, flown.findings))
     }
@@ -176,7 +176,7 @@ impl CompanionFactory {
     ///
     /// # Errors
     ///
-    /// If the flight cannot be set up; [`FaultsError`] lists the reasons.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn witness(&self, scenario: &Scenario) -> Result<Witnessed, FaultsError> {
         let mut flight = self.flown(scenario, Some(Vec::with_capacity(STEPS as usize)))?;
         let samples = flight.trace.take().unwrap_or_default();

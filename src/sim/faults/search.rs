@@ -50,7 +50,7 @@ pub struct Nearest {
 ///
 /// # Errors
 ///
-/// If a flight cannot be set up; [`FaultsError`] lists the reasons.
+/// If a flight cannot be set up; `FaultsError` lists the reasons.
 pub fn distances(
     factory: &CompanionFactory,
     rules: &[Policy],
@@ -90,7 +90,7 @@ fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
 ///
 /// # Errors
 ///
-/// If a flight cannot be set up; [`FaultsError`] lists the reasons.
+/// If a flight cannot be set up; `FaultsError` lists the reasons.
 pub fn search(
     factory: &CompanionFactory,
     counterparts: &[Counterpart],

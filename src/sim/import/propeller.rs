@@ -83,7 +83,7 @@ impl Subject<'_> {
     }
 
     /// Slope of the moment coefficient `of` over a surface: without thrust, and its slope over thrust divided by
-    /// dynamic pressure and area. `set` commands the surface to ±[`COMMAND`], at which its deflection is ±`unit` (rad).
+    /// dynamic pressure and area. `set` commands the surface to ±`COMMAND`, at which its deflection is ±`unit` (rad).
     /// `None` if there is no slipstream.
     fn slipstream(
         &mut self,
