@@ -1,4 +1,4 @@
-//! `greylag collect`: exploration flights in JSBSim, from which models are learned.
+//! `greylag collect`: flies exploration flights in JSBSim, from which models are learned.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -191,7 +191,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Roll and pitch, degrees, of the paper's Figures 7 to 9.
 const SHOWN: [[f64; 2]; 3] = [[-58.0, -21.0], [55.0, 28.0], [20.0, 10.0]];
 
-/// Flies every controller to the targets that are shown.
+/// Flies every controller to the targets `SHOWN`.
 fn flights(entrants: &[Entrant], plant: &PlantOptions) -> Result<Vec<(Target, Vec<Tracking>)>> {
     let mut simulator = Simulator::new(plant)?;
     let mut all = Vec::new();

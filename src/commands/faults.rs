@@ -180,7 +180,7 @@ pub fn shipped(kind: ControllerKind) -> Result<CompanionFactory> {
     factory(kind, &model, &plant)
 }
 
-/// The simulator's aircraft as the airframe of `model` describes it, at its usual start.
+/// The simulator's aircraft with the airframe of `model`, at its default start.
 fn plant(aircraft: &str, model: &GreyBox) -> Result<PlantOptions> {
     let models = std::slice::from_ref(model);
     let mut plant = PlantOptions { aircraft: aircraft.into(), ..PlantOptions::default() };
@@ -198,8 +198,8 @@ fn factory(
     Ok(CompanionFactory::new(companion, model)?.with_aircraft(plant.clone()))
 }
 
-/// Prints a table of faults by counterparts: the number of flights with the fault, and how many of them have a
-/// finding.
+/// Prints a table of faults by counterparts: the number of flights with the fault, and the number of these flights with
+/// a finding.
 fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entries: &[Entry]) {
     println!("\n{}: findings of flights of 60 s with each fault", controller.name());
     let mut table = Table::new();

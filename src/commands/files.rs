@@ -37,7 +37,7 @@ pub struct JsonArgument {
     json: Option<PathBuf>,
 }
 
-/// Result of a command, with the name of its layout and the program.
+/// Result of a command, with its schema and the program's version.
 #[derive(Serialize)]
 struct Document<'a, T> {
     schema: &'static str,
@@ -57,7 +57,7 @@ impl JsonArgument {
         is_stdout(self.json.as_deref())
     }
 
-    /// Writes `content` with the name of its layout to the file of `--json`; does nothing without that option.
+    /// Writes `content` with its schema to the file of `--json`. Does nothing without this option.
     pub fn write(
         &self,
         schema: &'static str,

@@ -133,7 +133,7 @@ pub enum CommandName {
 }
 
 impl ProfileName {
-    /// The stack of a real controller.
+    /// The stack of a real flight controller; `None` for the simulator.
     pub fn stack(self) -> Option<Stack> {
         match self {
             ProfileName::Sitl => None,
@@ -144,7 +144,7 @@ impl ProfileName {
 }
 
 impl CommandName {
-    /// Authority of the companion over a real controller.
+    /// Authority of the companion over a real flight controller.
     pub fn authority(self) -> Authority {
         match self {
             CommandName::Surfaces => Authority::Surfaces,
@@ -311,7 +311,7 @@ pub fn companion_with_planner(
 ) -> anyhow::Result<Companion> {
     check_changes(&[kind], changes)?;
     let controller = controller(kind, model, folder, changes)?;
-    // The design of an LQI takes a moment; it is not made twice.
+    // The design of an LQI takes time, so it is not repeated for the fallback.
     let fallback = if matches!(kind, ControllerKind::Lqi | ControllerKind::LqiDamped) {
         controller.boxed_clone()
     } else {

@@ -102,7 +102,7 @@ struct Reading {
 }
 
 impl Reading {
-    /// The settings of the readers for logs of the aircraft of `model`, if one is named.
+    /// The reader settings for logs of the aircraft of `model`; `None` if the model is not given.
     fn options(&self, model: Option<&GreyBox>) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
         let airframe = self.airframe.as_deref().map(|path| Airframe::load(&files::shipped(path)));

@@ -25,7 +25,7 @@ pub fn of(kind: ControllerKind, model: &GreyBox) -> Result<Option<Duration>> {
     let kind = if designed && kind.pace() != Pace::Planned { kind } else { ControllerKind::Lqi };
     match build(kind, model) {
         Ok(controller) => Ok(delay_margin(controller.as_ref(), model)),
-        // No LQI: the substitute was reported already, and its delay margin is unknown.
+        // Without an LQI, the substitute was reported already, and its delay margin is unknown.
         Err(_) if !designed => Ok(None),
         Err(why) => Err(why.into()),
     }

@@ -1,4 +1,4 @@
-//! `greylag mystery`: flights of an aircraft that has an effect which its model lacks.
+//! `greylag mystery`: makes flights of an aircraft with an effect that its model lacks.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

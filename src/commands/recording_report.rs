@@ -82,7 +82,7 @@ impl Reporter<'_> {
 }
 
 impl Reporter<'_> {
-    /// Prediction errors of the model on `flight`; a flight that cannot be compared is still reported.
+    /// Prediction errors of the model on `flight`; `None` if the flight cannot be compared.
     fn compared(&self, flight: &Flight) -> Option<Comparison> {
         let options = flight_path::Options {
             gravity: self.model.atmosphere.gravity,

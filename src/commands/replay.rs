@@ -82,7 +82,7 @@ pub struct Again {
 }
 
 impl FlownArguments {
-    /// Model and controller of the recording in `folder`, from the options or else from the recording.
+    /// Model and controller of the recording in `folder`. Options replace the entries of the recording.
     ///
     /// # Errors
     /// If a file cannot be used.

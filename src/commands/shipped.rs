@@ -104,7 +104,7 @@ mod tests {
         std::fs::write(&model, "spoiled").unwrap();
         unpacked(cache.path()).unwrap();
         crate::model::GreyBox::load(&model).unwrap();
-        // nothing half written is left
+        // no incomplete folder is left
         assert_eq!(std::fs::read_dir(cache.path()).unwrap().count(), 1);
     }
 

@@ -11,14 +11,14 @@ use greylag_logs::{Flight, Sample};
 use greylag_num::stream::{self, Stream};
 use greylag_physics::{Command, State};
 
-/// Number of bins of roll and of pitch; each cell is visited once before any is visited again.
+/// Number of bins of roll and of pitch. Every cell is used once before any cell is used again.
 const BINS: usize = 5;
 /// Range of the target attitudes, rad: Table II.
 const ENVELOPE: [f64; 2] = [60.0 * DEGREE, 30.0 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Steps of 10 ms for which a random action is held. White noise at every step never leaves the trim region.
 const HELD: usize = 25;
-/// Correlation from step to step of Ornstein–Uhlenbeck actions: a time constant of 0.33 s.
+/// Correlation from step to step of Ornstein–Uhlenbeck actions, which gives a time constant of 0.33 s.
 const MEMORY: f64 = 0.97;
 
 /// Ids of the random streams.
@@ -94,8 +94,8 @@ impl Wander {
     }
 }
 
-/// Flies an episode of [`STEPS`] steps. `planner` acts, except for a fraction of random actions. Without a planner all
-/// actions are random. The episode ends early if a state is not finite.
+/// Flies an episode of [`STEPS`] steps. `planner` acts, except during random intervals with random actions. Without a
+/// planner all actions are random. The episode ends early if a state is not finite.
 ///
 /// # Errors
 ///

@@ -13,7 +13,7 @@ pub use greylag_control::quality::{REACHED_DEG, attitude_error_deg};
 /// Number of steps of an episode: 10 s in steps of 10 ms (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
 
-/// Number of steps over which the settled error is taken: the last fifth.
+/// Number of steps over which the settled error is computed: the last fifth of an episode.
 pub const SETTLED: usize = 200;
 
 /// Settled error above which an episode counts as diverged, degrees (Table VIII).
@@ -53,7 +53,7 @@ pub struct Leg {
 }
 
 impl Episode<'_> {
-    /// Flies towards `target` and scores it; `watch` is called at every step.
+    /// Flies towards `target` and scores the flight. `watch` is called at every step.
     ///
     /// # Errors
     ///
@@ -245,7 +245,7 @@ mod tests {
         let outcome = episode.fly_leg(Some(first), leg, |_, _| steps += 1).unwrap();
         assert_eq!((steps, outcome.cost.len(), outcome.track.moments.len()), (900, 400, 401));
         assert_eq!((outcome.track.target, outcome.track.before), (TARGET, Some(Command::IDLE)));
-        // away up to step 800 of the episode, which is 300 of the leg
+        // off target up to step 800 of the episode, which is step 300 of the leg
         assert!(
             (outcome.settling_s - 3.0).abs() < 1e-9 && (outcome.settled_deg - 0.5).abs() < 1e-9
         );

@@ -35,7 +35,7 @@ pub struct Evaluation {
     pub groups: Vec<Score>,
     /// Computing time per step.
     pub ms_per_step: Cost,
-    /// The limits that the flights are measured against; `None` without measurement.
+    /// The limits against which the flights are measured; `None` without measurement.
     pub limits: Option<Limits>,
     /// Every flight with its measures, in the order of the targets; empty without measurement.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -311,7 +311,7 @@ impl Sums {
             .into_iter()
             .map(|group| Score::new(group.name(), &of(&|g| g == Some(group))))
             .collect();
-        // "all" means the targets of Table II; a subset of them is not "all"
+        // "all" means the targets of Table II, of which no group may be missing
         if groups[..2].iter().all(|score| score.count > 0) {
             let table = |g| matches!(g, Some(Group::Easy | Group::HardCorners));
             groups.push(Score::new("all", &of(&table)));

@@ -1,4 +1,4 @@
-//! A flight test in JSBSim: a controller flies a schedule, and the true state of every step is kept.
+//! A flight test in JSBSim: a controller flies a schedule, and the true state of every step is stored.
 
 use greylag_sitl::plant::{PlantOptions, Truth};
 

@@ -82,7 +82,7 @@ struct Batch {
 }
 
 impl Imagination {
-    /// `instances` aircraft of `model` at the neutral start; `targets` supplies the target of each episode.
+    /// `instances` aircraft of `model` at the neutral start. `targets` supplies the target of each episode.
     pub fn new(model: Arc<GreyBox>, instances: usize, targets: Stratified) -> Imagination {
         let lane = Block::from_f64;
         let (state, rest) = (model.airframe.start(), Controls::default());
@@ -156,7 +156,7 @@ impl Imagination {
         observe(state, &actuators.observed(&self.model.airframe.actuators), target)
     }
 
-    /// One step of a block under `action`; ended episodes are reset afterwards.
+    /// Simulates one step of a block under `action`. Ended episodes are reset afterwards.
     pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
         let batch = &mut self.batches[block];
         let (observed, reward, outside) = batch.advance(&self.model, &self.task, action);

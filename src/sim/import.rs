@@ -107,7 +107,8 @@ struct Subject<'a> {
 /// Coefficients of drag, side force and lift (wind axes), and of rolling, pitching and yawing moment (body axes).
 type Coefficients = [f64; 6];
 
-/// Imports the aircraft of `plant` about `cruise` (m/s) at `altitude` (m), under `name`.
+/// Imports the aircraft of `plant` as the aircraft `name`, from its loads about the airspeed `cruise` (m/s) and the
+/// altitude `altitude` (m).
 ///
 /// # Errors
 ///
@@ -176,7 +177,7 @@ struct Polar {
 }
 
 impl Polar {
-    /// The smallest incidence (rad) at which the lift coefficient reaches `lift`, interpolated.
+    /// The smallest incidence (rad) at which the interpolated lift coefficient reaches `lift`; 0 if it does not.
     fn incidence(&self, lift: f64) -> f64 {
         let reaches = self.lift.windows(2).position(|w| w[0] < lift && lift <= w[1]);
         reaches.map_or(0.0, |k| {

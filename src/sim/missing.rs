@@ -131,9 +131,9 @@ const WRITTEN: Sizes = Sizes {
 /// An effect that can be missing.
 #[derive(Clone, Copy, Debug)]
 pub struct MissingKind {
-    /// Id in the catalogue.
+    /// Id of the effect in the catalogue.
     pub id: &'static str,
-    /// Unit of its amplitude; empty if dimensionless.
+    /// Unit of the amplitude; empty if dimensionless.
     pub unit: &'static str,
     /// Range of amplitudes that are identifiable in a few minutes of flight while the aircraft remains flyable.
     pub clear: [f64; 2],
@@ -230,7 +230,7 @@ pub(super) fn rounded(x: f64) -> f64 {
 /// An effect that is missing from a model, with its amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
-    /// Id in the catalogue.
+    /// Id of the effect in the catalogue.
     pub id: &'static str,
     /// Amplitude in the unit of [`MissingKind::unit`].
     pub amplitude: f64,

@@ -53,7 +53,7 @@ pub enum FlightError {
 ///
 /// # Errors
 ///
-/// [`FlightError`], if no LQI can be designed, or the aircraft cannot be flown.
+/// If no LQI can be designed from the model, or the environment cannot continue.
 pub fn errors(
     model: &GreyBox,
     environment: &mut impl Environment,

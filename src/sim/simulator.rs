@@ -7,7 +7,7 @@ use greylag_control::Observation;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// JSBSim with one aircraft.
+/// One aircraft in JSBSim, as an environment.
 pub struct Simulator {
     plant: Plant,
     start: Start,

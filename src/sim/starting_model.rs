@@ -86,7 +86,7 @@ fn most_in_table(effect: &toml::Value) -> Option<f64> {
     effect.get("T_n")?.get("value")?.as_array()?.last()?.as_array()?.first()?.as_float()
 }
 
-/// The effect `thrust_linear` without airspeed dependence: half of the static thrust.
+/// The effect `thrust_linear` with half of the static thrust `most` (N), without airspeed dependence.
 fn linear_thrust(most: f64) -> toml::Value {
     let number =
         [("value", rounded(0.5 * most).into()), ("source", "half the thrust at rest".into())];
@@ -145,7 +145,7 @@ fn text(file: &toml::Table) -> String {
         value.as_table().is_some_and(|t| t.values().any(|v| v.is_table() || v.is_array()))
     };
     let mut sections = vec![(String::new(), file)];
-    // the stack is emptied from its end
+    // sections are taken from the end of the stack
     while let Some((path, table)) = sections.pop() {
         let (below, here): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
         if !path.is_empty() && !here.is_empty() {

@@ -38,7 +38,7 @@ pub struct Row {
     pub pitch_deg: f64,
 }
 
-/// Number of bins of roll and of pitch; each cell is visited once before any is visited again (section IV-A of
+/// Number of bins of roll and of pitch. Every cell is used once before any cell is used again (section IV-A of
 /// \[GSFM26\]).
 const BINS: usize = 5;
 /// Id of the random stream of [`Stratified`].
@@ -122,7 +122,7 @@ impl Stratified {
     }
 }
 
-/// The target file: 140 easy, 100 hard in the corners, 100 hard outside the easy box.
+/// The target file: 140 easy targets, 100 in the hard corners, and 100 anywhere outside the easy box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFile {
     /// The targets in file order.

@@ -4,7 +4,7 @@ use crate::Trouble;
 use crate::imagined::{Block, Imagination, Stepped};
 use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
-/// One or several aircraft, each in its own episode. An episode that ends is followed by a new one.
+/// One or several aircraft, each in its own episode. A new episode follows one that ends.
 pub trait World {
     /// Number of aircraft.
     fn instances(&self) -> usize;

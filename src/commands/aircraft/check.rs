@@ -70,7 +70,7 @@ pub fn status(found: &AircraftCheck) -> ExitCode {
     if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) }
 }
 
-/// The page of the aircraft of `model`, whose file is `file`.
+/// The page of the aircraft of `model`. `file` is the path of the model file.
 ///
 /// # Errors
 /// If the aircraft cannot be trimmed or stabilised at its cruise airspeed.

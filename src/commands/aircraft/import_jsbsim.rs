@@ -39,7 +39,7 @@ pub struct Jsbsim {
     set: Vec<(String, f64)>,
 }
 
-/// Imports the aircraft, writes its files and lists what was left out.
+/// Imports the aircraft, writes its files and lists the effects that they do not represent.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let mut options = PlantOptions {
         aircraft_dir: Some(jsbsim.dir.clone()),

@@ -92,8 +92,8 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     Ok(super::check::status(&found))
 }
 
-/// The text of the airframe file with the upper airspeed limit reduced to the fastest level flight, unless that limit
-/// would lie within 10 % of the cruise airspeed.
+/// The text of the airframe file with the upper airspeed limit reduced to the fastest level flight. The limit is kept
+/// if the reduced one would be at most 1.1 times the cruise airspeed.
 fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = scratch.path().join("model.toml");

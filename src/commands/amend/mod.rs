@@ -203,7 +203,7 @@ fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { done })
 }
 
-/// Refuses effects that the program does not know or the model has already.
+/// Refuses effects that are unknown to the program or already in the model.
 fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     for id in effects {
         if catalogue::describe(id).is_none() {
@@ -250,7 +250,7 @@ fn tests(
     Ok(more.flights)
 }
 
-/// The report as HTML, with the growth of the errors on the flights that the fit did not see.
+/// The report as HTML, with the growth of the errors on the validation flights.
 fn page(
     arguments: &Arguments,
     model: &GreyBox,
@@ -289,7 +289,8 @@ fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf
     }
 }
 
-/// Error message when the diagnosis of the fitted flights asserts no effect: its verdict, and the commands to run next.
+/// Error message if the diagnosis of the fitted flights asserts no effect. The message has the verdict of the diagnosis
+/// and the commands to run next.
 fn nothing_asserted(
     arguments: &Arguments,
     diagnosis: &Diagnosis,

@@ -26,8 +26,8 @@ pub enum Source {
 }
 
 impl Cost {
-    /// Cost of a cell of `stage`; `None` if it is unknown. Interrupted cells are not counted, because the time of their last
-    /// session is not that of the whole cell.
+    /// Cost of a cell of `stage`; `None` if it is unknown. Resumed cells are not counted, because their time covers the
+    /// last session only.
     ///
     /// # Errors
     /// If the times of a cell cannot be read.

@@ -1,4 +1,4 @@
-//! `greylag campaign gather`: join the results and list the missing cells.
+//! `greylag campaign gather`: joins the results and lists the missing cells.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -130,7 +130,7 @@ impl Local<'_> {
         }
     }
 
-    /// The first cell that can be run at once.
+    /// The first cell that can be run at once; `None` if there is none.
     fn next(&self, now: Instant) -> Option<usize> {
         let ready = |i: &usize| {
             let State::Waiting { not_before, .. } = self.states[*i] else { return false };
@@ -166,7 +166,7 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            // by id, because the numbers of the cells change if the campaign file is edited meanwhile
+            // the cell is named by id, because its number changes if the campaign file is edited meanwhile
             .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())
@@ -224,7 +224,7 @@ impl Local<'_> {
         Ok(())
     }
 
-    /// The metrics of a result that the campaign's tables use, three at most.
+    /// At most three metrics of a result, from those in the campaign's tables.
     fn reached(&self, record: &Record) -> String {
         let file = &self.plan.file;
         let of = |choice: &str| {

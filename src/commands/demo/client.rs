@@ -172,7 +172,7 @@ impl Client {
         let _ = self.socket.send(bytes);
     }
 
-    /// The last text that does not merely confirm a request.
+    /// The companion's last text, without confirmations of requests.
     fn last_text(&self) -> &str {
         let done = |words: &str| words.starts_with("mode ") || words.starts_with("armed");
         let last = self.texts.iter().rev().find(|(_, words)| !done(words));

@@ -7,7 +7,7 @@ use super::client::View;
 use super::indicator::{self, ROWS};
 use super::schedule::{Leg, Legs};
 
-/// Interval between two drawings, on the time of the leg.
+/// Interval between two drawings.
 const EVERY: Duration = Duration::from_millis(100);
 /// Width of the bar that shows the flown part of a leg, characters.
 const BAR: usize = 24;
@@ -38,7 +38,7 @@ impl Live<'_> {
         }
     }
 
-    /// Shows `view`, `seconds` after the leg number `leg` was begun.
+    /// Shows `view` at the time `seconds` (s) after the start of the leg with index `leg`.
     pub fn show(&mut self, leg: usize, seconds: f64, view: &View) {
         if self.leg != Some(leg) {
             self.end();

@@ -76,7 +76,7 @@ pub struct Arguments {
     faults: FaultArgs,
 }
 
-/// Flies the schedule; the exit status is 0 if every target was tracked.
+/// Flies the schedule. The exit status is 0 if every target was tracked.
 ///
 /// # Errors
 /// If a file, a link or the simulator cannot be opened, or the flight ends before the schedule does.
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .map_or_else(|| Legs::demonstration(&model.airframe.envelope), Legs::during);
     let tracked = if schedule.is_none() { legs.legs.as_slice() } else { &[] };
     schedule.iter().for_each(|schedule| flying.pilot.follow(schedule.clone()));
-    // an aircraft that cannot fly is found before anything is opened or written
+    // an aircraft that cannot fly is reported before anything is opened or written
     let plant = plant(arguments, &model)?;
     Plant::new(&plant)?.reset(&plant.start)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -160,7 +160,7 @@ fn announce(
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
 }
 
-/// Options of the flight, as the recording keeps them.
+/// Options of the flight that are stored with the recording.
 fn chosen(arguments: &Arguments) -> Chosen<'_> {
     Chosen {
         controller: arguments.controller,
@@ -231,7 +231,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Result<FlightOptions> {
     })
 }
 
-/// The simulator's aircraft as the model's airframe describes it, at its start.
+/// The simulator's aircraft with the model's airframe and the initial state of the options.
 fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
     let mut plant = arguments.plant.options(arguments.seed);
     let models = std::slice::from_ref(model);

@@ -20,7 +20,7 @@ pub const LEG_S: f64 = 8.0;
 
 /// Largest bank for which the legs are written, degrees: that of the paper's hard targets.
 const BANK_DEG: f64 = 60.0;
-/// Largest pitch for which the legs are written, degrees, up and down.
+/// Largest magnitude of pitch for which the legs are written, degrees.
 const PITCH_DEG: f64 = 30.0;
 
 /// Easy targets, then hard targets. Climbs and dives alternate to restore the altitude.

@@ -1,4 +1,5 @@
-//! The file in which a campaign records its flights, one JSON object a line, so that it can be resumed.
+//! The file in which a fault campaign records its flights, one JSON object a line. An interrupted campaign resumes from
+//! this file.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};

@@ -14,7 +14,7 @@ use crate::sysid::amend::document::effect_file;
 
 /// Name of the controller's folder below that of a learning.
 pub const CONTROLLER: &str = "controller";
-/// Name of the record of origin.
+/// File name of the record of origin.
 pub const ORIGIN: &str = "learned.toml";
 
 /// The controller's files: folder below that of the learning, and name.

@@ -192,7 +192,7 @@ impl Inputs<'_> {
 }
 
 impl Stage {
-    /// The command as one would type it in a shell.
+    /// The command as typed in a shell.
     pub fn command(&self) -> String {
         let quoted = |word: &OsString| match word.to_string_lossy() {
             word if word.contains([' ', '\'', '"', '$', '*']) => {

@@ -260,7 +260,7 @@ impl Arguments {
     }
 
     /// `prior`, with the stated or default width of each coefficient as its prior. It is unchanged with
-    /// `--from-scratch`, or if flights come from other sources than logs.
+    /// `--from-scratch`, or if rounds of `greylag collect` or recent flights are used.
     fn narrowed(&self, prior: GreyBox) -> GreyBox {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;

@@ -126,7 +126,7 @@ impl FlightArguments {
         Ok(all)
     }
 
-    /// The tracks `others` and the recent flights. Recent flights are repeated until they make up their share of all
+    /// Joins the tracks `others` and the recent flights. Recent flights are repeated to make up their share of all
     /// samples.
     fn with_recent(
         &self,

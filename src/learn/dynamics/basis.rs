@@ -1,4 +1,4 @@
-//! Coordinates of the trainable coefficients in which each has the same effect on the rates.
+//! Coordinates of the trainable coefficients. A unit of each coordinate has the same effect on the state rates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -20,7 +20,7 @@ pub const JXZ: &str = "rigid_body.jxz_kgm2";
 /// Number of samples that determine the coordinates.
 const SAMPLES: usize = 4096;
 
-/// Squared relative strength below which a direction counts as unidentifiable.
+/// Eigenvalue, relative to the largest one, up to which a direction counts as unidentifiable.
 const UNSEEN: f64 = 1e-9;
 
 /// θ_p = θ_p0 + T η: η has as many entries as there are identifiable directions.
@@ -185,7 +185,8 @@ impl Basis {
         (0..self.len()).map(|k| of(k).sum()).collect()
     }
 
-    /// Prior information on the coordinates from the stated standard deviations: Tᵀ Σ⁻¹ T, zero where none is stated.
+    /// Prior information on the coordinates from the stated standard deviations: Tᵀ Σ⁻¹ T. A coefficient without a
+    /// stated standard deviation contributes zero.
     pub fn prior_information(&self) -> DMatrix<f64> {
         let weighed = DMatrix::from_diagonal(&self.information) * &self.turn;
         self.turn.transpose() * weighed

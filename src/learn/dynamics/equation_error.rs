@@ -58,7 +58,7 @@ pub(super) enum Weighting {
     Alike,
 }
 
-/// A window or a sample: each channel's error in units of x_c, and the slopes of the prediction.
+/// Regression row of a window or a sample: each channel's error in units of x_c, and the slopes of the prediction.
 pub(super) struct Row {
     pub error: [f64; 6],
     /// Slopes over the coordinates, then over the nuisance terms.
@@ -66,7 +66,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The row after a step of the fitted parameters.
+    /// Updates the error after a step of the fitted parameters.
     pub fn advance(&mut self, step: &DVector<f64>) {
         for (slopes, step) in self.slopes.iter().zip(step.iter()) {
             self.error.iter_mut().zip(slopes).for_each(|(error, slope)| *error -= slope * step);

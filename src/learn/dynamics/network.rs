@@ -114,7 +114,8 @@ impl Passes {
         input
     }
 
-    /// Adds the contributions of `points` points, whose traces and slopes are consecutive, to `gradient`.
+    /// Adds the contributions of several points to `gradient`. `traces` and `slopes` hold the data of one point after
+    /// another.
     #[inline(always)]
     pub fn gather<R: Packet>(&self, traces: &[R], slopes: &[R], gradient: &mut [f64]) {
         let sizes = self.network.sizes();

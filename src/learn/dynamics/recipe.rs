@@ -37,9 +37,9 @@ impl Criterion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// Those of the prior, as in the paper.
+    /// The values of the prior, as in the paper.
     AsGiven,
-    /// Those of a robust regression on short windows.
+    /// Estimates of a robust regression on short windows.
     EquationError,
 }
 
@@ -47,7 +47,7 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Joint {
-    /// By the gradient of the rollouts, at [`Recipe::prior_rate`]: the paper's.
+    /// By the gradient of the rollouts, at the learning rate [`Recipe::prior_rate`], as in the paper.
     #[default]
     Gradient,
     /// By robust variable projection: the part of the residual in the prior's span moves into its coefficients.
@@ -88,7 +88,7 @@ pub struct Recipe {
     pub joint: Joint,
     /// λ0 of eq. (24).
     pub lambda: f64,
-    /// τ of eq. (24), the growth of λ per update.
+    /// τ of eq. (24). λ grows by τ times the relative prediction loss in each update.
     pub tau: f64,
     /// Variant of the training objective.
     pub criterion: Criterion,
@@ -125,7 +125,7 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// Description of the first invalid setting, if there is one.
+    /// Description of the first invalid setting; `None` if all are valid.
     pub fn fault(&self) -> Option<&'static str> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if self.steps.is_empty() || self.steps.iter().any(|n| !(1..=500).contains(n)) {

@@ -222,7 +222,7 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// If more than 20 consecutive updates have no finite gradient, or the data is too short for a new rollout length.
+    /// If more than 20 consecutive updates fail, or the data is too short for a new rollout length.
     pub fn run(&mut self, count: u64) -> Result<Progress, TrainError> {
         let mut sum = Progress::default();
         let (mut made, mut failed) = (0.0_f64, 0);
@@ -284,7 +284,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// One update; `None` if the gradient is not finite.
+    /// One update. `None` if the gradient is not finite or more than half of the rollouts are lost.
     fn one(&mut self) -> Result<Option<(Loss, f64)>, TrainError> {
         let steps = self.recipe.steps_at(self.update);
         if steps != self.stage.steps {

@@ -82,7 +82,7 @@ pub struct Window {
     pub weight: f64,
 }
 
-/// Largest |pitch| for training, rad: Euler angles are singular near the vertical.
+/// Magnitude of pitch below which samples are used for training, rad. Euler angles are singular near the vertical.
 const STEEPEST: f64 = 1.4;
 /// Airspeed below which flow angles are undefined, m/s.
 const SLOWEST: f64 = 5.0;
@@ -92,7 +92,7 @@ pub(crate) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 
-/// Every window of `steps` steps, in order, in which the aircraft flies and is not near the vertical.
+/// Every window of `steps` steps, in order, in which all samples are regular (not near the vertical, fast enough).
 pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
     let mut all = Vec::new();
     for (track, t) in tracks.iter().enumerate() {

@@ -41,7 +41,7 @@ pub struct AnalyticRecipe {
     pub rounding: f64,
     /// Weight (≥ 0) of the squared change of the command per step, in units of the action, in the objective.
     pub effort: f64,
-    /// Fraction of the targets in the hard corners.
+    /// Fraction of the targets in the hard corners, 0..1.
     pub corners: f64,
     /// Number of models drawn from the standard deviations of the coefficients, over which the aircraft are distributed
     /// (domain randomisation). 0 means the model itself.
@@ -223,7 +223,7 @@ impl AnalyticTrainer {
         Ok(AnalyticProgress { update: self.update, reward, lost: self.lost })
     }
 
-    /// Advances an aircraft to its next step; `false` if its episode ended there.
+    /// Advances an aircraft to its next step. Returns `false` if its episode ended there.
     fn advance(&mut self, k: usize, next: Aircraft) -> bool {
         let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
         let inside = pitch.abs() < 1.4

@@ -33,7 +33,7 @@ const ROW: usize = INPUTS + 2 + INPUTS;
 /// Return, in units of the reward of eq. (30), below which errors count as absolute instead of relative.
 const SMALL: f32 = 0.1;
 
-/// Settings of learning critics.
+/// Settings of the training of critics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValuationRecipe {
     /// Units of a critic's hidden layers.
@@ -54,7 +54,7 @@ pub struct ValuationRecipe {
     pub windows: u64,
     /// Number of updates between windows.
     pub between: u64,
-    /// Capacity of the memory, steps.
+    /// Capacity of the replay buffer, steps.
     pub remembered: usize,
     /// Discount factor γ per step.
     pub discount: f64,
@@ -109,7 +109,7 @@ pub struct ValuationProgress {
     pub steps: u64,
 }
 
-/// State of learning critics.
+/// State of the training of critics.
 pub struct Valuation<W> {
     recipe: ValuationRecipe,
     world: W,
@@ -216,7 +216,7 @@ impl<W: World> Valuation<W> {
         let mut way = Vec::with_capacity(self.recipe.window);
         for step in 0..self.recipe.window {
             let observed = self.world.observe(block);
-            // the first action of the window is arbitrary, the others are the actor's
+            // the first action of the window is random, the others are the actor's
             if step > 0 {
                 action = self.actor.act_block(&mut self.units, &observed);
             }
@@ -281,7 +281,7 @@ impl<W: World> Valuation<W> {
         self.next = (self.next + 1) % self.recipe.remembered;
     }
 
-    /// One update of both critics; returns the mean square of their relative errors.
+    /// Makes one update of both critics. Returns the mean square of their relative errors.
     fn update(&mut self) -> Result<f64, ValuationError> {
         let mut rng = stream::stream(self.recipe.seed, &[UPDATE, self.updates]);
         let batch = self.recipe.batch;

@@ -13,10 +13,10 @@ pub const CURVE: &str = "curve.csv";
 /// Column names.
 pub const COLUMNS: &str =
     "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
-/// Fraction of the way from the first to the smallest error that defines the knee.
+/// Fraction of the reduction from the first to the smallest error that defines the knee.
 const KNEE: f64 = 0.9;
 
-/// One evaluation; unmeasured values are NaN.
+/// One evaluation. Values that were not measured are NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// Environment steps so far, all aircraft together.
@@ -90,7 +90,7 @@ pub fn best(points: &[CurvePoint]) -> Option<usize> {
     (0..points.len()).rev().min_by(|a, b| points[*a].badness().total_cmp(&points[*b].badness()))
 }
 
-/// The knee of the curve: the first point that has covered nine tenths of the way from the first error to the smallest.
+/// The knee of the curve: the first point with nine tenths of the reduction from the first error to the smallest.
 /// `None` without points.
 pub fn knee(points: &[CurvePoint]) -> Option<&CurvePoint> {
     let (first, best) = (points.first()?.badness(), points[best(points)?].badness());
@@ -146,7 +146,8 @@ pub struct CurveFile {
 }
 
 impl CurveFile {
-    /// Opens the curve in `path` to continue it after `steps`, and removes later points. A curve without a file is new.
+    /// Opens the curve in `path` to continue it after `steps`. Later points are removed. A new curve is started if
+    /// there is no file.
     ///
     /// # Errors
     ///

@@ -15,7 +15,7 @@ pub struct Transition {
     pub reward: f32,
     /// Next observation, o'.
     pub next: [f32; OBSERVATIONS],
-    /// 1 where the next state is bootstrapped, 0 where the aircraft was lost (terminal).
+    /// 1 if the next state is bootstrapped, 0 if the aircraft was lost (terminal).
     pub goes_on: f32,
 }
 

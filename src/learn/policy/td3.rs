@@ -133,7 +133,7 @@ impl Td3 {
         })
     }
 
-    /// One update from `batch`, eq. (1) to (3); `rng` draws the smoothing noise.
+    /// One update from `batch`, eqs. (1) to (3). `rng` draws the smoothing noise.
     pub fn update(&mut self, batch: &Batch, rng: &mut impl Rng) -> Losses {
         let rows = |numbers: &[f32], width: usize| -> Tensor<2> {
             let data = TensorData::new(numbers.to_vec(), [batch.size, width]);

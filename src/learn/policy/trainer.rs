@@ -31,11 +31,11 @@ pub struct PolicyRecipe {
     pub steps: u64,
     /// Warm-up steps with random actions and without updates.
     pub warmup: u64,
-    /// Capacity of the replay buffer.
+    /// Capacity of the replay buffer, transitions.
     pub replay: usize,
     /// Number of simulated aircraft.
     pub instances: usize,
-    /// Fraction of the targets in the hard corners.
+    /// Fraction of the targets in the hard corners, 0..1.
     pub corners: f64,
     /// Steps between checkpoints. All episodes are reset at a checkpoint. A resumed training therefore equals an
     /// uninterrupted one.
@@ -194,7 +194,7 @@ impl<W: World> PolicyTrainer<W> {
         stretch(before) != stretch(self.steps)
     }
 
-    /// One step of every aircraft, then as many updates.
+    /// Makes one step of every aircraft, then as many updates as there are aircraft.
     fn advance(&mut self) -> Result<(), PolicyError> {
         let mut rng = stream::stream(self.recipe.seed, &[ACT, self.steps]);
         let instances = self.world.instances();

@@ -89,7 +89,7 @@ pub(super) enum Aircraft {
 }
 
 impl Aircraft {
-    /// The aircraft `plant` in the scenario's air, with sensor noise and flight controller or shim.
+    /// The aircraft `plant` in the scenario's wind and turbulence, with sensor noise and flight controller or shim.
     pub(super) fn new(plant: &PlantOptions, scenario: &Scenario) -> Result<Self, ShimError> {
         let mut options = ShimOptions::new(scenario.air(plant), plant.start);
         options.seed = scenario.seed;
@@ -162,7 +162,7 @@ impl Aircraft {
         }
     }
 
-    /// Advances a step; `false` when the flight has ended on the ground or with a state that is not finite.
+    /// Advances a step. Returns `false` when the flight has ended on the ground or with a state that is not finite.
     pub(super) fn fly(&mut self) -> bool {
         let flown = match self {
             Aircraft::Sitl(bench) => bench.fly(),

@@ -39,7 +39,7 @@ const STEPS: u64 = 6000;
 /// Time within which control must be returned on a dead link, s.
 const HAND_BACK_S: f64 = 0.5;
 
-/// Random stream of an overloaded processor.
+/// Random stream for the suspensions by an overloaded processor.
 const STARVED: u64 = 20;
 
 /// Conditions of a flight.
@@ -60,7 +60,7 @@ pub struct Report {
     pub case: Case,
     /// The faults that occurred.
     pub faults: Vec<Fault>,
-    /// The findings of the judge.
+    /// The violated requirements.
     pub findings: Vec<Found>,
     /// Texts to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
@@ -71,7 +71,7 @@ pub struct Report {
 pub struct Witnessed {
     /// Samples at intervals of 10 ms. They end with a panic or on the ground.
     pub samples: Vec<Sample>,
-    /// The findings of the judge.
+    /// The violated requirements.
     pub findings: Vec<Found>,
     /// Texts of the companion to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
@@ -162,8 +162,8 @@ impl CompanionFactory {
         Ok(Report { case, faults: scenario.faults, findings, texts: flight.texts })
     }
 
-    /// Flies `scenario` and returns its samples of every 10 ms and the findings of the judge. The samples end at a
-    /// panic.
+    /// Flies `scenario` and returns its samples at intervals of 10 ms and the violated requirements. The samples end at
+    /// a panic.
     ///
     /// # Errors
     ///

@@ -57,13 +57,13 @@ pub struct Exposure {
     /// The actuators hold their position because no command arrives, or the flight controller holds its own attitude
     /// because targets are missing.
     pub unsteered: bool,
-    /// The state is unusable, and there is no other pilot.
+    /// No state is usable, and no other pilot can fly.
     pub blind: bool,
     /// A sensor shows a plausible wrong value.
     pub misled: bool,
 }
 
-/// Explanation of a violated envelope.
+/// Cause of a finding on the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
     /// No command arrived for at least 0.2 s, within the last 3 s (within 1 s for bank and pitch).
@@ -72,7 +72,7 @@ pub enum Cause {
     Blind,
     /// A sensor showed a plausible wrong value within these times.
     Misled,
-    /// No fault: the same flight without faults has the finding too.
+    /// No fault is the cause: the same flight without faults has the finding too.
     Itself,
 }
 
@@ -110,7 +110,7 @@ impl Cause {
     }
 }
 
-/// A finding with its circumstances.
+/// A finding with its time and causes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Time of the finding, s.
@@ -191,7 +191,7 @@ impl Judge {
         }
     }
 
-    /// Records a finding; only the first of each kind counts.
+    /// Records a finding. Only the first finding of each kind counts.
     pub fn note(&mut self, at_s: f64, finding: Finding) {
         if !self.findings.iter().any(|known| known.finding == finding) {
             let suspects = if finding.is_own() { [None; 3] } else { self.suspects(finding) };

@@ -37,23 +37,23 @@ pub enum FaultKind {
     Alpha,
     /// The pitch rate is NaN.
     NotANumber,
-    /// The vehicle's clock jumps forward.
+    /// The vehicle's clock jumps forward by up to 10 s.
     Clock,
     /// The vehicle restarts, and its clock starts again.
     Reboot,
-    /// The client that sends the commands ends.
+    /// The client stops sending commands.
     Client,
     /// The companion is suspended for up to 0.3 s at a time. Its ticks come late and in bursts.
     Starvation,
     /// The disk is full, and recording ends.
     Disk,
-    /// The companion is killed; another one starts without its state when the fault ends.
+    /// The companion is killed. When the fault ends, another one starts without its state.
     Killed,
 }
 
 impl FaultKind {
-    /// The kinds that campaigns and searches draw. A killed companion is excluded: including it would change the
-    /// flight of every seed.
+    /// The kinds that campaigns and searches draw. A killed companion is excluded, because it would change the flight
+    /// of every seed.
     pub const DRAWN: [FaultKind; 17] = [
         FaultKind::Loss,
         FaultKind::Duplication,

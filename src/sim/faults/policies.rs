@@ -133,7 +133,7 @@ fn decided(holds: impl Fn(&Decision) -> bool + Send + Sync + 'static) -> Rule {
     is(move |s| s.decided(&holds))
 }
 
-/// Holds unless the aircraft was exposed recently.
+/// The rule holds, or the aircraft was exposed within the last `MEMORY_S`.
 fn unless_exposed(rule: Rule) -> Rule {
     is(|s| s.exposed).once(MEMORY_S).or(rule)
 }
@@ -143,7 +143,7 @@ fn near(most: f64) -> Rule {
     Formula::atom(move |s: &Sample| s.error_deg().map_or(1.0, |e| (most - e) / most))
 }
 
-/// The same attitude has been flown for less than `seconds`.
+/// The companion has controlled to the same attitude for less than `seconds`.
 fn steady_for_less(seconds: f64) -> Rule {
     Formula::atom(move |s: &Sample| (seconds - s.steady_s) / UNIT_S)
 }

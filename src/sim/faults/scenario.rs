@@ -88,7 +88,7 @@ const SETTINGS: [(&str, [f64; 2]); 9] = [
 pub struct ControllerSetting {
     /// Name of the parameter in PX4 or ArduPilot.
     pub name: String,
-    /// Its value in the stack's unit.
+    /// Value of the parameter in the stack's unit.
     pub value: f64,
 }
 
@@ -229,7 +229,7 @@ impl Scenario {
                 fault.strength = (fault.strength + random.random_range(-0.3..0.3)).clamp(0.0, 1.0);
             }
             7 if changed.legs.len() > 1 => {
-                // the last leg stays level, because the end of the flight is judged against it
+                // the last leg stays level, because the check at the end of the flight requires it
                 let place = random.random_range(0..changed.legs.len() - 1);
                 let leg = &mut changed.legs[place];
                 leg.roll_deg = random.random_range(-60.0..60.0);
@@ -300,7 +300,7 @@ impl Scenario {
         all
     }
 
-    /// The aircraft `plant` in the scenario's air.
+    /// The aircraft `plant` in the scenario's wind and turbulence.
     pub(super) fn air(&self, plant: &PlantOptions) -> PlantOptions {
         let mut plant = plant.clone();
         if self.wind_ned_mps != [0.0; 3] {

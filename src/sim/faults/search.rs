@@ -25,7 +25,7 @@ const ROUNDS: usize = 8;
 /// Random stream of the search.
 const SEARCH: u64 = 61;
 
-/// Closest approach to the violation of a rule.
+/// The flight that came closest to the violation of a rule.
 #[derive(Clone, Debug)]
 pub struct Nearest {
     /// Name of the rule.

@@ -2,7 +2,7 @@
 //!
 //! A formula has a robustness at each sample (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued
 //! Signals, FORMATS 2010). The robustness is positive where the formula holds and negative where it is violated. Its
-//! magnitude is the margin. An eventuality whose window extends past the end of the flight holds. For `Once`, the time
+//! magnitude is the margin. `Eventually` holds if its window extends past the end of the flight. For `Once`, the time
 //! before the first sample counts as violated.
 
 use std::collections::VecDeque;
@@ -15,9 +15,9 @@ pub enum Formula<S> {
     Atom(Box<dyn Fn(&S) -> f64 + Send + Sync>),
     /// Negation: the formula does not hold.
     Not(Box<Formula<S>>),
-    /// Conjunction: all hold.
+    /// Conjunction: all formulas hold.
     All(Vec<Formula<S>>),
-    /// Disjunction: one of them holds.
+    /// Disjunction: at least one formula holds.
     Any(Vec<Formula<S>>),
     /// Eventually: the formula holds at some sample within this time from now, s.
     Eventually(f64, Box<Formula<S>>),

@@ -6,7 +6,7 @@ use super::propulsion::{LBF_FT, NO_ARM};
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
 use greylag_num::least_squares;
 
-/// Throttle values at which the engines are settled.
+/// Throttle values at which the settled engines are measured.
 const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
 /// Fraction of a surface's moment that full throttle must add to count as slipstream.
 const NO_SLIPSTREAM: f64 = 0.01;

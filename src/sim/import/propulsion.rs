@@ -8,7 +8,7 @@ use greylag_model::textbook::Estimate;
 use greylag_num::{Grid, least_squares};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Fraction of the largest thrust above which the rms residual of the thrust polynomial is reported.
+/// RMS residual of the thrust polynomial, as a fraction of the largest thrust, above which it is reported.
 const REPORTED_FROM: f64 = 0.02;
 /// Throttle before and after the step that measures the engine's lag.
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
@@ -32,11 +32,11 @@ pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 
 /// Propulsion parameters.
 pub(super) struct Propulsion {
-    /// Polynomial of the settled thrust over throttle and airspeed.
+    /// Coefficients of the settled thrust as a polynomial of throttle and airspeed.
     pub(super) thrust: Vec<Estimate>,
     /// Settled thrust (N, at sea-level density); `None` if it is no function of throttle and airspeed alone.
     pub(super) table: Option<Grid>,
-    /// Time constant from throttle position to thrust, s.
+    /// Time constant from throttle position to thrust, s; `None` without a first-order lag.
     pub(super) lag: Option<f64>,
     /// Rolling moment at full throttle, positive to the left, N m; `None` if negligible.
     pub(super) torque: Option<f64>,
@@ -45,7 +45,7 @@ pub(super) struct Propulsion {
 }
 
 impl Subject<'_> {
-    /// Measures propulsion, settled and after a throttle step.
+    /// Measures settled thrust and moments, and the thrust after a throttle step.
     pub(super) fn propulsion(
         &mut self,
         left_out: &mut Vec<String>,

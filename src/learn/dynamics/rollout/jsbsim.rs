@@ -1,4 +1,4 @@
-//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the last one.
+//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the previous one.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;

@@ -28,12 +28,12 @@ pub enum TrainError {
         "the flights have no stretch of {0} samples without a gap, which one rollout takes; give longer logs, or shorter rollouts"
     )]
     Data(usize),
-    /// The bare prior cannot predict the flights at all.
+    /// The bare prior diverges on more than half of the rollouts.
     #[error(
         "model {0} leaves the numbers on most rollouts before anything is learned: it is no model of this aircraft, or the logs are of another"
     )]
     Prior(String),
-    /// The loss is not finite.
+    /// The loss or its gradient was not finite in too many consecutive updates.
     #[error(
         "the loss left the numbers at update {update}; what was learned before is kept in the last checkpoint: go on from it with a smaller learning rate"
     )]

@@ -1,4 +1,4 @@
-//! Data of a training stage with one rollout length: windows, weights, order, the prior's error.
+//! Data of a training stage with one rollout length: windows, their weights and order, and the prior's error.
 
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// The rollouts of `steps` steps, and the error of the prior alone, `bare`, on them.
+    /// Collects the rollouts of `steps` steps, and computes the error of the bare prior, `bare`, on them.
     pub(super) fn new(
         bare: &Subject,
         recipe: &Recipe,
@@ -65,7 +65,7 @@ impl Stage {
         Ok(Stage { steps, prior_error, all, pass: u64::MAX, order: Vec::new() })
     }
 
-    /// The rollouts of an update; each epoch shuffles the data anew.
+    /// The rollouts of an update. Each epoch shuffles the data anew.
     pub(super) fn minibatch(&mut self, recipe: &Recipe, update: u64) -> &[Window] {
         let batch = recipe.batch.min(self.all.len());
         let passes = (self.all.len() / batch) as u64;

@@ -50,7 +50,7 @@ const MOVED: [(usize, f32); 14] = [
     (20, 0.2),
 ];
 
-/// Data common to all aircraft; shared by all threads.
+/// Data common to all aircraft, shared by all threads.
 #[derive(Clone, Copy)]
 pub(super) struct Flyer<'a> {
     pub(super) model: &'a GreyBox,
@@ -132,7 +132,7 @@ impl Flyer<'_> {
         (after, Step { next, reward: self.reward(&after, target) }, earned)
     }
 
-    /// State and memory after a step; their slopes go into `next`.
+    /// State and memory after a step. Writes their slopes into `next`.
     fn motion(&self, aircraft: &Aircraft, next: &mut [[f32; INPUTS]; NUMBERS]) -> Aircraft {
         let at: Aircraft<Block> = aircraft.map(|place, x| {
             let mut lanes = Block::from_f64(x);
@@ -160,7 +160,7 @@ impl Flyer<'_> {
         after.map(|_, x| x.0[0].into())
     }
 
-    /// Actuators and last commands after a step; their slopes go into `next`.
+    /// Actuators and last commands after a step. Writes their slopes into `next`.
     fn actuation(
         &self,
         aircraft: &Aircraft,

@@ -27,7 +27,7 @@ const WIND_MPS: f64 = 4.0;
 const FLIGHT_S: f64 = 60.0;
 /// Time at which a surface jams, s. The companion is engaged within the first 10 s.
 pub const FAILS_S: f64 = 25.0;
-/// Roll and pitch of the legs, degrees, and their duration, s.
+/// Roll and pitch of the legs, degrees. Each leg lasts `LEG_S` seconds.
 const LEGS: [[f64; 2]; 6] =
     [[0.0, 2.0], [25.0, 3.0], [-20.0, 5.0], [0.0, 0.0], [-35.0, 4.0], [15.0, 6.0]];
 const LEG_S: f64 = 5.0;
@@ -92,11 +92,11 @@ pub struct Watched {
 }
 
 impl CompanionFactory {
-    /// Flies for a minute under the monitor; all random numbers follow from `seed`.
+    /// Flies for 60 s under the monitor. All random numbers follow from `seed`.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be loaded.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn watched(&self, seed: u64, failure: Failure) -> Result<Watched, FaultsError> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(DRAWN);
@@ -154,7 +154,7 @@ impl Bench {
         self.watched.since_s = self.watched.since_s.map(|_| FAILS_S);
     }
 
-    /// Advances 10 ms; `false` when the flight has ended on the ground or with a state that is not finite.
+    /// Advances 10 ms. Returns `false` when the flight has ended on the ground or with a state that is not finite.
     fn step(&mut self, step: u64) -> bool {
         let (at_s, host) = (step as f64 * 0.01, Duration::from_millis(1000 + 10 * step));
         let (mut down, mut up) = (Vec::new(), Vec::new());

@@ -33,7 +33,7 @@ pub(super) struct Follower {
     surfaces: [Fast; 2],
 }
 
-/// High-pass of a surface's deflection with its mean square.
+/// High-pass filter of a surface deflection, with the mean square of its output.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fast {
     slow: f64,
