@@ -1,4 +1,4 @@
-//! Options whose values are the names of a list, so that `--help` shows them.
+//! Options whose values are the names of a list. `--help` shows these names.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 

@@ -245,7 +245,7 @@ fn channel_table(models: &[ModelResult]) -> Table {
     table
 }
 
-/// Three significant figures; a dash for an unknown value.
+/// Formats `x` with three significant figures; a dash if `x` is not finite.
 fn number(x: f64) -> String {
     match x {
         x if !x.is_finite() => "–".into(),

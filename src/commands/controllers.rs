@@ -17,7 +17,7 @@ pub const POLICY: &str = "params/x8/learned/policy";
 /// planner's settings.
 ///
 /// # Errors
-/// If the policy cannot be used, or the model does not allow the controller.
+/// If the policy cannot be read or belongs to another airframe, or the model does not allow the controller.
 pub fn controller(
     kind: ControllerKind,
     model: &GreyBox,
@@ -34,7 +34,7 @@ pub fn controller(
 /// is the default folder, whose policy belongs to another airframe. Notes on the policy are printed on standard error.
 ///
 /// # Errors
-/// If the policy cannot be used.
+/// If the policy cannot be read or belongs to another airframe.
 pub fn policy(
     kind: ControllerKind,
     model: &GreyBox,

@@ -319,7 +319,7 @@ fn one(
     Ok(Evaluation::measured([kind.name(), model], courses, &outcomes, limits))
 }
 
-/// A progress bar on a terminal; elsewhere one plain line.
+/// A progress bar on a terminal. Elsewhere one plain line is printed.
 fn progress(length: u64, of: &str, what: &str) -> ProgressBar {
     if bar::is_silent() {
         return ProgressBar::hidden();

@@ -1,5 +1,4 @@
-//! Access control of the clients' links: this machine only, holders of the key, or explicitly
-//! anybody.
+//! Access control of the clients' links: links of this machine, signed links, or links that the user allows explicitly.
 
 use anyhow::{Result, bail};
 

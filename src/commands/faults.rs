@@ -172,7 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Factory of the default companions of scenarios: the controller `kind` of the default model, with the X8.
 ///
 /// # Errors
-/// If the model or the policy that are shipped cannot be used.
+/// If the shipped model or policy cannot be read.
 #[cfg(feature = "study")]
 pub fn shipped(kind: ControllerKind) -> Result<CompanionFactory> {
     let model = fly::model(fly::MODEL.as_ref(), None)?;
@@ -283,7 +283,7 @@ mod tests {
     fn a_few_flights_with_every_fault_leave_the_companion_sound() {
         roomy(|| {
             let factory = factory();
-            // Over this many seeds each kind of fault is drawn first once; the seeds are spread over the
+            // Over this many seeds each kind of fault is the first fault once. The seeds are distributed over the
             // counterparts.
             for seed in 0..FaultKind::DRAWN.len() as u64 {
                 let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];

@@ -102,7 +102,7 @@ impl FlownWith {
     /// have none.
     ///
     /// # Errors
-    /// If the file cannot be used.
+    /// If the file cannot be read, is invalid or has another schema.
     pub fn read(folder: &Path) -> Result<Option<FlownWith>> {
         let path = folder.join(FILE);
         if !path.exists() {

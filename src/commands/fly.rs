@@ -202,7 +202,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Flies until Ctrl-C or the end of the duration.
 ///
 /// # Errors
-/// If a file cannot be used, a link cannot be opened or a recording cannot be created. Nothing has been started then.
+/// If a file cannot be read or is invalid, a link cannot be opened or a recording cannot be created. Nothing has been
+/// started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let asked = if arguments.insecure { Asked::Insecure } else { Asked::Nothing };
     let exposed = exposure::check(arguments.unsigned(), asked)?;
@@ -275,7 +276,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> FlightOptions {
 /// Loads a model file, with another airframe if one is given. [`shipped`] resolves paths below `params/`.
 ///
 /// # Errors
-/// If a file cannot be used.
+/// If the model file or the airframe file cannot be read or is invalid.
 pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     let mut model = GreyBox::load(&shipped(path))?;
     if let Some(path) = airframe {
@@ -289,8 +290,9 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
 /// model. If no LQI can be designed, the fallback is `pid-retuned`, with a line on standard error.
 ///
 /// # Errors
-/// If the policy cannot be used, if the model does not allow `kind`, or if the model can be trimmed at its cruise
-/// airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the fallback is no error.
+/// If the policy cannot be read or belongs to another airframe, if the model does not allow `kind`, or if the model can
+/// be trimmed at its cruise airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the
+/// fallback is no error.
 pub fn companion_with(
     kind: ControllerKind,
     model: &GreyBox,

@@ -48,7 +48,7 @@ pub struct Reading {
 /// Flights read from the logs.
 #[derive(Default)]
 pub struct Intake {
-    /// The flights that could be reconstructed; at least one.
+    /// The reconstructed flights, at least one.
     pub flights: Vec<Reconstruction>,
     /// Findings about the logs, and the reasons why logs were left out.
     pub notes: Vec<String>,
@@ -232,7 +232,7 @@ fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
         return Ok(());
     }
     let log = quoted(path);
-    // a problem that a factor corrects is named by its column only: the command below explains it
+    // A problem that a factor corrects is named by its column only. The command in the message explains the problem.
     let said = |f: &&Finding| match &f.cure {
         Some(cure) => {
             format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::sync::Mutex;
 
-/// Lines that were printed.
+/// Lines already printed.
 static PRINTED: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
 /// Largest number of stored lines. Further lines are printed each time.
 const REMEMBERED: usize = 1000;

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::logs::info::Info;
 
-/// Columns that share a unit: a finding names only the first of each group.
+/// Columns that share a unit. A finding names only the first column of a group.
 const ALIKE: [(&str, [&str; 2]); 2] =
     [("roll_rad", ["pitch_rad", "yaw_rad"]), ("p_radps", ["q_radps", "r_radps"])];
 

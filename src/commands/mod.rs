@@ -200,7 +200,7 @@ fn end_with_the_reader() {
     }));
 }
 
-/// Parses the command line. clap ends the program if it is wrong.
+/// Parses the command line. An error ends the program.
 fn parse() -> Arguments {
     let line = with_signs(<Arguments as clap::CommandFactory>::command());
     let found = line.get_matches();
@@ -235,7 +235,7 @@ pub fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce);
     tracing_subscriber::registry().with(filter).with(lines).init();
-    // a flight must continue when nobody reads its output
+    // a flight must continue after the reader of its output has ended
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
     }

@@ -117,7 +117,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
         turbulence: arguments.turbulence_severity,
         installed: Installation::TRUE,
     };
-    // the folder is written under another name first; it is then either complete or absent
+    // The folder is written under another name first. Its final name then denotes a complete folder or no folder.
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
     let beside = beside.with_context(|| {
         format!("cannot make a folder in {}, so name another place with --out", parent.display())
@@ -225,7 +225,7 @@ fn coefficient_names(id: &str) -> Vec<&'static str> {
         .map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
 }
 
-/// JSON in hexadecimal digits, which nobody reads by accident.
+/// JSON in hexadecimal digits. The digits keep a user from reading the answer by accident.
 fn seal(answer: &Answer) -> Result<String> {
     let mut out = String::new();
     for line in serde_json::to_vec(answer)?.chunks(32) {

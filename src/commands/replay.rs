@@ -85,7 +85,7 @@ impl FlownArguments {
     /// Model and controller of the recording in `folder`. Options replace the entries of the recording.
     ///
     /// # Errors
-    /// If a file cannot be used.
+    /// If the model, policy, schedule or options of the recording cannot be read or are invalid.
     pub fn again(&self, folder: &Path) -> Result<Again> {
         let said = FlownWith::read(folder)?;
         let said = said.as_ref();
@@ -167,7 +167,7 @@ impl From<&Outcome> for Document {
 /// Replays the flight. The exit status is 0 if every command equals the recorded one.
 ///
 /// # Errors
-/// If a file cannot be used.
+/// If a file of the recording, the model or the policy cannot be read or is invalid.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
     let Again { companion, vehicle, .. } = arguments.flown.again(&arguments.folder)?;

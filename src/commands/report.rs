@@ -30,7 +30,7 @@ pub struct Arguments {
 /// Draws attitude, commands, timing, the model's error, and the planner's candidates.
 ///
 /// # Errors
-/// If a file cannot be used or written.
+/// If a file of the recording, the model or the policy cannot be read, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let folder = &arguments.folder;
     let page = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));

@@ -9,7 +9,8 @@ use crate::sim::described::describe as describe_aircraft;
 
 /// The aircraft that starts under the conditions of the paper.
 const X8: &str = "x8";
-/// Accepted relative difference between the travel in the airframe file and in the simulator. Files have four digits.
+/// Accepted relative difference between the travel in the airframe file and in the simulator. Numbers in files have
+/// four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 
 /// Where an episode begins.

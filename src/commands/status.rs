@@ -1,4 +1,4 @@
-//! Exit statuses that several commands share; clap's 2 is a wrong command line.
+//! Exit statuses that several commands share. The status 2 of clap means a wrong command line.
 
 /// Done, but in doubt: a log was left out or has a problem that makes the results wrong, an effect was refused, or
 /// flights contradict one another.

@@ -1,4 +1,4 @@
-//! Output on a terminal: tables that fit it, the answer in colour, the summary last.
+//! Output on a terminal: tables of limited width, the answer in colour, the summary last.
 
 use std::io::IsTerminal;
 
@@ -8,7 +8,7 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyl
 
 use crate::sysid::compare::Answer;
 
-/// Half width of a 95 % interval in standard deviations: what ± means in every output.
+/// Half width of a 95 % interval, in standard deviations. The symbol ± means this half width in every output.
 #[cfg(feature = "study")]
 pub const NORMAL_95: f64 = 1.96;
 /// Largest width of tables and texts, terminal columns.

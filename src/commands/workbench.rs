@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {
         let session = arguments.folder.display();
-        // the reader of standard output may have closed it; the page is served regardless
+        // The reader of standard output may have closed it. The page is served regardless.
         let _ = write!(
             std::io::stdout(),
             "the workbench is open at {address}\nsession: {session}; Ctrl-C ends it\n"

@@ -193,7 +193,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".greylag-").suffix(".part");
-    // a temporary file is private by default; a model file has the permissions that the umask allows
+    // A temporary file is private by default. A model file must have the permissions that the umask allows.
     #[cfg(unix)]
     let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]

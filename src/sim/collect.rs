@@ -192,7 +192,7 @@ mod tests {
         let most = |get: &dyn Fn(&Sample) -> f64| {
             flights.iter().flatten().map(|s| get(s).abs()).fold(0.0, f64::max)
         };
-        // the stall is at 12.3°; hard targets reach 60° of bank
+        // The stall is at 12.3°. Hard targets reach 60° of bank.
         assert!(most(&|s| s.alpha_rad).to_degrees() > 13.0);
         assert!(most(&|s| s.attitude_rad[0]).to_degrees() > 60.0);
         let again = fly(2);

@@ -265,7 +265,7 @@ fn imagine(
         notes: Vec::new(),
     };
     let mut prepared = Prepared::new(&flight, 0.0)?;
-    // the simulated flight has no noise; the separation accounts for sensor noise
+    // The simulated flight has no noise. The separation accounts for sensor noise.
     (prepared.noise, prepared.force_noise) = (noise, force_noise);
     Ok((!prepared.windows.is_empty()).then_some(prepared))
 }

@@ -27,7 +27,7 @@ impl Flown {
     ///
     /// # Errors
     ///
-    /// If JSBSim cannot be set up.
+    /// If JSBSim cannot load the aircraft or reset it.
     pub fn new(plant: &PlantOptions, targets: Stratified) -> Result<Flown, Trouble> {
         let mut simulator = Simulator::new(plant)?;
         let seen = simulator.reset()?;

@@ -201,7 +201,7 @@ fn call(function: Function, all: &[String]) -> String {
             let low = element("product", &[number(-1.0), width]);
             element("difference", &[all[0].clone(), element("max", &[held, low])])
         }
-        // lags and delays are separate filters; in steady state their output equals their argument
+        // Lags and delays are separate filters. In steady state their output equals their argument.
         Function::Lag | Function::Delay => all[0].clone(),
     }
 }

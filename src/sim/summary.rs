@@ -18,7 +18,7 @@ pub struct Spread {
     pub median: f64,
     /// 95 % bootstrap interval of the median over the flights.
     pub median_ci95: [f64; 2],
-    /// The worst value over the flights, by the measure's own order.
+    /// The worst value over the flights: smallest or largest, as the measure defines.
     pub worst: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Cost of the cells of a campaign. The cost is measured on cells of the same stage; otherwise it is the figure in the
-//! campaign file.
+//! Cost of the cells of a campaign. The cost is measured on cells of the same stage. Without a measurement it is the
+//! figure in the campaign file.
 
 use anyhow::Result;
 

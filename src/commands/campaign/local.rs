@@ -166,7 +166,7 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            // the cell is named by id, because its number changes if the campaign file is edited meanwhile
+            // The cell is named by id. Its number changes if the campaign file is edited during the run.
             .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())

@@ -100,7 +100,7 @@ fn line(seconds: f64, target: &Leg, view: &View) -> String {
     )
 }
 
-/// The attitude indicator with the numbers beside it.
+/// The rows of the attitude indicator, with numbers to the right.
 fn block(what: &str, flown: f64, target: &Leg, view: &View) -> Vec<String> {
     let (roll, pitch) = (view.roll.to_degrees(), view.pitch.to_degrees());
     let done = (flown.clamp(0.0, 1.0) * BAR as f64).round() as usize;

@@ -42,7 +42,7 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     println!(
         "envelope kept: load factor and angle of attack, 5 % beyond the airframe file's limits at most"
     );
-    // printed last: the end of the output is what the user sees first
+    // printed last, because a user sees the end of the output first
     println!();
     evaluation_answer(evaluations).iter().for_each(|sentence| println!("{}", broken(sentence)));
 }

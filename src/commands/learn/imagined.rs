@@ -16,8 +16,8 @@ use crate::sim::{Group, TargetFile};
 /// Seed of the targets. They differ from the targets that score controllers and from the targets by which a training
 /// chooses its policy.
 const TARGETS: u64 = 3;
-/// Each controller flies one in this many targets: a planner takes milliseconds a step, and few targets suffice for
-/// the LQI.
+/// Each controller flies one in this many targets. A planner takes milliseconds a step, and few targets suffice for the
+/// LQI.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
@@ -36,11 +36,12 @@ pub struct Reached {
     pub divergence_rate: f64,
 }
 
-/// Flies the controllers in the model of `folder` with the policy in `policy`; `None` if interrupted.
+/// Flies the controllers in the model of the folder `folder`, with the policy in the folder `policy`. `None` if
+/// interrupted.
 ///
 /// # Errors
-/// If a file or the policy cannot be used. Other controllers that cannot be built are left out, for example an LQI that
-/// cannot be designed.
+/// If the model or the policy cannot be read or is invalid. Other controllers that cannot be built are left out, for
+/// example an LQI that cannot be designed.
 pub fn reached(
     folder: &Path,
     policy: &Path,

@@ -47,7 +47,7 @@ pub struct Inputs<'a> {
     pub source: Source,
     /// Number of planned rounds.
     pub rounds: u32,
-    /// Coefficients of the prior that are learned; an empty list freezes the prior.
+    /// Coefficients of the prior that are learned. An empty list freezes the prior.
     pub trainable: &'a [String],
     /// Whether the widths of the coefficients are ignored.
     pub from_scratch: bool,

@@ -265,7 +265,7 @@ impl Arguments {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;
         }
-        // as in `amend`: a flight without identification manoeuvres determines only part of the coefficients
+        // As in `amend`: a flight without identification manoeuvres determines only some of the coefficients.
         prior.with_widths(|c| Some(c.width()).filter(|width| *width > 0.0))
     }
 }
@@ -317,7 +317,7 @@ fn train(
         lines += 1;
         let interrupted = stop.is_set();
         if lines % KEEP == 0 || interrupted || trainer.is_done() {
-            // the history is written first: entries beyond the checkpoint are dropped when the training is resumed
+            // The history is written first. A resumed training drops the entries beyond its checkpoint.
             files::write(past, &serde_json::to_string(&history)?, Overwrite::Force)?;
             trainer.checkpoint().save(kept)?;
         }

@@ -258,7 +258,7 @@ impl Arguments {
         self.start.as_ref().map(load).transpose()
     }
 
-    /// Trains the policy of one seed; `false` if interrupted.
+    /// Trains the policy of one seed. Returns `false` if interrupted.
     fn train(&self, ground: &Ground, seed: u64, stop: &Interruption) -> Result<bool> {
         let folder = match self.seeds {
             1 => self.out.clone(),

@@ -60,7 +60,7 @@ impl Passes {
         self.network.sizes()[1..].iter().sum()
     }
 
-    /// The network's output; `trace` receives the activations.
+    /// The network's output. `trace` receives the activations.
     #[inline(always)]
     pub fn forward<R: Real>(&self, input: [R; INPUTS], trace: &mut [R]) -> [R; OUTPUTS] {
         let mut output = [R::zero(); OUTPUTS];

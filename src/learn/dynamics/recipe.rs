@@ -74,7 +74,7 @@ pub struct Recipe {
     pub batch: usize,
     /// Total number of updates.
     pub updates: u64,
-    /// Initial learning rate; cosine schedule.
+    /// Initial learning rate. A cosine schedule reduces it to the fraction `rate_end`.
     pub rate: f64,
     /// Final fraction of the learning rate.
     pub rate_end: f64,

@@ -63,7 +63,8 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// If recipe, prior and data are incompatible.
+    /// If the recipe is invalid, a coefficient cannot be trained, the flights are too short, or the prior diverges on
+    /// most rollouts.
     pub fn new(recipe: Recipe, prior: &GreyBox, tracks: Vec<Track>) -> Result<Trainer, TrainError> {
         if let Some(fault) = recipe.fault() {
             return Err(TrainError::Recipe(fault));

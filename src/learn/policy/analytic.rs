@@ -134,7 +134,7 @@ impl AnalyticTrainer {
             Stratified::new(recipe.seed, 0, recipe.corners).at_airspeeds_of(&model.airframe);
         let instances = (0..recipe.instances)
             .map(|k| {
-                // episode ends are spread over time; otherwise one window would hold all starts
+                // Episode ends are spread over time. Otherwise one window would hold all starts.
                 let left = recipe.episode * (k + 1) / recipe.instances;
                 Instance { aircraft: neutral, target: targets.next_target(), left }
             })
@@ -193,7 +193,7 @@ impl AnalyticTrainer {
         let mut seen = vec![[0.0_f32; OBSERVATIONS]; count * window];
         let mut steps: Vec<Option<Step>> = Vec::with_capacity(count * window);
         let mut reward = 0.0;
-        // forward pass, step by step; the instances of a step are distributed over the cores
+        // Forward pass, step by step. The instances of a step are distributed over the cores.
         let mut flown = Vec::with_capacity(count);
         for t in 0..window {
             let fly = |units: &mut Units<f32>, (k, instance): (usize, &Instance)| {

@@ -150,7 +150,7 @@ fn append<const D: usize>(all: &mut Vec<f32>, tensor: Tensor<D>) {
 }
 
 impl Optimiser {
-    /// Adam for `network` at learning rate `rate`; ε is 1e-8, not burn's 1e-5.
+    /// Adam for `network` at the learning rate `rate`. ε is 1e-8 instead of burn's 1e-5.
     pub fn new(network: &Mlp, rate: f64) -> Optimiser {
         let zeros = |n: usize| Moment { mean: vec![0.0; n], square: vec![0.0; n] };
         let layers = network.sizes.windows(2).map(|s| [zeros(s[0] * s[1]), zeros(s[1])]);
@@ -161,7 +161,7 @@ impl Optimiser {
     pub fn step(&mut self, network: &mut Mlp, followed: Mlp, gradients: &mut Gradients) {
         self.steps += 1;
         let pace = Pace::of(self.steps, self.rate);
-        // the copy shares the parameters' memory; without the copy the parameters are updated in place
+        // The copy shares the parameters' memory. Once the copy is dropped, the parameters are updated in place.
         let slopes: Vec<_> = followed
             .layers
             .into_iter()
@@ -194,7 +194,7 @@ impl Optimiser {
         }
     }
 
-    /// Restores `moments`; `false` if they belong to another network.
+    /// Restores `moments`. Returns `false` if they belong to another network.
     pub fn remember(&mut self, moments: Moments) -> bool {
         if moments.steps == 0 {
             return moments.mean.is_empty() && moments.square.is_empty();

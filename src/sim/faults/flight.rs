@@ -300,7 +300,7 @@ impl Flight {
         self.hear_of_the_disk(end);
     }
 
-    /// Advances a step of 10 ms; `false` when the aircraft is lost.
+    /// Advances a step of 10 ms. Returns `false` when the aircraft is lost.
     fn step(&mut self, step: u64, now_s: f64) -> bool {
         let acting: Vec<Fault> =
             self.scenario.faults.iter().filter(|f| f.acts(now_s)).copied().collect();

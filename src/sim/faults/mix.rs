@@ -33,7 +33,7 @@ pub enum FaultKind {
     Frozen,
     /// The pitot tube is blocked.
     Airspeed,
-    /// The angle of attack jumps.
+    /// The measured angle of attack has an offset of −0.25 to 0.25 rad.
     Alpha,
     /// The pitch rate is NaN.
     NotANumber,

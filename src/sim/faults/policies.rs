@@ -44,7 +44,7 @@ pub struct Sample {
     pub held_s: f64,
     /// Largest change of a surface command since the last sample, −1..1 being the travel; 0 without a new decision.
     pub moved: f64,
-    /// Whether the flight controller executes the companion's commands; always true for the shim.
+    /// Whether the flight controller executes the companion's commands. Always true for the shim.
     pub steered: bool,
     /// Whether the companion intends to control.
     pub engaged: bool,

@@ -15,8 +15,8 @@ use super::scenario::Scenario;
 use greylag_flight::pilot::TICK_S;
 use greylag_num::stream::stream;
 
-/// Number of flights per round, which run in parallel. It is fixed so that the result does not depend on the number of
-/// cores.
+/// Number of flights per round, which run in parallel. The number is fixed to make the result independent of the number
+/// of cores.
 const TOGETHER: u64 = 16;
 /// Fraction of flights that are drawn at random instead of varied.
 const FRESH: f64 = 0.25;

@@ -55,7 +55,7 @@ pub(super) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Trains an actor by the analytic policy gradient, then its critics; `false` if interrupted.
+    /// Trains an actor by the analytic policy gradient, then its critics. Returns `false` if interrupted.
     pub(super) fn climb(
         &self,
         recipe: &AnalyticRecipe,
@@ -81,7 +81,7 @@ impl Run<'_> {
     }
 
     pub(super) fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        // the number of steps is not part of the identity; a training can then be continued with more steps
+        // The number of steps is not part of the identity. A training can then be continued with more steps.
         let of = PolicyRecipe { steps: 0, ..recipe.clone() };
         let of = (of, &self.ground.origin.model_sha256);
         let what = serde_json::to_string(&of)?;

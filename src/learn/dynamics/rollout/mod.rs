@@ -22,7 +22,7 @@ const CHUNK: usize = 20;
 /// The model that is learned.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The prior with its present coefficients; its own residual is not used.
+    /// The prior with its present coefficients. A residual of the prior is not used.
     pub prior: GreyBox,
     /// Network of the residual.
     pub network: Passes,
@@ -44,7 +44,7 @@ pub enum PriorSlopes {
 /// Recorded data of `Packet::WIDTH` rollouts.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded<R> {
-    /// States before the start, at the start, and after each step; roll in −π..π.
+    /// States one step before the start, at the start, and after each step, with roll in −π..π.
     pub states: Vec<[R; 8]>,
     /// Effective aileron, elevator, throttle and rudder, from the step before the start on.
     pub controls: Vec<[R; 4]>,

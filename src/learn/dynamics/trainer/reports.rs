@@ -53,7 +53,7 @@ pub struct Progress {
     pub update: u64,
     /// Length of the rollouts, steps of 10 ms.
     pub steps: usize,
-    /// Mean loss over the updates since the last report; `lost` is a sum.
+    /// Loss, mean over the updates since the last report. `lost` is the sum over these updates.
     pub loss: Loss,
     /// L_pred/L_prior, eq. (23), mean over the updates since the last report.
     pub normalised: f64,

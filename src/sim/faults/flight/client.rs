@@ -38,7 +38,7 @@ impl Flight {
             if self.armed {
                 self.follower.asked = true;
                 self.desk.pilot().attitude_setpoint(now, setpoint);
-                // the request is refused only if the link is lost at this moment; the companion then flies HOLD
+                // The request is refused only if the link is lost at this moment. The companion then flies HOLD.
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }

@@ -183,7 +183,7 @@ impl Bench {
         if !self.armed && step.is_multiple_of(10) {
             self.armed = self.desk.arm(host) == Verdict::Accepted;
             if self.armed {
-                // the request is refused only if the link is lost at this moment; the companion then flies HOLD
+                // The request is refused only if the link is lost at this moment. The companion then flies HOLD.
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
