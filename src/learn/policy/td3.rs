@@ -3,9 +3,9 @@
 //! Departures from the paper:
 //! - Observations are scaled, and contain the errors instead of the targets
 //!   ([`greylag_control::policy::observe`]): the information is the same.
-//! - Leaving the model's validity limits is terminal, with the smallest reward in all further steps, −(κ_φ + κ_θ +
-//!   κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next state is bootstrapped. The paper
-//!   specifies neither.
+//! - Leaving the model's validity limits is terminal, with the smallest reward in all further steps,
+//!   −(κ_φ + κ_θ + κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next state is
+//!   bootstrapped. The paper specifies neither.
 //! - The actor's last layer is initialised near zero: neutral surfaces and half throttle.
 
 use burn::tensor::{Device, Tensor, TensorData};
