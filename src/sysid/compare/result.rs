@@ -1,7 +1,7 @@
 //! The result of a comparison, as plain data for the terminal, the JSON and the report.
 //!
-//! Residuals are measured − model: a positive one means that the model is too low. A number that does not exist is
-//! NaN, which JSON writes as `null`.
+//! Residuals are measured − model: a positive residual means that the model is too low. An undefined number is NaN, written
+//! as `null` in JSON.
 
 use serde::Serialize;
 
@@ -62,7 +62,7 @@ pub struct Settings {
     pub start_every_s: f64,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// A free run has diverged once its scaled error exceeds this.
+    /// A free run has diverged once its scaled error exceeds this bound.
     pub divergence_bound: f64,
     /// Length of the Hann kernel of the weak form, s.
     pub kernel_s: f64,
@@ -90,7 +90,7 @@ pub struct ModelResult {
     pub growth: Vec<GrowthPoint>,
     /// Channels D, L, Y, l, m, n and the rates of V, α, β, as far as the logs allow.
     pub channels: Vec<ChannelResult>,
-    /// Its predictions over time, one entry a flight, in the order of [`Comparison::flights`].
+    /// Predictions over time, one entry a flight, in the order of [`Comparison::flights`].
     #[serde(skip)]
     pub traces: Vec<ModelTrace>,
 }
@@ -98,7 +98,7 @@ pub struct ModelResult {
 /// Constants of the flights in a model's file, and the errors of its free runs without them.
 #[derive(Clone, Debug, Serialize)]
 pub struct KnownUse {
-    /// Flights with constants of their own in the file (`[flights.NAME]`).
+    /// Flights with a table `[flights.NAME]` in the file.
     pub flights: Vec<String>,
     /// Other flights, for which the file's `[installation]` is used.
     pub by_installation: Vec<String>,
@@ -106,7 +106,7 @@ pub struct KnownUse {
     pub without: Vec<HorizonScore>,
 }
 
-/// Free-run error at one horizon: at that time after the start, over all starts.
+/// Free-run errors at one horizon over all runs that reach it.
 #[derive(Clone, Debug, Serialize)]
 pub struct HorizonScore {
     /// Time after the start, s.
@@ -115,7 +115,7 @@ pub struct HorizonScore {
     pub runs: usize,
     /// Number of those runs that have diverged by then.
     pub diverged: usize,
-    /// `diverged / runs`, 0..1.
+    /// `diverged / runs`, 0 to 1; NaN without runs.
     pub divergence_rate: f64,
     /// Root mean square, over runs, of the scaled error: the root mean square over the eight states
     /// of error / x_c (eq. 21). A diverged run counts with the divergence bound.
@@ -180,18 +180,17 @@ pub struct ChannelResult {
     pub residual_rms: f64,
     /// Standard deviation of the residual that sensor noise accounts for, in `unit`.
     pub noise_sd: f64,
-    /// Mean square residual less noise, divided by the measured variance less noise, 0 (the model
-    /// explains everything) upwards (over 1: worse than a constant). NaN if the flights do not move
-    /// the channel above the noise.
+    /// Mean square residual less noise, divided by the measured variance less noise. At 0 the model explains all variance
+    /// beyond noise; above 1 the model is worse than a constant. NaN if the measured variance hardly exceeds the noise.
     pub unexplained_fraction: f64,
-    /// Rate of the scaled state error (error / x_c) caused by the residual beyond noise, RMS, 1/s. Comparable between
-    /// channels.
+    /// RMS rate of the scaled state error (error / x_c) that the residual beyond noise causes, 1/s. The values of different
+    /// channels are comparable.
     pub effect_per_s: f64,
     /// Share of the mean square residual due to a constant offset, 0..1.
     pub offset_share: f64,
     /// The worst regime in one sentence.
     pub worst_regime: String,
-    /// Reason why these flights cannot judge the model in this channel; `None` if they can.
+    /// Reason why these flights do not suffice to assess the model in this channel; `None` if they suffice.
     pub abstained: Option<&'static str>,
     /// The worst regime as numbers; `None` if no supported regime differs from zero.
     pub regime: Option<Regime>,
@@ -201,14 +200,14 @@ pub struct ChannelResult {
     pub map: Map,
 }
 
-/// Whether a comparison can judge a model in one channel.
+/// Whether the flights suffice to assess a model in one channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Abstention {
-    /// Channel that is judged.
+    /// Channel that is assessed.
     pub channel: ChannelId,
-    /// Why the flights cannot judge the model here; `None` where they can.
+    /// Reason why the flights do not suffice; `None` if they suffice.
     pub why: Option<&'static str>,
-    /// Whether a regime with enough samples differs from the model beyond doubt.
+    /// Whether the mean residual differs significantly from zero in a regime with enough samples.
     pub sure_error: bool,
 }
 
@@ -224,7 +223,7 @@ pub struct RegimeBins {
     /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, adjusted for
     /// their number of parameters, 0..1.
     pub explained: f64,
-    /// Bins in ascending order; for the variable flight, one each in the flights' order.
+    /// Bins in ascending order of the variable; for the variable flight, one bin a flight in the order of the flights.
     pub bins: Vec<Bin>,
 }
 
@@ -233,9 +232,9 @@ pub struct RegimeBins {
 pub struct Bin {
     /// Lower edge in the variable's unit; for the variable flight, the flight's index − 0.5. NaN if open.
     pub low: f64,
-    /// Upper edge; NaN if open.
+    /// Upper edge in the variable's unit; for the variable flight, the flight's index + 0.5. NaN if open.
     pub high: f64,
-    /// Mean of the variable over the bin's windows.
+    /// Mean of the variable over the bin's windows, in the variable's unit.
     pub center: f64,
     /// Name of the flight if the bins are flights; otherwise empty.
     pub label: String,
@@ -251,7 +250,7 @@ pub struct Bin {
     pub measured: f64,
     /// Number of independent samples: kernel lengths that the windows cover.
     pub independent: usize,
-    /// Whether there are enough independent samples ([`Settings::support`]); draw grey otherwise.
+    /// Whether there are enough independent samples ([`Settings::support`]).
     pub supported: bool,
 }
 
@@ -288,7 +287,7 @@ pub struct Regime {
     pub variable: Option<RegimeVariable>,
     /// Lower end in `unit`; NaN if open.
     pub low: f64,
-    /// Upper end; NaN if open.
+    /// Upper end in `unit`; NaN if open.
     pub high: f64,
     /// Unit of the ends.
     pub unit: &'static str,
@@ -296,12 +295,12 @@ pub struct Regime {
     pub mean: f64,
     /// 95 % interval of `mean`.
     pub interval: [f64; 2],
-    /// Relative error, model − measured over the measured mean there, %; NaN if the measured channel passes through
-    /// zero there.
+    /// Relative error (model − measured) / measured in the regime, from the means, %. NaN if the measured channel changes its
+    /// sign there.
     pub relative_percent: f64,
     /// Number of independent samples.
     pub independent: usize,
-    /// Names of the flights that show it.
+    /// Names of the flights in which the mean residual has the same sign, with enough samples.
     pub flights: Vec<String>,
 }
 
@@ -332,14 +331,14 @@ pub struct NuisanceResult {
     pub name: String,
     /// Estimate, in `unit`.
     pub value: f64,
-    /// Its standard deviation, in `unit`.
+    /// Standard deviation of the estimate, in `unit`.
     pub sd: f64,
     /// Unit of the values.
     pub unit: &'static str,
-    /// Prior mean; absent if it was not estimated along with the path.
+    /// Prior mean, in `unit`; `None` if the quantity was not estimated together with the path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<f64>,
-    /// Prior standard deviation.
+    /// Prior standard deviation, in `unit`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior_sd: Option<f64>,
     /// Change from the prior mean, in standard deviations of the prior.
@@ -347,7 +346,7 @@ pub struct NuisanceResult {
     pub moved_sd: Option<f64>,
 }
 
-/// A flight over time. All lists have one length; a row of NaN stands between segments.
+/// A flight over time. All lists have the same length. A row of NaN follows each segment.
 #[derive(Clone, Debug, Default)]
 pub struct FlightTrace {
     /// Time on the log's clock, s, ascending.
@@ -362,7 +361,7 @@ pub struct FlightTrace {
 #[derive(Clone, Debug, Default)]
 pub struct ModelTrace {
     /// States of free runs restarted from the reconstruction every [`Settings::start_every_s`], at the times of
-    /// [`FlightTrace::time_s`]; NaN where there is none.
+    /// [`FlightTrace::time_s`]; NaN between segments and after divergence.
     pub states: [Vec<f64>; 8],
     /// The channels in weak form.
     pub channels: Vec<ChannelTrace>,
@@ -373,8 +372,8 @@ pub struct ModelTrace {
 pub struct ChannelTrace {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Middle of each window, s on the log's clock, ascending. Between segments, a row of NaN values stands one sample
-    /// before the next segment's first window.
+    /// Middle of each window, s on the log's clock, ascending. A row of NaN values separates two segments. Its time is one
+    /// sample before the first window of the next segment.
     pub time_s: Vec<f64>,
     /// Measured values, in the channel's unit.
     pub measured: Vec<f64>,
