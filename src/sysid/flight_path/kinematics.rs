@@ -68,7 +68,8 @@ fn put<const N: usize, const W: usize>(
 }
 
 impl Drive {
-    /// Propagation input of `track` at the constants `values`, for a sampling interval of `step` (s).
+    /// Rates and forces of `track`, corrected with the constants `values`, for the sampling interval `step` (s) and `gravity`
+    /// (m/s²).
     ///
     /// Without accelerometers, the force is the one that keeps the velocity constant.
     pub fn new(

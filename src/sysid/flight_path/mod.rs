@@ -92,9 +92,9 @@ impl Options {
         }
     }
 
-    /// Options for the aircraft and the gravity of `model`, deflections on `clock`.
+    /// Options for the aircraft and the gravity of `model`, with deflections on `clock`.
     ///
-    /// An aircraft slower than usual is reconstructed down to a lower airspeed and in shorter stretches.
+    /// For a slow aircraft, the airspeed limit and the shortest segment are smaller than the defaults.
     pub fn of(name: &str, model: &GreyBox, clock: ActuatorClock) -> Options {
         let usual = Options::new(name, model.airframe.actuators);
         let flies = Flying::from(model.airframe.envelope.flying_from_mps());
