@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_record_of_means_is_undone() {
-        // 3 Hz at 100 samples a second; each recorded sample is the mean of two adjacent ones, so the record is half a sample late
+        // 3 Hz at 100 samples a second; each record is the mean of two adjacent samples and therefore half a sample late
         let true_value = |k: usize| (0.19 * k as f64).sin();
         let instant = |k: usize| {
             let aileron = 0.5 * (true_value(k) + true_value(k.saturating_sub(1)));
