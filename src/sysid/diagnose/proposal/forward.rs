@@ -23,11 +23,9 @@ const MOST: usize = 3;
 const WORTH: f64 = 0.05;
 /// Number of tuning passes after a term has been added.
 const SETTLING: usize = 2;
-/// Unexplained share of the variance beyond noise from which a channel is searched: the level that the diagnosis considers
-/// adequate.
+/// Unexplained share of the variance beyond noise from which a channel is searched; the diagnosis's adequate level.
 const FAILING: f64 = 5e-4;
-/// Unexplained share of a searched channel relative to the worst channel. Smaller shares can be searched after the worst
-/// channel has been corrected.
+/// Unexplained share, relative to the worst channel, from which a channel is searched.
 const BESIDE: f64 = 0.05;
 /// Number of standard deviations by which joint tuning may change a coefficient. A larger change shows confounded terms.
 const MOVED: f64 = 5.0;
@@ -37,8 +35,7 @@ const CHANNELS: usize = 3;
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// The channels that the diagnosis leaves unexplained, in descending order of the removable error relative to its chance
-/// level.
+/// The channels that the diagnosis leaves unexplained, in descending order of removable error relative to its chance level.
 pub(super) fn failing(found: &Found) -> Vec<Channel> {
     let tuned = &found.unexplained;
     let removable = |c: usize| {
@@ -203,9 +200,8 @@ impl Ask<'_> {
         Some(c)
     }
 
-    /// Records the best form of a round in the front. If the form is accepted, it is added to the terms and the model.
-    ///
-    /// Returns whether the form was added. `None` if the model with the form cannot be evaluated over the flights.
+    /// Records the best form of a round in the front, and adds an accepted form to the terms and the model. Returns whether it
+    /// was added. `None` if the model with the form cannot be evaluated over the flights.
     fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
         let &Stage { round, scores, place, threshold } = stage;
         let (trial, score) = &scores[place];
@@ -276,8 +272,7 @@ impl Ask<'_> {
         Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
 
-    /// The model of `round` with a trial added and all coefficients tuned. `Some(None)` if the trial cannot join the model, `None`
-    /// if the model with it cannot be evaluated over the flights.
+    /// The model of `round` with a trial added and all coefficients tuned. `Some(None)` if the trial cannot join the model.
     fn tuned(&self, round: &Round, trial: usize, score: &Score) -> Option<Option<GreyBox>> {
         let mut model = round.with(score);
         if model.join_most(round.trials[trial].id, &score.values).is_err() {
@@ -344,8 +339,7 @@ impl Ask<'_> {
             .collect()
     }
 
-    /// Whether a similar form removes significantly more error for its size than the chosen form. The chosen form is then an
-    /// approximation of the true form.
+    /// Whether a similar form removes significantly more error for its size. The chosen form is then an approximation.
     fn surpassed(&self, stage: &Stage) -> bool {
         let &Stage { round, scores, place, .. } = stage;
         let size = |k: usize| {
