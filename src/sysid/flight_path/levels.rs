@@ -137,7 +137,7 @@ impl Levels {
         self
     }
 
-    /// Raises the noise levels of gyros or accelerometers if their scaled kinematic residuals exceed [`EXCESSIVE`]. The three
+    /// Raises the noise levels of gyros or accelerometers if their scaled kinematic residuals exceed `EXCESSIVE`. The three
     /// axes have a common factor. Returns the natural logarithm of the largest factor.
     pub fn loosen(&mut self, step_residuals: &[f64; 6]) -> f64 {
         let worst = |of: &[f64]| {
