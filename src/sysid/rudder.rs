@@ -37,7 +37,7 @@ pub fn warning(motion: RudderMotion) -> String {
     )
 }
 
-/// Reason why an effect in a channel of [`CHANNELS`] is not asserted while an unmodelled rudder moves.
+/// Reason why an effect in a channel of `CHANNELS` is not asserted while an unmodelled rudder moves.
 pub fn reason(motion: RudderMotion) -> String {
     let motion = motion.to_string();
     format!("t{}, and the model has no rudder effect for its channels", &motion[1..])

@@ -55,7 +55,7 @@ impl Own {
         self.sensors.into_iter().chain(askew).chain(trims)
     }
 
-    /// Adds `step` to the unknowns that `asked` selects, in the order of [`Self::unknowns`].
+    /// Adds `step` to the unknowns that `asked` selects, in the order of `Self::unknowns`.
     pub fn step(&mut self, asked: &PerFlight, step: &[f64]) {
         let askew = self.askew.iter_mut().take(asked.angles());
         let all = self.sensors.iter_mut().chain(askew).chain(&mut self.trims);

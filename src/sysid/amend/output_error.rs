@@ -102,7 +102,7 @@ pub(super) struct Left {
 /// Fits the free coefficients of `model` to `flights`. `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// The flights are shorter than [`LEAST_S`], no coefficient is free, the flights excite none, free runs diverge too early,
+/// The flights are shorter than `LEAST_S`, no coefficient is free, the flights excite none, free runs diverge too early,
 /// the search does not converge or its equations are singular, or `progress` cancelled.
 pub fn fit(
     model: &GreyBox,

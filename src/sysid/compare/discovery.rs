@@ -28,7 +28,7 @@ pub fn control(channels: &mut [Vec<RegimeBins>]) {
     }
 }
 
-/// Whether the model fails in a cell: the q-value is at most [`FALSE_SHARE`].
+/// Whether the model fails in a cell: the q-value is at most `FALSE_SHARE`.
 pub fn found(bin: &Bin) -> bool {
     bin.q_value <= FALSE_SHARE
 }

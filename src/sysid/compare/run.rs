@@ -107,7 +107,7 @@ pub fn compare(
 /// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s).
 ///
 /// # Errors
-/// The sampling interval of a flight is not usable: see [`ClockError`].
+/// The sampling interval of a flight is not usable: see `ClockError`.
 pub fn scores(
     model: &GreyBox,
     flights: &[Reconstruction],

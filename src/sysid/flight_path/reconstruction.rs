@@ -76,7 +76,7 @@ pub struct Reconstruction {
     /// p, q, r, alpha, beta (units of [`State`]).
     pub noise: [f64; 8],
     /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the order and units of
-    /// [`Self::noise`].
+    /// `Self::noise`.
     ///
     /// Body rates are measured rates less biases and are not smoothed. The errors of the other states vary over tenths of
     /// seconds. Constant errors are not included; [`Self::nuisances`] contains their standard deviations.

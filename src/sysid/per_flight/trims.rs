@@ -49,7 +49,7 @@ pub fn joined(model: &GreyBox) -> Result<GreyBox, JoinError> {
     Ok(with)
 }
 
-/// Sets the trims of a model from [`joined`] to `values`, in the order of [`TRIMS`].
+/// Sets the trims of a model from [`joined`] to `values`, in the order of `TRIMS`.
 pub fn set(model: &mut GreyBox, values: &[f64]) {
     let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
     let first = all.len().saturating_sub(values.len());

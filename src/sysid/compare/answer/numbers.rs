@@ -28,7 +28,7 @@ pub struct Step {
     pub model: String,
     /// Free-run error at the horizon: NRMSE, the root mean square over the eight states, each over its scale x_c.
     pub error: f64,
-    /// Change of `error` relative to the step before, %; relative to the first step for [`Way::Other`]. `None` for the first
+    /// Change of `error` relative to the step before, %; relative to the first step for `Way::Other`. `None` for the first
     /// step.
     pub change_percent: Option<f64>,
 }
