@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 pub struct Stage<'a> {
     /// Current activity, in words for the user.
     pub doing: &'a str,
-    /// Share of the whole task that is done, 0 to 1; never decreases.
+    /// Share of the whole task that is done, 0 to 1. It never decreases.
     pub fraction: f64,
     /// Candidates of a diagnosis in the current ranking, the best first. Empty before the ranking and in other tasks.
     pub ranking: &'a [FirstLook],

@@ -173,7 +173,7 @@ fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
     plainest(all, SWEEPS)
 }
 
-/// Values of [`CHANNELS`] at a condition.
+/// Values of [`CHANNELS`] at a flight condition.
 fn accelerations(model: &GreyBox, at: &Condition) -> [f64; 6] {
     let air = model.air(&at.state, at.altitude);
     let (acceleration, [l, m, n]) = model.accelerations(&at.state, &at.controls, &air);
@@ -262,7 +262,7 @@ mod tests {
             let found = signature(&model, &about, about.entry.unwrap().example).unwrap();
             let first = found.sweeps.first().map(|pair| (pair.x_label, pair.y_label));
             println!("{:25} {first:?}", about.id);
-            // the X8 has no rudder, so the manoeuvre's rudder doublet does nothing
+            // the X8 has no rudder: the manoeuvre's rudder doublet has no effect
             let moves = about.id == "rudder_linear" || !found.manoeuvre.is_empty();
             assert!(first.is_some() && moves, "{}", about.id);
         }

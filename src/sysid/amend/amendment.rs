@@ -68,7 +68,7 @@ pub enum Prior {
 /// Options of an amendment.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Effects to add, in this order; empty to tune the prior only.
+    /// Effects to add, in this order; empty to fit only the model's coefficients.
     pub effects: Vec<Added>,
     /// Prior on the model's coefficients.
     pub prior: Prior,
@@ -104,7 +104,7 @@ impl Default for Options {
     }
 }
 
-/// An amendment with the models it compares.
+/// Result of an amendment, and the models that it compares.
 #[derive(Clone, Debug)]
 pub struct Amended {
     /// The amendment's result, as written to `amend.json`.
@@ -134,7 +134,8 @@ fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
 /// `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// An effect cannot join the model, the flights do not allow a fit, or `progress` cancelled.
+/// An effect cannot join the model, a flight's sampling interval is not usable, the flights do not allow a fit (see
+/// `AmendError`), or `progress` cancelled.
 pub fn amend(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -220,8 +221,8 @@ struct Right {
     notes: Vec<String>,
 }
 
-/// Corrects `flights` for the misalignment and the sensor errors in the file of `model`, unless misalignment is to be
-/// estimated. If the file has trims of any of the flights, trims are estimated for each flight.
+/// Corrects `flights` for the misalignment and the sensor errors in the file of `model`, unless the fit estimates the
+/// misalignment. If the file has trims of any of `flights`, trims are estimated for each flight.
 fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
     let mut notes = Vec::new();
     let (flights, named) = match asked.askew_deg {

@@ -8,7 +8,7 @@ use greylag_model::{GreyBox, Integrator};
 use greylag_physics::atmosphere::Density;
 use greylag_physics::rigid_body::ForceAxes;
 
-/// Standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
+/// Number of standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
 const CLEARLY: f64 = 1.96;
 /// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
@@ -101,7 +101,7 @@ impl Convention {
         }
     }
 
-    /// `model` with the alternative convention; `None` if there is none to try.
+    /// `model` with the alternative convention; `None` if the convention has no alternative.
     pub(super) fn other(self, model: &GreyBox) -> Option<GreyBox> {
         let mut other = model.clone();
         match self {

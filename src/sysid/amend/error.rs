@@ -23,7 +23,7 @@ pub enum AmendError {
         model: String,
         /// Usable duration of the flights, s.
         flown_s: f64,
-        /// Least duration that a fit needs, s.
+        /// Smallest duration for a fit, s.
         needed_s: f64,
     },
     /// There are too few flights for leave-one-out cross-validation.
@@ -34,7 +34,7 @@ pub enum AmendError {
     TooFewFlights {
         /// Number of flights that are long enough to be predicted, or of all flights if even these are too few.
         flights: usize,
-        /// Least number of flights needed.
+        /// Smallest number of flights for the cross-validation.
         needed: usize,
     },
     /// No coefficient is free.

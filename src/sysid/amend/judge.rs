@@ -16,7 +16,7 @@ pub(super) const IMPROVED: f64 = 0.01;
 /// An effect that reduces the held-out error below this share of the previous error is accepted although the search has not
 /// converged with it. Convergence may need further effects.
 pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
-/// At least one coefficient of an effect must differ from zero by this many standard deviations.
+/// At least one coefficient of an effect must differ from zero by this number of standard deviations.
 const CLEAR: f64 = 1.96;
 /// The same number for effects of more than three coefficients: with many coefficients, one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;

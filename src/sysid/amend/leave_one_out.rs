@@ -118,7 +118,7 @@ pub fn leave_one_out(
 
 /// The flights of a cross-validation.
 struct Set<'a> {
-    /// All flights as they are predicted.
+    /// All flights, uncorrected, for the prediction.
     judged: &'a [Flight],
     /// The same flights corrected with their constants in the model's file, for the fits.
     fitted: &'a [Flight],

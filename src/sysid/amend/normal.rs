@@ -36,7 +36,7 @@ pub(super) struct Place {
 /// Weights of a shot's residuals and of its initial state's errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
-    /// Inverse variance of each state's residual, divided by the common correlation length.
+    /// Inverse variance of each state's residual, divided by the common correlation length (samples).
     pub output: [f64; 8],
     /// Inverse variance of the initial state's errors.
     pub start: [f64; 8],
@@ -116,7 +116,7 @@ impl Neighbourhood {
     }
 }
 
-/// Normal equations of a shot in the free coefficients and the constants of its flight.
+/// Normal equations of a shot for the free coefficients and the constants of the shot's flight.
 pub(super) struct Normal {
     /// Information matrix after elimination of the initial state.
     pub information: DMatrix<f64>,

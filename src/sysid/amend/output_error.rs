@@ -1,4 +1,4 @@
-//! Output-error estimation by multiple shooting: fits the coefficients so that free runs follow the flights.
+//! Output-error estimation by multiple shooting: fits the coefficients such that short free runs follow the flights.
 //!
 //! Each shot starts from a reconstructed state. The error of this state is an unknown that is eliminated from the normal
 //! equations. The sensors' remaining biases and the actuators' delay are unknowns of each flight. The weights of the

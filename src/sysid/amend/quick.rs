@@ -26,7 +26,7 @@ pub struct Estimate {
 /// Fits the coefficients of `model` to `flights` without added effects: the value of [`Options::tuned`].
 ///
 /// # Errors
-/// The flights do not allow a fit, or `progress` cancelled.
+/// The flights do not allow a fit (see `AmendError`), or `progress` cancelled.
 pub fn tune(
     model: &GreyBox,
     flights: &[Reconstruction],

@@ -1,4 +1,4 @@
-//! Shots: short free runs from reconstructed states on recorded deflections.
+//! Shots: short free runs that start at reconstructed states and use recorded deflections.
 
 use std::f64::consts::{PI, TAU};
 
@@ -170,7 +170,7 @@ pub(super) fn fly(
     path
 }
 
-/// Predicted − measured, roll wrapped to ±π. Weak form and report use the opposite sign.
+/// Predicted − measured states, in the units of the state, with roll wrapped to ±π. Weak form and report use the opposite sign.
 pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;

@@ -26,11 +26,11 @@ pub struct Residual {
     pub flight: usize,
     /// Index of the window's bootstrap block, ascending over all flights.
     pub block: usize,
-    /// Values of the regime variables, in the order of [`RegimeVariable::CONTINUOUS`].
+    /// Values of the regime variables, in the order and units of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
     /// Number of independent samples that the window represents: stride of the windows divided by the kernel's length.
     pub weight: f64,
-    /// Change of the residual for one standard deviation of each of the flight's sensor errors.
+    /// Change of the residual for one standard deviation of each sensor constant of the flight, in the channel's unit.
     pub shift: Shift,
 }
 
@@ -64,7 +64,7 @@ pub fn residuals(
     all
 }
 
-/// Number of independent samples in `residuals`.
+/// Number of independent samples in `residuals`, rounded down.
 pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
@@ -152,7 +152,7 @@ fn by_flight(residuals: &[Residual], flights: &[Prepared], seed: u64, channel: u
     }
 }
 
-/// Statistics of a bin; the caller sets its edges.
+/// Statistics of a bin. The caller sets the edges and the centre.
 fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     let (mean, interval) = mean_interval(members.iter().copied(), seed, path);
     let independent = independent(members.iter().copied());
@@ -296,7 +296,7 @@ mod tests {
     #[test]
     fn a_step_over_alpha_is_explained_by_alpha_and_not_by_time() {
         let residual = |i: usize| {
-            // a permutation, so that alpha and time are unrelated
+            // a permutation: alpha and time are not correlated
             let alpha = (i * 37 % 100) as f64 / 10.0;
             let mut regime = [0.0; 13];
             (regime[0], regime[12]) = (alpha, i as f64);

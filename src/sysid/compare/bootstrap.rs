@@ -75,7 +75,7 @@ mod tests {
                 low <= 0.0 && 0.0 <= high
             })
             .count();
-        // 95 % nominal; percentile intervals of 60 blocks are a little narrow; 3 binomial sd is 5 %
+        // nominal coverage 95 %; intervals from 60 blocks are slightly too narrow; 3 binomial standard deviations are 5 %
         assert!((178..=200).contains(&covered), "{covered} of 200");
         assert!(interval(&blocks([(3, 1.0)].into_iter()), 1, &[]).iter().all(|x| x.is_nan()));
     }

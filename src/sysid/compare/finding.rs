@@ -16,17 +16,17 @@ const CIRCUMSTANCE_MARGIN: f64 = 0.15;
 const FOLLOWS: f64 = 0.5;
 /// An adjacent bin belongs to the worst range if its mean is at least this fraction of the worst bin's mean.
 const RANGE_PART: f64 = 0.5;
-/// Fewest independent samples for a flight to count as showing a regime.
+/// Smallest number of independent samples of a flight that can show a regime.
 const FLIGHT_SUPPORT: usize = 5;
 
 /// Trend of the residual along the variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trend {
-    /// The magnitude grows with the variable.
+    /// The magnitude of the residual grows with the variable.
     Grows,
-    /// The magnitude falls with the variable.
+    /// The magnitude of the residual falls with the variable.
     Falls,
-    /// The sign changes along the variable.
+    /// The sign of the residual changes along the variable.
     Reverses,
     /// The residual has none of these trends.
     None,
@@ -35,7 +35,7 @@ pub enum Trend {
 /// The worst regime with the residual's trend.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The regime, with its range and mean residual.
+    /// The regime with its range and mean residual.
     pub regime: Regime,
     /// Trend along its variable.
     pub trend: Trend,
@@ -110,7 +110,7 @@ fn range(bins: &[Bin]) -> Option<(usize, usize)> {
         .filter(|&k| discovery::found(&bins[k]))
         .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
     let worst = bins[peak].mean;
-    // neighbours with few samples may join: together with the worst bin they have enough
+    // adjacent bins with few samples may join the range: together with the worst bin they have enough samples
     let alike = |k: usize| bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART;
     let from = (0..peak).rev().take_while(|&k| alike(k)).last().unwrap_or(peak);
     let to = (peak + 1..bins.len()).take_while(|&k| alike(k)).last().unwrap_or(peak);
@@ -120,7 +120,7 @@ fn range(bins: &[Bin]) -> Option<(usize, usize)> {
 fn lies_in(r: &Residual, variable: RegimeVariable, low: f64, high: f64) -> bool {
     let place = RegimeVariable::CONTINUOUS.iter().position(|v| *v == variable);
     let x = place.map_or(r.flight as f64, |v| r.regime[v]);
-    // an open end is NaN, which no number is below or above
+    // an open end is NaN, and comparisons with NaN are false
     !(x < low || x >= high)
 }
 

@@ -14,7 +14,7 @@ const REGRESSORS: usize = 13;
 /// moves.
 const RANK: f64 = 1e-9;
 
-/// Free-run error of a baseline forecast, over the same starts as those of the models.
+/// Free-run error of a baseline forecast, with the same starts as the free runs of the models.
 #[derive(Clone, Debug, Serialize)]
 pub struct ForecastResult {
     /// Name of the forecast.
@@ -148,7 +148,7 @@ fn results(
     .collect()
 }
 
-/// The runs of one flight, from the same starts as those of the models.
+/// The runs of one flight, with the same starts as the free runs of the models.
 fn flown(
     forecast: &Forecast,
     flight: &Prepared,
@@ -212,7 +212,7 @@ mod tests {
         let all = forecasts(&[flight()], [1.0; 8], &[1.0, 5.0]);
         let at_5: Vec<f64> = all.iter().map(|f| f.free_run[1].rmse_scaled).collect();
         let [hold, straight, linear] = at_5[..] else { panic!("{at_5:?}") };
-        // pitch goes up and down by a tenth of a radian; throttle and airspeed never move
+        // pitch oscillates by 0.1 rad; throttle and airspeed are constant
         assert!(hold > 0.01 && straight > 0.01 && linear < 1e-6, "{at_5:?}");
         // 20 s contain 7 starts, one every 3 s
         assert_eq!(all[0].free_run[0].runs, 7);

@@ -27,7 +27,7 @@ pub(super) type Look = Option<[[f64; 8]; 2]>;
 pub struct Runs {
     /// Sampled times, s after the start, ascending.
     times: Vec<f64>,
-    /// Samples of each run, up to the end of the flight.
+    /// Samples of each run, up to the end of its segment.
     runs: Vec<Vec<Look>>,
     scale: [f64; 8],
 }
@@ -148,7 +148,7 @@ fn run(
         flight.advance(model, state, [&segment[k], next], memory)
     };
     if let Some(before) = start.checked_sub(1) {
-        // the integrator uses the acceleration of the step before
+        // the integrator uses the acceleration of the preceding step
         advance(before, segment[before].state, &mut memory);
     }
     let last = looks.last().map_or(0, |l| (start + l).min(segment.len() - 1));
@@ -199,7 +199,7 @@ impl Runs {
         place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
     }
 
-    /// Scaled error of each run at one time; a diverged run counts with [`DIVERGENCE_BOUND`].
+    /// Scaled error of each run at one time. The error of a diverged run is [`DIVERGENCE_BOUND`].
     fn errors(&self, looks: &[Look]) -> Vec<f64> {
         let one = |look: &Look| match look {
             Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),
@@ -240,7 +240,7 @@ impl Runs {
         self.times.iter().map(point).filter(|p| p.runs > 0).collect()
     }
 
-    /// RMSE, R² and Theil's U with its shares for one state.
+    /// RMSE, R² and Theil's U with its shares for state number `k`.
     fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
         let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
         // measured plus wrapped error: a roll error across ±180° is then the smaller angle
@@ -301,7 +301,7 @@ mod tests {
         assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
         assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
         assert_eq!(score.states[2].rmse, 0.0);
-        // a roll of 179° predicted as −179° is 2° off
+        // a roll of 179° predicted as −179° has an error of 2°
         let e = error(&[179_f64.to_radians(); 8], &[-179_f64.to_radians(); 8]);
         assert!((e[0] - 2_f64.to_radians()).abs() < 1e-9);
     }

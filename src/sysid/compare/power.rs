@@ -18,7 +18,7 @@ pub struct Power {
 }
 
 impl Power {
-    /// Mean squares of the channel with these `residuals`, whose noise has the variance `noise`.
+    /// Mean squares of the channel with `residuals` and the noise variance `noise`.
     pub fn of(residuals: &[Residual], noise: f64) -> Power {
         let count = residuals.len() as f64;
         let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;

@@ -20,7 +20,7 @@ pub struct Comparison {
     pub seed: u64,
     /// Short answer in sentences, with their numbers.
     pub answer: Answer,
-    /// Findings in sentences: those of the first model, the most important ones first.
+    /// Findings on the first model in sentences, in descending order of importance.
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
@@ -30,7 +30,7 @@ pub struct Comparison {
     pub flights: Vec<FlightResult>,
     /// Settings that the figures depend on.
     pub settings: Settings,
-    /// Notes for the reader: what was skipped, assumed or lost.
+    /// Notes on skipped flights, assumptions and lost accuracy.
     pub notes: Vec<String>,
 }
 
@@ -70,7 +70,7 @@ pub struct Settings {
     pub block_s: f64,
     /// Number of resamples of the bootstrap.
     pub resamples: usize,
-    /// Fewest independent samples that support a bin.
+    /// Smallest number of independent samples with which a bin counts as supported.
     pub support: usize,
 }
 
@@ -79,16 +79,16 @@ pub struct Settings {
 pub struct ModelResult {
     /// Name of the model, from its file.
     pub name: String,
-    /// Findings in sentences, the most important ones first.
+    /// Findings in sentences, in descending order of importance.
     pub sentences: Vec<String>,
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
-    /// Constants of the flights in the model's file, if it has any; `free_run` uses them.
+    /// Constants of the flights in the model's file, which `free_run` uses; `None` if the file has none for these flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
     pub growth: Vec<GrowthPoint>,
-    /// Channels D, L, Y, l, m, n and the rates of V, α, β, as far as the logs allow.
+    /// Channels D, L, Y, l, m, n and the rates of V, α, β that the logs measure.
     pub channels: Vec<ChannelResult>,
     /// Predictions over time, one entry a flight, in the order of [`Comparison::flights`].
     #[serde(skip)]
@@ -111,14 +111,14 @@ pub struct KnownUse {
 pub struct HorizonScore {
     /// Time after the start, s.
     pub horizon_s: f64,
-    /// Number of runs for which the flights are long enough.
+    /// Number of runs that reach the horizon before their segment ends, including diverged runs.
     pub runs: usize,
     /// Number of those runs that have diverged by then.
     pub diverged: usize,
     /// `diverged / runs`, 0 to 1; NaN without runs.
     pub divergence_rate: f64,
-    /// Root mean square, over runs, of the scaled error: the root mean square over the eight states
-    /// of error / x_c (eq. 21). A diverged run counts with the divergence bound.
+    /// Root mean square, over runs, of the scaled error: the root mean square over the eight states of error / x_c (eq. 21). The
+    /// scaled error of a diverged run is the divergence bound.
     pub rmse_scaled: f64,
     /// Errors of each state over the runs that did not diverge.
     pub states: Vec<StateScore>,
@@ -133,16 +133,16 @@ pub struct StateScore {
     pub rmse: f64,
     /// Root mean square error divided by x_c.
     pub rmse_scaled: f64,
-    /// Coefficient of determination over the runs: 1 − mean square error / variance of the measured state at
-    /// that time. 1 is perfect; at 0 or below the measured mean is the better forecast.
+    /// Coefficient of determination over the runs: 1 − mean square error / variance of the measured state at the horizon. 1 is
+    /// perfect; at 0 or below, the mean of the measured states would be at least as good a forecast.
     pub r2: f64,
     /// Theil's U: RMSE / (RMS of measured + RMS of predicted), 0 (perfect) to 1.
     pub theil_u: f64,
     /// Share of the mean square error due to a constant offset, 0..1.
     pub bias_share: f64,
-    /// Share due to a difference in the amount of variation, 0..1.
+    /// Share of the mean square error due to different standard deviations of predicted and measured state, 0..1.
     pub variance_share: f64,
-    /// Share due to lack of correlation, 0..1; the three shares add up to 1.
+    /// Share of the mean square error due to lack of correlation, 0..1. The three shares add up to 1.
     pub covariance_share: f64,
 }
 
@@ -157,13 +157,13 @@ pub struct GrowthPoint {
     pub diverged: usize,
     /// Scaled error at this time, as [`HorizonScore::rmse_scaled`].
     pub rmse_scaled: f64,
-    /// Median over runs of the scaled error; a diverged run counts with the bound.
+    /// Median over runs of the scaled error. The scaled error of a diverged run is the divergence bound.
     pub median_scaled: f64,
-    /// 90 % quantile over runs of the scaled error; a diverged run counts with the bound.
+    /// 90 % quantile over runs of the scaled error. The scaled error of a diverged run is the divergence bound.
     pub p90_scaled: f64,
 }
 
-/// One channel of one model over all flights, in weak form: averages over the kernel.
+/// One channel of one model over all flights, in weak form: values are averages over the kernel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelResult {
     /// Identifier of the channel.
@@ -178,7 +178,7 @@ pub struct ChannelResult {
     pub measured_sd: f64,
     /// Root mean square residual, in `unit`.
     pub residual_rms: f64,
-    /// Standard deviation of the residual that sensor noise accounts for, in `unit`.
+    /// Standard deviation of the residual due to sensor noise, in `unit`.
     pub noise_sd: f64,
     /// Mean square residual less noise, divided by the measured variance less noise. At 0 the model explains all variance
     /// beyond noise; above 1 the model is worse than a constant. NaN if the measured variance hardly exceeds the noise.
@@ -192,7 +192,7 @@ pub struct ChannelResult {
     pub worst_regime: String,
     /// Reason why these flights do not suffice to assess the model in this channel; `None` if they suffice.
     pub abstained: Option<&'static str>,
-    /// The worst regime as numbers; `None` if no supported regime differs from zero.
+    /// The worst regime as numbers; `None` if the mean residual of no supported regime differs from zero.
     pub regime: Option<Regime>,
     /// Mean residual over each regime variable.
     pub bins: Vec<RegimeBins>,
@@ -220,8 +220,8 @@ pub struct RegimeBins {
     pub name: &'static str,
     /// Display unit of the variable: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
     pub unit: &'static str,
-    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, adjusted for
-    /// their number of parameters, 0..1.
+    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, 0..1. The share is
+    /// adjusted for the number of parameters.
     pub explained: f64,
     /// Bins in ascending order of the variable; for the variable flight, one bin a flight in the order of the flights.
     pub bins: Vec<Bin>,
@@ -243,12 +243,12 @@ pub struct Bin {
     /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated by the
     /// reconstruction.
     pub interval: [f64; 2],
-    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model at least as
-    /// significant as this one; NaN without support. The model fails in cells of at most 0.05.
+    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model that are at least as
+    /// significant as this cell. NaN without support. The model fails in cells with a q-value of at most 0.05.
     pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
-    /// Number of independent samples: kernel lengths that the windows cover.
+    /// Number of independent samples: number of kernel lengths that the windows cover.
     pub independent: usize,
     /// Whether there are enough independent samples ([`Settings::support`]).
     pub supported: bool,
@@ -291,7 +291,7 @@ pub struct Regime {
     pub high: f64,
     /// Unit of the ends.
     pub unit: &'static str,
-    /// Mean residual (measured − model) there, in the channel's unit.
+    /// Mean residual (measured − model) in the regime, in the channel's unit.
     pub mean: f64,
     /// 95 % interval of `mean`.
     pub interval: [f64; 2],
@@ -341,7 +341,7 @@ pub struct NuisanceResult {
     /// Prior standard deviation, in `unit`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior_sd: Option<f64>,
-    /// Change from the prior mean, in standard deviations of the prior.
+    /// Estimate less prior mean, in prior standard deviations; `None` without a prior.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moved_sd: Option<f64>,
 }
@@ -360,7 +360,7 @@ pub struct FlightTrace {
 /// A model's predictions for one flight.
 #[derive(Clone, Debug, Default)]
 pub struct ModelTrace {
-    /// States of free runs restarted from the reconstruction every [`Settings::start_every_s`], at the times of
+    /// States of free runs that restart from the reconstruction every [`Settings::start_every_s`], at the times of
     /// [`FlightTrace::time_s`]; NaN between segments and after divergence.
     pub states: [Vec<f64>; 8],
     /// The channels in weak form.

@@ -328,7 +328,7 @@ fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     let body = &model.body;
     match id {
         ChannelId::Drag => 1.0 / (body.mass * v),
-        // a force across the path turns it by force / (m V)
+        // a force F normal to the path turns the path at the rate F / (m V)
         ChannelId::Lift => 1.0 / (body.mass * v * alpha),
         ChannelId::Side => 1.0 / (body.mass * v * beta),
         ChannelId::Roll => 1.0 / (body.jx * p),
@@ -357,7 +357,7 @@ fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {
     let mut segment = None;
     for (k, window) in flight.windows.iter().enumerate() {
         if segment.is_some_and(|s| s != window.segment) {
-            // a NaN row breaks the curve between segments
+            // a NaN row interrupts the curve between segments
             trace.time_s.push(window.time_s - flight.dt);
             trace.measured.push(f64::NAN);
             trace.predicted.push(f64::NAN);

@@ -9,13 +9,13 @@ const EXPLAINED: f64 = 0.01;
 /// Unexplained share of the variance below which the sentence names no regime.
 pub const NOTHING_LEFT: f64 = 0.001;
 
-/// Figures from which the sentence of a channel is written.
+/// Quantities from which the sentence of a channel is written.
 pub struct Subject<'a> {
     /// Identifier of the channel.
     pub channel: ChannelId,
     /// Unexplained share of the channel's variance; NaN if the flights do not excite the channel above the noise.
     pub unexplained: f64,
-    /// Worst regime of the channel, if there is one.
+    /// Worst regime of the channel; `None` if there is none.
     pub finding: Option<&'a Finding>,
     /// The variable that the residual mainly follows; `None` if there is none.
     pub follows: Option<RegimeVariable>,
@@ -30,7 +30,7 @@ pub struct Subject<'a> {
 /// Unexplained share of the variance above which the sentence states no percentage: the channel is hardly excited.
 const QUIET: f64 = 9.995;
 
-/// The sentence, without a full stop, beginning in lower case.
+/// The sentence without a full stop; the first letter is lower case.
 pub fn sentence(subject: &Subject) -> String {
     let noun = noun(subject.channel);
     if subject.unexplained.is_nan() {
@@ -107,7 +107,7 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
 /// The error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
     let [least, most] = regime.interval;
-    // the half width towards zero: an interval that excludes zero must not appear to include it
+    // half width on the side of zero: an interval that excludes zero must not appear to include zero
     let half = if regime.mean > 0.0 { regime.mean - least } else { most - regime.mean };
     let (low, high) = directions(subject.channel);
     if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {

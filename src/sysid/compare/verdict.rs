@@ -41,7 +41,7 @@ fn capital(text: &str) -> String {
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
 }
 
-/// A warning if most free runs have diverged by the shortest horizon.
+/// A warning if more than half of the free runs have diverged at the shortest horizon.
 fn diverges(scores: &[HorizonScore]) -> Option<String> {
     let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
     (first.divergence_rate > 0.5).then(|| {
@@ -52,7 +52,7 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
     })
 }
 
-/// A warning if a forecast without aerodynamics is better than the model at the longest horizon.
+/// A warning if a forecast without aerodynamics is better than the model at the longest horizon that a run reaches.
 pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
     let score = free_run.iter().rev().find(|s| s.runs > 0 && s.rmse_scaled.is_finite())?;
     let horizon = score.horizon_s;

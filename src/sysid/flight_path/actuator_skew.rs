@@ -44,7 +44,7 @@ pub struct Skew {
 
 /// Reads a body rate, rad/s.
 type Rate = fn(&Instant) -> f64;
-/// Regressors of the rate's derivative.
+/// Regressors of the body rate's derivative; the deflection is the last regressor.
 type Terms = fn(&Instant) -> Vec<f64>;
 
 /// Delay of the recorded deflections from roll, pitch and the prior, in gusts of the standard deviation `gusts` (m/s).
@@ -71,7 +71,7 @@ pub fn estimate(
         information += i;
         weighted += i * skew.late;
     }
-    // the same gusts disturb roll and pitch, so two axes do not average this error
+    // the same gusts disturb roll and pitch: the mean over both axes does not reduce this error
     let by_gusts = BY_GUSTS * gusts;
     let width = SKEW_SAMPLES * step;
     let deviation = information.recip().sqrt().hypot(by_gusts).min(width);
@@ -88,19 +88,19 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     let mean = again.iter().sum::<f64>() / count;
     let scatter = again.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let pulled = mean - skew.late;
-    // scatter of the draws, and the part of the bias that is not linear in the errors' variance
+    // variance of the draws' mean, and the part of the bias that is not linear in the errors' variance
     let deviation = (skew.deviation.powi(2) + scatter / count + (CURVED * pulled).powi(2)).sqrt();
     Skew { late: skew.late - pulled, deviation }
 }
 
-/// Regressors of the roll acceleration, the deflection last.
+/// Regressors of the roll acceleration; the deflection is last.
 fn roll_terms(i: &Instant) -> Vec<f64> {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
     vec![v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
 }
 
-/// Regressors of the pitch acceleration, the deflection last.
+/// Regressors of the pitch acceleration; the deflection is last.
 fn pitch_terms(i: &Instant) -> Vec<f64> {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;

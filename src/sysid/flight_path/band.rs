@@ -76,10 +76,10 @@ struct Eliminated<const N: usize, const W: usize> {
 /// A stretch after elimination.
 #[derive(Clone, Debug)]
 pub struct Stretch<const N: usize, const W: usize> {
-    /// Instants from the start to the one before the middle.
+    /// Instants before the middle, in order of time.
     head: Vec<Eliminated<N, W>>,
     middle: Eliminated<N, W>,
-    /// Instants from the end to the one after the middle.
+    /// Instants after the middle, in reverse order of time.
     tail: Vec<Eliminated<N, W>>,
 }
 

@@ -22,7 +22,7 @@ const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
 const UNUSUAL: f64 = 4.0;
 /// Smallest relevant delay, s.
 const DELAY: f64 = 0.02;
-/// A constant is freed only if its standard deviation is below this share of its new prior width.
+/// A constant is freed only if its standard deviation is below this share of its new prior standard deviation.
 const KNOWN: f64 = 0.25;
 
 /// Index of the next constant to free, and its new prior standard deviation. `None` if no other constant is significant.

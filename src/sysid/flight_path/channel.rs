@@ -25,7 +25,7 @@ pub enum Interpolation {
 pub struct Channel {
     time: Vec<f64>,
     value: Vec<f64>,
-    /// Whether more than 20 values are all equal; always false for `Interpolation::Kept`.
+    /// Whether all values are equal, if there are more than 20; always false for `Interpolation::Kept`.
     pub stuck: bool,
 }
 
@@ -170,7 +170,7 @@ where
 mod tests {
     use super::*;
 
-    /// 100 Hz samples of a slow sine as `value` makes them.
+    /// Channel with 100 Hz samples of `value`.
     fn channel(value: impl Fn(f64) -> f64) -> Channel {
         let times = (0..1000).map(|k| k as f64 * 0.01);
         Channel::new(times.map(|t| (t, value(t))), Interpolation::Linear)
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_quantised_sensor_is_known_while_it_stays() {
-        // about 0.6 s pass at the sine's top without a step of 0.05
+        // at the maximum of the sine, about 0.6 s pass without a step of 0.05
         let coarse = channel(|t| (t.sin() / 0.05).round() * 0.05);
         assert!((0..1000).all(|k| coarse.between(k as f64 * 0.01, 0.2).is_finite()));
     }

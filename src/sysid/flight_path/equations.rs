@@ -17,7 +17,7 @@ use crate::flight_path::{Options, ReconstructError, noise};
 use greylag_logs::Sampling;
 use greylag_num::statistics;
 
-/// Number of columns if the constants are free: all constants, then the right-hand side.
+/// Number of columns if the constants are free: all constants and the right-hand side.
 const WIDTH: usize = COUNT + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
@@ -283,7 +283,7 @@ fn huber(size: f64, bound: f64) -> f64 {
     if size <= bound { size * size } else { bound * (2.0 * size - bound) }
 }
 
-/// Standard deviations of the differences between samples `step` (s) apart.
+/// Standard deviations of the changes between samples `step` (s) apart: attitude (rad), velocity (m/s), gust (m/s).
 fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
     std::array::from_fn(|i| match i {

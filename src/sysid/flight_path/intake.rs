@@ -113,7 +113,7 @@ impl Track {
         self.rates.len()
     }
 
-    /// Time of sample `k`, s, for a sampling interval of `step` (s).
+    /// Time of sample `k` on the log's clock, s, for the sampling interval `step` (s).
     pub fn time(&self, k: usize, step: f64) -> f64 {
         self.start + k as f64 * step
     }

@@ -28,7 +28,7 @@ pub struct Drive {
     rate: Vec<Vector3<f64>>,
     /// Mean specific force from each sample to the next, body axes at the first sample, m/s².
     force: Vec<Vector3<f64>>,
-    /// Derivative of `force` with respect to the accelerometers' delay, m/s³.
+    /// Derivative of `force` with respect to the accelerometers' delay, body axes, m/s³.
     force_by_skew: Vec<Vector3<f64>>,
     /// Time of the first sample, s.
     start: f64,

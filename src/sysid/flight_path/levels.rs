@@ -183,7 +183,7 @@ impl Levels {
     }
 }
 
-/// The white noise that represents [`PITOT`] at `airspeed`, m/s: see [`Levels::slow_airspeed`].
+/// White noise, m/s, that represents [`PITOT`] at `airspeed` (m/s): see [`Levels::slow_airspeed`].
 fn slow_airspeed(log: &Log, airspeed: f64) -> f64 {
     if log.has.alpha || !log.has.velocity {
         return 0.0;

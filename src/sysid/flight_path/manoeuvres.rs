@@ -32,9 +32,9 @@ pub enum ManoeuvreKind {
     Turn,
     /// The throttle moves, the surfaces do not.
     Thrust,
-    /// The ailerons or the roll rate move.
+    /// The ailerons move, or the roll rate is large.
     Roll,
-    /// The elevator or the pitch angle moves.
+    /// The elevator moves, or the pitch angle changes.
     Pitch,
     /// Roll and pitch move together.
     RollAndPitch,

@@ -71,7 +71,7 @@ pub struct Options {
     pub shortest_s: f64,
     /// Airspeed below which the aircraft counts as not flying, m/s.
     pub airspeed_min_mps: f64,
-    /// Stated properties of the aircraft's sensors; those stated in the log itself take precedence.
+    /// Stated properties of the aircraft's sensors. Properties that the log states take precedence.
     pub sensors: Sensors,
 }
 
@@ -127,7 +127,7 @@ pub enum ReconstructError {
         flight: String,
         /// The missing channel, in words.
         channel: &'static str,
-        /// Column of the log format that would provide it.
+        /// Column of the log format for the channel.
         column: &'static str,
     },
     /// The log contains no flight.
@@ -170,8 +170,8 @@ pub enum ReconstructError {
 /// Reconstructs `flight`: resamples each segment to uniform time steps, then estimates and removes sensor errors and wind.
 ///
 /// # Errors
-/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors
-/// contradict one another.
+/// A required channel is missing, the log contains no flight, no stretch of the flight is long enough, or no path fits the
+/// sensors.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));

@@ -90,8 +90,8 @@ mod tests {
                 slow
             })
             .collect();
-        // for a first-order process the ratio of variances is (1 + 0.9) / (1 − 0.9) = 19, less the
-        // ends of the blocks
+        // for a first-order process, the ratio of variances is (1 + 0.9) / (1 − 0.9) = 19, reduced by the ends
+        // of the blocks
         let found = colour(&slow, 100);
         assert!((3.4..4.8).contains(&found), "{found}");
     }

@@ -6,26 +6,26 @@ use greylag_physics::sensors::CONSTANTS;
 
 /// Number of estimated constants.
 pub const COUNT: usize = 41;
-/// Index of the angle-of-attack vane's bias.
+/// Index of the angle-of-attack vane's bias, rad.
 pub const ALPHA: usize = 0;
-/// Index of the sideslip vane's bias.
+/// Index of the sideslip vane's bias, rad.
 pub const BETA: usize = 1;
 /// Index of the airspeed scale: measured = (1 + scale) · true.
 pub const SCALE: usize = 2;
 /// First index of the steady wind north, east, down, m/s.
 pub const WIND: usize = 3;
-/// Index of the attitude's delay behind the gyros.
+/// Index of the attitude's delay relative to the gyros, s.
 pub const SKEW_ATTITUDE: usize = 6;
-/// Index of the airspeed's delay.
+/// Index of the airspeed's delay relative to the gyros, s.
 pub const SKEW_AIRSPEED: usize = 7;
-/// Index of the vanes' delay.
+/// Index of the vanes' delay relative to the gyros, s.
 pub const SKEW_VANES: usize = 8;
-/// Index of the ground velocity's delay.
+/// Index of the ground velocity's delay relative to the gyros, s.
 pub const SKEW_VELOCITY: usize = 9;
 /// First index of the gains of the α and β vanes less 1. Upwash of a wing or a body causes such gains.
 pub const VANE_GAIN: usize = 10;
 const BETA_GAIN: usize = VANE_GAIN + 1;
-/// Index of the airspeed's offset: measured = (1 + scale) · true + offset.
+/// Index of the airspeed's offset, m/s: measured = (1 + scale) · true + offset.
 pub const AIRSPEED_OFFSET: usize = 12;
 /// Index of the offset of the measured heading relative to the velocity over ground, rad.
 pub const HEADING: usize = 13;
@@ -35,7 +35,7 @@ pub const INERTIAL: usize = 14;
 pub const GYRO: usize = 14;
 /// First index of the accelerometer biases x, y, z, m/s².
 pub const FORCE: usize = 17;
-/// Index of the accelerometers' delay.
+/// Index of the accelerometers' delay relative to the gyros, s.
 pub const SKEW_FORCE: usize = 20;
 /// First index of the drift rates of the gyro biases p, q, r, rad/s².
 ///
@@ -57,7 +57,7 @@ const KNOTS: usize = 3;
 /// accelerometer bias after a minute.
 pub const EARTH: usize = 39;
 
-/// Order of the constants in the result.
+/// Indices of the constants in the order of the result.
 pub const ORDER: [usize; BEND] = [
     14, 15, 16, 21, 22, 23, 24, 25, 26, 17, 18, 19, 27, 28, 29, 0, 1, 10, 11, 2, 12, 13, 3, 4, 5,
     6, 20, 7, 8, 9,

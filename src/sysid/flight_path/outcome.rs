@@ -47,7 +47,7 @@ const DRAWS: usize = 3;
 /// Assembles the reconstruction.
 ///
 /// # Errors
-/// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
+/// [`ReconstructError::NoPath`] if the equations of the simulated path errors are singular.
 pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
     let Problem { log, options, .. } = *problem;
     let mut segments = path_as_segments(problem, found, &found.paths, None);

@@ -34,7 +34,7 @@ pub struct Segment {
     pub instants: Vec<Instant>,
 }
 
-/// A sensor error or a component of the wind, as estimated together with the path.
+/// A sensor error or a component of the wind that the reconstruction has estimated.
 ///
 /// The wind is the steady part without gusts. Its standard deviation covers the difference to the mean wind of the flight.
 /// The velocity relative to the air at an instant includes the gust.
@@ -85,7 +85,7 @@ pub struct Reconstruction {
     pub force_noise: [f64; 3],
     /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
-    /// Notes for the reader: assumptions made, and lost accuracy, for example without a vane.
+    /// Notes on assumptions and on lost accuracy, for example without a vane.
     pub notes: Vec<String>,
 }
 

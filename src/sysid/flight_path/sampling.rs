@@ -25,7 +25,7 @@ const AGREE: f64 = 0.03;
 /// Additional tolerance, in standard deviations of the clock skew.
 const DEVIATIONS: f64 = 3.0;
 
-/// The sampling of a log with the path estimated under it, and a note on the choice.
+/// The sampling of a log, the path estimated with this sampling, and a note on the choice.
 pub struct Chosen {
     /// Meaning of a rate sample.
     pub sampling: Sampling,

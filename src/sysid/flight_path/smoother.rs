@@ -30,7 +30,7 @@ const LAST: usize = 25;
 /// level.
 const STEP_TOLERANCE: f64 = 0.05;
 const LEVEL_TOLERANCE: f64 = 0.02;
-/// Smallest share of a step that is tried.
+/// Smallest fraction of a step that the line search tries.
 const LEAST_PART: f64 = 1.0 / 64.0;
 
 /// Smooths all stretches of the log together.

@@ -18,7 +18,7 @@ const fn trim(name: &'static str, width: f64) -> Trim {
     Trim { name, width }
 }
 
-/// The trims in the order of the effect's coefficients, with their usual standard deviations between flights of one
+/// The trims in the order of the effect's coefficients, with their assumed standard deviations between flights of one
 /// aircraft.
 ///
 /// Assumed causes. Lift: half a degree of incidence of a wing that was mounted again, at a slope of 4 to 5 per rad. Pitch: a

@@ -36,7 +36,7 @@ pub enum ChannelId {
 }
 
 impl ChannelId {
-    /// All channels, forces before moments before kinematics.
+    /// All channels in the order forces, moments, rates of V, α and β.
     pub const ALL: [ChannelId; 9] = [
         ChannelId::Drag,
         ChannelId::Lift,
@@ -125,7 +125,7 @@ pub enum RegimeVariable {
 }
 
 impl RegimeVariable {
-    /// The numeric variables: all but the flight.
+    /// The continuous variables: all variables except the flight.
     pub const CONTINUOUS: [RegimeVariable; 13] = [
         RegimeVariable::Alpha,
         RegimeVariable::Beta,

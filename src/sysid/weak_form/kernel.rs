@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-/// Length of the kernel, s (`docs/explanation/comparison.md`).
+/// Length of the kernel, s (see `docs/explanation/comparison.md`).
 pub const KERNEL_S: f64 = 0.37;
 
 /// A Hann window over a number of time steps; it has one more sample than steps.

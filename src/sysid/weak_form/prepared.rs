@@ -15,7 +15,7 @@ use greylag_physics::State;
 /// Airspeed below which an aircraft of any size counts as not in flight, m/s.
 const FLYING_FLOOR: f64 = 3.0;
 
-/// Error of a flight whose sampling interval is not usable.
+/// Error of a flight whose sampling interval is outside 1e-6 to 1 s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"

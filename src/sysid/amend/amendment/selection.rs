@@ -36,7 +36,7 @@ pub(super) struct Ask<'a> {
     pub(super) train: &'a [Flight],
     pub(super) judge: &'a Judge<'a>,
     pub(super) progress: &'a Progress<'a>,
-    /// Number of fits begun; the first one tunes the prior.
+    /// Number of fits that have begun; the first fit has no added effects.
     pub(super) begun: AtomicUsize,
 }
 
@@ -214,7 +214,7 @@ impl Ask<'_> {
             let own = format!("{}.", added.id);
             let fitted = near.coefficients().iter().filter(|c| c.name.starts_with(&own));
             let fitted: Vec<f64> = fitted.map(|c| c.value).collect();
-            // the starting values of a curve are its prior, so they must not come from an earlier fit
+            // the starting values of a curve are its prior means: they must not come from an earlier fit
             let start = match fitted.is_empty() || parameters::SLIGHT.contains(&added.id.as_str()) {
                 true => added.start.clone(),
                 false => Some(fitted),

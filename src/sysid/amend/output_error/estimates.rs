@@ -15,7 +15,7 @@ use crate::amend::result::{FittedFlight, FlightEstimate, OwnConstant, Parameter}
 use crate::amend::shooting::Shot;
 use greylag_model::{GreyBox, Known};
 
-/// Two-sided 95 % point of the normal distribution.
+/// Half width of a 95 % interval in standard deviations of a normal distribution.
 const NORMAL_95: f64 = 1.96;
 /// A prior whose standard deviation is at least this share of the range of the bounds adds no information to the bounds.
 const WIDE: f64 = 0.5;
@@ -39,7 +39,7 @@ fn held_note(held: &[String]) -> Option<String> {
     })
 }
 
-/// Whether `value` lies at a bound of `free`, to a millionth of their range.
+/// Whether `value` lies at a bound of `free`, within a millionth of the range of the bounds.
 fn at_bound(free: &Free, value: f64) -> bool {
     let (low, high) = free.bounds;
     let at = |bound: f64| (value - bound).abs() <= 1e-6 * (high - low);
@@ -49,8 +49,8 @@ fn at_bound(free: &Free, value: f64) -> bool {
 impl Search<'_> {
     /// Holds the undetermined coefficients at their values in the model file, and returns their names.
     ///
-    /// A coefficient is undetermined if its prior is as wide as its bounds and its 95 % interval contains both bounds. If
-    /// all coefficients are undetermined, none is held.
+    /// A coefficient is undetermined if its prior standard deviation is at least half the range of its bounds and its 95 %
+    /// interval contains both bounds. If all coefficients are undetermined, none is held.
     pub(super) fn hold_undetermined(&mut self) -> Vec<String> {
         let Some(cholesky) = self.system().information.cholesky() else { return Vec::new() };
         let inverse = cholesky.inverse();

@@ -14,7 +14,7 @@ pub use numbers::{Baseline, Decisive, InUse, Left, Numbers, Step, Way};
 /// runs of every model reach.
 pub const ANSWER_S: f64 = 5.0;
 
-/// The answer in sentences, with the numbers in them.
+/// An answer in sentences, with their numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Answer {
     /// Change of the free-run error with each step, and the flights on which the error was computed.
@@ -24,14 +24,14 @@ pub struct Answer {
     pub effect: String,
     /// Largest remaining prediction error.
     pub left: String,
-    /// The next command, ready to be copied; empty if none is known.
+    /// The recommended next command; empty if there is none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub next: String,
     /// All numbers of the sentences.
     pub numbers: Numbers,
 }
 
-/// A model in the sequence from the given to the last one.
+/// A model in the sequence from the given model to the last model.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
     /// Derivation from the model before it.
@@ -42,14 +42,14 @@ pub struct Stage<'a> {
     pub scores: &'a [HorizonScore],
 }
 
-/// Relation of the free runs' flights to the fit.
+/// Relation between the flights of the free runs and the flights of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// The flights that the model was fitted to are not known.
+    /// The flights of the fit are unknown.
     Unknown,
-    /// The model was fitted to this many of the flights.
+    /// Number of the flights to which the model was fitted.
     Of(usize),
-    /// The flights are the last third of a flight whose rest was fitted.
+    /// The flights are the last third of a flight; the first two thirds were fitted.
     LastThird,
 }
 
@@ -60,16 +60,16 @@ pub struct Subject<'a> {
     pub stages: Vec<Stage<'a>>,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Relation of the flights to the fit.
+    /// Relation between `flights` and the flights of the fit.
     pub seen: Seen,
-    /// Effects that the last model has and the first has not, each with its most significant coefficient.
+    /// Effects that the last model has and the first model lacks, each with its most significant coefficient.
     pub effects: Vec<Decisive>,
     /// Name and errors of a forecast without aerodynamics.
     pub baseline: Option<(&'a str, &'a [HorizonScore])>,
 }
 
 impl Answer {
-    /// The empty answer, before any result is known.
+    /// The empty answer, for the time before the first result.
     pub fn nothing() -> Answer {
         Answer::of(&Subject {
             stages: Vec::new(),

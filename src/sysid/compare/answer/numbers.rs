@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{ANSWER_S, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
 
-/// Derivation of a model from the one before it.
+/// Derivation of a model from the model before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
@@ -26,7 +26,7 @@ pub struct Step {
     pub way: Way,
     /// Name of the model.
     pub model: String,
-    /// Free-run error at the horizon: NRMSE, the root mean square over the eight states, each over its scale x_c.
+    /// Free-run error at the horizon of the answer: NRMSE, the root mean square over runs and states of error / x_c.
     pub error: f64,
     /// Change of `error` relative to the step before, %; relative to the first step for `Way::Other`. `None` for the first
     /// step.
@@ -48,7 +48,7 @@ pub struct Decisive {
     pub ci95: [f64; 2],
     /// Unit of `value`; may be empty.
     pub unit: String,
-    /// Ids of effects that the flights cannot distinguish from this one.
+    /// Identifiers of effects that the flights cannot distinguish from this effect.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<String>,
 }
@@ -99,23 +99,23 @@ pub struct Numbers {
     pub horizon_s: f64,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Number of these flights that a fit has used; `None` (null) if that is not known.
+    /// Number of these flights that a fit has used; `None` (null) if it is unknown.
     pub fitted_flights: Option<usize>,
-    /// Whether the flights are the last third of a flight whose rest was fitted.
+    /// Whether the flights are the last third of a flight whose first two thirds were fitted.
     pub last_third: bool,
-    /// The models, from the given to the last one.
+    /// The models, from the given model to the last model; empty if no horizon is reached.
     pub steps: Vec<Step>,
     /// Change of the error from the first to the last model, %; NaN (null) for a single model.
     pub change_percent: f64,
     /// The best forecast without aerodynamics; `None` if the answer has none, or if no run of the forecast reaches the horizon.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<Baseline>,
-    /// Effects that the last model has and the first has not.
+    /// Effects that the last model has and the first model lacks.
     pub effects: Vec<Decisive>,
     /// The state whose prediction improves most; `None` if no prediction improves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
-    /// The state with the largest remaining error.
+    /// The state with the largest remaining error; `None` if no horizon is reached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<Left>,
 }

@@ -240,7 +240,7 @@ fn lower(text: &str) -> String {
     }
 }
 
-/// Colloquial name and unit of a state, and the factor from its SI unit.
+/// Name and unit of a state in the sentences, and the factor from the state's SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let degrees = 1f64.to_degrees();
     match state {

@@ -15,7 +15,7 @@ use greylag_num::stream::{Stream, stream};
 
 /// Number of the random stream for the phases.
 const DECOYS: u64 = 84;
-/// Largest number of candidates turned into decoys.
+/// Largest number of candidates from which decoys are made.
 const MOST: usize = 6;
 /// Longest series, in windows, that is transformed at once. Longer series are randomized in pieces to limit the cost of the
 /// transform.

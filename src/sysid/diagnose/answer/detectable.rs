@@ -45,7 +45,7 @@ fn linear(round: &Round, trial: &Trial, threshold: f64) -> Option<f64> {
     amount.is_finite().then_some(amount)
 }
 
-/// Detectability of a direction against noise.
+/// Detectability of an effect's contribution in the noise.
 struct Shown {
     /// Standard deviation of the amount due to noise alone.
     alone: f64,

@@ -60,7 +60,8 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Searches free forms for `channels` in the residual of `tuned`, then selects among them and the library's best forms.
+/// Searches free forms for `channels` in the residual of the library's first round, then selects among these forms and the
+/// library's best forms, starting from `tuned`.
 /// `None` if the library's search tried nothing, or if the model cannot be evaluated over the flights.
 ///
 /// # Errors
@@ -124,7 +125,7 @@ fn as_of_library(form: Form) -> Form {
     of.into_iter().find(same).unwrap_or(form)
 }
 
-/// Whether the formula `free` replaces the library's.
+/// Whether the formula `free` replaces the formula of the library.
 ///
 /// - With the same structure and other constants, `free` must reduce the error by more than `WORTH` beyond the library's
 ///   formula. The library takes its constants from quantiles of the flights and does not fit them.

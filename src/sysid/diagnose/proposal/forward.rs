@@ -284,7 +284,7 @@ impl Ask<'_> {
         Some(Some(model))
     }
 
-    /// Share of the block bootstraps in which the form at index `place`, or one indistinguishable from it, is best.
+    /// Share of the block bootstraps in which the form at index `place`, or an indistinguishable form, is best.
     fn selected(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> f64 {
         let alike = checks::class(round, scores, place);
         let members: Vec<usize> =

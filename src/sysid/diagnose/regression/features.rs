@@ -120,7 +120,7 @@ pub fn spread<const N: usize>(
     })
 }
 
-/// `raw` standardised: less its mean, in standard deviations.
+/// Standardised variables: `raw` less the mean, in standard deviations.
 pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
     std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
 }

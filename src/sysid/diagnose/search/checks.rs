@@ -267,7 +267,7 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     let mut all = round.known.clone();
     for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
         let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
-        // the change due to the effect has the same relative uncertainty as the effect, 1 / √wald
+        // the change due to the effect has the same relative standard deviation as the effect, 1 / √wald
         let astray = given.powi(2) / score.wald.max(1.0);
         known.offset = p.tuned[k] - given;
         known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);

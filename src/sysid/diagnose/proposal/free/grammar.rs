@@ -22,7 +22,7 @@ pub struct Free {
 pub struct Reach {
     /// The variable itself.
     pub variable: Variable,
-    /// The quantiles 0.5, 0.75 and 0.95 of its magnitude.
+    /// The quantiles 0.5, 0.75 and 0.95 of the variable's magnitude.
     pub levels: [f64; 3],
 }
 

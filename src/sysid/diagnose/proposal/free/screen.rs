@@ -1,4 +1,4 @@
-//! Evaluation of all forms on the whitened residual of one channel, and on that of null flights.
+//! Evaluation of all forms on the whitened residual of one channel, in the flights and in null flights.
 //!
 //! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)), with the model's
 //! coefficients projected out. They contain no correction for noise that columns and residual share. The round applies this

@@ -49,7 +49,7 @@ pub struct Searched {
     pub tried: usize,
     /// Evidence that the same search reaches in null flights.
     pub threshold: f64,
-    /// The best form of each size, if it is better than all smaller ones.
+    /// The best form of each size, if it reduces the error more than all smaller forms.
     pub front: Vec<Fitted>,
     /// Forms that enter the round, in descending order of `worth`.
     pub finalists: Vec<Fitted>,
