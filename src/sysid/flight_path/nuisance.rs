@@ -53,8 +53,8 @@ pub const BEND: usize = 30;
 const KNOTS: usize = 3;
 /// First index of the Earth's rate north and down, rad/s.
 ///
-/// The latitude is not known. The Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice the standard deviation of an
-/// accelerometer bias after a minute.
+/// A log without a latitude does not determine this rate. The Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice the
+/// standard deviation of an accelerometer bias after a minute.
 pub const EARTH: usize = 39;
 
 /// Indices of the constants in the order of the result.

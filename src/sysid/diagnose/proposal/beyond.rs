@@ -12,8 +12,8 @@ use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// Free forms are tried if a flexible model could remove more than this share of the error that the library's formula
-/// removes, in addition.
+/// Free forms are tried if a flexible model could remove an additional error of more than this share of the error that the
+/// library's formula removes.
 const MATERIAL: f64 = 0.02;
 /// The simplest form is chosen whose error reduction is within this share of the best reduction. Even an exact formula of a
 /// strong effect leaves a residual of this order, due to errors of the reconstructed path.
