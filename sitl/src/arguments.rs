@@ -1,4 +1,4 @@
-//! The command line of `greylag-sitl`, in units a person writes.
+//! Command line of `greylag-sitl`: parses the arguments and converts them to options in SI units and radians.
 
 use std::path::{Path, PathBuf};
 
@@ -74,7 +74,7 @@ pub struct Cli {
     faults: FaultArgs,
 }
 
-/// A flight stack to be played.
+/// A flight stack that the shim can simulate.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum PersonalityName {
     /// PX4 with a fixed-wing airframe.
@@ -109,7 +109,7 @@ struct Px4Args {
     px4_noise: Px4NoiseName,
 }
 
-/// Where PX4 looks for its simulator.
+/// Default address at which stock PX4 SITL connects to its simulator.
 const PX4_ADDRESS: &str = "tcpin:127.0.0.1:4560";
 
 /// A preset of sensor noise.
@@ -151,7 +151,7 @@ struct ArdupilotArgs {
     ardupilot_pwm: Vec<ChannelRange>,
 }
 
-/// Where ArduPilot looks for its simulator.
+/// Default address to which stock ArduPlane SITL sends its servo packets.
 const ARDUPILOT_ADDRESS: &str = "udpin:127.0.0.1:9002";
 
 impl ArdupilotArgs {
@@ -188,16 +188,16 @@ struct StartArgs {
 }
 
 impl Cli {
-    /// Address of PX4 or ArduPilot if the shim is their simulator, else of the companion.
+    /// Address at which PX4 or ArduPilot connects if the shim is their simulator, otherwise the address of the companion.
     fn address(&self) -> &Address {
         let simulated = self.px4.px4_sim.as_ref().or(self.ardupilot.ardupilot_sim.as_ref());
         simulated.unwrap_or(&self.link)
     }
 
-    /// Options of the run that the command line describes.
+    /// Converts the command line into the options of a run.
     ///
     /// # Errors
-    /// If the airframe file or the parameter file cannot be used.
+    /// `CliError` if the airframe file or the parameter file cannot be read, or its content is invalid.
     pub fn options(&self) -> Result<ShimOptions, CliError> {
         let personality = self.personality.map(Personality::from);
         let (mut parameters, unplayed) = match (&self.parameters, personality) {
@@ -234,10 +234,10 @@ impl Cli {
     }
 }
 
-/// Parameters that the flight stack simulates, by name and value, and the names of the others.
+/// Simulated parameters by name and value, and the names of those that the flight stack does not simulate.
 type Played = (Vec<(String, f64)>, Vec<String>);
 
-/// The parameters of a file that `personality` simulates, and the names of the others.
+/// Reads a parameter file and separates the parameters that `personality` simulates from the others.
 fn played(path: &Path, personality: Personality) -> Result<Played, ParameterFileError> {
     let (played, others): (Vec<_>, Vec<_>) = parameter_file::read(path)?
         .into_iter()
@@ -287,7 +287,7 @@ impl StartArgs {
 mod tests {
     use super::*;
 
-    /// The options of `--personality stack` with a parameter file of this text, and `--parameter` words.
+    /// Options from `--personality stack`, a parameter file that contains `text`, and the further arguments `more`.
     fn options(stack: &str, text: &str, more: &[&str]) -> Result<ShimOptions, CliError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("some.parm");

@@ -41,7 +41,7 @@ fn fly(cli: &Cli) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints a line; a reader that has gone away does not end the flight.
+/// Prints a line and ignores a write error: a closed pipe must not end the flight.
 fn print(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }

@@ -1,4 +1,4 @@
-//! The options of a command line that choose an aircraft with its air.
+//! Command-line options that choose an aircraft and its air.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -101,7 +101,7 @@ impl<const N: usize> FromStr for Numbers<N> {
 }
 
 impl PlantArgs {
-    /// Options of the plant that the command line describes, with turbulence of `seed`.
+    /// Options of the plant with the turbulence seed `seed`.
     pub fn options(&self, seed: u32) -> PlantOptions {
         let mut plant = PlantOptions { seed, air: self.air.air(), ..Default::default() };
         plant.aircraft_dir = self.aircraft.aircraft_dir.clone();

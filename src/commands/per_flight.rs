@@ -2,9 +2,9 @@
 
 use crate::sysid::per_flight::PerFlight;
 
-/// Largest standard deviation of an angle, °: beyond it the approximation of small angles fails.
+/// Largest standard deviation of an angle, °. Beyond this value the small-angle approximation fails.
 const MOST_DEG: f64 = 10.0;
-/// Largest factor on the trims' widths.
+/// Largest factor on the standard deviations of the trims.
 const MOST_TIMES: f64 = 100.0;
 
 /// Constants that may differ from flight to flight.

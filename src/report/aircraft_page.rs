@@ -1,4 +1,4 @@
-//! The page of an aircraft from its model: three views, trim, modes, stick response.
+//! Page on an aircraft from its model: three views, trim, modes, loops and control responses.
 
 use std::fmt::Write;
 
@@ -11,18 +11,18 @@ use greylag_control::aircraft_check::AircraftCheck;
 use greylag_control::stick_response::{STEPPED, StickResponse};
 use greylag_model::GreyBox;
 
-/// Input of the page about one aircraft's model.
+/// Input of the page on an aircraft's model.
 #[derive(Clone, Debug)]
 pub struct AircraftReport<'a> {
-    /// The model that the page is about.
+    /// The model of the aircraft.
     pub model: &'a GreyBox,
     /// Results of the checks of the model.
     pub check: &'a AircraftCheck,
-    /// Responses to a step of a quarter of full aileron, then of full elevator.
+    /// Responses to a step of a quarter of full aileron and to a step of a quarter of full elevator.
     pub responses: &'a [StickResponse; 2],
     /// Path of the model's file.
     pub model_file: String,
-    /// The command line that made the page.
+    /// The command line that generated the page.
     pub command_line: String,
 }
 
@@ -117,7 +117,7 @@ impl AircraftReport<'_> {
             let [alpha, path] = [l.alpha, l.path].map(f64::to_degrees);
             let row = [l.airspeed, alpha, 100.0 * l.elevator, 100.0 * l.throttle];
             let row = row.map(|x| format!("{x:.1}").replace('-', "−"));
-            // a path that is level but for rounding
+            // a path within 0.05° of level counts as level
             let path = if path.abs() < 0.05 {
                 "level".into()
             } else {
@@ -248,7 +248,7 @@ fn sketch(model: &GreyBox) -> Drawing {
             "<rect class=\"{class}\" x=\"{x:.4}\" y=\"{y:.4}\" width=\"{w:.4}\" height=\"{h:.4}\"/>"
         );
     };
-    // from above, nose up
+    // top view, nose up
     let nose = 0.5 * span - 0.5 * body;
     rectangle(nose, 0.0, body, length, "body");
     rectangle(0.0, 0.22 * length, span, chord, "wing");
@@ -259,14 +259,14 @@ fn sketch(model: &GreyBox) -> Drawing {
         rectangle(0.34 * span, length - 0.45 * chord, 0.32 * span, 0.45 * chord, "wing");
         rectangle(0.34 * span, length - 0.15 * chord, 0.32 * span, 0.15 * chord, "surface");
     }
-    // from ahead
+    // front view
     let ahead = length + gap;
     rectangle(nose, ahead + 0.5 * high - 0.5 * body, body, body, "body");
     rectangle(0.0, ahead + 0.5 * high - 0.06 * chord, span, 0.12 * chord, "wing");
     if tailed {
         rectangle(0.5 * span - 0.02 * chord, ahead, 0.04 * chord, 0.5 * high, "wing");
     }
-    // from the left
+    // side view from the left
     let left = span + gap;
     let mid = 0.5 * high;
     rectangle(left, mid - 0.5 * body, length, body, "body");

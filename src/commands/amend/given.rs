@@ -28,8 +28,8 @@ struct Parameter {
     value: Option<f64>,
 }
 
-/// The effects that the diagnosis in `path` asserts of `model`. The fit of each starts at the coefficients of the
-/// diagnosis.
+/// The effects that the diagnosis in `path` asserts for the model named `model`. Their fit starts at the coefficients
+/// of the diagnosis.
 pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the diagnosis {}", path.display()))?;

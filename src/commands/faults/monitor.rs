@@ -9,13 +9,13 @@ use rayon::prelude::*;
 
 use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watched};
 
-/// Largest share of healthy flights with a false alarm: one in forty.
+/// Largest accepted fraction of healthy flights with a false alarm: one in forty.
 const FALSE_ALARMS: f64 = 1.0 / 40.0;
 
-/// Flies and prints a table; the exit status shows whether too many healthy flights raised an alarm.
+/// Flies and prints a table. The exit status is 1 if too many healthy flights raised an alarm.
 ///
 /// # Errors
-/// If the aircraft cannot be made.
+/// If the aircraft cannot be built.
 pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitCode> {
     let [roll, pitch, heading] = ATTITUDE_DEG;
     println!(

@@ -1,7 +1,7 @@
-//! Measurement errors that look like missing physics, as entries of the catalogue of effects.
+//! Catalogue entries of measurement errors that resemble missing physical effects.
 //!
-//! The reconstruction of the flight path estimates them without any aerodynamics: their parameters are its
-//! [nuisances](crate::flight_path), under the same names.
+//! The reconstruction of the flight path estimates these errors without aerodynamics. Their coefficients are the
+//! [nuisances](crate::flight_path) of the reconstruction, with the same names.
 
 use greylag_physics::effects::{Coefficient, Description, Entry, coefficient};
 
@@ -199,7 +199,7 @@ const SKEW: [Coefficient; 5] = [
     coefficient("skew_velocity", "delay of the velocity over ground", "s", (-2.0, 2.0)),
 ];
 
-/// Common properties of all of them: no shape constants, no table.
+/// Common properties of all measurement effects: no shape constants, no table.
 const fn measured(entry: &Entry) -> Description {
     Description {
         id: "",
@@ -220,8 +220,8 @@ mod tests {
     use super::*;
     use crate::flight_path::nuisance;
 
-    /// The reconstruction estimates exactly these constants, under these names and in these units;
-    /// the Earth's rate, known from the latitude, is no error of a sensor.
+    /// The reconstruction estimates exactly these constants, with these names and units. The Earth's rate is not among them,
+    /// because it is not a sensor error.
     #[test]
     fn parameters_are_the_nuisances_of_the_reconstruction() {
         let mut ours: Vec<_> = MEASUREMENT_EFFECTS

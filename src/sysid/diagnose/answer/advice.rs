@@ -1,14 +1,14 @@
-//! Advice on the next flight.
+//! Advice on the manoeuvres of the next flight.
 
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
 use crate::diagnose::answer::sentences::figures;
 use crate::diagnose::search::stepwise::Found;
 use greylag_physics::catalogue::describe;
 
-/// Largest number of hints on effects that these data could not have shown.
+/// Largest number of recommendations for candidates whose evidence is near the threshold.
 const UNSEEN: usize = 2;
 
-/// Advice on the next flight, the most useful first.
+/// Advice on the next flight, in descending order of usefulness; empty if there is none.
 pub fn advice(
     found: &Found,
     verdict: Verdict,
