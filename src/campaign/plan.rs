@@ -9,7 +9,7 @@ use super::file::{CampaignFile, Level, StageFile, levels};
 use greylag_model::GreyBox;
 use greylag_model::residual::hash;
 
-/// The placeholder of the folder that a cell writes.
+/// Placeholder of the cell's output folder in a stage's command.
 const OWN: &str = "{out}";
 
 /// A campaign with its cells.
@@ -17,15 +17,15 @@ const OWN: &str = "{out}";
 pub struct Plan {
     /// The campaign file.
     pub file: CampaignFile,
-    /// The cells in order: a cell follows those that it reads.
+    /// The cells in order: each cell follows the cells whose folders it reads.
     pub cells: Vec<Cell>,
 }
 
-/// The cells of `file`, read from `path`; `find` locates a file that a command names.
+/// Expands `file`, which was read from `path`, into cells. `find` returns the location of a file that a command names.
 ///
 /// # Errors
 ///
-/// If a command has an unknown placeholder, or names a file that does not exist.
+/// If a command has an unknown placeholder, or names a file that does not exist or cannot be read.
 pub fn plan(
     file: CampaignFile,
     path: &Path,
@@ -55,11 +55,11 @@ pub fn plan(
 }
 
 impl Plan {
-    /// The cell with that number or id.
+    /// The cell whose number or id is `name`.
     ///
     /// # Errors
     ///
-    /// If there is none.
+    /// If the campaign has no such cell.
     pub fn cell(&self, name: &str) -> Result<&Cell, String> {
         let number: Option<usize> = name.parse().ok();
         let wanted = |cell: &&Cell| cell.id == name || Some(cell.number) == number;
@@ -78,7 +78,7 @@ impl Plan {
     }
 }
 
-/// Every combination of the levels of a stage's axes, the last axis fastest.
+/// Every combination of the levels of a stage's axes. The last axis varies fastest.
 fn combinations(file: &CampaignFile, stage: &StageFile) -> Vec<Vec<(String, Level)>> {
     stage.over.iter().fold(vec![Vec::new()], |all, axis| {
         let with = |start: &Vec<(String, Level)>| {
@@ -140,7 +140,8 @@ impl Draft<'_> {
         Ok(text + rest)
     }
 
-    /// The folder of the cell of an earlier stage: `stage`, or `stage:axis=level,…` for levels other than its own.
+    /// Folder of an earlier stage's cell. `name` is `stage`, or `stage:axis=level,…` with levels that replace those of
+    /// the present cell.
     fn upstream(&self, name: &str, after: &mut Vec<usize>) -> Result<String, String> {
         let (stage, chosen) = name.split_once(':').unwrap_or((name, ""));
         let given = levels(chosen.split(',').filter(|part| !part.is_empty()))?;
@@ -189,11 +190,11 @@ fn cell(
     cell
 }
 
-/// The files that a command names: words with a slash that are not folders of the campaign, and the additional ones
-/// of its stage.
+/// Input files of a command: its words with a slash, except folders of the campaign, and the additional inputs of its
+/// stage.
 fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
-    // `--env model:FOLDER`
+    // in `--env model:FOLDER` the path follows the colon
     let path = |word: &String| word.rsplit_once(':').map_or(word.as_str(), |(_, p)| p).to_owned();
     named.map(path).chain(stage.inputs.iter().cloned()).collect()
 }

@@ -30,11 +30,11 @@ pub struct Store {
 pub enum Standing {
     /// It has a result.
     Done(Box<Record>),
-    /// It failed, and would fail again.
+    /// It failed permanently: another run would fail as well.
     Failed(Failure),
-    /// It has started and has no result: it runs, or was stopped.
+    /// It has started and has no result: it is running or was interrupted.
     Begun,
-    /// It has a result of another command or of other inputs, which is not valid.
+    /// Only a result of another command or of other inputs exists, which is not valid for this cell.
     Stale,
     /// It has not started.
     Missing,
@@ -49,7 +49,7 @@ pub struct Failure {
     pub program: String,
 }
 
-/// Computing time and machine of a cell: separate from its result, which is the same everywhere.
+/// Computing time and processor of a cell. They are stored apart from the result, which does not depend on the machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Times {
     /// Id of the cell.
@@ -58,9 +58,9 @@ pub struct Times {
     pub seconds: f64,
     /// Processor time in that session, s.
     pub core_seconds: f64,
-    /// Whether an earlier session had started it, so that the times are incomplete.
+    /// Whether an earlier session had started the cell. If so, the times exclude that session.
     pub resumed: bool,
-    /// End, seconds since 1970 UTC.
+    /// Time at which the cell ended, s since 1970-01-01 UTC.
     pub ended_unix_s: u64,
     /// Model of the processor.
     pub processor: String,
@@ -68,12 +68,12 @@ pub struct Times {
     pub program: String,
 }
 
-/// The lock on a cell: no other process of any machine with the same disk holds it.
+/// Exclusive lock on a cell among all processes that share the disk, on any machine.
 #[derive(Debug)]
 pub struct Claimed {
     /// Folder of the cell.
     pub folder: PathBuf,
-    /// Whether an earlier session had started it.
+    /// Whether an earlier session had started the cell.
     pub resumed: bool,
     _lock: File,
 }
@@ -98,7 +98,7 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// If a result exists and cannot be read.
+    /// If a result or a failure record exists and cannot be read, or if the result belongs to another cell.
     pub fn standing(&self, cell: &Cell) -> Result<Standing, CampaignError> {
         let folder = self.folder_of(cell);
         if let Some(record) = read::<Record>(&folder.join(RESULT))? {
@@ -131,11 +131,12 @@ impl Store {
         })
     }
 
-    /// Locks a cell; `None` while another process holds the lock.
+    /// Locks a cell, marks it as started and removes an earlier failure record. `None` while another process holds the
+    /// lock.
     ///
     /// # Errors
     ///
-    /// If the folder cannot be created or locked.
+    /// If the folder or one of its files cannot be created, locked or removed.
     pub fn claim(&self, cell: &Cell) -> Result<Option<Claimed>, CampaignError> {
         let folder = self.folder_of(cell);
         std::fs::create_dir_all(&folder).map_err(CampaignError::io("cannot make", &folder))?;
@@ -153,7 +154,7 @@ impl Store {
         Ok(Some(Claimed { folder, resumed, _lock: lock }))
     }
 
-    /// Computing time of a cell, if known.
+    /// Computing time of a cell; `None` if it is not recorded.
     ///
     /// # Errors
     ///
@@ -164,11 +165,11 @@ impl Store {
 }
 
 impl Claimed {
-    /// Writes the result, which finishes the cell.
+    /// Writes the computing time and the result. The result marks the cell as finished.
     ///
     /// # Errors
     ///
-    /// If it cannot be written.
+    /// If one of the two files cannot be written.
     pub fn finish(&self, record: &Record, times: &Times) -> Result<(), CampaignError> {
         write(&self.folder.join(TIMES), times)?;
         write(&self.folder.join(RESULT), record)
@@ -178,7 +179,7 @@ impl Claimed {
     ///
     /// # Errors
     ///
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn fail(&self, failure: &Failure) -> Result<(), CampaignError> {
         write(&self.folder.join(FAILURE), failure)
     }

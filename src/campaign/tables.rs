@@ -1,4 +1,4 @@
-//! Tables of a campaign: each quantity summarised over seeds beside the paper's value, and tests of its claims.
+//! Tables of a campaign: summaries over seeds with the published values, and tests of the claims.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,13 +14,13 @@ pub struct Summary {
     pub title: String,
     /// Unit of its quantities.
     pub unit: String,
-    /// The paper's table for comparison.
+    /// Number of the published table for comparison; `None` without comparison.
     pub paper: Option<String>,
     /// Rows of the table.
     pub rows: Vec<SummaryRow>,
 }
 
-/// A quantity of the cells with the same levels.
+/// A quantity, summarised over the cells with the same levels.
 #[derive(Clone, Debug)]
 pub struct SummaryRow {
     /// The levels, joined by `/`.
@@ -29,9 +29,9 @@ pub struct SummaryRow {
     pub metric: String,
     /// Summary over the seeds.
     pub ours: Aggregate,
-    /// The single values.
+    /// The values of the individual cells.
     pub runs: Vec<Run>,
-    /// The paper's median, interquartile mean and mean.
+    /// The published median, interquartile mean and mean; `None` where a statistic is not published.
     pub paper: [Option<Estimate>; 3],
 }
 
@@ -60,13 +60,13 @@ pub struct Finding {
 /// Result of a claim's test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Confirmed: the interval of the difference is above zero.
+    /// Confirmed: the 95 % interval of the difference `than − less` is above zero.
     Holds,
-    /// Refuted: the interval is below zero.
+    /// Refuted: the 95 % interval of the difference is below zero.
     Contradicted,
-    /// Undecided: the interval contains zero.
+    /// Undecided: the 95 % interval of the difference contains zero, or one side has fewer than three cells.
     Undecided,
-    /// No cells for the test.
+    /// Not tested: one side has no cell with the quantity.
     NoData,
 }
 
@@ -82,7 +82,7 @@ impl Outcome {
     }
 }
 
-/// The tables of a campaign file.
+/// The tables of a campaign file, summarised over `records`.
 pub fn summaries(file: &CampaignFile, records: &[Record]) -> Vec<Summary> {
     file.tables.iter().map(|table| summary(file, table, records)).collect()
 }
@@ -143,11 +143,12 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
-/// Number of runs below which an interval over seeds is meaningless: one run has no spread.
+/// Least number of runs for which an interval over seeds is used. A single run has no spread.
 const FEWEST: usize = 3;
 
 impl Summary {
-    /// Rows where our interval and the paper's are disjoint, a sentence each.
+    /// One sentence for each row whose 95 % interval of the mean is disjoint from the published interval. Rows with
+    /// fewer than three runs are omitted.
     pub fn departures(&self) -> Vec<String> {
         self.rows.iter().filter_map(SummaryRow::departure).collect()
     }
@@ -174,7 +175,7 @@ impl SummaryRow {
     }
 }
 
-/// A value with its interval as text.
+/// The value and its 95 % interval as text, with three decimals.
 pub fn said(estimate: &Estimate) -> String {
     let Estimate { value, ci95: [low, high] } = estimate;
     format!("{value:.3} [{low:.3}, {high:.3}]")
@@ -189,7 +190,7 @@ pub fn findings(file: &CampaignFile, records: &[Record]) -> Result<Vec<Finding>,
     file.claims.iter().map(|claim| finding(file, claim, records)).collect()
 }
 
-/// The levels of a cell that a claim leaves open, including its seed.
+/// The levels of a cell on the axes that a claim leaves open, including the seed.
 type Levels = BTreeMap<String, String>;
 
 fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result<Finding, String> {
@@ -241,8 +242,8 @@ fn left(record: &Record, fixed: &dyn Fn(&str) -> bool) -> Levels {
     open.map(|(axis, level)| (axis.clone(), level.clone())).collect()
 }
 
-/// The gaps `than − less` of cells that agree in all open levels, by stratum (all of them but the seed); `None` unless
-/// every cell of both sides has exactly one partner.
+/// Differences `than − less` between cells with equal open levels, by stratum. The open levels without the seed form
+/// the stratum. `None` unless every cell of both sides has exactly one partner.
 fn pairs(less: &[(Levels, f64)], than: &[(Levels, f64)]) -> Option<Vec<Vec<f64>>> {
     let of: BTreeMap<&Levels, f64> = than.iter().map(|(key, value)| (key, *value)).collect();
     let own: BTreeSet<&Levels> = less.iter().map(|(key, _)| key).collect();

@@ -9,17 +9,17 @@ use greylag_model::{GreyBox, Integrator, Trim, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
-/// Step of the delays that are tried, ms.
+/// Step between the simulated delays, ms.
 const STEP_MS: usize = 4;
-/// Largest delay that is tried, ms; a loop that is stable with it has enough margin.
+/// Largest simulated delay, ms. A loop that is stable with this delay has enough margin.
 const LONGEST_MS: usize = 120;
 /// Length of a simulation, ticks.
 const TICKS: usize = 1000;
 /// Ticks of the full-deflection pulse.
 const PULSE: std::ops::Range<usize> = 100..110;
-/// First tick that is judged: the last two seconds count, as in JSBSim with `examples/delay_margin.rs`.
+/// First evaluated tick: only the last 2 s of a simulation count, as in JSBSim with `examples/delay_margin.rs`.
 const END: usize = 800;
-/// Peak-to-peak rate at the end of a simulation that counts as an oscillation, rad/s (10 °/s).
+/// Peak-to-peak rate at the end of a simulation above which the loop oscillates, rad/s (10 °/s).
 const SWING: f64 = 0.17;
 /// Control period in ms.
 const TICK_MS: usize = 10;
@@ -30,7 +30,7 @@ const TICK_MS: usize = 10;
 /// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
 /// The search takes about a second for a controller that computes its command in microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
-    // JSBSim's Euler steps delay the attitude by one cycle, which no aircraft does
+    // JSBSim's Euler steps delay the attitude by one cycle; an aircraft has no such delay
     let model = &{
         let mut continuous = model.clone();
         continuous.integrator = Integrator::Rk4;
@@ -50,7 +50,7 @@ enum Axis {
     Roll,
 }
 
-/// Whether the oscillation persists after the pulse.
+/// Whether the rate about `axis` still oscillates at the end of a simulation with the delay `delay_ms`.
 fn swings(controller: &dyn Controller, model: &GreyBox, axis: Axis, delay_ms: usize) -> bool {
     let envelope = &model.airframe.envelope;
     let airspeed = envelope.airspeed_cruise_mps;
@@ -115,7 +115,8 @@ fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
     }
 }
 
-/// The command that acts: one surface delayed by whole cycles and a fraction, interpolated between two commands.
+/// The command at the actuators: one surface is delayed, the others are not. A fraction of a cycle is interpolated
+/// linearly between two commands.
 fn delayed(late: &VecDeque<Command>, now: Command, axis: Axis, delay_ms: usize) -> Command {
     let (whole, share) = (delay_ms / TICK_MS, (delay_ms % TICK_MS) as f64 / TICK_MS as f64);
     let newest = late.len() - 1;

@@ -1,7 +1,8 @@
-//! The companion without threads, sockets or a wall clock: bytes in, bytes out, time as an argument.
+//! The companion without threads, sockets or a wall clock: received bytes and time are arguments, bytes to send are
+//! results.
 //!
-//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime), for campaigns of thousands of
-//! flights in one process, and for replays.
+//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime). It serves campaigns of thousands
+//! of flights in one process, and replays.
 
 use std::time::Duration;
 
@@ -19,8 +20,8 @@ const WIRE: PeerId = PeerId { link: LinkId(0), address: SERIAL };
 
 /// A companion whose input and time are arguments.
 ///
-/// Call [`Desk::receive`] with received bytes and [`Desk::poll`] every 10 ms; both append the bytes to send. `host`
-/// must not decrease.
+/// Call [`Desk::receive`] with received bytes, and [`Desk::poll`] every 10 ms. Both append the bytes to send to `out`.
+/// The host time `host` must not decrease from call to call.
 pub struct Desk {
     pilot: Pilot,
     controller: Box<dyn Controller>,
@@ -34,8 +35,8 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// A companion at a vehicle from which nothing was received yet. The controller is called synchronously, even one
-    /// that has a thread of its own in flight.
+    /// A companion for `vehicle`, before any byte is received. The controller runs synchronously, even if it has a
+    /// separate thread in flight.
     pub fn new(companion: Companion, vehicle: Vehicle) -> Self {
         let mut pilot = companion.pilot;
         pilot.take_on(&vehicle);
@@ -50,12 +51,13 @@ impl Desk {
         }
     }
 
-    /// Starts recording.
+    /// Starts recording with `recorder`.
     pub fn record(&mut self, recorder: Recorder) {
         self.recorder = Some(recorder);
     }
 
-    /// Takes bytes that arrive at `host`, appends the replies to `out`, and calls `watch` with each state and its decision.
+    /// Processes `bytes` that arrive at the host time `host`, and appends the replies to `out`. Calls `watch` with each
+    /// state and its decision.
     pub fn receive(
         &mut self,
         host: Duration,
@@ -92,7 +94,7 @@ impl Desk {
         self.heed(host);
     }
 
-    /// Performs the periodic duties at `host`, as every 10 ms in flight.
+    /// Performs the periodic duties (timeouts, due messages, texts) at the host time `host`; to be called every 10 ms.
     pub fn poll(&mut self, host: Duration, out: &mut Vec<u8>) {
         let now = self.now(host);
         self.pilot.advance(now);
@@ -119,12 +121,13 @@ impl Desk {
         }
     }
 
-    /// Vehicle time at `host`: between states it advances with host time.
+    /// Vehicle time at the host time `host`, extrapolated from the newest state; zero before the first state.
     pub fn now(&self, host: Duration) -> Time {
         self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
     }
 
-    /// Arms and so engages, as a client would.
+    /// Arms the companion, as a client's request does. An obstacle to the engagement of the vehicle is returned as a
+    /// rejection.
     pub fn arm(&mut self, host: Duration) -> Verdict {
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(obstacle),

@@ -15,9 +15,9 @@ const TRIM_SPACING: f64 = 1.0;
 pub struct Config {
     /// Flight envelope from the airframe file.
     pub envelope: Envelope,
-    /// Age of the last setpoint (or stick input) at which its mode ends, s.
+    /// Timeout of setpoints and stick inputs, s. The pilot then changes to HOLD.
     pub offboard_loss_s: f64,
-    /// Age of the last fresh state at which the vehicle link counts as lost, s.
+    /// Timeout of fresh states, s. The vehicle link then counts as lost.
     pub vehicle_loss_s: f64,
     /// Longest gap in usable states over which the last command is held, s.
     pub state_hold_s: f64,
@@ -29,10 +29,10 @@ pub struct Config {
     pub arm_tilt_max_deg: f64,
     /// Airspeed above which disarming needs force, m/s.
     pub disarm_airspeed_max_mps: f64,
-    /// Trim of straight flight with level wings ([`Trim::straight`]): level, or a glide at idle throttle; by rising
-    /// airspeed.
+    /// Trim of straight flight with level wings ([`Trim::straight`]), by rising airspeed. Rows without level trim are
+    /// glides at idle throttle.
     pub trim: Vec<TrimPoint>,
-    /// Modelled responses to the surfaces, for the check of their signs; `None` to skip it.
+    /// Modelled responses to the surfaces for the sign check; `None` omits the check.
     pub answers: Option<Answers>,
 }
 
@@ -41,7 +41,7 @@ pub struct Config {
 pub enum ThrustSource {
     /// The controller's throttle, which holds the cruise airspeed.
     Cruise,
-    /// The setpoint's thrust, where it has one.
+    /// The setpoint's thrust, 0..1; the controller's throttle if the setpoint has no thrust.
     Setpoint,
 }
 
@@ -50,7 +50,7 @@ pub enum ThrustSource {
 pub struct TrimPoint {
     /// True airspeed V_a, m/s.
     pub airspeed_mps: f64,
-    /// Pitch, degrees: the angle of attack in level flight, smaller in a glide.
+    /// Pitch angle, degrees. It equals the angle of attack in level flight and is smaller in a glide.
     pub pitch_deg: f64,
     /// Elevator command as a fraction, −1..1.
     pub elevator: f64,
@@ -63,7 +63,8 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// If the model has no trim at the cruise airspeed, level or in a glide, or an error of [`Config::check`].
+    /// If the model has no trim at the cruise airspeed, level or in a glide, or if [`Config::check`] finds an invalid
+    /// setting.
     pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
@@ -87,7 +88,7 @@ impl Config {
             // Five frames: longer than the jitter of a link, shorter than a wrong aileron needs
             // to roll the aircraft far.
             state_hold_s: 0.05,
-            // Full travel in 0.2 s, the lag of the motor: a faster command would not change the thrust.
+            // Full travel in 0.2 s, the time constant of the motor: a faster command would not change the thrust.
             throttle_slew_per_s: 5.0,
             thrust_source: ThrustSource::Cruise,
             arm_tilt_max_deg: 60.0,
@@ -100,7 +101,7 @@ impl Config {
 }
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
-    // trim depends on equivalent airspeed; at a given true airspeed it changes by 5 % per 1000 m of altitude
+    // trim depends on equivalent airspeed, which changes by 5 % per 1000 m of altitude at a given true airspeed
     let trim = Trim::straight(model, airspeed, model.airframe.reference.altitude)?;
     let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {
@@ -145,11 +146,11 @@ pub enum ConfigError {
 }
 
 impl Config {
-    /// Checks ranges and order.
+    /// Checks that all settings are in range, that their bounds are in order, and that the trim table is valid.
     ///
     /// # Errors
     ///
-    /// The first setting outside its range, or the first contradictory pair.
+    /// The first setting outside its range, the first contradictory pair, or an invalid trim table.
     pub fn check(&self) -> Result<(), ConfigError> {
         for (name, value, low, high) in self.ranges() {
             if !(value >= low && value <= high) {
@@ -316,7 +317,7 @@ mod tests {
         let check = |trim: Vec<TrimPoint>| Config { trim, ..x8() }.check();
         assert_eq!(check(vec![good]), Ok(()));
         assert_eq!(check(vec![good, good]), Err(ConfigError::Trim));
-        // The ends of what is allowed are good, a little more is not.
+        // The bounds are accepted; values beyond them are rejected.
         let edge = TrimPoint { pitch_deg: -30.0, elevator: 1.0, throttle: 1.0, ..good };
         assert_eq!(check(vec![edge]), Ok(()));
         for bad in [

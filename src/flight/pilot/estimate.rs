@@ -58,21 +58,21 @@ impl Estimate {
         self.newest.is_some_and(|newest| newest.since(frame.time) > RESTART)
     }
 
-    /// Counts the state as fresh at `now`, as when it is constant for a known reason.
+    /// Counts an unchanged state as fresh at `now`, if it is constant for a known reason.
     pub(super) fn refresh(&mut self, now: Time) {
         if self.usable_at.is_some() {
             self.fresh_at = Some(now);
         }
     }
 
-    /// Excludes the stall `missed` from all ages.
+    /// Excludes `missed`, a stall of this computer, from the ages of the state.
     pub(super) fn excuse(&mut self, missed: Duration) {
         for at in [&mut self.usable_at, &mut self.fresh_at].into_iter().flatten() {
             *at = at.plus(missed);
         }
     }
 
-    /// Whether the last usable frame equals the one before.
+    /// Whether the last usable frame equals the frame before it.
     pub(super) fn is_frozen(&self) -> bool {
         self.frozen
     }

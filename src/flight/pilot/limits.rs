@@ -8,12 +8,12 @@ use greylag_physics::Command;
 pub const TICK_S: f64 = 0.01;
 /// Airspeed margin over which pitch protection fades in, m/s.
 const PROTECTION_BAND: f64 = 2.0;
-/// Largest pitch below the minimum airspeed, rad: clearly nose down, not a dive.
+/// Upper pitch limit at the minimum airspeed and below, rad: clearly nose down, not a dive.
 const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
-/// Smallest pitch above the maximum airspeed, rad: clearly nose up, not a climb.
+/// Lower pitch limit at the maximum airspeed and above, rad: clearly nose up, not a climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
-/// Load factor available at the minimum airspeed. That airspeed is about 1.41 times the stall speed (13 and 9.2 m/s
-/// for the X8), so that the lift allows a load factor of 2; a margin of 1.2 on the stall speed in a turn leaves 2 / 1.2².
+/// Load factor available at the minimum airspeed. This airspeed is about 1.41 times the stall speed (13 and 9.2 m/s for
+/// the X8): the lift allows a load factor of 2. A margin of 1.2 on the stall speed in a turn reduces it to 2 / 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -32,9 +32,9 @@ pub struct Limits {
     pub airspeed_max: f64,
     /// Largest load factor of a level turn.
     pub load_max: f64,
-    /// Largest change of a surface command per tick.
+    /// Largest change of a surface command (−1..1) per tick.
     pub surface_step: f64,
-    /// Largest change of the throttle command per tick.
+    /// Largest change of the throttle command (0..1) per tick.
     pub throttle_step: f64,
 }
 
@@ -83,7 +83,7 @@ impl Limits {
         }
     }
 
-    /// The throttle after airspeed protection.
+    /// The throttle (0..1) after airspeed protection: full below the minimum airspeed, idle above the maximum.
     pub fn protect(&self, throttle: f64, airspeed: f64) -> f64 {
         if airspeed < self.airspeed_min {
             1.0
@@ -194,7 +194,7 @@ mod tests {
         let e = x8();
         let pitch =
             |wanted: f64, airspeed: f64| e.limit(wish(0.0, wanted), airspeed).pitch.to_degrees();
-        // Between −5° and 30° halfway and at a quarter; between 5° and −30° likewise.
+        // Halfway and at a quarter of the band: between −5° and 30° when slow, between 5° and −30° when fast.
         for (wanted, airspeed, limited) in [
             (90.0, 14.0, 12.5),
             (90.0, 13.5, 3.75),
