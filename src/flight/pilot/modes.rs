@@ -24,7 +24,7 @@ fn rejected(words: impl Into<String>) -> Verdict {
 }
 
 impl Pilot {
-    /// Why arming is refused, if it is.
+    /// Reason for which arming is refused; `None` if arming is allowed.
     fn arming_obstacle(&self) -> Option<String> {
         if !self.vehicle_alive() {
             return Some("no fresh state from the vehicle".into());
@@ -43,7 +43,7 @@ impl Pilot {
         None
     }
 
-    /// Why `mode` is refused, if it is.
+    /// Reason for which `mode` is refused; `None` if it is allowed.
     fn mode_obstacle(&self, mode: Mode) -> Option<String> {
         match mode {
             Mode::Offboard if !self.armed => Some("OFFBOARD refused: arm first".into()),
@@ -93,7 +93,7 @@ impl Autopilot for Pilot {
         if let Some(check) = &mut self.check {
             check.await_authority();
         }
-        // until now the aircraft may have been stationary
+        // the state may have been constant before arming: its age counts from now on
         self.estimate.refresh(now);
         self.texts.say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
         Verdict::Accepted

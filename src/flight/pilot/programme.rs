@@ -14,8 +14,8 @@ enum Stage {
     Over,
 }
 
-/// A schedule under the pilot: it supplies targets as a client does and adds its excitation to the command; envelope,
-/// slew limits, airspeed protection and failsafes apply after it.
+/// A schedule under the pilot. It supplies targets as a client does and adds its excitation to the command. Envelope,
+/// slew limits, airspeed protection and failsafes apply afterwards.
 #[derive(Debug)]
 pub(super) struct Programme {
     name: String,
@@ -31,7 +31,7 @@ impl Programme {
         Programme { name, overlay: Overlay::new(schedule), demand: None, stage: Stage::Waiting }
     }
 
-    /// Returns to the start, as when OFFBOARD ends.
+    /// Returns to the start of the schedule, for instance when OFFBOARD ends.
     pub(super) fn stop(&mut self) {
         self.overlay.reset();
         (self.demand, self.stage) = (None, Stage::Waiting);
@@ -50,7 +50,7 @@ impl Programme {
         demand.target
     }
 
-    /// The command plus the excitation of the last target, if it is active.
+    /// `own` plus the excitation of the last target; `own` without an active target.
     pub(super) fn excite(&mut self, own: Command) -> Command {
         match self.demand.take() {
             Some(demand) => self.overlay.command(&demand, own),

@@ -3,7 +3,7 @@
 use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
 
-/// Faults that make a state unusable. Specific force is only recorded.
+/// Faults that make a state unusable for control. Control does not use the specific force.
 const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ATTITUDE, "attitude"),
     (Faults::RATES, "body rates"),
@@ -13,10 +13,11 @@ const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ACTUATORS, "actuators"),
 ];
 
-/// Temporary reason: after a gap the first airspeed arrives later.
+/// Temporary reason: after a gap in telemetry the first airspeed arrives later.
 pub(super) const LATE_AIR: &str = "airspeed and altitude are late";
 
-/// Why this frame is unusable, if it is: a fault found by the link, or a value that is not finite or implausible.
+/// Reason for which a frame is unusable: a fault found by the link, or a value that is not finite or implausible.
+/// `None` for a usable frame.
 pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
     let found = STATE_FAULTS.iter().find(|(fault, _)| frame.faults.contains(*fault));
     found.map(|(_, name)| *name).or_else(|| implausible(frame))

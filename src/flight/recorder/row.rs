@@ -44,8 +44,8 @@ impl Row {
         Row { sample: sample(state, decision), decision: *decision, latency_us, residuals }
     }
 
-    /// The row without surfaces, for a controller that is commanded attitudes: the companion's surface commands were
-    /// not sent, and the actuator state is unknown. The throttle is sent.
+    /// Removes the surfaces from the row, for a controller that is commanded attitudes. The companion's surface
+    /// commands were not sent, and the actuator state is unknown. The throttle command was sent and is kept.
     pub fn without_surfaces(mut self) -> Self {
         let sample = &mut self.sample;
         for column in [
@@ -92,11 +92,11 @@ impl Row {
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // a part with a fault holds its last valid value; in a log it is missing
+    // a part with a fault holds its last valid value, which a log omits
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
-    // An aircraft without a rudder has no column of it.
+    // Without a rudder both values are zero; the rudder columns then stay empty.
     let rudder =
         if (z.rudder, c.rudder) == (0.0, 0.0) { [f64::NAN; 2] } else { [z.rudder, c.rudder] };
     Sample {

@@ -5,8 +5,8 @@
 //!                ── client channel ──►   │    ▲
 //!                ◄── frames to send ─────┘    └─ one plan a tick ─ planner thread (slow controllers)
 //! ```
-//! The control thread owns the pilot, the vehicle's session, the client server. It serves the
-//! vehicle first: a client's packet is looked at only when no state frame waits.
+//! The control thread owns the pilot, the vehicle's session and the client server. The vehicle has priority: a client's
+//! packet is processed only when no state frame is queued.
 
 mod clock;
 mod control;
@@ -62,19 +62,20 @@ pub struct FlightOptions {
     pub record: Option<Place>,
     /// Real time or lockstep.
     pub pace: Pace,
-    /// Duration after which the flight ends by itself.
+    /// Duration after which the flight ends by itself; `None` without a limit.
     pub duration: Option<Duration>,
-    /// Time after the arrival of a state frame at which a plan is late.
+    /// Time from the arrival of a state frame after which its plan is late.
     pub plan_deadline: Duration,
     /// Travel of the airframe's surfaces.
     pub travels: Travels,
-    /// Surfaces and motors of the airframe, where it names them: the `sitl` profile also sends their commands.
+    /// Surfaces and motors of the airframe, to which the `sitl` profile also sends commands; `None` if the airframe
+    /// does not name them.
     pub mixer: Option<Mixer>,
     /// Profile of a real flight controller; `None` is the simulator's shim.
     pub controller: Option<Profile>,
-    /// Delay margin of the loop through a real controller's surfaces, where known.
+    /// Delay margin of the loop through a real controller's surfaces; `None` if it is unknown.
     pub delay_margin: Option<Duration>,
-    /// Message signing of the links; `None` for none.
+    /// Message signing of the links; `None` for unsigned links.
     pub signing: Option<Signing>,
 }
 
@@ -89,7 +90,7 @@ pub struct Companion {
     pub pilot: Pilot,
     /// The controller, which computes the command of each tick.
     pub controller: Box<dyn Controller>,
-    /// Where the controller runs.
+    /// Thread on which the controller runs.
     pub placement: Placement,
 }
 
@@ -126,7 +127,7 @@ pub enum Event {
     Text(Text),
     /// The first state of the vehicle was received.
     VehicleFound(PeerId),
-    /// Nothing was received from a vehicle since the start.
+    /// No state of a vehicle was received in the first 2 s.
     NoVehicle,
 }
 
@@ -138,9 +139,9 @@ pub struct Flight {
     pub vehicle: Option<SocketAddr>,
     /// The bound addresses of the clients' links, in the order of the options.
     pub clients: Vec<Option<SocketAddr>>,
-    /// Folder of the recording.
+    /// Folder of the recording; `None` without a recording.
     pub recording: Option<std::path::PathBuf>,
-    /// Rounds of the control thread, at least one per 10 ms while it lives.
+    /// Rounds of the control thread, about one per 10 ms while the thread runs.
     pub rounds: Arc<AtomicU64>,
     thread: JoinHandle<Summary>,
 }

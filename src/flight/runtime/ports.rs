@@ -1,4 +1,4 @@
-//! The links of a flight by number.
+//! The links of a flight, with their arrival queues and signatures.
 
 use std::net::SocketAddr;
 
@@ -10,9 +10,9 @@ use greylag_link::peer::{LinkId, PeerId};
 use greylag_link::signing::SigningCounts;
 use greylag_link::transport::{Arrival, Link, Network, Packet};
 
-/// Capacity of the vehicle's queue: two seconds, longer than the control thread may stall.
+/// Capacity of the vehicle's queue: 2 s, longer than the control thread may stall.
 const VEHICLE_QUEUE: usize = 256;
-/// Capacity of the clients' queue; a flood loses the rest.
+/// Capacity of the clients' queue. Further packets are dropped.
 const CLIENT_QUEUE: usize = 512;
 
 /// The open links with the channels of their arrivals.
@@ -57,7 +57,7 @@ impl Ports {
         self.network.rounds()
     }
 
-    /// The vehicle's peer, when it may be sent to before it has sent anything.
+    /// The vehicle's peer, if its address is known before its first packet.
     pub(super) fn vehicle_target(&self) -> Option<PeerId> {
         self.vehicle.target()
     }
@@ -93,7 +93,7 @@ impl Ports {
         }
     }
 
-    /// Signing counters, where links are signed.
+    /// Signing counters; `None` without signing.
     pub(super) fn signing(&self) -> Option<SigningCounts> {
         self.guard.as_ref().map(Guard::counts)
     }

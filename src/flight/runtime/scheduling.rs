@@ -6,16 +6,16 @@ use std::time::{Duration, Instant};
 
 use super::timing::Histogram;
 
-/// Real-time priority, 1..99: above most, below the kernel's own (50 where interrupts have threads).
+/// Real-time priority, 1..99: above most threads, below the kernel's interrupt threads, which have 50.
 const PRIORITY: i32 = 40;
-/// Period of the measurement.
+/// Period of the wake-up measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Limits of the wake-up latency: one wake-up in a hundred may exceed the first, none the second. A plan has 8 ms of
-/// a cycle of 10 ms.
+/// Limits of the wake-up latency. One wake-up in a hundred may exceed the first limit, none the second. A plan has 8 ms
+/// of a cycle of 10 ms.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
-/// Puts this thread, and all that it starts, into the scheduling class SCHED_FIFO: it runs before all threads outside
-/// it.
+/// Puts this thread, and all threads that it starts, into the scheduling class SCHED_FIFO. A thread of this class runs
+/// before all threads of the default class.
 ///
 /// # Errors
 ///
@@ -61,13 +61,13 @@ impl Punctuality {
         self.late.note(late);
     }
 
-    /// Whether the latency suffices for flight.
+    /// Whether the latency suffices for flight: at most 2 ms for 99 % of the wake-ups, and at most 5 ms for all.
     pub fn is_good(&self) -> bool {
         let us = |limit: Duration| limit.as_secs_f64() * 1e6;
         self.late.quantile_us(0.99) <= us(LATE.0) && self.late.max_us() <= us(LATE.1)
     }
 
-    /// Remedies on this computer, each a sentence.
+    /// Remedies for a high latency on this computer, one sentence each. Empty if the latency suffices.
     pub fn advice(&self, class: Class) -> Vec<String> {
         if self.is_good() {
             return Vec::new();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Durations up to this many microseconds are kept to the microsecond.
+/// Longest duration that is resolved to 1 µs, µs. All longer durations share one bucket.
 const RESOLVED_US: usize = 50_000;
 
 /// A histogram of durations, of fixed size.
@@ -38,7 +38,7 @@ impl Histogram {
         self.max_us
     }
 
-    /// The quantile (0..1) of the durations, µs, rounded up to the microsecond; NaN without any.
+    /// The quantile `share` (0..1) of the durations, µs, rounded up to the microsecond; NaN without durations.
     pub fn quantile_us(&self, share: f64) -> f64 {
         let rank = ((share * self.count as f64).ceil() as u64).max(1);
         let mut seen = 0;
@@ -73,7 +73,8 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Why this computer was too slow for real time, in one sentence with the remedy; `None` if it was not.
+    /// Reason for which this computer was too slow for real time, in one sentence with the remedy; `None` if it was
+    /// fast enough.
     pub fn trouble(&self) -> Option<String> {
         let cycles = self.latency.count().max(1) as f64;
         let missed = self.missed as f64 / cycles;
@@ -103,7 +104,7 @@ mod tests {
         for us in 0..1000 {
             histogram.note(Duration::from_micros(us));
         }
-        // Of 0, 1 … 999 µs a half do not exceed 499 µs: reported as the bucket's end.
+        // Half of the durations 0, 1 … 999 µs do not exceed 499 µs; the end of this bucket is 500 µs.
         assert_eq!(histogram.quantile_us(0.5), 500.0);
         assert_eq!(histogram.quantile_us(0.99), 990.0);
         assert_eq!(histogram.quantile_us(1.0), 999.0);

@@ -1,4 +1,4 @@
-//! Vehicle side of the control thread: the newest state is answered, overtaken ones only recorded.
+//! Vehicle side of the control thread: it answers the newest state; older queued states are only recorded.
 
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use greylag_physics::Time;
 /// Largest number of states per packet: a TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;
 
-/// A state with the packet that completed it.
+/// A state with the peer and the arrival time of the packet that completed it.
 #[derive(Clone, Copy)]
 struct Heard {
     state: Telemetry,
@@ -26,8 +26,9 @@ struct Heard {
 }
 
 impl Control {
-    /// Takes `arrival` and all that is queued behind it. In real time only the newest state is answered; in lockstep
-    /// the vehicle waits for each reply. After a stall, states are live from the vehicle time `live` on.
+    /// Handles `arrival` and all queued arrivals. In real time only the newest state is answered. In lockstep every
+    /// state is answered, because the vehicle waits for each reply. After a stall, states are live from the vehicle
+    /// time `live` on.
     pub(super) fn take_vehicles(&mut self, arrival: Option<Arrival>, live: Option<Time>) {
         let mut newest = arrival.and_then(|arrival| self.take_vehicle(arrival, None));
         if self.clock.pace() == Pace::RealTime {
@@ -47,8 +48,8 @@ impl Control {
         self.take_notices();
     }
 
-    /// Takes arrivals until a state is live: a full socket buffer holds the oldest states of a stall,
-    /// which are history.
+    /// Handles arrivals until a state is live, for at most 50 ms. After a stall a full socket buffer holds the oldest
+    /// states.
     fn catch_up(&mut self, mut newest: Option<Heard>, live: Time) -> Option<Heard> {
         let until = Instant::now() + CATCH_UP;
         while newest.is_none_or(|heard| heard.state.time < live) {
@@ -58,7 +59,7 @@ impl Control {
         newest
     }
 
-    /// Takes one arrival; returns the newest state, `newest` or one that it completed.
+    /// Handles one arrival. Returns the newest state: the last one that the arrival completed, otherwise `newest`.
     fn take_vehicle(&mut self, arrival: Arrival, newest: Option<Heard>) -> Option<Heard> {
         let packet = match arrival {
             Arrival::Packet(mut packet) => {
@@ -187,7 +188,7 @@ impl Control {
         }
     }
 
-    /// Sends frames due on the vehicle's link, when there is a peer.
+    /// Sends the frames that are due on the vehicle's link, if its peer is known.
     pub(super) fn send_due(&mut self, host: Duration) {
         let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
             return;

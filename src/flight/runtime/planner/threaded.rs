@@ -1,4 +1,4 @@
-//! A controller on its own thread: its plan is used at its tick or not at all.
+//! A controller on a separate thread. Its plan is used at the tick of its request or not at all.
 
 use std::time::{Duration, Instant};
 
@@ -14,14 +14,15 @@ pub struct Threaded {
     pub(super) plans: Receiver<(u64, Command)>,
     thread: Option<JoinHandle<()>>,
     tick: u64,
-    /// A reset that the planner has not received, because it was busy.
+    /// Whether the controller is still to be reset, because the planner was busy at the last engagement.
     owed: bool,
     pub(super) deadline: Duration,
     pace: Pace,
 }
 
 impl Threaded {
-    /// Starts the thread. A plan is due `deadline` after its state frame; in lockstep it is waited for.
+    /// Starts the thread. In real time a plan is late `deadline` after the arrival of its state frame; in lockstep
+    /// there is no deadline.
     pub fn start(
         mut controller: Box<dyn Controller>,
         deadline: Duration,
@@ -89,7 +90,7 @@ impl Drop for Threaded {
         // the thread may block on its last plan, which is not taken any more
         while self.plans.recv().is_ok() {}
         if let Some(thread) = self.thread.take() {
-            // A panic there has been reported by its own thread.
+            // a panic of the controller has been reported by its thread
             let _ = thread.join();
         }
     }
