@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use crate::wire::telemetry::STREAMS;
 
-/// Shortest interval: one message per control cycle.
+/// Shortest interval of a stream: one message per control cycle.
 const SHORTEST: Duration = Duration::from_millis(10);
 /// Longest interval of a stream.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// Intervals of one client, a row per entry of [`STREAMS`].
+/// Intervals of one client's streams, one row per entry of [`STREAMS`].
 #[derive(Clone, Debug)]
 pub struct StreamTable {
     rows: [Row; STREAMS.len()],
@@ -31,7 +31,7 @@ impl StreamTable {
         }
     }
 
-    /// Whether row `at` is due; its next due time is then one interval later. Missed messages are not sent later.
+    /// Whether row `at` is due. If so, its next due time is one interval later. Missed messages are not sent later.
     pub fn is_due(&mut self, at: usize, host: Duration) -> bool {
         let row = &mut self.rows[at];
         let Some(interval) = row.interval.filter(|_| host >= row.due) else {
@@ -44,13 +44,13 @@ impl StreamTable {
         true
     }
 
-    /// Interval of row `at`, µs; −1 when off.
+    /// Interval of row `at`, µs; −1 if the stream is off.
     pub fn interval_us(&self, at: usize) -> i32 {
         self.rows[at].interval.map_or(-1, |interval| interval.as_micros() as i32)
     }
 
-    /// Sets row `at` as in SET_MESSAGE_INTERVAL: µs, 0 for the default, −1 for off. The interval is clamped to the
-    /// supported range. `Err` if the value is invalid.
+    /// Sets row `at` as SET_MESSAGE_INTERVAL specifies: µs, 0 for the default, −1 for off. The interval is clamped to
+    /// 10 ms..60 s. `Err` if the value is negative or NaN.
     pub fn set_interval(&mut self, at: usize, us: f64, host: Duration) -> Result<(), ()> {
         let interval = match us {
             -1.0 => None,
@@ -62,7 +62,8 @@ impl StreamTable {
         Ok(())
     }
 
-    /// Sets a REQUEST_DATA_STREAM group (0: every stream that is on by default) to a rate in Hz, or off.
+    /// Sets all streams of a REQUEST_DATA_STREAM group to a rate in Hz (0: their default rates), or turns them off
+    /// (`None`). Group 0 contains all streams that are on by default.
     pub fn set_group(&mut self, group: u8, rate: Option<u16>, host: Duration) {
         for (row, stream) in self.rows.iter_mut().zip(STREAMS) {
             let meant = stream.group == group || (group == 0 && stream.default_hz > 0.0);
