@@ -79,20 +79,20 @@ pub use greylag_manoeuvres as manoeuvres;
 // MAVLink.
 pub use greylag_link as link;
 
-// Flight logs of any format.
+// Reading of flight logs.
 pub use greylag_logs as logs;
 
-// The companion in flight.
+// Pilot, runtime and recorder in flight.
 pub use greylag_flight as flight;
 
-// From a log to the missing effect.
+// System identification: finds missing effects in a log.
 pub use greylag_sysid as sysid;
 
-// Simulated and imagined flights, scored.
+// Simulated and imagined flights with their scores.
 #[cfg(any(feature = "demo", feature = "learn"))]
 pub use greylag_sim as sim;
 
-// Training; the home of burn.
+// Training; only this layer uses burn.
 #[cfg(feature = "learn")]
 pub use greylag_learn as learn;
 

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 /// Placeholder of the campaign's folder in a cell's command line and in recorded commands.
 pub const OUT: &str = "$OUT";
-/// Digits of the identity in a folder name.
+/// Number of hexadecimal digits of the identity in a folder name.
 const SHORT: usize = 12;
 
-/// A planned cell.
+/// A planned cell: one run of a stage's command at one combination of levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
     /// Number of the cell, from 1. A scheduler's job array uses it as its index.
@@ -19,9 +19,9 @@ pub struct Cell {
     pub id: String,
     /// Name of its stage.
     pub stage: String,
-    /// The level of each axis that its stage varies, including the seed.
+    /// The level of each axis that the cell's stage varies, including the seed.
     pub levels: BTreeMap<String, String>,
-    /// The command line without the program's name; [`OUT`] replaces the campaign's folder.
+    /// The command line without the program's name. [`OUT`] stands for the path of the campaign's folder.
     pub words: Vec<String>,
     /// SHA-256 of each input, by its name in the command.
     pub inputs: BTreeMap<String, String>,
@@ -66,7 +66,7 @@ impl Cell {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// Schema of the line.
+    /// Name and version of the line's schema.
     pub schema: String,
     /// Name of the campaign.
     pub campaign: String,
@@ -74,7 +74,7 @@ pub struct Record {
     pub cell: String,
     /// Name of its stage.
     pub stage: String,
-    /// Levels of its axes.
+    /// Level of each axis that the cell's stage varies.
     pub levels: BTreeMap<String, String>,
     /// Random seed of the cell; `None` if its stage does not vary the seed.
     pub seed: Option<u64>,
@@ -82,9 +82,9 @@ pub struct Record {
     pub identity: String,
     /// Version and build of the program.
     pub program: String,
-    /// The command; `$OUT` is the campaign's folder.
+    /// The command line; `$OUT` stands for the path of the campaign's folder.
     pub command: String,
-    /// SHA-256 of its inputs.
+    /// SHA-256 of the cell's inputs, by their names in the command.
     pub inputs: BTreeMap<String, String>,
     /// SHA-256 of the output files that later cells read, by their names in the folder.
     pub files: BTreeMap<String, String>,

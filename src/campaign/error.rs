@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// A campaign cannot be planned, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The campaign file cannot be read.
+    /// The campaign file cannot be read by the operating system.
     #[error("cannot read campaign file {path}: {source}; name a file such as params/campaigns/small.toml", path = path.display())]
     Read {
         /// Path of the file.
@@ -25,7 +25,7 @@ pub enum CampaignError {
     /// An operation on an input or on a file in the campaign's folder failed.
     #[error("{doing} {path}: {source}", path = path.display())]
     Io {
-        /// The operation that failed.
+        /// The operation that failed, as the beginning of the message.
         doing: &'static str,
         /// Path of the file.
         path: PathBuf,

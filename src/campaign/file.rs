@@ -23,7 +23,7 @@ pub struct CampaignFile {
     /// Purpose in one sentence.
     #[serde(default)]
     pub about: String,
-    /// Random seeds of the runs.
+    /// Random seeds: the levels of the seed axis.
     pub seeds: Vec<u64>,
     /// Axes in addition to the seed.
     #[serde(default)]
@@ -74,7 +74,7 @@ impl From<LevelFile> for Level {
 pub struct StageFile {
     /// Name of the stage. `{name}` in the command of a later stage is replaced by the output folder of this stage.
     pub name: String,
-    /// The axes that it varies.
+    /// The axes that the stage varies.
     pub over: Vec<String>,
     /// The command line without `greylag`. Its placeholders are `{out}` (the cell's folder), `{seed}`, `{axis}` (the
     /// level of an axis) and `{stage}` (the folder of an earlier stage's cell).
@@ -92,13 +92,13 @@ pub struct StageFile {
 pub struct TableFile {
     /// Title of the table.
     pub title: String,
-    /// The stage whose cells it summarises, and their required levels: `stage axis=level …`.
+    /// The stage whose cells the table summarises, and the levels that these cells must have: `stage axis=level …`.
     pub stage: String,
     /// Axes that form the rows. All other axes except the seed divide the cells of a row into strata.
     pub rows: Vec<String>,
     /// Names of the quantities in a result, such as `easy.mean_deg`.
     pub metrics: Vec<String>,
-    /// Unit of the quantities.
+    /// Unit of the quantities as text; may be empty.
     #[serde(default)]
     pub unit: String,
     /// The published table for comparison, one of those in [`super::published`]; `None` without comparison.
@@ -120,7 +120,7 @@ pub struct ClaimFile {
 }
 
 impl CampaignFile {
-    /// Reads and checks a campaign file.
+    /// Reads a campaign file and checks its contents.
     ///
     /// # Errors
     ///

@@ -14,9 +14,9 @@ pub struct Gathered {
     pub records: Vec<Record>,
     /// Computing times of the finished cells, as far as recorded. [`Times::cell`] is the id of the cell.
     pub times: Vec<Times>,
-    /// Failed cells, with the reasons.
+    /// Ids of the failed cells, with the reasons.
     pub failed: Vec<(String, Failure)>,
-    /// Cells that have started and not finished.
+    /// Ids of the cells that have started and have no result.
     pub begun: Vec<String>,
     /// Cells that have only a result of another command or of other inputs.
     pub stale: Vec<String>,
@@ -27,7 +27,7 @@ pub struct Gathered {
 /// Outcome of an import of results.
 #[derive(Clone, Debug, Default)]
 pub struct Joined {
-    /// Results that were imported.
+    /// Number of imported results.
     pub taken: usize,
     /// Number of results of cells that already have a result with equal measurements.
     pub twice: usize,
@@ -41,7 +41,7 @@ pub struct Joined {
 ///
 /// # Errors
 ///
-/// If a file of the campaign's folder cannot be read.
+/// If a file of the campaign's folder cannot be read or belongs to another cell.
 pub fn gather(plan: &Plan, store: &Store) -> Result<Gathered, CampaignError> {
     let mut all = Gathered::default();
     for cell in &plan.cells {
@@ -103,7 +103,7 @@ impl Gathered {
     }
 }
 
-/// Writes each of `lines` as one line of JSON.
+/// Writes `lines` to a file, one line of JSON each.
 ///
 /// # Errors
 /// If a line cannot be written as JSON, or the file cannot be written.

@@ -1,4 +1,4 @@
-//! Extracts quantities and output files from the folder of a finished command.
+//! Extracts measured quantities and hashes of output files from the folder of a finished command.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,13 +27,13 @@ const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 pub struct Harvest {
     /// SHA-256 of the files that later cells read, by their names in the folder.
     pub files: BTreeMap<String, String>,
-    /// Measured quantities by name.
+    /// Measured quantities by name, such as `easy.mean_deg`.
     pub metrics: BTreeMap<String, f64>,
     /// Learning curve: the values of each column, by column name. Empty without a learning curve.
     pub curve: BTreeMap<String, Vec<f64>>,
 }
 
-/// Extracts the output of a cell's command from `folder`.
+/// Extracts the output of a cell's command from the cell's folder `folder`.
 ///
 /// # Errors
 ///

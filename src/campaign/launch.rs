@@ -24,7 +24,7 @@ pub struct Job {
     pub file: String,
     /// Path of the campaign's folder.
     pub out: String,
-    /// Attempts at a cell that fails temporarily (exit status 75).
+    /// Largest number of attempts at a cell that fails temporarily (exit status 75).
     pub attempts: usize,
     /// Further options of the scheduler, such as a partition and a time limit.
     pub options: String,
@@ -34,7 +34,7 @@ const SLURM: &str = include_str!("launch/slurm.sh");
 const HYPERQUEUE: &str = include_str!("launch/hyperqueue.sh");
 const PARALLEL: &str = include_str!("launch/parallel.sh");
 
-/// The script that submits `plan`.
+/// The script that submits `plan` with the scheduler `launcher`.
 pub fn script(launcher: Launcher, plan: &Plan, job: &Job) -> String {
     let template = match launcher {
         Launcher::Slurm => SLURM,

@@ -1,4 +1,4 @@
-//! Expands a campaign file into its cells.
+//! Expands a campaign file into cells.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -98,12 +98,12 @@ struct Draft<'a> {
 }
 
 impl Draft<'_> {
-    /// The words of the command, and the numbers of the cells whose folders they name.
+    /// The words of the command line, and the numbers of the cells whose folders these words name.
     fn words(&self) -> Result<(Vec<String>, Vec<usize>), String> {
         let (mut words, mut after) = (Vec::new(), Vec::new());
         for word in self.stage.command.split_whitespace() {
             match self.level_of(word) {
-                // a level may be replaced by several words, or by none
+                // a level may insert several words, or none
                 Some(level) => {
                     for word in level.words.split_whitespace() {
                         words.push(self.word(word, &mut after)?);
@@ -199,7 +199,7 @@ fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     named.map(path).chain(stage.inputs.iter().cloned()).collect()
 }
 
-/// SHA-256 of a file, of a folder's files, or of a model with all files that it reads.
+/// SHA-256 of a file, of all files in a folder, or of a model with all files that the model reads.
 fn content(path: &Path) -> Result<String, String> {
     let cannot = |e: std::io::Error| format!("cannot read {}: {e}", path.display());
     if path.extension().is_some_and(|e| e == "toml")

@@ -8,7 +8,7 @@
 use greylag_num::bootstrap;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};
 
-/// Seed of the bootstrap: the same runs give the same intervals.
+/// Seed of the bootstrap. It is constant, so the same runs give the same intervals.
 const SEED: u64 = 95;
 
 /// A statistic with its confidence interval.
@@ -89,7 +89,7 @@ mod tests {
         assert_eq!(all.count, 10);
         for (value, wanted) in [
             (all.median.value, 1.0),
-            // scipy cuts int(0.25 · 10) = 2 at each end: mean of 0.85 0.91 0.95 1.05 1.1 1.2
+            // scipy omits int(0.25 · 10) = 2 runs at each end; the mean is that of 0.85 0.91 0.95 1.05 1.1 1.2
             (all.iqm.value, 6.06 / 6.0),
             (all.mean.value, 1.126),
             (all.min, 0.6),

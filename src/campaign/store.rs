@@ -1,4 +1,4 @@
-//! A campaign on disk: a folder per cell with one result, written atomically.
+//! A campaign on disk: one folder per cell with one result, which is written atomically.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const RESULT: &str = "result.json";
 const FAILURE: &str = "failure.json";
 /// File with a cell's computing time.
 const TIMES: &str = "times.json";
-/// Lock file while a cell runs.
+/// Lock file, which is locked while the cell runs.
 const LOCK: &str = "lock";
 /// File that marks a started cell.
 const BEGUN: &str = "begun";
@@ -45,7 +45,7 @@ pub enum Standing {
 pub struct Failure {
     /// Text of the error.
     pub error: String,
-    /// The program and its build.
+    /// Version and build of the program.
     pub program: String,
 }
 
@@ -54,9 +54,9 @@ pub struct Failure {
 pub struct Times {
     /// Id of the cell.
     pub cell: String,
-    /// Wall time of the session that finished it, s.
+    /// Wall time of the session that finished the cell, s.
     pub seconds: f64,
-    /// Processor time in that session, s.
+    /// Processor time of that session over all cores, s.
     pub core_seconds: f64,
     /// Whether an earlier session had started the cell. If so, the times exclude that session.
     pub resumed: bool,
@@ -64,7 +64,7 @@ pub struct Times {
     pub ended_unix_s: u64,
     /// Model of the processor.
     pub processor: String,
-    /// The program and its build.
+    /// Version and build of the program.
     pub program: String,
 }
 
@@ -94,7 +94,7 @@ impl Store {
         self.folder.join(cell.folder())
     }
 
-    /// State of a cell.
+    /// State of a cell, from the files in the campaign's folder.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ impl Store {
         Ok(if self.has_other(cell) { Standing::Stale } else { Standing::Missing })
     }
 
-    /// Whether there is a result of the same stage and levels with another identity.
+    /// Whether a result with another identity exists for the stage and levels of `cell`.
     fn has_other(&self, cell: &Cell) -> bool {
         let (stem, own) = (cell.stem() + "-", cell.folder());
         let Ok(entries) = std::fs::read_dir(&self.folder) else { return false };

@@ -23,11 +23,11 @@ pub struct Summary {
 /// A quantity, summarised over the cells with the same levels.
 #[derive(Clone, Debug)]
 pub struct SummaryRow {
-    /// The levels, joined by `/`.
+    /// The levels of the row's axes, joined by `/`.
     pub name: String,
     /// Name of the quantity.
     pub metric: String,
-    /// Summary over the seeds.
+    /// Summary over the seeds and strata of the row.
     pub ours: Aggregate,
     /// The values of the individual cells.
     pub runs: Vec<Run>,
@@ -40,7 +40,7 @@ pub struct SummaryRow {
 pub struct Run {
     /// Id of the cell.
     pub cell: String,
-    /// Its random seed.
+    /// Random seed of the cell; `None` if its stage does not vary the seed.
     pub seed: Option<u64>,
     /// Value of the quantity.
     pub value: f64,
@@ -53,7 +53,7 @@ pub struct Finding {
     pub says: String,
     /// Result of the test.
     pub outcome: Outcome,
-    /// The values of both sides, as a sentence.
+    /// The values of both sides and their difference, as a sentence.
     pub because: String,
 }
 
@@ -106,7 +106,7 @@ fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summar
     }
 }
 
-/// Every combination of levels that forms a row, in the order of the file.
+/// Every combination of levels that forms a row, in the order of the campaign file.
 fn row_levels(file: &CampaignFile, table: &TableFile) -> Vec<Vec<(String, String)>> {
     table.rows.iter().fold(vec![Vec::new()], |all, axis| {
         let levels = file.levels(axis);
@@ -181,7 +181,7 @@ pub fn said(estimate: &Estimate) -> String {
     format!("{value:.3} [{low:.3}, {high:.3}]")
 }
 
-/// Tests of the claims of a campaign file.
+/// Tests the claims of a campaign file against `records`.
 ///
 /// # Errors
 ///
@@ -267,7 +267,7 @@ mod tests {
         [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
     }
 
-    /// Seeds differ by 10 and the two sides by 1, so only the paired test can show the difference.
+    /// Seeds differ by 10 and the two sides by 1. Only the paired test can detect the difference.
     #[test]
     fn cells_of_one_seed_are_compared_with_each_other() {
         let side = |more: f64| -> Vec<(Levels, f64)> {

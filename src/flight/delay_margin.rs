@@ -1,4 +1,4 @@
-//! Delay margin of a controller's surface loops: the smallest delay with a limit cycle, found by simulation.
+//! Delay margin of a controller's surface loops, found by simulation: the smallest delay with a limit cycle.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -15,7 +15,7 @@ const STEP_MS: usize = 4;
 const LONGEST_MS: usize = 120;
 /// Length of a simulation, ticks.
 const TICKS: usize = 1000;
-/// Ticks of the full-deflection pulse.
+/// Ticks of the full-deflection pulse: 0.1 s, beginning after 1 s.
 const PULSE: std::ops::Range<usize> = 100..110;
 /// First evaluated tick: only the last 2 s of a simulation count, as in JSBSim with `examples/delay_margin.rs`.
 const END: usize = 800;
@@ -24,8 +24,9 @@ const SWING: f64 = 0.17;
 /// Control period in ms.
 const TICK_MS: usize = 10;
 
-/// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate after a pulse of
-/// full deflection, in level flight at the cruise airspeed. `None` if it is stable up to 0.12 s, or if the trim fails.
+/// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate. The simulation
+/// starts in level flight at the cruise airspeed and applies a pulse of full deflection. `None` if the loops are stable
+/// up to 0.12 s, or if the trim fails.
 ///
 /// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
 /// The search takes about a second for a controller that computes its command in microseconds.
@@ -43,7 +44,7 @@ pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Dura
     delays.find(|delay| swings(*delay)).map(|ms| Duration::from_millis(ms as u64))
 }
 
-/// The axis whose surface is delayed.
+/// The axis whose surface command is delayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Axis {
     Pitch,
@@ -145,8 +146,8 @@ mod tests {
 
     #[test]
     fn the_model_says_of_delay_what_the_official_simulator_does() {
-        // JSBSim with steps of 1 ms oscillates after a pulse of full deflection: `lqi` from 46 ms in pitch on,
-        // `lqi-damped` from 104 ms (`examples/delay_margin.rs`)
+        // JSBSim with steps of 1 ms oscillates after a pulse of full deflection: with `lqi` from 46 ms on, in pitch;
+        // with `lqi-damped` from 104 ms on (`examples/delay_margin.rs`).
         let model = GreyBox::load(Path::new(concat!(
             env!("CARGO_MANIFEST_DIR"),
             "/../../params/x8/jsbsim.toml"

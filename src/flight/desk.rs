@@ -27,7 +27,7 @@ pub struct Desk {
     controller: Box<dyn Controller>,
     vehicle: Vehicle,
     outputs: Outputs,
-    /// Host and vehicle time of the newest state.
+    /// Host time and vehicle time of the newest state.
     anchor: Option<(Duration, Time)>,
     recorder: Option<Recorder>,
     /// All texts sent to the ground stations.
@@ -109,7 +109,7 @@ impl Desk {
     fn heed(&mut self, host: Duration) {
         while let Some(notice) = self.vehicle.take_notice() {
             if let Some(words) = notice.ending() {
-                // forced disarming is never refused
+                // a forced disarming is never refused
                 let _ = self.pilot.disarm(self.now(host), true);
                 self.pilot.send_text(Severity::Critical, &words);
             }
@@ -135,12 +135,12 @@ impl Desk {
         }
     }
 
-    /// The pilot, for requests of a client.
+    /// The pilot, for the requests of a client.
     pub fn pilot(&mut self) -> &mut Pilot {
         &mut self.pilot
     }
 
-    /// Link to the vehicle.
+    /// The link to the vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }

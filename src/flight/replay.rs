@@ -14,7 +14,7 @@ use greylag_link::peer::{LinkId, PeerId, SERIAL};
 use greylag_link::vehicle::{Order, Telemetry, Vehicle};
 use greylag_physics::{Command, Time};
 
-/// Number of differences kept for display.
+/// Largest number of differences that are kept.
 const SHOWN: usize = 10;
 
 /// A recorded flight cannot be replayed.
@@ -28,20 +28,20 @@ pub enum ReplayError {
         /// The operating system's error.
         source: std::io::Error,
     },
-    /// The calls have another format version.
+    /// The file of calls has another format version.
     #[error("{} does not begin with `{HEADER}`: it was recorded by another version", path.display())]
     Header {
         /// Path of the file.
         path: PathBuf,
     },
-    /// A line before the last is invalid.
+    /// A line other than the last is invalid.
     #[error("{}, line {line}: {source}", path.display())]
     Line {
         /// Path of the file.
         path: PathBuf,
         /// Line number, from 1.
         line: usize,
-        /// Why it is invalid.
+        /// Reason for which the line is invalid.
         source: CallError,
     },
 }
@@ -70,7 +70,7 @@ pub struct Outcome {
     pub without_state: u64,
     /// The first differences, at most ten, in order.
     pub differences: Vec<Difference>,
-    /// Whether the recording ends inside an entry, as after a crash.
+    /// Whether the recording ends inside an entry, for instance after a crash.
     pub cut_short: bool,
 }
 
@@ -114,7 +114,7 @@ impl States {
         read
     }
 
-    /// Reads one record: eight bytes of time, then a frame.
+    /// Reads one record: eight bytes of time (big-endian, µs since 1970), then a frame.
     fn read_one(&mut self, stamp: u64) -> Option<()> {
         let rest = self.bytes.get(self.at + 8..)?;
         let len = frame_len(rest).filter(|len| *len <= rest.len())?;
@@ -137,7 +137,7 @@ impl States {
 ///
 /// # Errors
 ///
-/// If a file cannot be read, or is not part of a recording.
+/// If a file cannot be read, has another format version, or contains an invalid line.
 pub fn replay(
     folder: &Path,
     companion: Companion,
@@ -149,7 +149,7 @@ pub fn replay(
 /// Callback for each planned tick of a replay: time, request, and the controller after its command.
 pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
 
-/// Replays with the callback `watch`.
+/// Replays like [`replay`], and calls `watch` for each planned tick.
 ///
 /// # Errors
 ///
@@ -224,7 +224,7 @@ impl Replayed<'_, '_> {
     fn tick(&mut self, time: Time, planned: Planned, recorded: Command) -> bool {
         let Some((host, state)) = self.states.next(time) else {
             self.outcome.without_state += 1;
-            // at the end of a truncated recording the telemetry may end first
+            // the telemetry of a truncated recording may end before its calls
             let ended = self.states.at + 8 >= self.states.bytes.len();
             self.outcome.cut_short |= ended;
             return !ended;

@@ -1,4 +1,4 @@
-//! Link addresses of the command line, such as `udpin:0.0.0.0:14550`.
+//! Link addresses on the command line, such as `udpin:0.0.0.0:14550`.
 
 use std::fmt;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -26,7 +26,7 @@ pub enum Address {
     TcpIn(HostPort),
     /// Connects to this address, and reconnects when the connection is lost.
     TcpOut(HostPort),
-    /// A serial port at a baud rate.
+    /// A serial port with its baud rate.
     Serial {
         /// Device, such as `/dev/ttyACM0`.
         port: String,
@@ -50,7 +50,7 @@ pub enum AddressError {
     /// The port is not a number from 0 to 65535.
     #[error("address `{0}`: `{1}` is not a port number (0 to 65535)")]
     Port(String, String),
-    /// The baud rate is not a positive number.
+    /// The baud rate is missing or not a positive integer.
     #[error(
         "address `{0}`: `{1}` is not a baud rate; write for example serial:/dev/ttyACM0:921600"
     )]

@@ -2,7 +2,7 @@
 
 use greylag_physics::{ActuatorState, Command, Time};
 
-/// Flight modes, with the `custom_mode` numbers PX4 uses (main mode, sub mode).
+/// Flight modes, with their `custom_mode` numbers in PX4 (main mode, sub mode).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// Sticks command the surfaces directly. PX4 main mode 1.
@@ -28,7 +28,7 @@ pub enum Verdict {
     Denied(String),
 }
 
-/// An attitude setpoint decoded from SET_ATTITUDE_TARGET; all values are finite.
+/// An attitude setpoint from SET_ATTITUDE_TARGET. All its values are finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeSetpoint {
     /// Commanded roll, rad, not yet limited to the envelope.
@@ -92,7 +92,7 @@ pub struct Parameter {
     pub value: ParameterValue,
 }
 
-/// The autopilot's state from which telemetry streams are built. Unknown values are NaN.
+/// The autopilot's state, from which telemetry streams are built. Unknown values are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
     /// The active flight mode.
@@ -115,11 +115,11 @@ pub struct Status {
     pub position: [f64; 2],
     /// Velocity over ground, NED, m/s.
     pub velocity: [f64; 3],
-    /// Commanded roll and pitch after envelope limits, rad.
+    /// Commanded roll and pitch after envelope limits, rad; NaN without a target.
     pub target: [f64; 2],
-    /// The actuator command in force.
+    /// The last actuator command.
     pub command: Command,
-    /// The observed actuator state.
+    /// The observed actuator state: surfaces in rad and rad/s, throttle 0..1.
     pub actuators: ActuatorState,
     /// Recent processing time of the control task as a fraction of its 10 ms cycle, 0..1.
     pub load: f64,
@@ -134,9 +134,9 @@ pub const RESIDUALS: [&str; 6] = ["res_fx", "res_fy", "res_fz", "res_roll", "res
 
 /// An autopilot as its clients see it. `flight::pilot::Pilot` and a test double in the protocol tests implement it.
 pub trait Autopilot {
-    /// Enables actuator outputs; `force` skips the pre-arm checks.
+    /// Enables the actuator outputs. `force` skips the pre-arm checks.
     fn arm(&mut self, now: Time, force: bool) -> Verdict;
-    /// Disables actuator outputs; `force` allows it in flight.
+    /// Disables the actuator outputs. `force` also allows it in flight.
     fn disarm(&mut self, now: Time, force: bool) -> Verdict;
     /// Requests a flight mode.
     fn set_mode(&mut self, now: Time, mode: Mode) -> Verdict;
@@ -144,7 +144,7 @@ pub trait Autopilot {
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint);
     /// Passes stick positions, which also restart the timeout of the sticks.
     fn sticks(&mut self, now: Time, sticks: Sticks);
-    /// The parameter table; its length and order never change.
+    /// The parameter table. Its length and order never change.
     fn parameters(&self) -> &[Parameter];
     /// Sets the parameter `index`. `value` already has the table's type. A refusal contains the reason.
     fn set_parameter(&mut self, index: usize, value: ParameterValue) -> Verdict;

@@ -30,18 +30,18 @@ use session::{Session, Stay};
 use setpoint_authority::SetpointAuthority;
 use setpoints::OTHER_SETPOINT;
 
-/// Largest number of sessions.
+/// Largest number of simultaneous sessions.
 pub const MAX_SESSIONS: usize = 32;
 /// Silence after which a new peer may replace a session while all sessions are in use.
 const DISPLACEABLE: Duration = Duration::from_secs(3);
-/// Silence after which the session of a datagram peer ends.
+/// Time without frames after which the session of a datagram peer ends.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Largest number of texts fetched from the autopilot per call of `poll`.
 const TEXTS_PER_POLL: usize = 8;
 /// Longest text that is sent, in characters: eight chunks.
 const TEXT_LENGTH: usize = 400;
 
-/// Host time and vehicle time of a call.
+/// Host time and vehicle time at a call.
 ///
 /// Host time paces heartbeats and streams, which continue when the vehicle stops. Vehicle time is passed to the
 /// autopilot and stamps the messages.
@@ -116,7 +116,7 @@ impl Clients {
         Clients { role: Role::Onboard, ..Clients::new(identity) }
     }
 
-    /// Adopts the controller's system id.
+    /// Adopts the flight controller's system id for the messages of this server.
     pub fn adopt(&mut self, system: u8) {
         self.identity.system = system;
     }
@@ -306,7 +306,7 @@ impl Clients {
         self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 
-    /// Queues a warning for one client, within its rate limit.
+    /// Queues a warning for one client, unless its rate limit is exceeded.
     fn complain(&mut self, now: Now, at: usize, words: &str) {
         if self.sessions[at].may_complain(now.host) {
             self.say(at, Severity::Warning, words);
@@ -314,7 +314,7 @@ impl Clients {
     }
 }
 
-/// Reply to a mission message. Missions are not supported: the list is empty, and uploads are refused.
+/// Reply to a mission message. Missions are not supported: the list is empty and uploads are refused.
 fn mission(step: MissionStep, kind: u8, from: Source) -> Message {
     match step {
         MissionStep::List => answer::empty_mission(kind, from),

@@ -56,7 +56,7 @@ pub struct Frame<'a> {
     pub source: Source,
     /// Message id.
     pub id: u32,
-    /// Payload as sent: MAVLink 2 truncates trailing zeros.
+    /// Payload as sent. MAVLink 2 truncates its trailing zeros.
     pub payload: &'a [u8],
     /// Whether the frame has a signature. The signature is not checked here.
     pub signed: bool,
@@ -98,7 +98,7 @@ impl FrameCounts {
     }
 }
 
-/// Classification of the bytes at a start marker.
+/// Classification of the bytes from a start marker on.
 enum Candidate<'a> {
     Frame(Frame<'a>),
     BadCrc,

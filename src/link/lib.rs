@@ -1,4 +1,4 @@
-//! MAVLink: addresses, transports, frames, and the two sides of the companion.
+//! MAVLink: addresses, transports, frames, and the links to the vehicle and to clients.
 //!
 //! Only the transport has sockets and a clock. All other modules take bytes and time as arguments and return bytes.
 //! [`transport`] runs on tokio and passes datagrams and streams through channels. [`vehicle`] connects to the flight

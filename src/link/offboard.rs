@@ -8,7 +8,7 @@ pub use super::wire::offboard::Heard;
 
 /// Address of the autopilot: system 1, component 1.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
-/// This client's ids: an onboard computer of the same system.
+/// Ids of this client: an onboard computer of the same system.
 const OURSELVES: Source = Source { system: 1, component: 191 };
 
 /// Command number of MAV_CMD_COMPONENT_ARM_DISARM.
@@ -24,7 +24,7 @@ pub struct OffboardClient {
 }
 
 impl OffboardClient {
-    /// Encodes a heartbeat, to be sent once a second.
+    /// Encodes a heartbeat, which is to be sent once a second.
     pub fn heartbeat(&mut self) -> Vec<u8> {
         self.frame(&offboard::heartbeat())
     }

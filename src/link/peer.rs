@@ -3,7 +3,7 @@
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// A link of this program, numbered in the order of opening.
+/// Number of a link of this program, in the order of opening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LinkId(pub u16);
 
@@ -13,9 +13,9 @@ pub const SERIAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED)
 /// One peer on one link: the sender of datagrams, a TCP connection, or the device on a serial port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PeerId {
-    /// The link on which it was received.
+    /// The link on which the peer is reached.
     pub link: LinkId,
-    /// Its address and port.
+    /// Address and port of the peer.
     pub address: SocketAddr,
 }
 

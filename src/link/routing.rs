@@ -27,12 +27,12 @@ pub enum Way {
 #[derive(Clone, Debug, Default)]
 pub struct Router {
     routes: Vec<(Source, PeerId, Duration)>,
-    /// Number of frames withheld from the controller.
+    /// Number of clients' frames that were dropped instead of forwarded to the controller.
     pub held: u64,
 }
 
 impl Router {
-    /// Learns routes from a client's frames.
+    /// Adds a route for each sender in a client's frames.
     pub fn learn(&mut self, host: Duration, peer: PeerId, bytes: &[u8]) {
         pieces(bytes, |_, frame| {
             let Some(Frame { source, .. }) = frame else { return };

@@ -1,4 +1,4 @@
-//! MAVLink 2 message signing: signs outgoing frames and verifies incoming ones.
+//! MAVLink 2 message signing: signs outgoing frames and verifies received frames.
 //!
 //! According to the MAVLink guide, the signature is the first 48 bits of the SHA-256 of key, frame, link id and
 //! timestamp. Timestamps (10 µs since 2015) increase in each stream of a sender. The codec's signing is not used,
@@ -20,7 +20,7 @@ pub use stamp::{StampError, StampFile};
 const STX: u8 = 0xFD;
 /// Incompatibility flag of a signed frame.
 const FLAG_SIGNED: u8 = 0x01;
-/// Bytes of header, checksum, signature block of MAVLink 2.
+/// Lengths of header, checksum and signature block of MAVLink 2, bytes.
 const HEADER: usize = 10;
 const CHECKSUM: usize = 2;
 const BLOCK: usize = 13;
@@ -43,15 +43,16 @@ pub fn stamp_of(unix_us: u64) -> u64 {
 /// Counters of signed and verified frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SigningCounts {
-    /// Frames signed here.
+    /// Frames signed by this program.
     pub signed: u64,
-    /// Frames accepted with a valid signature.
+    /// Received frames with a valid signature.
     pub believed: u64,
-    /// Frames refused without a signature.
+    /// Received frames without a signature, which were refused.
     pub unsigned: u64,
-    /// Frames refused for an invalid signature: another key, or modified content.
+    /// Received frames with an invalid signature (another key or modified content), which were refused.
     pub forged: u64,
-    /// Frames refused for a timestamp that was used before or is more than a minute old.
+    /// Received frames that were refused for their timestamp: not newer than the last of its stream, or more than a
+    /// minute old in a new stream.
     pub replayed: u64,
     /// MAVLink 1 frames that were not sent, because they cannot be signed.
     pub unsignable: u64,
@@ -64,7 +65,7 @@ impl SigningCounts {
     }
 }
 
-/// A key with the timestamps of its streams.
+/// A signing key with the timestamps of all streams.
 #[derive(Debug)]
 pub struct Signer {
     key: Key,
@@ -209,7 +210,7 @@ mod tests {
         assert!(them.believed(NOW, &frames).is_empty());
         let counts = them.counts();
         assert_eq!((counts.believed, counts.replayed), (2, 2));
-        // One second later the timestamps have risen by 100,000.
+        // One second later the timestamps are larger by 100,000.
         let later = us.sign(NOW + 1_000_000, 3, &heartbeat(2));
         assert_eq!(them.believed(NOW, &later), later);
         assert_eq!(them.stamp(), stamp_of(NOW) + 100_000);

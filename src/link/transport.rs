@@ -62,7 +62,7 @@ pub enum Remark {
     /// The serial port is available again.
     #[error("serial port {0} is back")]
     Replugged(String),
-    /// Bytes are received, but no valid frame.
+    /// Bytes are received, but none of them form a valid frame.
     #[error(
         "bytes arrive on {port}, but no MAVLink frame among them: {baud} is probably not the baud \
          rate of the other end; set its port (SER_TEL2_BAUD on PX4, SERIAL2_BAUD on ArduPilot) or \
@@ -71,7 +71,7 @@ pub enum Remark {
     Noise {
         /// Name of the device.
         port: String,
-        /// Baud rate at which it is open.
+        /// Baud rate of the open port.
         baud: u32,
     },
 }
@@ -89,7 +89,7 @@ pub enum TransportError {
     InUse {
         /// Address of the link.
         address: Address,
-        /// The command-line option it came from, such as `--client`.
+        /// The command-line option that named the address, such as `--client`.
         option: &'static str,
     },
     /// The operating system refused the socket.
@@ -97,7 +97,7 @@ pub enum TransportError {
     Open {
         /// Address of the link.
         address: Address,
-        /// The command-line option it came from.
+        /// The command-line option that named the address.
         option: &'static str,
         /// The operating system's error.
         source: std::io::Error,
@@ -107,7 +107,7 @@ pub enum TransportError {
     Serial {
         /// Address of the link.
         address: Address,
-        /// The command-line option it came from.
+        /// The command-line option that named the address.
         option: &'static str,
         /// The reason, with its remedy.
         fault: SerialFault,
@@ -191,12 +191,12 @@ pub struct Network {
     rounds: Arc<AtomicU64>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
-    /// Whether the rate limit of datagram senders is off.
+    /// Whether the rate limit on datagram senders is disabled.
     takes_all: bool,
 }
 
 impl Network {
-    /// Starts the thread without links.
+    /// Starts the network thread without links.
     pub fn start() -> Result<Self, TransportError> {
         let runtime =
             Builder::new_current_thread().enable_all().build().map_err(TransportError::Thread)?;

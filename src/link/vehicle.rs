@@ -1,4 +1,4 @@
-//! The vehicle link: state frames in, actuator commands out.
+//! The vehicle link, which receives state frames and sends actuator commands.
 //!
 //! [`Vehicle`] is either the simulator's shim ([`sitl`]) or a real flight controller ([`real`]).
 
@@ -20,7 +20,7 @@ pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
 
-/// Standard deviations of angle of attack and sideslip from vanes, rad: typical of small aircraft.
+/// Standard deviations of angle of attack and sideslip from vanes, rad. The value is typical of small aircraft.
 pub const VANE_SD: [f64; 2] = [0.3 * std::f64::consts::PI / 180.0; 2];
 
 /// The vehicle's state at one instant, complete and in SI units.
@@ -28,7 +28,7 @@ pub const VANE_SD: [f64; 2] = [0.3 * std::f64::consts::PI / 180.0; 2];
 pub struct Telemetry {
     /// Vehicle time of the measurement.
     pub time: Time,
-    /// Order relative to the previous state.
+    /// Order relative to the previous state frame.
     pub order: Order,
     /// Invalid parts of the state. Such a part keeps its last valid value, or the neutral value before the first valid
     /// one.

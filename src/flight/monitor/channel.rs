@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A component of specific force or angular acceleration.
+/// A component of specific force (m/s²) or angular acceleration (rad/s²) in body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Specific force along body x.
@@ -57,7 +57,7 @@ impl fmt::Display for Channel {
 /// A warning that a residual has left its band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Warning {
-    /// The channel that deviates most.
+    /// The channel whose residual is largest relative to its band.
     pub channel: Channel,
     /// Residual divided by the half width of its band, signed and dimensionless. Beyond −1..1 the residual is outside
     /// the band.
@@ -73,7 +73,7 @@ impl Warning {
             (Channel::Roll, true) => "an aileron that sticks or moves less than commanded",
             (Channel::Pitch, true) => "an elevator that sticks or moves less than commanded",
             (Channel::Yaw, true) => "a rudder that sticks or moves less than commanded",
-            // z points down: a positive residual is too little lift.
+            // z points down: a positive residual means too little lift.
             (Channel::Normal, _) if self.share > 0.0 => {
                 "ice on the wing, a heavier load, a wrong airspeed or incidence"
             }

@@ -1,4 +1,4 @@
-//! The model monitor compares measured accelerations in flight with the model's predictions.
+//! The model monitor compares accelerations measured in flight with the model's predictions.
 //!
 //! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at
 //! the measured state and surfaces. The band is two standard deviations of the prediction. This standard deviation
@@ -25,7 +25,7 @@ use greylag_physics::{State, Time};
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
 /// Deviations in one plane within this time are attributed to one cause, s.
 const ONE_CAUSE_S: f64 = 20.0;
-/// Fraction of the envelope's smallest airspeed below which the monitor makes no comparison.
+/// Fraction of the envelope's smallest airspeed below which nothing is compared.
 const SLOWEST: f64 = 0.8;
 
 /// Measurement and prediction of one channel: m/s² for specific forces, rad/s² for angular accelerations.
@@ -34,9 +34,9 @@ pub struct Compared {
     /// Measured value. Specific forces are values at the sample, angular accelerations are means over the preceding
     /// step.
     pub measured: f64,
-    /// Value predicted by the model.
+    /// Value predicted by the model, m/s² or rad/s².
     pub predicted: f64,
-    /// Half width of the band about the prediction: two standard deviations.
+    /// Half width of the band about the prediction, two standard deviations, in the same unit.
     pub band: f64,
 }
 
@@ -142,7 +142,7 @@ impl Monitor {
             frame.actuators.rudder,
         ];
         for (k, watch) in self.watches.iter_mut().enumerate() {
-            // Differenced rates are means over the step; forces are values at its end.
+            // Differenced rates are means over the step. Specific forces are values at its end.
             let expected =
                 if k < 3 { predicted[k] } else { 0.5 * (predicted[k] + before.predicted[k]) };
             let residual = measured[k] - expected;
@@ -189,8 +189,9 @@ mod tests {
         .unwrap()
     }
 
-    /// Warnings of the monitor in a flight of the model `truth`. `commanded` gives the reported surfaces from time, state
-    /// and trim; `acting` gives the surfaces that act on the aircraft from the reported ones and the trim.
+    /// Warnings of the monitor, with their times (s), in a flight of the model `truth`. `commanded` returns the
+    /// reported surfaces from time, state and trim. `acting` returns the surfaces that act on the aircraft from the
+    /// reported surfaces and the trim.
     fn warnings(
         seconds: f64,
         truth: &GreyBox,

@@ -1,4 +1,4 @@
-//! Predicted accelerations with their standard deviations.
+//! Predicted accelerations with their variances.
 
 use greylag_link::vehicle::Telemetry;
 use greylag_model::GreyBox;
@@ -14,8 +14,8 @@ pub type Six = [f64; 6];
 const AIRSPEED_SD: f64 = 0.02;
 const SURFACE_SD: f64 = 0.3 * DEGREE;
 const THROTTLE_SD: f64 = 0.02;
-/// Gust intensity (m/s) and scale (m) for the rotation of the air, which no sensor measures: σ_p of MIL-F-8785C is
-/// 1.9 σ_w / √(L b).
+/// Gust intensity (m/s) and scale length (m) for the rotation of the air, which no sensor measures. σ_p of MIL-F-8785C
+/// is 1.9 σ_w / √(L b).
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
 /// Largest step of the finite differences in α and β, rad. A step by the standard deviation of a gust could end beyond
@@ -41,7 +41,7 @@ struct Asked {
     altitude: f64,
 }
 
-/// Adds one standard deviation to one uncertain input.
+/// Adds one standard deviation to one uncertain input of the model.
 type Change = fn(&mut Asked, &Deviations);
 
 /// Standard deviations that vary in flight.

@@ -1,4 +1,4 @@
-//! Monitor of one channel: size and duration of its residual outside the band.
+//! Monitor of one channel: size of its residual relative to the band, and duration outside the band.
 
 /// Time constant of the residual's low-pass, s: five samples of differenced gyro signals.
 const SMOOTHED_S: f64 = 0.1;
@@ -41,8 +41,8 @@ struct Follows {
 }
 
 impl Watch {
-    /// Updates the monitor with the residual of a step of `dt` (s), the variance of its prediction, and the deflection (rad)
-    /// of the channel's surface.
+    /// Updates the monitor with the residual of a step of `dt` (s). `variance` is the variance of the prediction in the
+    /// square of the residual's unit. `surface` is the deflection (rad) of the channel's surface.
     pub fn see(&mut self, residual: f64, variance: f64, surface: f64, dt: f64) {
         let towards = |from: &mut f64, to: f64, time: f64| *from += (to - *from) * dt / (time + dt);
         towards(&mut self.residual, residual, SMOOTHED_S);
@@ -139,7 +139,7 @@ mod tests {
     fn a_residual_that_swings_about_zero_is_outside_all_the_same() {
         let times = departures(20.0, |t| 5.0 * (TAU * 0.5 * t).sin());
         assert_eq!(times.len(), 1, "{times:?}");
-        // Noise of a gyro's differences, ten times the band from sample to sample.
+        // Differenced gyro noise, ten times the band and alternating from sample to sample.
         let noise = |t: f64| if (t / DT).round() as i64 % 2 == 0 { 20.0 } else { -20.0 };
         assert_eq!(departures(20.0, noise), [0.0; 0]);
     }

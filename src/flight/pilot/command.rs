@@ -1,4 +1,4 @@
-//! Selection of the command: planned, fallback, held, or level trim.
+//! Selection of the command: planned, fallback, held or level trim.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 

@@ -1,16 +1,16 @@
-//! Settings of the pilot: envelope, timeouts, slew limits, trim of straight flight.
+//! Settings of the pilot: envelope, timeouts, slew limits, and the trim of straight flight.
 //!
-//! "Level trim" abbreviates [`Trim::straight`] with level wings: level flight, or the descent at idle throttle where
-//! no throttle holds level flight.
+//! "Level trim" stands for [`Trim::straight`] with level wings. It is level flight, or a descent at idle throttle at
+//! airspeeds at which no throttle holds level flight.
 
 use super::polarity::Answers;
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::airframe::Envelope;
 
-/// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
+/// Airspeed step between two rows of the trim table, m/s. Interpolated pitch has an error below 0.1°.
 const TRIM_SPACING: f64 = 1.0;
 
-/// The pilot's settings. Fields have their units in their names, since parameters and files show them.
+/// The pilot's settings. The field names contain the units, because parameters and files show these names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Flight envelope from the airframe file.
@@ -19,9 +19,9 @@ pub struct Config {
     pub offboard_loss_s: f64,
     /// Timeout of fresh states, s. The vehicle link then counts as lost.
     pub vehicle_loss_s: f64,
-    /// Longest gap in usable states over which the last command is held, s.
+    /// Longest gap in usable states during which the last command is held, s.
     pub state_hold_s: f64,
-    /// Slew limit of the throttle command, in units of 0..1 per second.
+    /// Slew limit of the throttle command (0..1), 1/s.
     pub throttle_slew_per_s: f64,
     /// Source of the throttle in OFFBOARD.
     pub thrust_source: ThrustSource,
@@ -59,7 +59,7 @@ pub struct TrimPoint {
 }
 
 impl Config {
-    /// Settings for the aircraft of `model`: its envelope and its trim of straight flight.
+    /// Settings for the aircraft of `model`, with its envelope and its trim of straight flight.
     ///
     /// # Errors
     ///
@@ -79,20 +79,20 @@ impl Config {
         Ok(config)
     }
 
-    /// Default settings with an envelope and the rows of a trim table.
+    /// Default settings with an envelope and a trim table.
     pub fn new(envelope: Envelope, trim: Vec<TrimPoint>) -> Self {
         Config {
             envelope,
             offboard_loss_s: 1.0,
             vehicle_loss_s: 0.5,
-            // Five frames: longer than the jitter of a link, shorter than a wrong aileron needs
-            // to roll the aircraft far.
+            // Five frames: longer than the jitter of a link, and too short for a wrong aileron to roll the aircraft
+            // far.
             state_hold_s: 0.05,
             // Full travel in 0.2 s, the time constant of the motor: a faster command would not change the thrust.
             throttle_slew_per_s: 5.0,
             thrust_source: ThrustSource::Cruise,
             arm_tilt_max_deg: 60.0,
-            // Below every airspeed at which a fixed-wing aircraft of this class flies.
+            // Below the flying speed of every fixed-wing aircraft of this class.
             disarm_airspeed_max_mps: 8.0,
             trim,
             answers: None,
@@ -206,7 +206,7 @@ impl Config {
         ]
     }
 
-    /// Trim of straight flight at an airspeed (m/s): linear between the rows, constant outside.
+    /// Trim of straight flight at a true airspeed (m/s): linear between the rows of the table, constant outside.
     pub fn trim_at(&self, airspeed_mps: f64) -> TrimPoint {
         let (first, last) = (self.trim[0], self.trim[self.trim.len() - 1]);
         if airspeed_mps <= first.airspeed_mps {
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn trim_is_that_of_the_simulator() {
         let full = model().airframe.actuators.elevator.travel.most;
-        // The three rows measured in JSBSim; the tolerance of 0.05° is half of the table's spacing error.
+        // Three rows measured in JSBSim. The tolerance of 0.05° is half of the table's interpolation error.
         for (airspeed, pitch, deflection, throttle) in [
             (16.67, 2.283, 0.01855, 0.118),
             (20.0, 0.858, 0.0688, 0.185),

@@ -13,9 +13,9 @@ pub struct Request {
     pub observation: Observation,
     /// Target, already limited to the envelope.
     pub target: Target,
-    /// The controller's last command, if the envelope limiter changed it.
+    /// The controller's last command, if the envelope limiter changed it; otherwise `None`.
     pub overruled: Option<Overruled>,
-    /// Set on engagement: the planner must reset its internal state.
+    /// Whether the planner is being engaged and must reset its internal state.
     pub engage: bool,
 }
 
@@ -38,7 +38,7 @@ impl Request {
 /// Outcome of a planning request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Plan {
-    /// The planner's command, in time; it need not be finite or in range.
+    /// The planner's command arrived in time. It need not be finite or in range.
     Ready(Command),
     /// The planner's command did not arrive in time.
     Late,
@@ -53,15 +53,15 @@ pub enum Plan {
 pub enum Source {
     /// The planner's own command.
     Planned,
-    /// The fallback controller's command, because the plan was late.
+    /// The fallback controller's command, because the plan was late or the planner was busy.
     Late,
-    /// The fallback controller's command, because there was no finite plan.
+    /// The fallback controller's command, because no planner is active or its command was not finite.
     Fallback,
-    /// The last command, held over a short gap in the state.
+    /// The last command, held over a short gap in usable states.
     Held,
-    /// Level trim, because the state is unusable.
+    /// Level trim, because the state is unusable or the fallback's command is not finite.
     Level,
-    /// Pilot sticks, directly.
+    /// The pilot's stick positions as surface and throttle commands.
     Sticks,
     /// Level trim with the small pulses of the sign check.
     Check,
@@ -70,7 +70,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// Name in recordings.
+    /// Name of the origin in recordings.
     pub fn name(self) -> &'static str {
         match self {
             Source::Planned => "planned",

@@ -36,7 +36,7 @@ impl Pilot {
         }
     }
 
-    /// Whether the state is fresh; `None` before the first.
+    /// Whether the state is fresh; `None` before the first fresh state.
     pub(super) fn state_fresh(&self) -> Option<bool> {
         let limit = match self.estimate.is_frozen() {
             true => self.config.vehicle_loss_s.min(FROZEN_LOSS_S),
@@ -109,7 +109,7 @@ impl Pilot {
         }
     }
 
-    /// Resets after a restart of the vehicle's clock: earlier states and times are invalid.
+    /// Resets the pilot after a restart of the vehicle's clock, because earlier states and times are invalid.
     pub(super) fn restart(&mut self) {
         if self.estimate.last().is_some() {
             self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");

@@ -1,7 +1,7 @@
-//! The pilot: from telemetry, time and requests to one command per tick.
+//! The pilot turns telemetry, time and requests into one command per tick.
 //!
-//! A tick uses no socket, clock, lock or `Result`, so that a recording can be replayed: the same
-//! calls give the same commands to the bit. [`Pilot`] describes the order of calls.
+//! A tick uses no socket, clock, lock or `Result`. A recording can therefore be replayed: the same calls give the same
+//! commands to the bit. [`Pilot`] describes the order of calls.
 //!
 //! ```text
 //! planned command ─► fallback controller ─► command held 50 ms ─► wings level at trim constants
@@ -71,9 +71,9 @@ pub struct Pilot {
     fallback: Box<dyn Controller>,
     estimate: Estimate,
     texts: Texts,
-    /// Present vehicle time, also between states.
+    /// Present vehicle time, which also advances between states.
     clock: Time,
-    /// Time of the state that is answered.
+    /// Vehicle time of the state to which the pilot responds.
     answering: Time,
     armed: bool,
     mode: Mode,
@@ -83,13 +83,13 @@ pub struct Pilot {
     vehicle_lost: bool,
     /// Whether a loss of the vehicle was reported and its recovery was not.
     loss_reported: bool,
-    /// When the vehicle link last recovered.
+    /// Vehicle time at which the vehicle link last recovered.
     vehicle_back: Option<Time>,
-    /// Since when airspeed and altitude are missing.
+    /// Vehicle time since which airspeed and altitude are missing.
     air_late: Option<Time>,
     /// Roll and pitch (rad) of the setpoint whose limitation was reported.
     cut: Option<[f64; 2]>,
-    /// The last command.
+    /// The last command, after slew limits.
     in_force: Command,
     /// The command before the last command. Repeated states are not counted.
     before: Command,
@@ -115,15 +115,15 @@ pub struct Pilot {
     oscillated: Option<Time>,
     /// Low-pass of the controller's commands, and the time of its last update.
     mean: Option<(Time, Command)>,
-    /// Whether recovery from an upset is active.
+    /// Whether the recovery from an upset is active.
     upset: bool,
-    /// Fault found by the sign check or the oscillation guard since arming.
+    /// Fault found by the sign check or the oscillation guard since arming; `None` without a fault.
     refused: Option<Fault>,
     /// The model monitor, if set.
     monitor: Option<Monitor>,
     /// The envelope limiter, if set.
     envelope: Option<EnvelopeLimiter>,
-    /// The last command of a controller, if a limit or check changed it before it was flown.
+    /// The last command of a controller, if the envelope limiter changed it; otherwise `None`.
     overruled: Option<Overruled>,
 }
 
@@ -139,7 +139,7 @@ enum Pending {
 }
 
 impl Pilot {
-    /// A pilot, disarmed and in HOLD, with settings `config` and the controller `fallback`.
+    /// A pilot with the settings `config` and the fallback controller `fallback`. It starts disarmed and in HOLD.
     ///
     /// # Errors
     ///
@@ -319,7 +319,7 @@ impl Pilot {
         self.load = load;
     }
 
-    /// Sends a text from outside the pilot to the ground stations.
+    /// Sends a text of another part of the program to the ground stations.
     pub fn send_text(&mut self, severity: Severity, words: &str) {
         self.texts.say(severity, words);
     }
@@ -379,7 +379,7 @@ impl Pilot {
         self.target = self.limits.limit(wish, frame.state.airspeed);
         self.report_limits(&wish);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
-        // Noise of a sensor at rest may be negative.
+        // Sensor noise at zero airspeed may be negative.
         state.airspeed = state.airspeed.max(0.0);
         Pending::Fly {
             seen: Observation {

@@ -1,4 +1,4 @@
-//! The pilot's model monitor: deviations are reported to the ground stations.
+//! The pilot's use of the model monitor: deviations are reported to the ground stations.
 
 use super::Pilot;
 use crate::monitor::Monitor;
@@ -6,7 +6,7 @@ use greylag_link::autopilot::Severity;
 use greylag_link::vehicle::Telemetry;
 
 impl Pilot {
-    /// Compares measurements with the predictions of `monitor` from now on, while armed.
+    /// Sets the model monitor. From now on it compares measurements with its predictions while the pilot is armed.
     pub fn monitor_with(&mut self, monitor: Monitor) {
         self.monitor = Some(monitor);
     }

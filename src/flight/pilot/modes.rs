@@ -1,4 +1,4 @@
-//! Arming, modes and parameters: requests of clients to the pilot.
+//! Requests of clients to the pilot: arming, modes, setpoints and parameters.
 
 use super::estimate::within;
 use super::{Pilot, Source, parameters};
@@ -8,7 +8,7 @@ use greylag_link::autopilot::{
 };
 use greylag_physics::{ActuatorState, Command, Time};
 
-/// Name of a mode in ground stations.
+/// Name of a mode, as ground stations show it.
 pub fn mode_name(mode: Mode) -> &'static str {
     match mode {
         Mode::Manual => "MANUAL",
@@ -140,7 +140,7 @@ impl Autopilot for Pilot {
 
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint) {
         self.advance(now);
-        // the client side guarantees finite numbers; this check does not depend on it
+        // setpoints from the link are finite already; the pilot checks again
         if setpoint.roll.is_finite() && setpoint.pitch.is_finite() {
             let thrust = setpoint.thrust.filter(|x| x.is_finite());
             self.setpoint = Some((now, AttitudeSetpoint { thrust, ..setpoint }));

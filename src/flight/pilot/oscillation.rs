@@ -10,14 +10,15 @@ use super::limits::TICK_S;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, State, Time};
 
-/// Time constant of the high-pass on the rate, s: the pitch rate of a steady turn is removed.
+/// Time constant of the high-pass on the rate, s. The high-pass removes the pitch rate of a steady turn.
 const SLOW_S: f64 = 0.5;
-/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics, faster is structure or noise.
+/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics; faster motion is structural vibration or
+/// noise.
 const HALF_SWING_S: [f64; 2] = [0.06, 0.5];
 /// Smallest peak rate of a half period, rad/s (23 °/s). It is three times the peak in light turbulence and a quarter of
 /// the mildest observed limit cycle (pitch 4° rms at 2.6 Hz is 90 °/s).
 const PEAK: f64 = 0.4;
-/// Dead band of the rate's sign, rad/s (3 °/s): ten times the noise of a gyro.
+/// Dead band for the sign of the rate, rad/s (3 °/s): ten times the noise of a gyro.
 const NO_SIGN: f64 = 0.05;
 /// Smallest fraction of a half period with the command at its slew limit or stop: a fifth, less a tolerance for
 /// rounding.
@@ -36,9 +37,9 @@ const ALL: f64 = 0.999;
 #[derive(Clone, Copy, Debug)]
 struct Swings {
     mean: Option<f64>,
-    /// Sign of the present half period, 0 before the first.
+    /// Sign of the rate in the present half period; 0 before the first.
     sign: f64,
-    /// Duration of the present half period, and its part with the command at a limit, s.
+    /// Duration of the present half period, and the part of it with the command at a limit, s.
     lasts: f64,
     limited: f64,
     peak: f64,
@@ -49,7 +50,7 @@ struct Swings {
     row_s: f64,
 }
 
-/// The empty range of commands.
+/// The empty range: no command yet.
 const NONE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 impl Default for Swings {
@@ -111,7 +112,7 @@ impl Swings {
         (self.row >= SWINGS && self.row_s >= LONG_S).then_some(self.row_s)
     }
 
-    /// Evaluates a half period at its end.
+    /// Evaluates a half period when it ends.
     fn close(&mut self) {
         let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&self.lasts)
             && self.peak >= PEAK
@@ -173,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_swing_over_half_of_the_travel_is_found_without_the_limit() {
-        // the elevator changes by at most 0.15 a tick, where 0.2 is allowed, and reaches at most 0.8
+        // The elevator changes by at most 0.15 per tick (the limit is 0.2) and reaches at most 0.8.
         let q = |t: f64| 2.5 * (TAU * 3.0 * t).sin();
         let elevator = |part: f64| move |t: f64| -part * (TAU * 3.0 * t + 0.6).sin();
         let at = trips(5.0, q, elevator(0.8)).unwrap();

@@ -3,10 +3,10 @@
 use super::config::{Config, ThrustSource};
 use greylag_link::autopilot::{Parameter, ParameterValue, Verdict};
 
-/// A real parameter: name, getter, setter.
+/// A parameter with a real value: name, getter and setter.
 type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
 
-/// The real parameters in index order. Names have at most 16 characters.
+/// The real parameters in the order of their indices. Names have at most 16 characters.
 const REALS: [Real; 12] = [
     ("GL_OFFB_LOSS_S", |c| c.offboard_loss_s, |c, x| c.offboard_loss_s = x),
     ("GL_VEH_LOSS_S", |c| c.vehicle_loss_s, |c, x| c.vehicle_loss_s = x),
@@ -29,7 +29,7 @@ const REALS: [Real; 12] = [
 const THRUST_SOURCE: usize = REALS.len();
 /// Index of SYSID_THISMAV, a constant that ground stations read.
 const SYSTEM_ID: usize = REALS.len() + 1;
-/// The system id of the autopilot identity.
+/// System id of the autopilot as clients see it.
 const AUTOPILOT_SYSTEM: i32 = 1;
 
 /// The parameter table of `config`.

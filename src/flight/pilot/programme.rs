@@ -1,4 +1,4 @@
-//! The flight-test schedule flown in OFFBOARD, if there is one.
+//! The flight-test schedule, if one is flown in OFFBOARD.
 
 use super::texts::Texts;
 use greylag_control::Target;
@@ -37,7 +37,7 @@ impl Programme {
         (self.demand, self.stage) = (None, Stage::Waiting);
     }
 
-    /// The target at `now`; the first call starts the schedule.
+    /// The target at `now`. The first call starts the schedule.
     pub(super) fn wish(&mut self, now: Time, texts: &mut Texts) -> Target {
         let demand = self.overlay.demand(now);
         let over = self.overlay.is_over(now);

@@ -1,4 +1,4 @@
-//! Checks of the usability of a state frame.
+//! Checks whether a state frame is usable.
 
 use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
@@ -26,7 +26,7 @@ pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
 fn implausible(frame: &Telemetry) -> Option<&'static str> {
     let (s, z) = (&frame.state, &frame.actuators);
     let actuators = [z.aileron, z.aileron_rate, z.elevator, z.elevator_rate, z.throttle];
-    // Comparisons with NaN are false, so these also refuse what is not finite.
+    // Comparisons with NaN are false: values that are not finite are refused as well.
     if !(s.roll.abs() <= HALF_TURN && s.pitch.abs() <= HALF_TURN / 2.0) {
         Some("attitude")
     } else if !limits::rates([s.p, s.q, s.r]) {
@@ -42,7 +42,7 @@ fn implausible(frame: &Telemetry) -> Option<&'static str> {
     }
 }
 
-/// Whether every measured value equals that of `earlier` bit by bit: a frozen sensor.
+/// Whether every sensor value equals that of `earlier` bit by bit, which indicates a frozen sensor.
 pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
     let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
     same(&frame.state.to_array(), &earlier.state.to_array())
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_edge_of_the_plausible_is_still_flown() {
-        // inverted in a spin near a gyroscope's full scale: plausible, and the pilot is needed most
+        // inverted in a spin near a gyroscope's full scale: plausible, and a usable state is then essential
         let mut frame = good();
         frame.state.roll = -std::f64::consts::PI;
         frame.state.p = 34.9;

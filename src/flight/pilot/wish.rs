@@ -5,7 +5,7 @@ use greylag_control::Target;
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Smallest reduction of an attitude by the envelope that is reported, rad.
+/// Smallest reduction of a commanded angle by the envelope that is reported, rad.
 const REPORTED_CUT: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 impl Pilot {

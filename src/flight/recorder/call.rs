@@ -29,21 +29,21 @@ pub enum Planned {
 pub enum Call {
     /// Vehicle time was advanced to this time.
     Advance(Time),
-    /// This computer had stalled for this long.
+    /// This computer had stalled for this time.
     Excuse(Duration),
     /// The state of this vehicle time was observed. The planner's reply and the resulting command follow.
     Tick(Time, Planned, Command),
-    /// Arming was requested, with or without force.
+    /// Arming was requested at this vehicle time; the flag is set if it was forced.
     Arm(Time, bool),
-    /// Disarming was requested, with or without force.
+    /// Disarming was requested at this vehicle time; the flag is set if it was forced.
     Disarm(Time, bool),
     /// The flight controller gave control authority.
     Engaged(Time),
-    /// A mode was requested.
+    /// A mode was requested at this vehicle time.
     Mode(Time, Mode),
-    /// A setpoint was received.
+    /// An attitude setpoint was received at this vehicle time.
     Setpoint(Time, AttitudeSetpoint),
-    /// Stick positions were received.
+    /// Stick positions were received at this vehicle time.
     Sticks(Time, Sticks),
     /// The parameter with this index was set to this value.
     Parameter(usize, ParameterValue),
@@ -100,7 +100,7 @@ impl fmt::Display for Words<'_> {
     }
 }
 
-/// Whether two commands are equal bit by bit.
+/// Whether two commands are equal bit by bit; 0 and −0 differ.
 pub fn same(a: &Command, b: &Command) -> bool {
     let bits = |c: &Command| [c.aileron, c.elevator, c.throttle, c.rudder].map(f64::to_bits);
     bits(a) == bits(b)

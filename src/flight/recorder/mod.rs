@@ -1,4 +1,4 @@
-//! The recorder: a thread that writes `flight.csv`, `flight.tlog`, `flight.calls`.
+//! The recorder: a thread that writes the files `flight.csv`, `flight.tlog` and `flight.calls`.
 //!
 //! The control thread queues entries and never waits. Entries that do not fit are dropped and counted. An error of the
 //! disk closes the file concerned and is reported once; the flight continues.
@@ -23,7 +23,7 @@ use queue::Queue;
 
 /// Capacity of the queue: four seconds of a 100 Hz loop with its traffic.
 const QUEUE: usize = 4096;
-/// Longest time before written entries are flushed.
+/// Longest time between the writing of an entry and its flush to the disk.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
 /// An entry of the queue.
@@ -95,7 +95,7 @@ impl Recorder {
         self.queue.hand_over(Entry::Row(Box::new(row)));
     }
 
-    /// Records a datagram, or whole frames of a stream, sent or received at `unix_us` (µs since 1970).
+    /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970).
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
         self.queue.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }
@@ -110,12 +110,12 @@ impl Recorder {
         self.troubles.try_recv().ok()
     }
 
-    /// Entries dropped because the queue was full.
+    /// Number of entries dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped()
     }
 
-    /// Writes the queued entries, closes the files and returns the counters.
+    /// Writes the queued entries, closes the files and returns the counters of the recording.
     pub fn finish(mut self) -> Written {
         self.close()
     }

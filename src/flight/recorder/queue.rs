@@ -1,4 +1,4 @@
-//! A queue to a thread that never blocks the sender: entries that do not fit are dropped and counted.
+//! A queue to a thread that never blocks the sender. Entries that do not fit are dropped and counted.
 
 use crate::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
 
@@ -11,7 +11,8 @@ pub struct Queue<E, W> {
 }
 
 impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
-    /// A queue of `size` entries to a thread called `name`, which runs `work` until the queue is closed and empty.
+    /// A queue of `size` entries to a new thread called `name`. The thread runs `work` until the queue is closed and
+    /// empty.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! A tick as a row of `flight.csv`.
+//! One tick as a row of `flight.csv`.
 
 use std::io::Write;
 
@@ -17,12 +17,13 @@ pub struct Row {
     pub decision: Decision,
     /// Time from the arrival of the state frame to the sending of the command, µs.
     pub latency_us: f64,
-    /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; NaN when unknown.
+    /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; dimensionless, NaN if
+    /// unknown.
     pub residuals: [f64; 6],
 }
 
 impl Row {
-    /// The columns in addition to those of the log format.
+    /// Names of the columns in addition to those of the log format.
     pub const EXTRA: [&'static str; 12] = [
         "airspeed_target_mps",
         "mode",

@@ -1,4 +1,4 @@
-//! Vehicle time between two state frames, extrapolated by the host's monotonic clock.
+//! Vehicle time between two state frames, extrapolated with the host's monotonic clock.
 
 use std::time::{Duration, Instant};
 
@@ -7,7 +7,7 @@ use greylag_physics::Time;
 /// Advance of vehicle time between frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Real time: between frames vehicle time advances with the host's clock, while the link is polled.
+    /// Real time: between frames, vehicle time advances with the host's clock while the link is polled.
     RealTime,
     /// Lockstep: vehicle time is constant between frames, until the vehicle has been silent for [`PATIENCE`]. The
     /// result of a flight does not depend on the speed of the machine.
@@ -81,7 +81,7 @@ mod tests {
         let start = Instant::now();
         let time = |ms: u64| Time::from_micros(1000 * ms);
         let later = |ms: u64| start + Duration::from_millis(ms);
-        // One second in which the link was polled, then four in which it was not.
+        // The link is polled for one second, then not polled for four seconds.
         for (pace, after_a_second, after_five) in
             [(Pace::RealTime, 6000, 6100), (Pace::Lockstep, 5000, 5000)]
         {
@@ -99,7 +99,7 @@ mod tests {
         }
         // Half a second after the patience has ended, vehicle time is half a second ahead: the link counts as lost.
         assert_eq!(clock.at(later(1700)), time(5500));
-        // A companion that stalled for five seconds did not observe five seconds of silence.
+        // In a stall of five seconds the companion did not observe five seconds of silence.
         assert_eq!(clock.at(later(6700)), time(5600));
         clock.set(later(6700), time(5010));
         assert_eq!(clock.at(later(9000)), time(5010));

@@ -1,4 +1,4 @@
-//! The control thread: a loop that answers state frames, then serves clients.
+//! The control thread: a loop that first responds to state frames and then serves clients.
 
 mod clients;
 mod vehicle;
@@ -35,7 +35,7 @@ const CYCLE: Duration = Duration::from_millis(10);
 const NO_VEHICLE: Duration = Duration::from_secs(2);
 /// Weight of the newest tick in the low-pass of the reported load.
 const LOAD_WEIGHT: f64 = 0.02;
-/// Identity of the autopilot towards clients.
+/// Ids of the autopilot in messages to clients.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
 /// Longest wait for a live state after a stall, and the largest age of a live state.
@@ -45,7 +45,7 @@ const HAND_OVER: Duration = Duration::from_secs(2);
 /// Interval of queries to the scheduler.
 const WAITED: Duration = Duration::from_secs(1);
 
-/// Origin of a packet.
+/// A received packet with its origin.
 enum Arrived {
     Vehicle(Arrival),
     Client(Arrival),
@@ -66,7 +66,7 @@ pub(super) struct Control {
     clock: Clock,
     timing: Timing,
     attention: Attention,
-    /// The scheduler's last counters, and when to query again.
+    /// The scheduler's last counters, and the time of the next query.
     waited: Waited,
     next_waited: Instant,
     reports: Reports,
@@ -180,7 +180,7 @@ impl Control {
         let host = Instant::now();
         let (behind, since) = self.attention.look(host, self.ports.rounds())?;
         let before = self.clock.at(since);
-        // the first round may have started before the stall; the second has polled every socket
+        // the first round may have started before the end of the stall; the second polls every socket
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);
@@ -206,7 +206,7 @@ impl Control {
         Some(before.plus(missed.saturating_sub(CATCH_UP)))
     }
 
-    /// Reports a link condition to the ground stations and as an event.
+    /// Reports a condition of a link to the ground stations.
     fn remark(&mut self, remark: &Remark) {
         self.pilot.send_text(Severity::Warning, &remark.to_string());
     }
@@ -257,7 +257,7 @@ impl Control {
     }
 
     fn say(&self, event: Event) {
-        // there may be no reader of the events; control does not wait
+        // the events may have no reader; the control thread does not wait
         let _ = self.events.try_send(event);
     }
 

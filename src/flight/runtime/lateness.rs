@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-/// Delay of a thread that counts as a stall: ten cycles.
+/// Delay of a thread above which it counts as stalled: ten cycles.
 const LATE: Duration = Duration::from_millis(100);
 /// Longest interval between two checks of a running thread: at least one check per cycle.
 const USUAL: Duration = Duration::from_millis(10);
-/// Least time between two reports.
+/// Least time between two stall reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(5);
-/// Fraction of a stall in which the thread was runnable, above which the cause is other load.
+/// Fraction of a stall in which the thread was runnable. Above it, other load is the cause.
 const BUSY: f64 = 0.5;
 
 /// The thread that stalled.
@@ -49,7 +49,7 @@ impl Attention {
         }
     }
 
-    /// Restarts after a stall: both threads listen again at `host`.
+    /// Restarts the detector after a stall, at the time `host` at which both threads poll again.
     pub(super) fn resume(&mut self, host: Instant, rounds: u64) {
         *self = Attention { looked: host, network: (rounds, host) };
     }
@@ -63,7 +63,7 @@ pub(super) fn lateness(since: Instant, host: Instant) -> Duration {
 /// Cause of a stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// The thread was runnable, and other work had the processor.
+    /// The thread was runnable, but other work used the processor.
     Busy,
     /// The thread was suspended.
     Stopped,
@@ -144,7 +144,7 @@ impl Reports {
     }
 }
 
-/// Text on the load of the processors by other work.
+/// Text on the processor load by other work.
 fn busy() -> String {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let load = std::fs::read_to_string("/proc/loadavg").ok();

@@ -1,4 +1,4 @@
-//! The planner of a tick: a controller in the loop, or one on its own thread.
+//! The planner of a tick: a controller in the control loop or on a separate thread.
 
 mod threaded;
 
@@ -86,7 +86,7 @@ mod tests {
     }
 
     impl Bench {
-        /// `waits`: whether each plan waits, in order.
+        /// `waits` holds, for each plan in order, whether the plan waits for a release.
         fn new(pace: Pace, waits: &[bool]) -> Bench {
             let ((begun, started), (go, gate)) = (bounded(9), bounded(9));
             let waits = waits.iter().rev().copied().collect();

@@ -22,12 +22,12 @@ pub(super) struct Ports {
     guard: Option<Guard>,
     pub(super) from_vehicle: Receiver<Arrival>,
     pub(super) from_clients: Receiver<Arrival>,
-    // Dropped last: it closes the sockets.
+    // Must be dropped last, because dropping it closes the sockets.
     network: Network,
 }
 
 impl Ports {
-    /// Opens all links, or none.
+    /// Opens all links. After an error none stays open.
     pub(super) fn open(options: &FlightOptions) -> Result<Self, FlightError> {
         let guard = options.signing.as_ref().map(|s| Guard::open(s, options)).transpose()?;
         let mut network = Network::start()?;
@@ -52,7 +52,7 @@ impl Ports {
         self.clients.iter().map(Link::local).collect()
     }
 
-    /// Rounds of the network thread.
+    /// Number of rounds of the network thread.
     pub(super) fn rounds(&self) -> u64 {
         self.network.rounds()
     }
@@ -68,7 +68,7 @@ impl Ports {
         self.vehicle.send(peer, frames);
     }
 
-    /// Sends a frame to a client on the link it was received from.
+    /// Sends a frame to a client on the client's link.
     pub(super) fn send_to_client(&mut self, unix_us: u64, peer: PeerId, frame: Vec<u8>) {
         let frame = self.signed(unix_us, peer.link, frame);
         if let Some(link) = self.clients.iter().find(|link| link.id() == peer.link)
@@ -85,7 +85,7 @@ impl Ports {
         }
     }
 
-    /// Removes unauthenticated frames from a packet.
+    /// Removes frames without a valid signature from a packet.
     pub(super) fn sift(&mut self, unix_us: u64, packet: &mut Packet) {
         if let Some(guard) = &mut self.guard {
             let bytes = std::mem::take(&mut packet.bytes);

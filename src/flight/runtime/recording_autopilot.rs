@@ -9,7 +9,7 @@ use greylag_link::autopilot::{
 use greylag_link::vehicle::Vehicle;
 use greylag_physics::Time;
 
-/// Forwards all calls to the pilot; each text for the ground stations also becomes an event.
+/// Passes all calls to the pilot. Each text for the ground stations also becomes an event.
 pub(super) struct RecordingAutopilot<'a, F: FnMut(Event)> {
     pub(super) pilot: &'a mut Pilot,
     pub(super) vehicle: &'a Vehicle,

@@ -19,12 +19,12 @@ const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_mil
 ///
 /// # Errors
 ///
-/// If the system does not permit it, or has no such class.
+/// If the system does not permit real-time scheduling, or has no such class.
 pub fn take_real_time() -> io::Result<()> {
     #[cfg(target_os = "linux")]
     {
         let parameters = libc::sched_param { sched_priority: PRIORITY };
-        // SAFETY: the call reads the structure, which lives to its end, and changes this thread alone.
+        // SAFETY: the call reads the structure, which outlives the call, and changes this thread only.
         let result =
             unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
         if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
@@ -40,7 +40,7 @@ pub struct Punctuality {
 }
 
 impl Punctuality {
-    /// Measures for `length`, on the calling thread.
+    /// Measures the wake-up latency of the calling thread for `length`.
     pub fn measure(length: Duration) -> Self {
         let mut late = Histogram::default();
         let start = Instant::now();
@@ -111,7 +111,7 @@ fn load() -> String {
         .map_or_else(String::new, |load| format!(" (load {load} on {processors} processors)"))
 }
 
-/// The processor's frequency governor, if it saves power.
+/// Advice on the processor's frequency governor, if it saves power.
 fn governor() -> Option<String> {
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor";
     let governor = std::fs::read_to_string(path).ok()?;

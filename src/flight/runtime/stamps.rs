@@ -1,4 +1,4 @@
-//! Timestamps of recorded packets: the time of day at the start plus a monotonic clock.
+//! Timestamps of recorded packets: time of day at the start plus the time of a monotonic clock.
 
 use std::time::{Instant, SystemTime};
 
@@ -50,7 +50,7 @@ mod tests {
         let us = |us| started + Duration::from_micros(us);
         let first = stamps.of(us(1000));
         assert_eq!(stamps.of(us(301_000)) - first, 300_000);
-        // a reply sent in the microsecond of the next arrival
+        // a reply is sent in the same microsecond as the next arrival
         let [one, two] = [us(400_000), us(400_000)].map(|at| stamps.of(at));
         assert_eq!(two - one, 1);
         assert!(first.abs_diff(unix_us()) < 10_000_000);

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// Longest duration that is resolved to 1 µs, µs. All longer durations share one bucket.
 const RESOLVED_US: usize = 50_000;
 
-/// A histogram of durations, of fixed size.
+/// A histogram of durations with a fixed size.
 #[derive(Clone, Debug)]
 pub struct Histogram {
     buckets: Box<[u32]>,
@@ -33,7 +33,7 @@ impl Histogram {
         self.count
     }
 
-    /// Largest of the durations, µs.
+    /// Largest of the durations, µs; 0 without durations.
     pub fn max_us(&self) -> f64 {
         self.max_us
     }
@@ -55,16 +55,16 @@ impl Histogram {
 /// The timing of a flight.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
-    /// From the arrival of a state frame to the sending of its command.
+    /// Time from the arrival of a state frame to the sending of its command.
     pub latency: Histogram,
-    /// Between the arrivals of two state frames.
+    /// Time between the arrivals of two state frames.
     pub interval: Histogram,
-    /// Missed cycles: in real time those with a latency above 10 ms; in lockstep, where vehicle time waits for the
-    /// reply, those whose state was sent again.
+    /// Number of missed cycles. In real time these are ticks with a latency above 10 ms. In lockstep vehicle time waits
+    /// for the reply; missed cycles are then states that were sent again.
     pub missed: u64,
-    /// Ticks without a plan in time: it came after its deadline, or the planner was busy with an earlier request.
+    /// Number of ticks without a plan in time: the plan was late, or the planner was busy with an earlier request.
     pub late_plans: u64,
-    /// States not answered because newer ones had arrived.
+    /// Number of states without a reply because newer states had arrived.
     pub overtaken: u64,
     /// Number of stalls of more than 0.1 s.
     pub stalls: u64,
@@ -91,7 +91,7 @@ impl Timing {
     }
 }
 
-/// Fraction of late cycles above which the computer counts as too slow.
+/// Fraction of late cycles from which on the computer counts as too slow.
 const TOO_MANY: f64 = 0.02;
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::wire::mode::{self, ModeRequest};
 use crate::wire::request::CommandRequest;
 use crate::wire::telemetry;
 
-/// Value of param2 that forces arming or disarming.
+/// Value of parameter 2 that forces arming or disarming.
 const FORCE: f64 = 21196.0;
 const HEARTBEAT: u32 = 0;
 const AUTOPILOT_VERSION: u32 = 148;
@@ -82,7 +82,7 @@ impl Clients {
             return;
         }
         let outcome = self.carry_out(now, at, &command, autopilot);
-        // a refused command had no effect and may be retried
+        // a refused command had no effect and may be sent again
         if outcome.result == CommandResult::Accepted && CHANGING.contains(&command.number) {
             self.sessions[at].remember(now.host, command, outcome.result);
         }

@@ -17,7 +17,7 @@ pub struct ClientCounts {
     pub echoes: u64,
     /// Requests addressed to another system or component.
     pub for_others: u64,
-    /// Frames from new peers while all sessions were taken.
+    /// Frames from new peers while all sessions were in use.
     pub turned_away: u64,
     /// Setpoints and stick positions that were invalid or of an unsupported kind.
     pub refused_setpoints: u64,

@@ -69,8 +69,8 @@ impl Clients {
         self.reply(at, &message);
     }
 
-    /// Sets a parameter. The present value is always sent in reply; after a change it is sent to all peers. A refusal
-    /// is also reported by PARAM_ERROR and as text.
+    /// Sets a parameter. The value of an existing parameter is always sent in reply; after a change it is sent to all
+    /// peers. A refusal is also reported by PARAM_ERROR and as text.
     pub(super) fn set_parameter(
         &mut self,
         now: Now,

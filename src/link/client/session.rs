@@ -1,4 +1,4 @@
-//! Session of one client: MAVLink version, sequence counter, streams, parameter transfer.
+//! Session of one client: MAVLink version, sequence number, streams and parameter transfer.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::wire::request::CommandRequest;
 
 /// Silence after which a peer's MAVLink version is determined again, because another program may use its address.
 const VERSION_MEMORY: Duration = Duration::from_secs(5);
-/// Time within which a repeated command counts as a retransmission.
+/// Time within which the same command counts as a retransmission.
 const COMMAND_MEMORY: Duration = Duration::from_secs(3);
 /// Largest burst of warnings to one peer, and the interval after which one more warning is allowed.
 const COMPLAINTS: u32 = 10;
@@ -45,7 +45,7 @@ pub struct Session {
     /// Message intervals of the peer's streams.
     pub streams: StreamTable,
     version: Version,
-    /// Whether `version` was observed from the peer.
+    /// Whether `version` was determined from a frame of the peer.
     spoken: bool,
     sequence: u8,
     last_command: Option<(CommandRequest, CommandResult, Duration)>,
@@ -148,7 +148,7 @@ impl Session {
         (again && host.saturating_sub(*when) < COMMAND_MEMORY).then_some(*result)
     }
 
-    /// Stores the result of a command for its retransmissions.
+    /// Stores the result of a command, in case the command is retransmitted.
     pub fn remember(&mut self, host: Duration, command: CommandRequest, result: CommandResult) {
         self.last_command = Some((command, result, host));
     }

@@ -1,4 +1,4 @@
-//! Message intervals of a client's streams. Messages and default rates are in [`STREAMS`] in
+//! Message intervals of a client's streams. The messages and their default rates are in [`STREAMS`] in
 //! `link/wire/telemetry.rs`.
 
 use std::time::Duration;
@@ -50,7 +50,7 @@ impl StreamTable {
     }
 
     /// Sets row `at` as SET_MESSAGE_INTERVAL specifies: µs, 0 for the default, −1 for off. The interval is clamped to
-    /// 10 ms..60 s. `Err` if the value is negative or NaN.
+    /// 10 ms..60 s. `Err` for any other negative value and for NaN.
     pub fn set_interval(&mut self, at: usize, us: f64, host: Duration) -> Result<(), ()> {
         let interval = match us {
             -1.0 => None,
@@ -94,7 +94,7 @@ mod tests {
     #[test]
     fn rates_are_limited_and_garbage_is_refused() {
         let mut table = StreamTable::new(Duration::ZERO);
-        // 1 µs would be a million messages a second.
+        // An interval of 1 µs would mean a million messages per second.
         table.set_interval(0, 1.0, Duration::ZERO).unwrap();
         assert_eq!(table.interval_us(0), 10_000);
         table.set_interval(0, 1e30, Duration::ZERO).unwrap();
@@ -112,7 +112,7 @@ mod tests {
     fn a_pause_is_not_caught_up() {
         let mut table = StreamTable::new(Duration::ZERO);
         assert!(table.is_due(0, Duration::ZERO));
-        // 10 Hz: after 5 s of silence one message, then the next 100 ms later.
+        // At 10 Hz, one message follows after 5 s of silence, and the next 100 ms later.
         let late = Duration::from_secs(5);
         assert!(table.is_due(0, late));
         assert!(!table.is_due(0, late + Duration::from_millis(99)));

@@ -33,7 +33,7 @@ const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::fr
 /// Open connections by the peer's address.
 type Connections = Arc<Mutex<HashMap<SocketAddr, Sender<Vec<u8>>>>>;
 
-/// Listens for peers; returns the bound address.
+/// Listens for peers. Returns the bound address.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,

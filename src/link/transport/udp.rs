@@ -1,4 +1,4 @@
-//! UDP links: one socket, any number of peers.
+//! UDP links: one socket for any number of peers.
 //!
 //! The socket is never connected. An unreachable peer (ICMP port unreachable) therefore does not disturb the other
 //! peers, and a peer may reply from another port than its receiving port.

@@ -64,7 +64,7 @@ impl fmt::Display for Faults {
     }
 }
 
-/// Plausible body rates, rad/s. The full scale of common gyroscopes, 2000 °/s, is 35 rad/s.
+/// Plausible body rates, rad/s. Common gyroscopes have a full scale of 2000 °/s, 35 rad/s.
 const RATE: RangeInclusive<f64> = -40.0..=40.0;
 /// Plausible airspeed, m/s. An aircraft of this kind never reaches 150 m/s; values a little below zero are sensor
 /// noise.
@@ -84,7 +84,7 @@ const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
 /// Plausible rate of the normalised deflection, 1/s. The limit of a real actuator is far below.
 const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
 
-// A range does not contain NaN, so each check below is false for NaN.
+// A range does not contain NaN: each check below is false for NaN.
 
 /// Whether the body rates p, q, r, rad/s, are plausible.
 pub fn rates(values: [f64; 3]) -> bool {

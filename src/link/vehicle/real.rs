@@ -1,4 +1,4 @@
-//! The `px4` and `ardupilot` profiles: a real flight controller, which has priority.
+//! The `px4` and `ardupilot` profiles: the vehicle is a real flight controller, which has priority.
 //!
 //! The flight controller flies until a client requests engagement. The companion then commands it through the interface
 //! of its stack. At the first fault the companion returns control authority. The interfaces of the stacks are in
@@ -41,11 +41,11 @@ use requests::Requests;
 use sticks::Sticks;
 use survey::Survey;
 
-/// Our component id: MAV_COMP_ID_ONBOARD_COMPUTER.
+/// Component id of the companion: MAV_COMP_ID_ONBOARD_COMPUTER.
 pub const ONBOARD: u8 = 191;
-/// The controller's component id: MAV_COMP_ID_AUTOPILOT1.
+/// Component id of the flight controller: MAV_COMP_ID_AUTOPILOT1.
 const AUTOPILOT: u8 = 1;
-/// Silence after which a controller counts as disconnected.
+/// Time without heartbeats after which a controller counts as disconnected.
 const GONE: Duration = Duration::from_secs(3);
 /// Fraction of its nominal rate below which a stream is requested again and engagement is refused.
 const ENOUGH: f64 = 0.8;
@@ -88,7 +88,7 @@ pub struct Real {
     sticks: Sticks,
     ramp: AttitudeRamp,
     trim: AttitudeTrim,
-    /// The last command sent to the actuators.
+    /// The last command that was demanded, in −1..1 (throttle 0..1).
     sent: Command,
     last_state: Option<Duration>,
     pulse: Pulse,
@@ -217,7 +217,7 @@ impl Real {
         self.notices.pop_front()
     }
 
-    /// Whether the controller's mode shows that it executes the commands.
+    /// Whether the controller's mode confirms that it executes the companion's commands.
     pub fn flies(&self) -> bool {
         self.engagement.is_engaged()
     }

@@ -46,13 +46,13 @@ pub struct VehicleCounts {
     pub faulty: u64,
     /// Starts of the vehicle's clock, including the first.
     pub starts: u64,
-    /// MAVLink frames from other senders than the vehicle.
+    /// MAVLink frames from senders other than the vehicle.
     pub foreign: u64,
-    /// Commands that were not finite, replaced by the last finite one.
+    /// Commands that were not finite and were replaced by the last finite command.
     pub bad_commands: u64,
 }
 
-/// Messages of the state frame in reception.
+/// Messages received so far of the next state frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct Parts {
     imu: Option<(Time, [f64; 3])>,

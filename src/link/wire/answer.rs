@@ -34,7 +34,7 @@ pub enum CommandResult {
 /// `number`.
 pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
     let [low, high] = number.to_le_bytes();
-    // command, result, then the extensions: progress, result_param2, target system and component.
+    // command and result, then the extension fields: progress, result_param2, target system and component
     Message::raw(77, vec![low, high, result as u8, 0, 0, 0, 0, 0, to.system, to.component], 3)
 }
 
@@ -60,7 +60,7 @@ pub enum ParameterFault {
     DoesNotExist,
     /// The value is out of range.
     OutOfRange,
-    /// The type differs from the table's.
+    /// The type differs from the type in the table.
     TypeMismatch,
 }
 
@@ -160,7 +160,7 @@ pub fn message_interval(id: u32, interval_us: i32) -> Message {
     }))
 }
 
-/// HOME_POSITION: latitude and longitude in 1e-7 degrees, altitude above mean sea level in mm.
+/// HOME_POSITION: latitude and longitude in 1e-7°, altitude above mean sea level in mm.
 pub fn home_position(home: Home, now: Time) -> Message {
     Message::coded(MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude: (home.position[0] * 1e7).round() as i32,
@@ -199,7 +199,7 @@ pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     const UNKNOWN_COMMAND: u8 = 7;
     let mut payload = [0; 251];
     payload[..2].copy_from_slice(&sequence.wrapping_add(1).to_le_bytes());
-    // session, opcode, size, the request's opcode; the data start at 12.
+    // session, opcode, size and opcode of the request; the data start at byte 12
     payload[2..6].copy_from_slice(&[session, NAK, 1, opcode]);
     payload[12] = UNKNOWN_COMMAND;
     Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {

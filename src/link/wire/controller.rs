@@ -23,7 +23,7 @@ pub const SET_MESSAGE_INTERVAL: u16 = 511;
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;
 
-/// A message from a flight controller, in SI units.
+/// A message from a flight controller, converted to SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ControllerMessage {
     /// HEARTBEAT of the flight controller.
@@ -46,7 +46,7 @@ pub enum ControllerMessage {
     },
     /// Accelerometers and air density from HIGHRES_IMU.
     Imu {
-        /// Time of the measurement.
+        /// Time of the measurement, as stamped by the flight controller.
         time: Time,
         /// Specific force, m/s², FRD.
         specific_force: [f64; 3],
@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn pressure_is_read_in_hectopascal_and_in_pascal() {
-        // 934.0756 hPa at 10.6 °C, as real PX4 sent it in Pa: 93407.56 / (287.053 · 283.75).
+        // 934.0756 hPa at 10.6 °C, which a real PX4 sent in Pa: 93407.56 / (287.053 · 283.75).
         for pressure in [934.0756, 93_407.56] {
             assert!(
                 (density(pressure, 10.6) - 1.14678).abs() < 1e-4,

@@ -1,4 +1,4 @@
-//! Flight modes in PX4's `custom_mode` encoding, and the heartbeat that carries them.
+//! Flight modes in PX4's `custom_mode` encoding, and the heartbeat that contains them.
 
 use mavlink::dialects::ardupilotmega::{
     AVAILABLE_MODES_DATA, CURRENT_MODE_DATA, HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag,

@@ -1,4 +1,4 @@
-//! Requests of clients, decoded from frames.
+//! Requests of clients, decoded from MAVLink frames.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 
@@ -16,7 +16,7 @@ pub struct Recipient {
     pub component: u8,
 }
 
-/// A parameter's name as sent: up to 16 bytes, zero-terminated if shorter.
+/// A parameter's name as sent: up to 16 bytes. A shorter name ends with a zero byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParameterName(pub [u8; 16]);
 
@@ -75,7 +75,7 @@ pub enum Request {
     Sticks(Option<Sticks>),
     /// Request for the whole table, PARAM_REQUEST_LIST.
     ParameterList,
-    /// PARAM_REQUEST_READ.
+    /// PARAM_REQUEST_READ by index or name.
     ParameterRead(ParameterKey),
     /// PARAM_SET. The value is `None` for a type other than INT32 and REAL32.
     ParameterSet { name: ParameterName, value: Option<ParameterValue> },

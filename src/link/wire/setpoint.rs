@@ -1,12 +1,12 @@
-//! Decoding and validation of clients' setpoints.
+//! Decoding and validation of setpoints from clients.
 
 use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 
 use crate::autopilot::{AttitudeSetpoint, Sticks};
 
-/// Mask bit: thrust is to be ignored.
+/// Mask bit that marks the thrust as ignored.
 const IGNORE_THRUST: u8 = 64;
-/// Mask bit: the attitude is to be ignored.
+/// Mask bit that marks the attitude as ignored.
 const IGNORE_ATTITUDE: u8 = 128;
 /// Norms of quaternions that are accepted and normalised. A quaternion outside this range is invalid.
 const NORM: std::ops::RangeInclusive<f64> = 0.1..=10.0;
@@ -68,7 +68,7 @@ pub fn euler(q: [f64; 4]) -> Result<(f64, f64, f64), SetpointFault> {
     Ok((roll, pitch, yaw))
 }
 
-/// The quaternion NED→FRD, w first, of Euler angles in rad.
+/// The quaternion NED→FRD, w first, of Euler angles roll, pitch and yaw in rad.
 pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     let ((sr, cr), (sp, cp), (sy, cy)) =
         ((roll / 2.0).sin_cos(), (pitch / 2.0).sin_cos(), (yaw / 2.0).sin_cos());

@@ -21,7 +21,7 @@ const ALL: u32 = 15;
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const TRAVEL: f64 = 0.5235;
 
-/// A message from the vehicle, in SI units except for the normalised actuators.
+/// A message from the vehicle in SI units, except for the normalised actuators.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VehicleMessage {
     /// Time and specific force of a state frame, from HIGHRES_IMU.

@@ -24,7 +24,7 @@ impl Answers {
     ///
     /// If the model has no straight-flight trim at `airspeed`.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        // 1000 m of altitude change a response by a tenth
+        // a change of altitude by 1000 m changes a response by a tenth
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
@@ -71,13 +71,13 @@ mod tests {
         )))
         .unwrap();
         let answers = Answers::of(&model, 20.0).unwrap();
-        // a command appears in the surfaces of the next state, in the rates of the one after
+        // a command appears in the surfaces of the next state, and in the rates of the state after that
         assert_eq!([answers.after(0, -1), answers.after(0, 0), answers.after(0, 1)], [0.0; 3]);
         // Steady roll: Clδa δa · 2 V / (b |Clp|) = 0.1202 · 0.5235 · 40 / (2.1 · 0.4042) = 2.97 rad/s. Sideslip, the
         // product of inertia and the yaw rate reduce it by half.
         let roll = answers.after(0, 20);
         assert!(roll > 1.0 && roll < 3.0, "{roll}");
-        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first: −0.9 rad/s after two states.
+        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first; after two states q is −0.9 rad/s.
         let pitch = answers.after(1, 4);
         assert!(pitch < -0.5 && pitch > -2.0, "{pitch}");
     }

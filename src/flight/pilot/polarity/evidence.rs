@@ -9,7 +9,7 @@ use super::answers::Answers;
 
 /// Largest additional delay of link and controller relative to the simulator, state frames of 10 ms.
 const LATENESS: isize = 9;
-/// Smallest number of rate changes for a regression.
+/// Smallest number of rate changes with which a regression is made.
 const LEAST: usize = 14;
 /// Upper limit of the lag-one autocorrelation of the regression residuals.
 const MAX_AUTOCORRELATION: f64 = 0.9;
@@ -20,7 +20,7 @@ const TAKEN: RangeInclusive<isize> = -1..=2;
 /// Estimated gain on the modelled response, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
-    /// 1 is the modelled response, −1 its opposite.
+    /// Gain: 1 is the modelled response, −1 the opposite response.
     pub gain: f64,
     /// Standard error of the gain estimate.
     pub error: f64,
@@ -35,7 +35,7 @@ impl Fit {
     }
 }
 
-/// Record of a check, per state of 10 ms from its start.
+/// Record of a sign check, one entry per state frame of 10 ms from the start of the check.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Evidence {
     /// Roll and pitch rate, rad/s; `None` for a lost state.
@@ -176,7 +176,8 @@ mod tests {
         }
     }
 
-    /// The record of an aircraft that responds as the model does, with `leftover` added to its rates from state to state.
+    /// The record of an aircraft that responds as the model does. `leftover` (rad/s) is added to its rates at each
+    /// state frame.
     fn record(answers: &Answers, states: usize, leftover: impl Fn(usize) -> f64) -> Evidence {
         let mut evidence = Evidence::default();
         let changes = [[(0, 0.06), (12, -0.12)], [(6, 0.06), (18, -0.12)]];
@@ -214,7 +215,7 @@ mod tests {
 
     #[test]
     fn gusts_that_wander_leave_more_doubt_than_as_large_ones_that_do_not() {
-        // Rate changes of ±0.01 rad/s whose sign alternates every nine states, or every state.
+        // Rate changes of ±0.01 rad/s: the sign alternates every nine states, or every state.
         let answers = x8();
         let doubt = |states: usize| {
             let gust = |index: usize| if (index / states).is_multiple_of(2) { 0.01 } else { -0.01 };

@@ -1,4 +1,4 @@
-//! The check of surface signs: whether the aircraft responds to the surfaces as the model predicts.
+//! The check of surface signs: does the aircraft respond to the surfaces as the model predicts?
 //!
 //! A flight controller can fly well with its own loops although the channel order, a reversal or a mixer between the
 //! companion's commands and the surfaces is wrong. When control authority is given, the companion therefore first
@@ -17,7 +17,7 @@ use greylag_physics::{Command, State, Time};
 
 /// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8 and causes a roll rate of 9 °/s.
 const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
-/// Signs of a round's pulses, each of [`LENGTH`]: their effect on the attitude cancels.
+/// Signs of a round's pulses, each [`LENGTH`] state frames long. Their effects on the attitude cancel.
 const PATTERN: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
 /// Length of a pulse in state frames of 10 ms.
 const LENGTH: usize = 12;
@@ -27,14 +27,14 @@ const OFFSET: usize = 6;
 const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
 /// Number of state frames after which a check ends.
 const LONGEST: usize = PULSES.len() * ROUND;
-/// Ratio of the gain to its standard error above which a sign is certain; tested at every state frame.
+/// Ratio of the gain to its standard error above which a sign is certain. It is tested at every state frame.
 const CERTAIN: f64 = 7.0;
 /// State frames after which the signs of aileron and elevator are evaluated. By then the surface has moved both ways
 /// and the aircraft has responded. A single edge may coincide with a gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
 /// Number of state frames after a pulse edge within which the response appears.
 const ANSWERED: usize = 7;
-/// Smallest gain that counts as a response: a model may be wrong, but not by a factor of ten.
+/// Smallest gain that counts as a response. A model may be wrong, but not by a factor of ten.
 const ANSWER: f64 = 0.1;
 /// Change of bank or pitch that aborts the check, rad: 20°.
 const DEPARTED: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -67,7 +67,7 @@ enum Stage {
     Rest,
     /// Control authority is demanded and not yet given.
     Waiting,
-    /// Control authority was given; the first state since may still be outstanding.
+    /// Control authority was given. The first state after that may still be outstanding.
     Running { begun: Option<Begun>, evidence: Evidence, last: Command },
 }
 
@@ -252,11 +252,11 @@ mod tests {
 
     #[test]
     fn right_signs_pass_however_late_the_commands_arrive() {
-        // Up to 60 ms, twice the delay of a serial line and a controller that samples its channels at 50 Hz.
+        // Up to 60 ms: twice the delay of a serial link with a controller that samples its channels at 50 Hz.
         for late in 0..=6 {
             let (verdict, states) = verdict(late, |surfaces| surfaces);
             let Verdict::Right(gains) = verdict else { panic!("{late}: {verdict:?}") };
-            // The modelled responses are those at 22 m/s, the aircraft flies at 20 m/s: 0.8 of the force.
+            // The modelled responses are for 22 m/s and the aircraft flies at 20 m/s, with 0.8 of the force.
             assert!(gains.iter().all(|gain| (0.5..1.2).contains(gain)), "{late}: {gains:?}");
             assert!(states < ROUND as u64, "{late}: after {states}");
         }
@@ -284,12 +284,12 @@ mod tests {
         assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Roll)));
         let (dead, _) = verdict(2, |[aileron, _]| [aileron, trim]);
         assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Pitch)));
-        // The left of two elevons is reversed: an aileron command pitches and an elevator command rolls.
+        // The left elevon is reversed: an aileron command pitches and an elevator command rolls.
         let (mixed, _) = verdict(2, |[aileron, elevator]| [elevator - trim, aileron + trim]);
         assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
     }
 
-    /// A clock jump, at the first states or later, ends the check. The check neither lasts for ever nor allocates
+    /// A clock jump, at the first states or later, ends the check. Otherwise the check would not end, or would allocate
     /// memory for the skipped states.
     #[test]
     fn a_clock_that_jumps_ahead_ends_the_check() {

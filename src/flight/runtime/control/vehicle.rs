@@ -14,7 +14,7 @@ use greylag_link::transport::Arrival;
 use greylag_link::vehicle::{Notice, Order, Telemetry};
 use greylag_physics::Time;
 
-/// Largest number of states per packet: a TCP chunk of 1024 bytes holds four.
+/// Largest number of states from one packet. A TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;
 
 /// A state with the peer and the arrival time of the packet that completed it.
@@ -32,12 +32,12 @@ impl Control {
     pub(super) fn take_vehicles(&mut self, arrival: Option<Arrival>, live: Option<Time>) {
         let mut newest = arrival.and_then(|arrival| self.take_vehicle(arrival, None));
         if self.clock.pace() == Pace::RealTime {
-            // later arrivals are handled in the next round
+            // arrivals after this moment are handled in the next round
             for _ in 0..self.ports.from_vehicle.len() {
                 let Ok(arrival) = self.ports.from_vehicle.try_recv() else { break };
                 newest = self.take_vehicle(arrival, newest);
             }
-            // the program may have been stopped since the last check
+            // the program may have been suspended since the last check
             if let Some(live) = live.or_else(|| self.excuse_stall()) {
                 newest = self.catch_up(newest, live);
             }
@@ -73,7 +73,7 @@ impl Control {
             Arrival::Opened(_) | Arrival::Closed(_) => return newest,
         };
         self.record(packet.arrived, &packet.bytes);
-        // The states are collected first, since each tick answers through the vehicle.
+        // The states are collected first, because the reply to each tick also uses `vehicle`.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
         let mut places = states.iter_mut();
         self.vehicle.handle(
@@ -134,7 +134,7 @@ impl Control {
         self.account(heard, &decision, plan, latency);
     }
 
-    /// Records timing and row of a tick, after its command is out.
+    /// Records timing and row of a tick, after its command is sent.
     fn account(&mut self, heard: &Heard, decision: &Decision, plan: Plan, latency: Duration) {
         let Heard { state, peer, arrived } = heard;
         if self.last_arrival.is_none() {
@@ -151,7 +151,7 @@ impl Control {
         self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
-        // the positions of surfaces that we did not command are unknown
+        // surface positions are unknown while the companion does not command them
         match self.vehicle.moves_surfaces() {
             true => self.pilot.monitor(state),
             false => self.pilot.forget_residuals(),
@@ -171,7 +171,7 @@ impl Control {
             if let Some(words) = notice.ending() {
                 let now = self.clock.at(Instant::now());
                 self.note(Call::Disarm(now, true));
-                // forced disarming is never refused
+                // a forced disarming is never refused
                 let _ = self.pilot.disarm(now, true);
                 self.pilot.send_text(Severity::Critical, &words);
             }

@@ -8,7 +8,7 @@ use crate::threads::{Builder, JoinHandle, Receiver, RecvTimeoutError, Sender, bo
 use greylag_control::Controller;
 use greylag_physics::Command;
 
-/// A controller on its own thread.
+/// A controller on a separate thread.
 pub struct Threaded {
     requests: Option<Sender<(u64, Request)>>,
     pub(super) plans: Receiver<(u64, Command)>,
@@ -53,7 +53,7 @@ impl Threaded {
     /// The plan for `request`, whose state arrived at `arrived`.
     pub fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         self.tick += 1;
-        // plans of earlier ticks are obsolete
+        // plans for earlier ticks are obsolete
         while self.plans.try_recv().is_ok() {}
         let engage = request.engage || self.owed;
         let Some(requests) = &self.requests else {
@@ -87,7 +87,7 @@ impl Threaded {
 impl Drop for Threaded {
     fn drop(&mut self) {
         self.requests = None;
-        // the thread may block on its last plan, which is not taken any more
+        // the thread may block on its last plan, which nobody fetches
         while self.plans.recv().is_ok() {}
         if let Some(thread) = self.thread.take() {
             // a panic of the controller has been reported by its thread

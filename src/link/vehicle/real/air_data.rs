@@ -46,7 +46,7 @@ pub struct Measured {
     pub rates: [f64; 3],
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
-    /// True airspeed V_a, m/s.
+    /// True airspeed V_a, m/s; below 3 m/s the estimate restarts.
     pub airspeed: f64,
     /// Climb rate, m/s, positive upward; NaN if not reported.
     pub climb: f64,
@@ -133,7 +133,7 @@ impl AirData {
         let sideways = [0.0, 1.0, 0.0];
         let air = [0, 1, 2].map(|i| m.velocity[i] - m.wind[i]);
         if air.iter().all(|x| x.is_finite()) {
-            // The second column of the rotation body → NED.
+            // the second column of the rotation from body axes to NED
             let (sy, cy) = m.attitude[2].sin_cos();
             let side = [sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp];
             let measured: f64 = side.iter().zip(air).map(|(a, b)| a * b).sum();
@@ -316,7 +316,7 @@ mod tests {
         let mut filter = AirData::default();
         let step = |k: u32| turning(air, [0.5, 0.3], 0.3, f64::from(k) * 0.01);
         let last = (0..3000).filter_map(|k| filter.update(&step(k), 0.01)).last().unwrap();
-        // atan(6 / 20) and asin(4 / 21.26).
+        // atan(6 / 20) and asin(4 / 21.26)
         let [alpha, beta] = last.map(f64::to_degrees);
         assert!((alpha - 16.699).abs() < 0.03 && (beta - 10.844).abs() < 0.03, "{alpha} {beta}");
         let slow = Measured { airspeed: 3.0, velocity: [3.0, 0.0, 0.0], ..level() };
@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn a_glitch_moves_the_angles_by_a_tenth_of_a_degree() {
-        // An outlier of 40 m/s of climb: its innovation is limited to 1.5 m/s, and the gain is about a fiftieth.
+        // An outlier of 40 m/s in the climb rate. Its innovation is limited to 1.5 m/s, and the gain is about 1/50.
         let mut filter = AirData::default();
         let before = (0..400).filter_map(|_| filter.update(&level(), 0.01)).last().unwrap();
         let after = filter.update(&Measured { climb: 40.0, ..level() }, 0.01).unwrap();

@@ -20,7 +20,7 @@ const RESTART_MS: i32 = 1000;
 const STALE: Duration = Duration::from_millis(300);
 /// Largest number of actuator-model steps after a gap: 0.2 s, longer than any transient.
 const CATCH_UP: u64 = 20;
-/// The last value of a stream with its arrival time, host clock.
+/// The last value of a stream with its arrival time (host clock); `None` before the first value.
 type Heard<T> = Option<(Duration, T)>;
 
 /// The latest values of a controller's streams.
@@ -39,7 +39,7 @@ pub(super) struct Assembly {
     actuators: Actuators,
     boot_ms: Option<u32>,
     last: Telemetry,
-    /// Standard deviation of the reported wind, m/s.
+    /// Assumed standard deviation of the reported wind, m/s.
     wind_sd: f64,
     /// Bit patterns of the last state's sensor values, to detect frozen sensors.
     shown: [u64; 13],
@@ -167,7 +167,7 @@ impl Assembly {
         Some(next)
     }
 
-    /// Whether every sensor value equals that of the last state bit by bit.
+    /// Whether every sensor value equals the value of the last state bit by bit.
     fn stands_still(&mut self, quaternion: [f64; 4], rates: [f64; 3]) -> bool {
         let force = self.specific_force.map_or([0.0; 3], |(_, force)| force);
         let air = self.air.map_or([0.0; 3], |(_, air)| air);

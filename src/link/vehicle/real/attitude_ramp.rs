@@ -1,4 +1,4 @@
-//! Rate limit on the attitude commanded to a controller.
+//! Rate limit on the attitude that is commanded to a flight controller.
 //!
 //! A step of bank from one side to the other saturates a flight controller's loops. The pitch error then reaches 20°. A
 //! ramp that the loops can follow keeps the attitude inside the envelope.
@@ -12,7 +12,7 @@ const RATE: [f64; 2] = [45.0 * DEGREE, 20.0 * DEGREE];
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The roll and pitch commanded last.
+/// The ramp, with the roll and pitch (rad) that were last commanded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeRamp {
     last: Option<(Time, [f64; 2])>,

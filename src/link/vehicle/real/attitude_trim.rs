@@ -1,4 +1,4 @@
-//! Slow integral correction of the attitude commanded to a controller.
+//! Slow integral correction of the attitude that is commanded to a flight controller.
 //!
 //! The flight controller's loops leave a steady-state error of 0.3° to 1.8°. In steep turns, simulated loops with an
 //! elevator feed-forward that does not fit the aircraft leave up to 9° of pitch for half a minute.
@@ -8,7 +8,7 @@
 
 use greylag_physics::Time;
 
-/// Time constant of the integrator, s: five times slower than a controller's attitude loop.
+/// Time constant of the integrator, s: five times that of a flight controller's attitude loop.
 const TIME_S: f64 = 2.5;
 /// Largest correction, rad. The simulated loops of PX4 and ArduPlane have this error at 55° of bank and 20° nose down.
 const MOST: f64 = 10.0 * DEGREE;
@@ -19,7 +19,7 @@ const STILL: f64 = 0.5 * DEGREE;
 const SETTLING_S: f64 = 4.0;
 /// Error above which integration stops, rad, because it is not a steady-state error.
 const NEAR: f64 = 12.0 * DEGREE;
-/// Change of the wanted attitude beyond which the correction is reset, rad.
+/// Change of the wanted attitude that resets the correction, rad.
 const ANOTHER: f64 = 4.0 * DEGREE;
 /// Time between two states above which integration is skipped, s.
 const GAP_S: f64 = 0.1;
@@ -104,7 +104,7 @@ mod tests {
         // At most 10° of the 11° are removed.
         assert!((errors[1999].abs() / DEGREE - 1.0).abs() < 0.01, "{}", errors[1999] / DEGREE);
         assert!(flown(13.0 * DEGREE, |_| 0.8)[1999].abs() > 12.9 * DEGREE, "no error that stays");
-        // Half a hertz: the wanted attitude is never constant, so no correction is added.
+        // 0.5 Hz: the wanted attitude is never constant, so no correction is added.
         let sine = |t: f64| 0.3 * (3.1 * t).sin();
         let mut plain = 0.0;
         for (tick, error) in flown(0.01, sine).into_iter().enumerate() {

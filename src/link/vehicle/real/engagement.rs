@@ -37,13 +37,13 @@ pub(super) enum Shown {
     Nothing,
     /// The companion has control authority from now on.
     Engaged,
-    /// The controller or its pilot has taken control.
+    /// The controller, or its pilot, has taken control.
     Taken,
     /// The controller has confirmed the return.
     Confirmed,
 }
 
-/// The phase with the controller's replies.
+/// The phase of the engagement, with the controller's replies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Engagement {
     pub(super) phase: Phase,
@@ -51,7 +51,7 @@ pub(super) struct Engagement {
     lead: Duration,
     /// The last MAV_RESULT other than ACCEPTED.
     refused: Option<u8>,
-    /// Whether any request was accepted.
+    /// Whether any mode request was accepted.
     accepted: bool,
     /// Whether engagement is blocked: after a return, until the demand has ended once.
     barred: bool,
@@ -71,7 +71,7 @@ impl Engagement {
         }
     }
 
-    /// Whether commands are sent.
+    /// Whether the companion sends commands.
     pub(super) fn steers(&self) -> bool {
         matches!(self.phase, Phase::Entering { .. } | Phase::Engaged { .. })
     }
@@ -161,7 +161,7 @@ impl Engagement {
         })
     }
 
-    /// Whether an unconfirmed return is to be reported now; at most once.
+    /// Whether an unconfirmed return of control authority is to be reported now. It is reported at most once.
     pub(super) fn unconfirmed(&mut self, host: Duration) -> bool {
         let Phase::Releasing { since: Some(since), .. } = self.phase else { return false };
         let late = host.saturating_sub(since) > UNCONFIRMED && !self.reminded;

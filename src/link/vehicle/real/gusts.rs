@@ -23,7 +23,7 @@ const SLOWEST_MPS: f64 = 3.0;
 /// Longest gap between two velocities, s. After a longer gap the mean wind restarts.
 const GAP_S: f64 = 1.0;
 
-/// Running estimate of the gusts' standard deviation.
+/// Running estimate of the gusts' standard deviation, m/s.
 #[derive(Clone, Copy, Debug)]
 pub struct Gusts {
     /// Mean wind, NED, m/s.
@@ -90,7 +90,7 @@ impl Gusts {
     }
 }
 
-/// Unit vector of the velocity relative to the air, NED.
+/// Unit vector of the velocity relative to the air, in NED.
 fn towards([roll, pitch, yaw]: [f64; 3], [alpha, beta]: [f64; 2]) -> [f64; 3] {
     let (sr, cr) = roll.sin_cos();
     let (sp, cp) = pitch.sin_cos();

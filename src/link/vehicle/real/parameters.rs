@@ -8,7 +8,7 @@ use super::profile::{Matters, Need, Presence, Rule};
 
 /// Interval between requests for the same parameter.
 const AGAIN: Duration = Duration::from_millis(400);
-/// Largest number of requests per call. It keeps a slow link from overflow.
+/// Largest number of requests per call. It spreads the requests over several calls for slow links.
 const AT_ONCE: usize = 4;
 /// Number of requests for one name after which the controller counts as lacking the parameter.
 const TRIES: u32 = 5;
@@ -33,7 +33,7 @@ pub struct Parameters {
 /// Check result of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// Not yet reported.
+    /// The controller has not reported it yet.
     Unread,
     /// The controller does not reply to requests for it, although the rule requires it.
     Unknown,
@@ -58,7 +58,7 @@ impl Parameters {
         }
     }
 
-    /// Names to request at `host`.
+    /// Names of the parameters to request at `host`.
     pub(super) fn due(&mut self, host: Duration) -> Vec<&'static str> {
         let mut names = Vec::new();
         for entry in &mut self.entries {

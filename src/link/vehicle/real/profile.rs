@@ -54,7 +54,7 @@ const fn mode(name: &'static str, main: u8, sub: u8) -> StackMode {
 pub struct Stream {
     /// Message id of the stream.
     pub id: u32,
-    /// Message name for texts.
+    /// Name of the message in texts.
     pub name: &'static str,
     /// Requested rate, Hz.
     pub hz: f64,
@@ -94,7 +94,7 @@ pub enum Need {
     OneOf(&'static [f64]),
     /// A value in this closed interval.
     Between(f64, f64),
-    /// The companion's own system id.
+    /// The system id of the companion, which is that of the controller.
     OurSystem,
     /// A plausible pulse width of a channel, µs. The companion uses the value for scaling.
     Pulse,
@@ -111,7 +111,7 @@ pub enum Presence {
     Optional,
 }
 
-/// A parameter that is checked before engaging.
+/// A parameter that is checked before engagement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
     /// Names of the parameter, newest release first. One of them suffices.
@@ -331,7 +331,7 @@ impl Stack {
 }
 
 impl StackMode {
-    /// The `custom_mode` of this mode in a heartbeat.
+    /// The `custom_mode` of this mode in a heartbeat of `stack`.
     pub fn custom(self, stack: Stack) -> u32 {
         match stack {
             Stack::Px4 => u32::from(self.main) << 16 | u32::from(self.sub) << 24,

@@ -26,7 +26,7 @@ pub(super) struct Requests {
 }
 
 impl Requests {
-    /// Starts a new round.
+    /// Starts a new round of requests, and discards requests without a reply.
     pub(super) fn turn(&mut self) {
         self.waiting.clear();
     }

@@ -10,7 +10,7 @@ struct Rounding(f64);
 impl Rounding {
     fn round(&mut self, wanted: f64, low: f64, high: f64) -> f64 {
         let whole = (wanted + self.0).round().clamp(low, high);
-        // the part of the command beyond the stop is discarded
+        // the part of the command beyond the limit is not carried over
         self.0 = (wanted + self.0 - whole).clamp(-0.5, 0.5);
         whole
     }
@@ -45,10 +45,10 @@ impl Channel {
 }
 
 impl Sticks {
-    /// x (+ nose down), y (+ right) and z of MANUAL_CONTROL, in thousandths.
+    /// Axes of MANUAL_CONTROL in thousandths: x (positive nose down), y (positive right), z (throttle).
     ///
-    /// PX4 in MANUAL: roll torque = y · FW_MAN_R_SC + TRIM_ROLL, pitch torque (nose up) =
-    /// −x · FW_MAN_P_SC + TRIM_PITCH.
+    /// In MANUAL, PX4 computes roll torque = y · FW_MAN_R_SC + TRIM_ROLL and pitch torque (nose up) = −x · FW_MAN_P_SC
+    /// + TRIM_PITCH.
     pub(super) fn thousandths(&mut self, command: &Command, parameters: &Parameters) -> [i16; 3] {
         let read = |name: &str, default: f64| parameters.get(name).unwrap_or(default);
         let roll = (command.aileron - read("TRIM_ROLL", 0.0)) / read("FW_MAN_R_SC", 1.0);
@@ -155,7 +155,7 @@ mod tests {
         {
             parameters.take(name, value);
         }
-        // (0.3 − 0.1) / 0.5 and (0.25 − 0.05) / 0.8.
+        // (0.3 − 0.1) / 0.5 and (0.25 − 0.05) / 0.8
         assert_eq!(sent(&parameters, 0.3, 0.25, 0.5), [250, 400, 500]);
     }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 const WINDOW: Duration = Duration::from_secs(1);
 /// Largest lag of a late frame, sequence numbers. With a larger lag the sender has restarted its counter.
 const LATE: u32 = 32;
-/// Number of round-trip times kept.
+/// Largest number of round-trip times that are kept.
 const TRIPS: usize = 256;
 
 /// Statistics of one message.
@@ -70,7 +70,7 @@ impl Survey {
     /// Counts a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
         match self.sequence.map(|before| sequence.wrapping_sub(before)) {
-            // the same frame twice
+            // a repeated frame
             Some(0) => {}
             // a late frame was counted as lost before
             Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),
@@ -145,7 +145,7 @@ impl Survey {
         [self.received, self.lost]
     }
 
-    /// Fraction of frames lost, from gaps in the sequence numbers.
+    /// Fraction of frames lost (0..1), from gaps in the sequence numbers.
     pub fn loss(&self) -> f64 {
         let all = self.received + self.lost;
         if all == 0 { 0.0 } else { self.lost as f64 / all as f64 }
@@ -258,7 +258,7 @@ mod tests {
         for (i, ms) in [0, 10, 30].into_iter().enumerate() {
             survey.frame(Duration::from_millis(ms), 31, i as u8, 60);
         }
-        // 10 and 20 ms: √(2 · 5²) with one degree of freedom.
+        // Intervals of 10 ms and 20 ms: √(2 · 5²) ms with one degree of freedom.
         let jitter = survey.messages().next().unwrap().1.jitter_ms();
         assert!((jitter - 7.071).abs() < 0.001, "{jitter}");
     }
