@@ -92,7 +92,7 @@ pub use greylag_sysid as sysid;
 #[cfg(any(feature = "demo", feature = "learn"))]
 pub use greylag_sim as sim;
 
-// Training; only this layer uses burn.
+// Training. Only this layer uses burn.
 #[cfg(feature = "learn")]
 pub use greylag_learn as learn;
 

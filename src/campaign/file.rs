@@ -82,7 +82,7 @@ pub struct StageFile {
     /// Further input files, which the command line does not name.
     #[serde(default)]
     pub inputs: Vec<String>,
-    /// Estimated processor time of a cell, core seconds; used until computing times of cells are available.
+    /// Estimated processor time of a cell, core seconds, for cells without a measured time.
     pub core_seconds: Option<f64>,
 }
 

@@ -18,7 +18,7 @@ const CURVE: &str = "curve.csv";
 const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
 /// Suffixes of the files that later cells read.
 const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
-/// Files that are not hashed. The learning curve contains computing times; only the same cell resumes from the
+/// Files that are not hashed. The learning curve contains computing times. Only the same cell resumes from the
 /// checkpoint.
 const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 

@@ -1,4 +1,4 @@
-//! Scripts that submit a campaign to a scheduler. Each stage is a job array; each job runs `greylag campaign run FILE
+//! Scripts that submit a campaign to a scheduler. Each stage is a job array. Each job runs `greylag campaign run FILE
 //! --cell N`.
 
 use super::file::StageFile;

@@ -5,7 +5,7 @@
 //! the result of each cell as one JSON line, written atomically. [`gather`] collects these lines, and [`tables`]
 //! summarises them over seeds.
 //!
-//! This crate runs no cells. `greylag campaign run` runs them; a cluster's scheduler can call this command
+//! This crate runs no cells. `greylag campaign run` runs them. A cluster's scheduler can call this command
 //! ([`launch`]).
 
 pub mod cell;

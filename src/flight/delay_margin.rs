@@ -31,7 +31,7 @@ const TICK_MS: usize = 10;
 /// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
 /// The search takes about a second for a controller that computes its command in microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
-    // JSBSim's Euler steps delay the attitude by one cycle; an aircraft has no such delay
+    // JSBSim's Euler steps delay the attitude by one cycle, unlike an aircraft
     let model = &{
         let mut continuous = model.clone();
         continuous.integrator = Integrator::Rk4;

@@ -94,7 +94,7 @@ impl Desk {
         self.heed(host);
     }
 
-    /// Performs the periodic duties (timeouts, due messages, texts) at the host time `host`; to be called every 10 ms.
+    /// Performs the periodic duties (timeouts, due messages, texts) at the host time `host`. Call it every 10 ms.
     pub fn poll(&mut self, host: Duration, out: &mut Vec<u8>) {
         let now = self.now(host);
         self.pilot.advance(now);

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// A host name or IP address with a port; the name is not resolved yet.
+/// A host name or IP address with a port. The name is not resolved yet.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct HostPort {
     /// Host name, IPv4 address, or IPv6 address without its brackets.

@@ -124,7 +124,7 @@ pub struct Status {
     /// Recent processing time of the control task as a fraction of its 10 ms cycle, 0..1.
     pub load: f64,
     /// Model residuals (measured minus predicted) divided by the half width of their bands, two standard deviations
-    /// (see `flight::monitor`), in the order of [`RESIDUALS`]. They are dimensionless; beyond −1..1 a residual is
+    /// (see `flight::monitor`), in the order of [`RESIDUALS`]. They are dimensionless. Beyond −1..1 a residual is
     /// outside its band.
     pub residuals: [f64; 6],
 }

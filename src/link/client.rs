@@ -275,7 +275,7 @@ impl Clients {
         }
     }
 
-    /// Handles SET_MODE, which has no acknowledgement. The heartbeat shows the new mode; a refusal is sent as text.
+    /// Handles SET_MODE, which has no acknowledgement. The heartbeat shows the new mode. A refusal is sent as text.
     fn set_mode(
         &mut self,
         now: Now,

@@ -22,7 +22,7 @@ const FLAG_SIGNED: u8 = 0x01;
 /// Length of the longest frame, bytes: MAVLink 2 with full payload and signature.
 pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
 /// Number of false starts in one datagram or chunk after which the rest is dropped. Each costs a CRC over up to 267
-/// bytes; the limit bounds the time for noise to a few microseconds.
+/// bytes. The limit bounds the time for noise to a few microseconds.
 const MAX_FALSE_STARTS: u32 = 32;
 /// Largest number of frames from one datagram or chunk. Senders pack to an MTU, which holds fewer.
 const MAX_FRAMES: u32 = 128;

@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn a_frame_of_an_unknown_message_is_signed_and_a_signed_one_keeps_its_author() {
         let mut us = Signer::new(key(1), 0);
-        // A message id that no dialect has; the CRC_EXTRA in its checksum is unknown.
+        // A message id that no dialect has. The CRC_EXTRA in its checksum is unknown.
         let mut unknown = vec![0xFD, 2, 0, 0, 5, 7, 1, 0x39, 0x30, 0x7F, 1, 2];
         let extra = 77;
         let checksum = calculate_crc(&unknown[1..], extra);

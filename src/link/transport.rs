@@ -2,7 +2,7 @@
 //!
 //! Received bytes go into a bounded channel that the caller chooses for each link. Traffic of the vehicle can thus be
 //! served before that of the clients. Frames to send go into a bounded channel of the link. A full channel drops frames
-//! and counts them; no call blocks.
+//! and counts them. No call blocks.
 
 mod flood;
 mod serial;

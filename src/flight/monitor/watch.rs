@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn a_residual_outside_its_band_departs_after_two_seconds_and_once() {
         let times = departures(60.0, |_| 3.0);
-        // The filters first rise to the band, two thirds of the step; then 2 s outside the band pass.
+        // The filters first rise to the band, two thirds of the step. Then 2 s outside the band pass.
         assert!(times.len() == 1 && (2.2..3.0).contains(&times[0]), "{times:?}");
         assert_eq!(departures(60.0, |_| 1.8), [0.0; 0], "inside");
         let burst = |t: f64| if (10.0..11.0).contains(&t) { 6.0 } else { 0.0 };

@@ -11,7 +11,7 @@ use greylag_physics::{Command, Time};
 /// After an oscillation, deflections deviate from their running mean by this fraction only. The loop gain at the
 /// oscillation frequency falls by the same factor, and the delay margin grows by about its inverse.
 const REDUCED_GAIN: f64 = 1.0 / 3.0;
-/// Time constant of the running mean of the deflections, s. A limit cycle of 1 to 8 Hz averages out; the deflections of
+/// Time constant of the running mean of the deflections, s. A limit cycle of 1 to 8 Hz averages out. The deflections of
 /// a turn remain.
 const MEAN_S: f64 = 0.5;
 /// Duration of the reduced gain after an oscillation, s.

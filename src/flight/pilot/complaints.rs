@@ -37,7 +37,7 @@ impl Pilot {
     }
 }
 
-/// Whether a warning may be repeated at `now`; records the time if so.
+/// Whether a warning may be repeated at `now`. Records the time if so.
 pub(super) fn due(last: &mut Option<Time>, now: Time) -> bool {
     let silent = within(*last, now, COMPLAINT_INTERVAL_S);
     if !silent {

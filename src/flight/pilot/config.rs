@@ -317,7 +317,7 @@ mod tests {
         let check = |trim: Vec<TrimPoint>| Config { trim, ..x8() }.check();
         assert_eq!(check(vec![good]), Ok(()));
         assert_eq!(check(vec![good, good]), Err(ConfigError::Trim));
-        // The bounds are accepted; values beyond them are rejected.
+        // The bounds are accepted. Values beyond them are rejected.
         let edge = TrimPoint { pitch_deg: -30.0, elevator: 1.0, throttle: 1.0, ..good };
         assert_eq!(check(vec![edge]), Ok(()));
         for bad in [

@@ -16,8 +16,8 @@ const UNFELT_TRAVEL: f64 = 0.005;
 /// largest roll rate rolls by 20°. Real sensors do not repeat bit by bit.
 const FROZEN_LOSS_S: f64 = 0.2;
 
-/// Time for which a recovered vehicle link must persist before the recovery is reported, s; equal to the timeout of its
-/// loss.
+/// Time for which a recovered vehicle link must persist before the recovery is reported, s. It equals the default
+/// timeout of the vehicle link.
 const STEADY_S: f64 = 0.5;
 
 impl Pilot {

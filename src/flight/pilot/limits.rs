@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn the_load_limit_binds_where_the_bank_limit_is_wide() {
-        // 1 / cos 80° is 5.8; a load factor of 2.2 allows acos(1 / 2.2) = 62.96°.
+        // 1 / cos 80° is 5.8. A load factor of 2.2 allows acos(1 / 2.2) = 62.96°.
         let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
         assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
     }

@@ -196,7 +196,7 @@ impl Pilot {
     }
 
     /// Flies `schedule` in OFFBOARD instead of the client's attitudes. The schedule starts at each entry into the mode.
-    /// The client must still send setpoints; otherwise the offboard timeout applies.
+    /// The client must still send setpoints. Otherwise the offboard timeout applies.
     pub fn follow(&mut self, schedule: Schedule) {
         self.programme = Some(Programme::new(schedule));
     }

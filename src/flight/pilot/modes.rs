@@ -140,7 +140,7 @@ impl Autopilot for Pilot {
 
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint) {
         self.advance(now);
-        // setpoints from the link are finite already; the pilot checks again
+        // the pilot does not rely on the link for finite setpoints
         if setpoint.roll.is_finite() && setpoint.pitch.is_finite() {
             let thrust = setpoint.thrust.filter(|x| x.is_finite());
             self.setpoint = Some((now, AttitudeSetpoint { thrust, ..setpoint }));

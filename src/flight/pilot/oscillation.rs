@@ -3,8 +3,8 @@
 //! A loop with more delay than its margin can enter a limit cycle that the surface's slew limit sustains. The X8,
 //! commanded through ArduPlane's channels, oscillated for 50 s at 2.6 Hz with pitch rates up to 228 °/s. Every state
 //! was fresh and every command was in range. The guard looks for a rate that changes sign repeatedly. In each half
-//! period the command must be at its limit, or sweep over half of its travel. A manoeuvre shows this once or twice;
-//! turbulence does not move a command this far.
+//! period the command must be at its limit, or sweep over half of its travel. A manoeuvre shows this once or twice.
+//! Turbulence does not move a command this far.
 
 use super::limits::TICK_S;
 use greylag_link::vehicle::Axis;
@@ -12,7 +12,7 @@ use greylag_physics::{Command, State, Time};
 
 /// Time constant of the high-pass on the rate, s. The high-pass removes the pitch rate of a steady turn.
 const SLOW_S: f64 = 0.5;
-/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics; faster motion is structural vibration or
+/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics. Faster motion is structural vibration or
 /// noise.
 const HALF_SWING_S: [f64; 2] = [0.06, 0.5];
 /// Smallest peak rate of a half period, rad/s (23 °/s). It is three times the peak in light turbulence and a quarter of

@@ -144,7 +144,7 @@ mod tests {
         assert!(changed(&config, SYSTEM_ID, ParameterValue::Int(7)).is_err());
         assert!(changed(&config, THRUST_SOURCE, ParameterValue::Real(1.0)).is_err());
         assert!(changed(&config, 999, ParameterValue::Real(1.0)).is_err());
-        // Cruise must stay above the minimum airspeed; otherwise the airspeed protection would act in HOLD.
+        // Cruise must stay above the minimum airspeed. Otherwise the airspeed protection would act in HOLD.
         assert!(changed(&config, 5, ParameterValue::Real(12.0)).is_err());
     }
 }

@@ -33,9 +33,9 @@ pub enum Call {
     Excuse(Duration),
     /// The state of this vehicle time was observed. The planner's reply and the resulting command follow.
     Tick(Time, Planned, Command),
-    /// Arming was requested at this vehicle time; the flag is set if it was forced.
+    /// Arming was requested at this vehicle time. The flag is set if it was forced.
     Arm(Time, bool),
-    /// Disarming was requested at this vehicle time; the flag is set if it was forced.
+    /// Disarming was requested at this vehicle time. The flag is set if it was forced.
     Disarm(Time, bool),
     /// The flight controller gave control authority.
     Engaged(Time),

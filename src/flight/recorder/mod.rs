@@ -1,7 +1,7 @@
 //! The recorder: a thread that writes the files `flight.csv`, `flight.tlog` and `flight.calls`.
 //!
 //! The control thread queues entries and never waits. Entries that do not fit are dropped and counted. An error of the
-//! disk closes the file concerned and is reported once; the flight continues.
+//! disk closes the file concerned and is reported once. The flight continues.
 
 pub mod call;
 mod folder;

@@ -97,7 +97,7 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
-    // Without a rudder both values are zero; the rudder columns then stay empty.
+    // Without a rudder both values are zero. The rudder columns then stay empty.
     let rudder =
         if (z.rudder, c.rudder) == (0.0, 0.0) { [f64::NAN; 2] } else { [z.rudder, c.rudder] };
     Sample {

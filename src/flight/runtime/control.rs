@@ -180,7 +180,7 @@ impl Control {
         let host = Instant::now();
         let (behind, since) = self.attention.look(host, self.ports.rounds())?;
         let before = self.clock.at(since);
-        // the first round may have started before the end of the stall; the second polls every socket
+        // the first round may have started before the end of the stall: only the second surely polls every socket
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);
@@ -257,7 +257,7 @@ impl Control {
     }
 
     fn say(&self, event: Event) {
-        // the events may have no reader; the control thread does not wait
+        // the control thread does not wait for a reader of the events
         let _ = self.events.try_send(event);
     }
 

@@ -46,7 +46,7 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Reads key and timestamp. Link 0 is the vehicle's link; the clients' links are numbered from 1.
+    /// Reads key and timestamp. Link 0 is the vehicle's link. The clients' links are numbered from 1.
     pub(super) fn open(signing: &Signing, options: &FlightOptions) -> Result<Self, SigningError> {
         let key = Key::load(&signing.key)?;
         let (file, stamp) = StampFile::open(&signing.key)?;

@@ -134,7 +134,7 @@ mod tests {
         let mut bench = Bench::new(Pace::RealTime, &[true]);
         assert_eq!(bench.too_late(true), Plan::Late);
         bench.begun.recv().unwrap();
-        // This request waits in the queue; the next request finds the queue full.
+        // This request waits in the queue. The next request finds the queue full.
         assert_eq!(bench.too_late(false), Plan::Late);
         assert_eq!(bench.too_late(true), Plan::Busy);
         bench.go.send(()).unwrap();

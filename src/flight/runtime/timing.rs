@@ -60,7 +60,7 @@ pub struct Timing {
     /// Time between the arrivals of two state frames.
     pub interval: Histogram,
     /// Number of missed cycles. In real time these are ticks with a latency above 10 ms. In lockstep vehicle time waits
-    /// for the reply; missed cycles are then states that were sent again.
+    /// for the reply. Missed cycles are then states that were sent again.
     pub missed: u64,
     /// Number of ticks without a plan in time: the plan was late, or the planner was busy with an earlier request.
     pub late_plans: u64,
@@ -104,7 +104,7 @@ mod tests {
         for us in 0..1000 {
             histogram.note(Duration::from_micros(us));
         }
-        // Half of the durations 0, 1 … 999 µs do not exceed 499 µs; the end of this bucket is 500 µs.
+        // Half of the durations 0, 1 … 999 µs do not exceed 499 µs. The end of this bucket is 500 µs.
         assert_eq!(histogram.quantile_us(0.5), 500.0);
         assert_eq!(histogram.quantile_us(0.99), 990.0);
         assert_eq!(histogram.quantile_us(1.0), 999.0);

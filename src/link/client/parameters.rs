@@ -69,7 +69,7 @@ impl Clients {
         self.reply(at, &message);
     }
 
-    /// Sets a parameter. The value of an existing parameter is always sent in reply; after a change it is sent to all
+    /// Sets a parameter. The value of an existing parameter is always sent in reply. After a change it is sent to all
     /// peers. A refusal is also reported by PARAM_ERROR and as text.
     pub(super) fn set_parameter(
         &mut self,

@@ -75,7 +75,7 @@ impl Session {
         }
     }
 
-    /// Stores the version of a received frame. A peer that has sent MAVLink 2 gets MAVLink 2; a peer that has only sent
+    /// Stores the version of a received frame. A peer that has sent MAVLink 2 gets MAVLink 2. A peer that has only sent
     /// MAVLink 1 gets MAVLink 1.
     pub fn note_frame(&mut self, host: Duration, frame: &Frame<'_>) {
         let stale = host.saturating_sub(self.heard) > VERSION_MEMORY;
@@ -105,7 +105,7 @@ impl Session {
         }
     }
 
-    /// Sends a text of any length. MAVLink 2 receivers join its chunks; in MAVLink 1 each chunk is a separate text.
+    /// Sends a text of any length. MAVLink 2 receivers join its chunks. In MAVLink 1 each chunk is a separate text.
     pub fn say(
         &mut self,
         severity: Severity,

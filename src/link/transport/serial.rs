@@ -32,7 +32,7 @@ pub(super) struct Wire {
     pub(super) baud: u32,
 }
 
-/// A serial port cannot be opened; the message names the remedy.
+/// A serial port cannot be opened. The message names the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SerialFault {
     /// The device does not exist.

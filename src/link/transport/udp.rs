@@ -14,7 +14,7 @@ use tokio::sync::mpsc::Receiver;
 use super::flood::Senders;
 use super::{Port, count};
 
-/// Largest accepted datagram, bytes. MAVLink senders stay within an Ethernet frame; the limit allows jumbo frames.
+/// Largest accepted datagram, bytes. MAVLink senders stay within an Ethernet frame. The limit allows jumbo frames.
 const MAX_DATAGRAM: usize = 9000;
 /// Delay after a socket error. It prevents a busy loop on a persistent error.
 const ERROR_DELAY: Duration = Duration::from_millis(5);

@@ -66,7 +66,7 @@ impl fmt::Display for Faults {
 
 /// Plausible body rates, rad/s. Common gyroscopes have a full scale of 2000 °/s, 35 rad/s.
 const RATE: RangeInclusive<f64> = -40.0..=40.0;
-/// Plausible airspeed, m/s. An aircraft of this kind never reaches 150 m/s; values a little below zero are sensor
+/// Plausible airspeed, m/s. An aircraft of this kind never reaches 150 m/s. Values a little below zero are sensor
 /// noise.
 const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
 /// Plausible altitude above mean sea level, m.

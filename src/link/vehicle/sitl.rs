@@ -84,7 +84,7 @@ pub struct Sitl {
 
 impl Sitl {
     /// A connection to the vehicle with the system id `system`. `travels` are those of its airframe. The vehicle
-    /// normalises surface positions by its own travels; if these differ, the vehicle cannot be engaged.
+    /// normalises surface positions by its own travels. If these differ, the vehicle cannot be engaged.
     pub fn new(system: u8, travels: Travels) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {

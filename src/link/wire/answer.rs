@@ -87,7 +87,7 @@ pub fn parameter_error(
 
 /// STATUSTEXT messages that together carry `words`, in chunks that share `id`.
 ///
-/// MAVLink 1 has no fields for the id and the number of a chunk; each chunk is then a separate text. Characters outside
+/// MAVLink 1 has no fields for the id and the number of a chunk. Each chunk is then a separate text. Characters outside
 /// ASCII become `?`, because receivers differ in their encoding.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
     let bytes: Vec<u8> =

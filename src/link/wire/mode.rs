@@ -47,7 +47,7 @@ pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     }
 }
 
-/// The mode that DO_SET_MODE requests. PX4's clients send main and sub mode in two parameters; other clients send the
+/// The mode that DO_SET_MODE requests. PX4's clients send main and sub mode in two parameters. Other clients send the
 /// whole `custom_mode` in one. NaN counts as zero.
 pub fn from_do_set_mode(base: f64, main: f64, sub: f64) -> ModeRequest {
     let base = base as u32 as u8;

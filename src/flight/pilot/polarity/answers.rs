@@ -77,7 +77,7 @@ mod tests {
         // product of inertia and the yaw rate reduce it by half.
         let roll = answers.after(0, 20);
         assert!(roll > 1.0 && roll < 3.0, "{roll}");
-        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first; after two states q is −0.9 rad/s.
+        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first. After two states q is −0.9 rad/s.
         let pitch = answers.after(1, 4);
         assert!(pitch < -0.5 && pitch > -2.0, "{pitch}");
     }

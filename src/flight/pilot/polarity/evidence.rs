@@ -85,7 +85,7 @@ impl Evidence {
     }
 
     /// Least squares on the changes of the rate between states. Gusts are a random walk, so their changes are nearly
-    /// white; the standard error is increased by the remaining autocorrelation. There are three regressors: the
+    /// white. The standard error is increased by the remaining autocorrelation. There are three regressors: the
     /// modelled response to the commands, the response to a step of unknown size at the handover, `taken` states before
     /// the first, and a constant.
     fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {

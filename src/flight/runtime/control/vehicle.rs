@@ -1,4 +1,4 @@
-//! Vehicle side of the control thread: it answers the newest state; older queued states are only recorded.
+//! Vehicle side of the control thread: it answers the newest state. Older queued states are only recorded.
 
 use std::time::{Duration, Instant};
 

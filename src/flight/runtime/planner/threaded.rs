@@ -21,7 +21,7 @@ pub struct Threaded {
 }
 
 impl Threaded {
-    /// Starts the thread. In real time a plan is late `deadline` after the arrival of its state frame; in lockstep
+    /// Starts the thread. In real time a plan is late `deadline` after the arrival of its state frame. In lockstep
     /// there is no deadline.
     pub fn start(
         mut controller: Box<dyn Controller>,

@@ -17,7 +17,7 @@
 
 use greylag_physics::atmosphere::MIDDLE_GRAVITY;
 
-/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s²; it is multiplied by the step of 10
+/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s². It is multiplied by the step of 10
 /// ms. Light turbulence changes the velocity of the air at about this rate.
 const PROCESS: f64 = 1.0;
 /// Standard deviation of the airspeed, m/s.
@@ -46,7 +46,7 @@ pub struct Measured {
     pub rates: [f64; 3],
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
-    /// True airspeed V_a, m/s; below 3 m/s the estimate restarts.
+    /// True airspeed V_a, m/s. Below 3 m/s the estimate restarts.
     pub airspeed: f64,
     /// Climb rate, m/s, positive upward; NaN if not reported.
     pub climb: f64,

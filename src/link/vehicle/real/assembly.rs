@@ -150,7 +150,7 @@ impl Assembly {
         }
         self.fill_force(host, &mut next);
         let climb = self.fill_air(host, &mut next);
-        // stale parts do not count as frozen; they are already a fault
+        // stale parts do not count as frozen, because they are already a fault
         if self.stands_still(quaternion, rates) && next.faults.is_empty() {
             // the estimator would continue by itself, and hide from the pilot that all sensors are frozen
             (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);

@@ -4,7 +4,7 @@
 //! elevator feed-forward that does not fit the aircraft leave up to 9° of pitch for half a minute.
 //!
 //! The error is integrated over seconds and within narrow bounds, while the wanted attitude is constant and nearly
-//! reached. Constant errors are removed; transients are left to the flight controller.
+//! reached. Constant errors are removed. Transients are left to the flight controller.
 
 use greylag_physics::Time;
 
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     /// Attitude error at each tick of 20 s of flight, rad. The controller follows within half a second and keeps an
-    /// error of `error` (rad). `wanted` is the wanted roll (rad) as a function of time (s); the flight starts there.
+    /// error of `error` (rad). `wanted` is the wanted roll (rad) as a function of time (s). The flight starts there.
     fn flown(error: f64, wanted: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut trim, mut roll) = (AttitudeTrim::default(), wanted(0.0));
         (0..2000)

@@ -36,7 +36,7 @@ impl Real {
     }
 
     /// See [`crate::vehicle::Vehicle::excuse`]. After a stall longer than 0.5 s the flight controller's own failsafe is
-    /// active; control authority is then returned.
+    /// active. Control authority is then returned.
     pub fn excuse(&mut self, missed: Duration) {
         if self.engagement.steers() && missed > DEAD {
             self.hand_back(format!("this computer was late by {:.1} s", missed.as_secs_f64()));

@@ -145,7 +145,7 @@ impl Real {
     }
 
     /// Restarts with a controller that appears for the first time or again. Its parameters and channel directions are
-    /// then unknown; engagement is refused until they are read.
+    /// then unknown. Engagement is refused until they are read.
     fn meet(&mut self, system: u8, autopilot: u8) {
         if self.engagement.steers() {
             self.hand_back("no heartbeat of the controller for 3 s".into());

@@ -10,7 +10,7 @@ const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which 
 
 impl Real {
     /// Warning about a radio while surfaces are commanded; `None` without a radio. When the overrides end, ArduPlane
-    /// returns to the radio's sticks in MANUAL. It leaves MANUAL only by its ground-station failsafe; the companion
+    /// returns to the radio's sticks in MANUAL. It leaves MANUAL only by its ground-station failsafe. The companion
     /// acts as that ground station.
     pub fn radio_warning(&self) -> Option<String> {
         let by_channels =

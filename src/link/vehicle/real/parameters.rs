@@ -75,7 +75,7 @@ impl Parameters {
         names
     }
 
-    /// Stores a reported value; parameters outside the rules are ignored.
+    /// Stores a reported value. Parameters outside the rules are ignored.
     pub(super) fn take(&mut self, name: &str, value: f64) {
         for entry in &mut self.entries {
             if let Some(at) = entry.rule.names.iter().position(|known| *known == name) {

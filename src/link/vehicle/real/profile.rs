@@ -248,7 +248,7 @@ const STATION: &str =
     "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
 const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// Loop rate of the controller, Hz. States at 100 Hz need 125 Hz; there is no flight experience below 200 Hz.
+/// Loop rate of the controller, Hz. States at 100 Hz need 125 Hz. There is no flight experience below 200 Hz.
 const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [
@@ -287,7 +287,7 @@ impl Stack {
 
     /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every 100
     /// ms, and its stick input first passes through another module. It refused 2 of 3 requests at 150 ms, none at 300
-    /// ms. ArduPilot requires no stream; early sticks would act in LOITER.
+    /// ms. ArduPilot requires no stream. Early sticks would act in LOITER.
     pub fn lead(self) -> Duration {
         match self {
             Stack::Px4 => Duration::from_millis(500),

@@ -59,7 +59,7 @@ impl Requests {
         self.denied.contains(&id)
     }
 
-    /// The refused streams that engagement requires, as text; returned only once.
+    /// The refused streams that engagement requires, as text. They are returned only once.
     pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
         let words = self.words(stack).filter(|_| !self.reported)?;
         self.reported = true;
