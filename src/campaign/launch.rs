@@ -1,5 +1,6 @@
-//! Scripts that submit a campaign to a scheduler. Each stage is a job array. Each job runs `greylag campaign run FILE
-//! --cell N`.
+//! Scripts that submit a campaign to a scheduler.
+//!
+//! Each stage is a job array. Each job runs `greylag campaign run FILE --cell N`.
 
 use super::file::StageFile;
 use super::plan::Plan;

@@ -1,5 +1,4 @@
-//! The companion without threads, sockets or a wall clock: received bytes and time are arguments, bytes to send are
-//! results.
+//! The companion as a function of received bytes and time, without threads, sockets or a wall clock.
 //!
 //! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime). It serves campaigns of thousands
 //! of flights in one process, and replays.

@@ -1,5 +1,4 @@
-//! The companion in flight: pilot (decisions), runtime (threads and clocks), recorder, replay, monitor, and a desk for
-//! tests.
+//! The companion in flight: pilot, runtime, recorder, replay and model monitor, and a desk for tests.
 
 mod delay_margin;
 pub mod desk;

@@ -1,5 +1,6 @@
-//! Routing between clients and a flight controller. Frames for other components are forwarded unmodified to the peer
-//! from which their target was received.
+//! Routing between clients and a flight controller.
+//!
+//! Frames for other components are forwarded unmodified to the peer from which their target was received.
 
 use std::time::Duration;
 

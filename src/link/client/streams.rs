@@ -1,5 +1,6 @@
-//! Message intervals of a client's streams. The messages and their default rates are in [`STREAMS`] in
-//! `link/wire/telemetry.rs`.
+//! Message intervals of a client's streams.
+//!
+//! The messages and their default rates are in [`STREAMS`] in `link/wire/telemetry.rs`.
 
 use std::time::Duration;
 
