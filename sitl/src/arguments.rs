@@ -14,25 +14,26 @@ use crate::shim::{
 };
 use clap::{Args, Parser, ValueEnum};
 
-/// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
+/// Flies an aircraft in JSBSim and simulates its flight controller over MAVLink.
 ///
 /// Without options: real time, held at the start until the companion arms, sending to
 /// udpout:127.0.0.1:14600, where `cargo fly` listens.
 #[derive(Debug, Parser)]
 #[command(name = "greylag-sitl", version)]
 pub struct Cli {
-    /// Where the companion is met: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT; or
-    /// serial:DEVICE:BAUD; or pty:NAME, a pseudo-terminal that the companion opens under that name.
+    /// Address at which the companion connects: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT;
+    /// or serial:DEVICE:BAUD; or pty:NAME, a pseudo-terminal that the companion opens under that name.
     #[arg(long, value_name = "ADDRESS", default_value_t = ShimOptions::default_link())]
     link: Address,
-    /// Play this flight stack, with its modes, rates, parameters and failsafes, instead of the
+    /// Simulate this flight stack, with its modes, rates, parameters and failsafes, instead of the
     /// companion's own simulator link. It begins armed, in the air, flying by itself.
     #[arg(long, value_name = "STACK", value_enum, conflicts_with = "lockstep")]
     personality: Option<PersonalityName>,
     /// Set a parameter of that stack (may be repeated).
     #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = parameter)]
     parameter: Vec<(String, f64)>,
-    /// Set the parameters of a file, as params/x8/arduplane.parm: those that stack plays; --parameter goes on top.
+    /// Set the parameters of a file, such as params/x8/arduplane.parm: those that this stack simulates;
+    /// --parameter takes precedence.
     #[arg(long, value_name = "FILE", requires = "personality")]
     parameters: Option<PathBuf>,
     #[command(flatten)]
@@ -48,7 +49,7 @@ pub struct Cli {
     /// End after so much simulated flight; the time held at the start does not count.
     #[arg(long, value_name = "S")]
     duration_s: Option<f64>,
-    /// What the vehicle's clock shows at the start: 4294960 is seven seconds before its milliseconds wrap.
+    /// Initial value of the vehicle's clock: 4294960 is seven seconds before its milliseconds wrap.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     clock_start_s: f64,
     /// Seed of noise, frame faults and turbulence; equal seeds give equal flights in lockstep.
@@ -309,6 +310,6 @@ mod tests {
     #[test]
     fn a_file_of_the_other_stack_is_refused() {
         let said = options("ardupilot", "COM_RC_IN_MODE 1\n", &[]).unwrap_err().to_string();
-        assert!(said.contains("the ArduPilot personality plays"), "{said}");
+        assert!(said.contains("the ArduPilot personality simulates"), "{said}");
     }
 }

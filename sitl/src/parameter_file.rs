@@ -30,7 +30,7 @@ pub enum ParameterFileError {
     },
     /// The flight stack simulates none of the file's parameters.
     #[error(
-        "{path} has no parameter that the {stack} personality plays; give the file of that stack",
+        "{path} has no parameter that the {stack} personality simulates; give the file of that stack",
         path = path.display()
     )]
     Foreign {

@@ -53,7 +53,7 @@ struct AirArgs {
     /// MIL-spec turbulence: 3 light, 4 moderate, 6 severe.
     #[arg(long, value_name = "1..7")]
     turbulence_severity: Option<u8>,
-    /// Wind 20 ft above ground, which rules the turbulence near the ground; above 600 m the severity does.
+    /// Wind 20 ft above ground, which determines the turbulence near the ground; above 600 m the severity does.
     #[arg(
         long,
         value_name = "MPS",

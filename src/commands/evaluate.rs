@@ -59,7 +59,7 @@ pub struct Arguments {
     /// Folders of trained policies, for controllers that need one.
     #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(controllers::POLICY)])]
     policies: Vec<PathBuf>,
-    /// Settings of the planners in other than their usual size, as KEY=VALUE.
+    /// Settings of the planners that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// File of the targets to fly.

@@ -81,7 +81,7 @@ pub struct Arguments {
     /// Folder of the trained policy, for controllers that use one.
     #[arg(long, value_name = "DIR", default_value = POLICY)]
     policy: PathBuf,
-    /// Settings of the planner in other than their usual size, as KEY=VALUE.
+    /// Settings of the planner that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// Airframe file in place of the one that the model names.

@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Hide the effect of this file, with the values that the file has.
     #[arg(long, value_name = "FILE", group = "what")]
     hide: Option<PathBuf>,
-    /// How much of it, in its own unit; of an effect of a file, its first coefficient.
+    /// Amplitude in the effect's unit; for an effect of a file, its first coefficient.
     #[arg(long, requires = "what", allow_negative_numbers = true)]
     amplitude: Option<f64>,
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.

@@ -197,7 +197,7 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
     let Advised { name, delay_s } = check.controller;
     if delay_s < USUAL_DELAY {
         out.push(format!(
-            "the loops of {name} bear {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \
+            "the loops of {name} tolerate {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \
              faster, or correct Clda, Cmde or the inertia",
             1e3 * delay_s,
             1e3 * USUAL_DELAY

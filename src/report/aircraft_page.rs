@@ -38,7 +38,7 @@ impl AircraftReport<'_> {
                 "Over the envelope; angles up positive.",
                 vec![Figure::Table(self.trim())],
             ),
-            Section::new("What the stick does", &stick_note(), vec![Figure::Time(self.stick())]),
+            Section::new("Control response", &stick_note(), vec![Figure::Time(self.stick())]),
             Section::new(
                 "Modes",
                 "Of straight flight at the cruise airspeed.",
@@ -46,7 +46,7 @@ impl AircraftReport<'_> {
             ),
             Section::new(
                 "Loops of the LQI",
-                "Change of the loop's gain, phase lag and delay that it bears.",
+                "Change of the loop's gain, phase lag and delay that it tolerates.",
                 vec![Figure::Table(self.loops())],
             ),
             Section::new("Provenance", "", vec![Figure::Table(self.provenance())]).folded(),
@@ -67,7 +67,7 @@ impl AircraftReport<'_> {
         let AircraftCheck { findings, level_up_to, controller, .. } = self.check;
         let envelope = self.model.airframe.envelope;
         let mut details = vec![format!(
-            "Controller to begin with: {}; its loops bear {:.0} ms of delay.",
+            "Controller to begin with: {}; its loops tolerate {:.0} ms of delay.",
             controller.name,
             1e3 * controller.delay_s
         )];
@@ -90,14 +90,14 @@ impl AircraftReport<'_> {
             None => Verdict {
                 outcome: Outcome::Reached,
                 reason: String::new(),
-                sentence: format!("It {flies}; nothing is to be mended."),
+                sentence: format!("It {flies}; nothing needs correction."),
                 details,
                 next: String::new(),
             },
             Some((first, rest)) => Verdict {
                 outcome: Outcome::Missed,
                 reason: String::new(),
-                sentence: format!("To be mended before a flight: {first}."),
+                sentence: format!("To correct before a flight: {first}."),
                 details: rest.iter().cloned().chain(details).collect(),
                 next: String::new(),
             },

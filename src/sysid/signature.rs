@@ -66,7 +66,7 @@ pub struct Pair {
 
 /// The manoeuvre of [`Signature::manoeuvre`], in words.
 pub const MANOEUVRE: &str = "From level flight: 3-2-1-1 on the elevator from 0.5 s, a doublet of the aileron from \
-     4 s, full throttle from 6 s to 8 s.";
+     4 s, full throttle from 6 s to 8 s, a doublet of the rudder from 8 s.";
 
 /// Labels of the quantities that an effect may change, with their units.
 const CHANNELS: [&str; 6] = [

@@ -22,7 +22,7 @@ const LARGE: f64 = 1e7;
 pub static EFFECTS: [Effect; 25] = [
     Effect {
         id: "drag_alpha2",
-        formula: "drag Q a α², beside the drag table",
+        formula: "drag Q a α², in addition to the drag table",
         unit: "",
         bounds: (-ANY, ANY),
         write: |d, a| d.force(Axis::Drag, "drag-alpha2", a, &[alpha(), alpha()]),

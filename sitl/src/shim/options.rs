@@ -234,7 +234,7 @@ impl ShimOptions {
         self.check_simulators()?;
         demand(
             self.personality.is_none() || self.pace == Pace::RealTime,
-            "a personality flies in real time, as the flight controller it plays does",
+            "a personality flies in real time, as the flight controller that it simulates does",
         )?;
         // The upper limit is about ten thousand years, whose microseconds fit into 64 bits.
         demand(

@@ -106,13 +106,13 @@ pub fn print(found: &AircraftCheck) {
     }
     let controller = found.controller;
     println!(
-        "controller to begin with: {}, whose loops bear {:.0} ms of delay",
+        "controller to begin with: {}, whose loops tolerate {:.0} ms of delay",
         controller.name,
         1e3 * controller.delay_s
     );
     match found.findings.is_empty() {
-        true => println!("nothing to mend"),
-        false => found.findings.iter().for_each(|finding| println!("mend: {finding}")),
+        true => println!("nothing to correct"),
+        false => found.findings.iter().for_each(|finding| println!("correct: {finding}")),
     }
 }
 

@@ -99,7 +99,7 @@ fn table(scored: &[Scored]) -> Table {
         "free",
         "error on the flight left out",
         "± standard error",
-        "± beside the best",
+        "± relative to the best",
         "",
     ]);
     for column in table.column_iter_mut().skip(1) {

@@ -37,7 +37,7 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
 /// Constants estimated for each flight; angles in degrees.
 fn own_table(flights: &[FittedFlight]) -> Table {
     let mut table =
-        table(["flight", "its own", "value", "± 95 %", "beside the flights' mean", "± 95 %"], 1);
+        table(["flight", "its own", "value", "± 95 %", "minus the flights' mean", "± 95 %"], 1);
     for f in flights {
         for c in &f.own {
             let (factor, unit) = own_unit(c.name);

@@ -51,7 +51,7 @@ pub struct Arguments {
     /// Folder of the trained policy, for controllers that need one.
     #[arg(long, value_name = "DIR", default_value = controllers::POLICY)]
     policy: PathBuf,
-    /// Settings of the planner in other than their usual size, as KEY=VALUE.
+    /// Settings of the planner that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// Fly this flight-test schedule in place of the six attitudes.

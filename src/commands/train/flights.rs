@@ -32,7 +32,8 @@ pub struct FlightArguments {
     /// Folders that `greylag collect` wrote; every round below them is read, its states as they are.
     #[arg(long = "collect", num_args = 1..)]
     folders: Vec<PathBuf>,
-    /// Logs of recent flights, which outweigh the others; the last fifth of each judges and is not learned from.
+    /// Logs of recent flights, which outweigh the others; the last fifth of each is for validation and is not used for
+    /// training.
     #[arg(long = "recent", value_name = "LOG", num_args = 1..)]
     recent: Vec<PathBuf>,
     /// Part of all samples that recent flights make up, by being repeated; 1 leaves the others out.

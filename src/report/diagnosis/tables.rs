@@ -109,7 +109,7 @@ pub(crate) fn measurement(d: &Diagnosis) -> Section {
     }
     let note = match d.settings.per_flight.askew_deg {
         Some(_) => {
-            "Decided from kinematics alone, before any aerodynamics, and taken out; axes_askew beside the aerodynamics."
+            "Decided from kinematics alone, before any aerodynamics, and taken out; axes_askew together with the aerodynamics."
         }
         None => "Decided from kinematics alone, before any aerodynamics, and taken out.",
     };
@@ -123,7 +123,7 @@ pub(crate) fn trims(d: &Diagnosis) -> Section {
         ("Trim", Left),
         ("Value", Right),
         ("95 % interval", Right),
-        ("Beside the flights' mean", Right),
+        ("Minus the flights' mean", Right),
         ("95 % interval", Right),
         ("Clearly its own", Left),
     ];

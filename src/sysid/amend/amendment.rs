@@ -263,10 +263,10 @@ fn installed(
     let (said, [a, b]) = match errors {
         Some((a, b)) if a <= b => ("kept as [installation]", [a, b]),
         Some((a, b)) => ("not kept", [a, b]),
-        None => ("not kept, for no flight held out can judge it", [f64::NAN; 2]),
+        None => ("not kept, because no held-out flight can validate it", [f64::NAN; 2]),
     };
     let note = format!(
-        "The measured axes of the flights fitted stand askew in common ({words}), which is {said}: the error of the flights \
+        "The measured axes of the fitted flights have a common misalignment ({words}), which is {said}: the error of the flights \
          held out is {a:.5} with it, {b:.5} without."
     );
     if a <= b {

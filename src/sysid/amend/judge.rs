@@ -148,7 +148,7 @@ fn confounded_with_model(id: &str, parameters: &[Parameter]) -> String {
     let mut said: Vec<&str> = own(id, parameters).filter_map(|p| p.same_as.as_deref()).collect();
     said.sort_unstable();
     said.dedup();
-    format!(", for {} of the model itself can say nearly the same", said.join(", "))
+    format!(", because it is confounded with {} of the model", said.join(", "))
 }
 
 /// The coefficients of the added effect `id`.

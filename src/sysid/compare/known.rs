@@ -37,7 +37,7 @@ impl KnownUse {
         }
         let (with, without) = both;
         Some(format!(
-            "What the model's file knows of the flights is used ({}): the error over {} s is {:.5} with it, {:.5} without.",
+            "The flights' constants in the model's file are used ({}): the error over {} s is {:.5} with it, {:.5} without.",
             what.join("; "),
             with.horizon_s,
             with.rmse_scaled,

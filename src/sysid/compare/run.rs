@@ -32,7 +32,7 @@ use greylag_model::GreyBox;
 
 /// Reasons why a channel is not assessed.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
-const DOUBTFUL: &str = "the remaining errors of the sensors may account for all that is left";
+const DOUBTFUL: &str = "the uncertainty of the sensor errors may explain the whole residual";
 
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]

@@ -45,7 +45,7 @@ pub fn sentence(subject: &Subject) -> String {
     let Some(finding) = subject.finding else {
         let why = match subject.follows {
             _ if subject.within_doubt => {
-                "which the remaining errors of the sensors may account for: these flights cannot judge \
+                "which the uncertainty of the sensor errors may explain: these flights cannot judge \
                  the model more closely"
                     .into()
             }
@@ -57,8 +57,8 @@ pub fn sentence(subject: &Subject) -> String {
         };
         if subject.unexplained > QUIET {
             return format!(
-                "{noun} hardly varies in these flights (a quiet axis): the model leaves over more than ten times \
-                 what there is, {why}"
+                "{noun} hardly varies in these flights (a quiet axis): the residual is more than ten times \
+                 the channel's variation, {why}"
             );
         }
         return format!("{noun}: {share} of its variation is unexplained, {why}");

@@ -46,7 +46,7 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
     let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
     (first.divergence_rate > 0.5).then(|| {
         format!(
-            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are those of the bound.",
+            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are dominated by the divergence bound.",
             first.diverged, first.runs, first.horizon_s
         )
     })

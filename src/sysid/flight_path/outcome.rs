@@ -80,7 +80,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     } else if late {
         correct(&mut segments, &skew, log.step);
         notes.push(format!(
-            "The recorded actuators came {:.1} ms late against the gyros and were put right; a lag of \
+            "The recorded actuators came {:.1} ms late against the gyros and were corrected; a lag of \
              the surfaces that the record does not show would look the same.",
             1e3 * skew.late
         ));
@@ -326,7 +326,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     notes.extend(nuisance::unseen(&places, has, options));
     for n in found.iter().filter(|n| n.moved().abs() > FAR) {
         notes.push(format!(
-            "{} is found at {:.4} {}, {:.1} standard deviations from what was known of it beforehand: check that \
+            "{} is found at {:.4} {}, {:.1} standard deviations from the prior mean: check that \
              sensor, or what [sensors] says of it.",
             n.name,
             n.value,

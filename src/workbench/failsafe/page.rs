@@ -108,7 +108,7 @@ fn choices(form: &Form, wrong: Option<&Wrong>) -> String {
 
 /// Conditions of every flight of the page.
 const NOTE: &str = "60 s of the X8 as shipped. The attitude is asked for from 8 to 45 s; level before and after. The flight \
-                    controllers are played: their modes, time-outs and rules, not their firmware.";
+                    controllers are simulated: their modes, time-outs and rules, not their firmware.";
 
 fn examples() -> String {
     let one = |(name, query): &(&str, &str)| {

@@ -121,8 +121,8 @@ fn undecided(content: &Content) -> String {
              moment; log faster and unfiltered.",
             removable(content.found)
         ),
-        _ => "These flights cannot say whether the model lacks anything: in every channel the remaining errors of the \
-             sensors may account for all that is left; log what is noted below, or fly with better sensors."
+        _ => "These flights cannot say whether the model lacks anything: in every channel the uncertainty of the \
+             sensor errors may explain the whole residual; log what is noted below, or fly with better sensors."
             .into(),
     }
 }
