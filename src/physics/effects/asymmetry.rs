@@ -31,7 +31,7 @@ impl Effect for Asymmetry {
             "side_force_linear.CY0",
             "beta_bias",
         ],
-        separated_by: "throttle steps at several airspeeds: it grows with V² and does not know the throttle",
+        separated_by: "throttle steps at several airspeeds: it grows with V² and is independent of the throttle",
         example: &[0.004, 0.004, 0.004],
         starts: &[],
     });

@@ -30,7 +30,7 @@ macro_rules! heights {
     ($letter:literal, $bounds:expr, $($name:literal $degrees:literal),*) => {
         &[$(super::coefficient(
             concat!($letter, "_", $name),
-            concat!("what ", $letter, " is more at α = ", $degrees, "°"),
+            concat!("addition to ", $letter, " at α = ", $degrees, "°"),
             "",
             $bounds,
         )),*]

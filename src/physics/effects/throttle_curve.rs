@@ -17,7 +17,7 @@ impl Effect for ThrottleCurve {
         "thrust goes with the square of a propeller's speed, and that with the voltage: BM12 section 4.3";
     const COEFFICIENTS: &'static [Coefficient] = &[coefficient(
         "Tb_n",
-        "four times what half throttle gives less than half the thrust",
+        "four times the thrust missing at half throttle",
         "N",
         (-1e4, 1e4),
     )];

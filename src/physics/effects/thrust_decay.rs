@@ -22,7 +22,7 @@ impl Effect for ThrustDecay {
     const ENTRY: Option<Entry> = Some(Entry {
         channels: &[Channel::BodyX],
         look_alikes: &["drag_linear.CD0", "thrust_linear.Cp_n", "thrust_scale"],
-        separated_by: "throttle steps at several airspeeds: drag does not know the throttle",
+        separated_by: "throttle steps at several airspeeds: drag is independent of the throttle",
         example: &[0.6],
         starts: &[],
     });

@@ -31,7 +31,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "alpha_bias",
-        description: "The angle-of-attack vane stands askew.",
+        description: "The angle-of-attack vane is misaligned.",
         formula: "α_measured = α + b",
         source: PATH,
         coefficients: &[coefficient("alpha_bias", "measured less true", "rad", (-0.3, 0.3))],
@@ -45,7 +45,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "beta_bias",
-        description: "The sideslip vane stands askew.",
+        description: "The sideslip vane is misaligned.",
         formula: "β_measured = β + b",
         source: PATH,
         coefficients: &[coefficient("beta_bias", "measured less true", "rad", (-0.3, 0.3))],
@@ -73,7 +73,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "imu_bias",
-        description: "Gyros or accelerometers show a constant beside what they measure; that of a gyro drifts.",
+        description: "Gyros or accelerometers have a constant bias; that of a gyro drifts.",
         formula: "ω_measured = ω + b_ω + d_ω (t − t_middle), f_measured = f + b_f",
         source: PATH,
         coefficients: &IMU,
@@ -132,7 +132,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "heading_offset",
-        description: "The measured heading stands askew against the velocity over ground.",
+        description: "The measured heading is misaligned with the velocity over ground.",
         formula: "ψ_measured = ψ + b",
         source: PATH,
         coefficients: &[coefficient("heading_offset", "measured less true", "rad", (-0.5, 0.5))],
