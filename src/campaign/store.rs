@@ -192,7 +192,7 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Campai
         Err(e) => return Err(CampaignError::io("cannot read", path)(e)),
     };
     let wrong =
-        |e| CampaignError::content(path, format!("is not what it should be: {e}; delete it"));
+        |e| CampaignError::content(path, format!("has invalid contents: {e}; delete it"));
     serde_json::from_str(&text).map(Some).map_err(wrong)
 }
 

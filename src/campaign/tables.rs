@@ -164,7 +164,7 @@ impl SummaryRow {
         let word = if b < c { "less" } else { "more" };
         (b < c || d < a).then(|| {
             format!(
-                "{}, {}: mean {} here ({} runs), {} in the paper: {word}, the intervals have nothing in common.",
+                "{}, {}: mean {} here ({} runs), {} in the paper: {word}, the intervals are disjoint.",
                 self.name,
                 self.metric,
                 said(&ours),

@@ -104,7 +104,7 @@ impl Notice {
     pub fn ending(&self) -> Option<String> {
         match self {
             Notice::Released(reason) => {
-                Some(format!("hand-back asked, not confirmed yet: {reason}"))
+                Some(format!("hand-back requested, not confirmed yet: {reason}"))
             }
             Notice::HandedBack(reason) => Some(format!("handed back to the controller: {reason}")),
             Notice::Text(..) | Notice::Engaged | Notice::System(_) => None,

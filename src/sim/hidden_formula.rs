@@ -95,7 +95,7 @@ fn variable(of: Variable) -> Result<String, String> {
         V::BetaRate => property("aero/betadot-rad_sec"),
         V::Lift => {
             return Err(format!(
-                "{} is not known there while forces are worked out; write qbar*S and alpha",
+                "{} is not available while forces are computed; write qbar*S and alpha",
                 of.name()
             ));
         }

@@ -60,7 +60,7 @@ impl Network {
                 numbers.map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect();
             match all.iter().all(|x| x.is_finite()) {
                 true => Ok(all),
-                false => Err(format!("{name} holds what is no number")),
+                false => Err(format!("{name} has a value that is not finite")),
             }
         };
         Ok(Network {

@@ -112,7 +112,7 @@ impl Pilot {
     /// Resets the pilot after a restart of the vehicle's clock, because earlier states and times are invalid.
     pub(super) fn restart(&mut self) {
         if self.estimate.last().is_some() {
-            self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
+            self.texts.say(Severity::Warning, "vehicle clock jumped back: vehicle restarted?");
         }
         self.estimate = Estimate::default();
         self.setpoint = None;

@@ -118,7 +118,7 @@ impl Reports {
             return None;
         }
         self.reported = Some(host);
-        let late = format!("this computer was late by {:.1} s", missed.as_secs_f64());
+        let late = format!("this computer stalled for {:.1} s", missed.as_secs_f64());
         Some(match cause {
             Cause::Busy => format!("{late}: {}", busy()),
             Cause::Stopped => format!("{late}: the program was stopped, or the machine suspended"),
@@ -138,7 +138,7 @@ impl Reports {
         (self.reported, self.unreported) = (Some(host), (0, Duration::ZERO));
         let longest = longest.as_secs_f64();
         Some(format!(
-            "this computer was late {times} times more, by {longest:.1} s at most: {}",
+            "this computer stalled {times} times more, for at most {longest:.1} s: {}",
             busy()
         ))
     }
@@ -151,7 +151,7 @@ fn busy() -> String {
     let load = load.as_deref().and_then(|words| words.split(' ').next());
     let load =
         load.map_or(String::new(), |load| format!(" (load {load}, processors {processors})"));
-    format!("other work has its processors{load}")
+    format!("other load on its processors{load}")
 }
 
 #[cfg(test)]
@@ -200,7 +200,7 @@ mod tests {
         let mut reports = Reports::default();
         let first = reports.note(at(0), ms(1200), Cause::Stopped).unwrap();
         assert!(
-            first.starts_with("this computer was late by 1.2 s: the program was stopped"),
+            first.starts_with("this computer stalled for 1.2 s: the program was stopped"),
             "{first}"
         );
         let more: Vec<_> =
@@ -209,7 +209,7 @@ mod tests {
         assert_eq!(reports.due(at(4900)), None);
         let rest = reports.due(at(5000)).unwrap();
         assert!(
-            rest.starts_with("this computer was late 49 times more, by 0.1 s at most"),
+            rest.starts_with("this computer stalled 49 times more, for at most 0.1 s"),
             "{rest}"
         );
         assert_eq!(reports.due(at(20_000)), None);

@@ -72,7 +72,7 @@ impl fmt::Display for Summary {
         if t.stalls > 0 {
             writeln!(
                 f,
-                "this computer was late {} times, by {:.1} s at most; {} states overtaken by newer ones",
+                "this computer stalled {} times, for at most {:.1} s; {} states overtaken by newer ones",
                 t.stalls,
                 t.longest_stall.as_secs_f64(),
                 t.overtaken

@@ -59,7 +59,7 @@ pub enum TrainableError {
     },
     /// An effect depends on the altitude.
     #[error(
-        "model {model} has the effect {effect}, which goes with the altitude, and the rollouts that are learned from do not know it: leave it out of the prior"
+        "model {model} has the effect {effect}, which depends on the altitude; the rollouts for training do not include the altitude: leave the effect out of the prior"
     )]
     Effect {
         /// Name of the model.

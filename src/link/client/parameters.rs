@@ -91,7 +91,7 @@ impl Clients {
             return;
         };
         let refusal = match matched(autopilot.parameters()[index].value, value) {
-            None => Some((ParameterFault::TypeMismatch, "its type is not the table's".to_owned())),
+            None => Some((ParameterFault::TypeMismatch, "wrong type".to_owned())),
             Some(value) => match autopilot.set_parameter(index, value) {
                 Verdict::Accepted => None,
                 Verdict::Rejected(reason) | Verdict::Denied(reason) => {

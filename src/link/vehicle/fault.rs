@@ -50,8 +50,8 @@ impl Fault {
                     Axis::Pitch => ("elevator", "roll"),
                 };
                 format!(
-                    "it does not answer to the {surface}: check servo, wire, mixer (one elevon \
-                     reversed makes {other} of it)"
+                    "no response to the {surface}: check servo, wire, mixer (one reversed elevon \
+                     turns it into {other})"
                 )
             }
             Fault::Oscillation(axis) => {
@@ -60,8 +60,8 @@ impl Fault {
                     Axis::Pitch => ("pitch", "elevator"),
                 };
                 format!(
-                    "it oscillates in {axis}, the {surface} at its limits: the delay is more than \
-                     its controller bears; fly --controller lqi-damped, or attitudes{}",
+                    "it oscillates in {axis}, the {surface} at its limits: the delay exceeds \
+                     the margin of its controller; fly --controller lqi-damped, or attitudes{}",
                     faster(stack)
                 )
             }

@@ -272,7 +272,7 @@ fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Ve
         used.push(name.as_str());
         let turn = if column[place] * sign < 0.0 { -1.0 } else { 1.0 };
         if turn < 0.0 {
-            notes.push(format!("{name} of the file is turned round: {}", SENSE[place - 2]));
+            notes.push(format!("{name} of the file is reversed in sign: {}", SENSE[place - 2]));
         }
         let [side, lift, roll, pitch, yaw] = column.map(|x| turn * x);
         out.extend(match control {

@@ -89,8 +89,8 @@ impl Tool {
     /// Explanation of why a damping derivative may be missing.
     pub(super) fn of_damping(self) -> &'static str {
         match self {
-            Tool::LiftingLine => "AeroSandbox's lifting line does not see rotation",
-            _ => "the run did not see rotation, or its reference lengths are wrong",
+            Tool::LiftingLine => "AeroSandbox's lifting line does not model rotation",
+            _ => "the run did not model rotation, or its reference lengths are wrong",
         }
     }
 }

@@ -142,7 +142,7 @@ pub(crate) fn trims(d: &Diagnosis) -> Section {
             if t.asserted { "yes".into() } else { "no".to_string() },
         ]);
     }
-    let note = "Fitted beside the aerodynamics, to be added to the model's coefficients in that flight. What all \
+    let note = "Fitted together with the aerodynamics, to be added to the model's coefficients in that flight. What all \
                 flights have in common is in the model's coefficients as well, so that the difference from the \
                 flights' mean is known better.";
     section("Trims of the flights", note, table)

@@ -100,7 +100,7 @@ impl Aircraft {
                 return Err(ShimError::Parameter {
                     stack: "sitl",
                     name: setting.name.clone(),
-                    known: "none: no flight controller is played there".into(),
+                    known: "none: no flight controller is simulated there".into(),
                 });
             }
             (None, None) => Aircraft::Sitl(Box::new(Bench::new(&options)?)),

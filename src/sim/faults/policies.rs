@@ -226,7 +226,7 @@ fn of_commands() -> Vec<Policy> {
         ),
         policy(
             "held",
-            "a command is held over a gap of states for at most 0.06 s",
+            "a command is held over a gap of states for at most 0.055 s",
             Formula::atom(|s: &Sample| (HELD_S - s.held_s) / HELD_S),
         ),
     ]

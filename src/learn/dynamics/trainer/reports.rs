@@ -30,12 +30,12 @@ pub enum TrainError {
     Data(usize),
     /// The bare prior diverges on more than half of the rollouts.
     #[error(
-        "model {0} leaves the numbers on most rollouts before anything is learned: it is no model of this aircraft, or the logs are of another"
+        "model {0} diverges on most rollouts before training starts: it is not a model of this aircraft, or the logs are of another"
     )]
     Prior(String),
     /// The loss or its gradient was not finite in too many consecutive updates.
     #[error(
-        "the loss left the numbers at update {update}; what was learned before is kept in the last checkpoint: go on from it with a smaller learning rate"
+        "the loss is not finite at update {update}; the last checkpoint has the result of earlier updates: continue from it with a smaller learning rate"
     )]
     Diverged {
         /// Number of the update.

@@ -79,7 +79,7 @@ impl Real {
         let (delays, bears) = (self.delays()?, self.bears?.as_secs_f64());
         let left = bears - delays.sum_s();
         let words = format!(
-            "{delays}: {:.0} of the {:.0} ms at which its loop swings by itself, {:.0} ms are left",
+            "{delays}: {:.0} of the {:.0} ms at which the loop oscillates; margin {:.0} ms",
             1e3 * delays.sum_s(),
             1e3 * bears,
             1e3 * left
@@ -97,12 +97,12 @@ impl Real {
     pub fn delay_obstacle(&self) -> Option<String> {
         let (left, words) = self.left()?;
         (left <= 0.0)
-            .then(|| format!("the controller bears no such delay: {words}; {}", self.shorter()))
+            .then(|| format!("the delay exceeds the controller's margin: {words}; {}", self.shorter()))
     }
 
     pub(super) fn delay_warning(&self) -> Option<String> {
         let (left, words) = self.left()?;
-        (left < SCARCE_S).then(|| format!("little delay is left: {words}; {}", self.shorter()))
+        (left < SCARCE_S).then(|| format!("small delay margin: {words}; {}", self.shorter()))
     }
 
     fn shorter(&self) -> &'static str {

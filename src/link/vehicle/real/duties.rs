@@ -39,7 +39,7 @@ impl Real {
     /// active. Control authority is then returned.
     pub fn excuse(&mut self, missed: Duration) {
         if self.engagement.steers() && missed > DEAD {
-            self.hand_back(format!("this computer was late by {:.1} s", missed.as_secs_f64()));
+            self.hand_back(format!("this computer stalled for {:.1} s", missed.as_secs_f64()));
         }
         self.last_state = self.last_state.map(|at| at + missed);
         if let Some(controller) = &mut self.controller {
@@ -70,7 +70,7 @@ impl Real {
         } else if let Some(why) =
             self.engagement.overdue(host, self.profile.stack, self.profile.authority)
         {
-            self.hand_back(format!("the controller did not go to {steered}: {why}"));
+            self.hand_back(format!("the controller did not enter {steered}: {why}"));
         }
     }
 

@@ -166,7 +166,7 @@ impl Bench {
             if text.words.starts_with("engaged") {
                 self.watched.since_s.get_or_insert(at_s);
             }
-            if text.words.contains("is not the model's") {
+            if text.words.contains("deviates from the model") {
                 self.watched.said.push((at_s, text.words));
             }
         }

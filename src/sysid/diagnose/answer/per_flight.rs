@@ -186,7 +186,7 @@ pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     });
     let one = |(flight, all): (&str, String)| {
         format!(
-            "{flight}: the measured axes stand askew, {all} (95 %; {}), fitted beside the aerodynamics.",
+            "{flight}: the measured axes are misaligned, {all} (95 %; {}), fitted together with the aerodynamics.",
             askew::ID
         )
     };
