@@ -191,8 +191,7 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Campai
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(CampaignError::io("cannot read", path)(e)),
     };
-    let wrong =
-        |e| CampaignError::content(path, format!("has invalid contents: {e}; delete it"));
+    let wrong = |e| CampaignError::content(path, format!("has invalid contents: {e}; delete it"));
     serde_json::from_str(&text).map(Some).map_err(wrong)
 }
 

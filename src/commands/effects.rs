@@ -170,7 +170,9 @@ fn list() -> String {
             about.description.to_owned(),
         ]);
     }
-    format!("{table}\n`greylag effects show ID` tells more of one; --report draws its signature.\n")
+    format!(
+        "{table}\n`greylag effects show ID` describes one in full; --report draws its signature.\n"
+    )
 }
 
 /// The letters of an effect's channels.
@@ -198,7 +200,7 @@ fn variables() -> String {
     for v in Variable::ALL {
         text += &format!("  {:12} {:18} {}\n", v.name(), v.alias(), v.meaning());
     }
-    text += "functions, beside + - * / ^\n";
+    text += "functions, in addition to + - * / ^\n";
     for f in Function::ALL.iter().filter(|f| !f.is_operator()) {
         text += &format!("  {:12} {}\n", f.name(), f.meaning());
     }

@@ -42,7 +42,7 @@ pub struct Arguments {
     /// Controllers that fly the campaign.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
-    /// The simulator's aircraft; the played flight controllers have gains for the X8, so others fly with the
+    /// The simulator's aircraft; the simulated flight controllers have gains for the X8, so others fly with the
     /// counterpart sitl.
     #[arg(long, value_name = "NAME", default_value = AIRCRAFT, conflicts_with = "resume")]
     aircraft: String,
@@ -72,7 +72,7 @@ pub struct Arguments {
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
     scenario: Option<PathBuf>,
-    /// Fly this number of flights, healthy and with each failure, under the model monitor, beside a
+    /// Fly this number of flights, healthy and with each failure, under the model monitor, with a
     /// simulated ArduPlane whose attitude has errors drawn for each flight: false alarms and
     /// delays. `--first` is the first seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json"])]

@@ -283,12 +283,12 @@ fn open(folder: &Path) -> Result<ExitCode> {
     println!("hidden: {} = {} {}", answer.id, answer.amplitude, answer.unit);
     let path = folder.join(DIAGNOSIS);
     if !path.exists() {
-        println!("{} is not there: nothing to set beside it", path.display());
+        println!("{} does not exist: no diagnosis to compare", path.display());
         return Ok(ExitCode::SUCCESS);
     }
     let text = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
     let said: serde_json::Value = serde_json::from_slice(&text)
-        .with_context(|| format!("{} is no diagnosis; write it anew", path.display()))?;
+        .with_context(|| format!("{} is not a diagnosis; write it again", path.display()))?;
     beside(&answer, &said);
     Ok(ExitCode::SUCCESS)
 }

@@ -57,7 +57,7 @@ pub const MENU: &[Manoeuvre] = &[
     },
     Manoeuvre {
         name: "fast-multisine",
-        description: "Sines of 2 to 6 Hz on the surfaces: tells lags and delays apart.",
+        description: "Sines of 2 to 6 Hz on the surfaces: distinguishes lags from delays.",
         steps: || multisines(8.0, 2.0, 6.0, [0.20, 0.20, 0.0]),
     },
     Manoeuvre {
@@ -157,7 +157,7 @@ pub const MENU: &[Manoeuvre] = &[
     },
     Manoeuvre {
         name: "two-altitudes",
-        description: "The same doublets before and after a climb: what goes with air density.",
+        description: "The same doublets before and after a climb: what depends on air density.",
         steps: || {
             let shake = Step::hold(4.0, 0.0, 3.0, 19.0).with(doublet(Elevator, 0.15, 1.0, 0.4));
             vec![shake.clone(), Step::hold(20.0, 0.0, 25.0, 19.0), shake]

@@ -7,7 +7,7 @@ use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 #[derive(Debug, thiserror::Error)]
 pub enum EditError {
     /// The text is not valid TOML.
-    #[error("cannot edit the model file: {0}; `greylag compare` tells what is wrong with it")]
+    #[error("cannot edit the model file: {0}; `greylag compare` names the fault")]
     Syntax(#[from] toml_edit::TomlError),
     /// An entry is missing or has another type than in a model file.
     #[error("cannot edit the model file: {0} is not where a model file has it")]

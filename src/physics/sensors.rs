@@ -185,7 +185,7 @@ impl Sensors {
             Written::Known(known) => {
                 let found = CONSTANTS.into_iter().find(|c| key(*c) == name);
                 let (constant, _) = found.ok_or_else(|| {
-                    format!("sensors.{name} is no constant of a sensor; {}", known_keys())
+                    format!("sensors.{name} is not a constant of a sensor; {}", known_keys())
                 })?;
                 if !(known.value.is_finite() && known.sd.is_finite() && known.sd >= 0.0) {
                     return Err(format!(
@@ -252,7 +252,7 @@ impl Sensors {
 fn known_keys() -> String {
     let constants: Vec<String> = CONSTANTS.into_iter().map(key).collect();
     format!(
-        "[sensors] knows wind, clocks, {}, vanes_at_m, accelerometer_at_m, and as {{ value = …, sd = … }} {}",
+        "[sensors] accepts wind, clocks, {}, vanes_at_m, accelerometer_at_m, and as {{ value = …, sd = … }} {}",
         NOISE.join(", "),
         constants.join(", ")
     )

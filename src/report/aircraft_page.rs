@@ -223,8 +223,8 @@ impl AircraftReport<'_> {
     }
 }
 
-const SKETCH_NOTE: &str = "Span and mean chord to scale; the body and the tail are drawn as usual ones, for the model \
-                           knows them by their coefficients only.";
+const SKETCH_NOTE: &str = "Span and mean chord to scale; the shapes of the body and the tail are typical ones, because \
+                           the model has only their coefficients.";
 
 fn stick_note() -> String {
     format!(

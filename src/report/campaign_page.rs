@@ -213,7 +213,7 @@ fn summary(index: usize, summary: &Summary) -> Section {
     };
     let note = format!(
         "Median, interquartile mean and mean over the runs, with 95 % percentile bootstrap intervals over seeds, \
-         each stratum resampled by itself. A row's name leads to its numbers.{beside}"
+         each stratum resampled separately. A row's name leads to its numbers.{beside}"
     );
     Section::new(&summary.title, &note, figures)
 }

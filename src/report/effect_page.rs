@@ -50,7 +50,7 @@ impl EffectReport<'_> {
 
     fn facts(&self) -> Table {
         let mut table = Table::new(
-            "what the catalogue knows",
+            "entry of the catalogue",
             &[("", Align::Left), (self.about.id, Align::Left)],
         );
         for [name, text] in facts(&self.about, self.place, &self.channels) {

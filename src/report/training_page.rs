@@ -136,7 +136,7 @@ impl TrainingReport<'_> {
         if self.history.is_empty() {
             return Section::default();
         }
-        let note = "The prediction error over the bare prior's, how large the residual is beside the \
+        let note = "The prediction error over the bare prior's, the size of the residual relative to the \
                     prior, and λ, whose inverse weighs it.";
         let figures = vec![
             line("Prediction error, eq. (23)", "L / L_prior", &|m| m.normalised),

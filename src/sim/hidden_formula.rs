@@ -128,7 +128,7 @@ impl Writer<'_> {
                 match written.len() > LONGEST {
                     true => Err(format!(
                         "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what \
-                         stands inside smoothstep, tanh, sign and deadband; nest them less"
+                         is inside smoothstep, tanh, sign and deadband; nest them less"
                     )),
                     false => Ok(written),
                 }
@@ -144,7 +144,7 @@ impl Writer<'_> {
     fn filter(&mut self, function: Function, all: &[Expression]) -> Result<String, String> {
         let time_s = match all.get(1).map(|e| &e.node) {
             Some(Node::Parameter(k)) => self.value(*k),
-            _ => return Err(format!("the time of {} is no parameter", function.name())),
+            _ => return Err(format!("the time of {} is not a parameter", function.name())),
         };
         let input = self.xml(&all[0])?;
         let kind = if function == Function::Delay { FilterKind::Delay } else { FilterKind::Lag };

@@ -56,7 +56,7 @@ pub enum WorkbenchError {
     },
     /// A log has changed since the session read it.
     #[error(
-        "{} is not the log that the session knows: its content changed; take it out of the session and add it again", path.display()
+        "{} has changed since it was added to the session; take it out of the session and add it again", path.display()
     )]
     LogChanged {
         /// Path of the log.
@@ -132,7 +132,7 @@ pub enum WorkbenchError {
     )]
     MappingGiven(String),
     /// The session's mapping is invalid.
-    #[error("cannot add to the mapping {}: it is no mapping; mend or remove it", .0.display())]
+    #[error("cannot add to the mapping {}: it is not a mapping; correct or remove it", .0.display())]
     NoMapping(PathBuf),
     /// The flight has no data at this time, s, from which a free run can start.
     #[error(
@@ -149,7 +149,7 @@ pub enum WorkbenchError {
     #[error("{0} is accepted; take it back first")]
     Accepted(String),
     /// No manoeuvre in the list distinguishes the two effects.
-    #[error("no manoeuvre of the menu tells {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
+    #[error("no manoeuvre of the menu distinguishes {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
     NotApart([String; 2]),
     /// A flight is in progress.
     #[error("a flight is on; stop it, or wait for its end")]
@@ -169,7 +169,7 @@ pub enum WorkbenchError {
     )]
     Open(PathBuf),
     /// The session file is invalid.
-    #[error("cannot read the session {}: {why}; mend the file, or give --dir another folder", path.display())]
+    #[error("cannot read the session {}: {why}; correct the file, or give --dir another folder", path.display())]
     Session {
         /// Path of the session file.
         path: PathBuf,

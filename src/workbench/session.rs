@@ -215,7 +215,7 @@ impl Session {
         let session: Session = toml::from_str(&text).map_err(|e| broken(e.to_string()))?;
         match session.schema {
             SCHEMA => Ok(Some(session)),
-            other => Err(broken(format!("its schema is {other}, this program knows {SCHEMA}"))),
+            other => Err(broken(format!("its schema is {other}, this program reads {SCHEMA}"))),
         }
     }
 

@@ -244,7 +244,7 @@ fn what_a_method_does_not_compute_is_named_and_not_taken() {
     assert!(value(&textbook, "pitch_linear.Cmde") < -0.3, "the textbook's elevator stands in");
     let line = read(&computed("trainer-liftingline"), &beside()).unwrap();
     let said = line.warnings.join("\n");
-    for part in ["Clp = -0.00", "beside CLalpha", "Cmq = ", "does not model rotation"] {
+    for part in ["Clp = -0.00", "with CLalpha", "Cmq = ", "does not model rotation"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     assert!(value(&model(&line), "roll_linear.Clp") < -0.2);

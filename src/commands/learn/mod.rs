@@ -154,7 +154,7 @@ impl Arguments {
         let policy = shipped(&flying(folder)?.join(plan::POLICY));
         if !policy.exists() {
             bail!(
-                "cannot go on from {}: it has a model and no policy; give the folder of `greylag learn`",
+                "cannot continue from {}: it has a model and no policy; give the folder of `greylag learn`",
                 folder.display()
             );
         }
@@ -286,7 +286,7 @@ fn flying(folder: &Path) -> Result<PathBuf> {
     let place = places.into_iter().find(|place| shipped(&place.join("model.toml")).exists());
     place.with_context(|| {
         format!(
-            "cannot go on from {}: it has no model.toml; give the --out of `greylag learn` that ended",
+            "cannot continue from {}: it has no model.toml; give the --out of `greylag learn` that ended",
             folder.display()
         )
     })

@@ -278,7 +278,7 @@ fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     if kept.exists() {
         trainer
             .resume(Checkpoint::load(kept)?)
-            .with_context(|| format!("cannot go on from {}", kept.display()))?;
+            .with_context(|| format!("cannot continue from {}", kept.display()))?;
         eprintln!("going on after {} updates", trainer.update());
     }
     Ok(trainer)

@@ -157,7 +157,7 @@ impl FlightArguments {
         let wanted = share / (1.0 - share) * old as f64 / new as f64;
         let copies = wanted.round().clamp(1.0, MOST_COPIES) as usize;
         notes.push(format!(
-            "{new} samples of recent flights count {copies} times beside {old} of others: {:.0} % of what is learned from.",
+            "{new} samples of recent flights count {copies} times against {old} of others: {:.0} % of the training data.",
             100.0 * (copies * new) as f64 / (copies * new + old) as f64
         ));
         let mut learn = others;

@@ -251,8 +251,9 @@ impl Arguments {
     /// The actor from which the training starts; `None` without `--start`.
     fn started(&self, airframe: &Airframe) -> Result<Option<Arc<Actor>>> {
         let load = |folder: &PathBuf| -> Result<Arc<Actor>> {
-            let agent = Agent::load(folder, airframe)
-                .with_context(|| format!("cannot go on from the policy in {}", folder.display()))?;
+            let agent = Agent::load(folder, airframe).with_context(|| {
+                format!("cannot continue from the policy in {}", folder.display())
+            })?;
             Ok(agent.actor)
         };
         self.start.as_ref().map(load).transpose()

@@ -98,6 +98,9 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Warning { channel, share, .. } = self;
         let (share, suspect) = (share.abs(), self.suspect());
-        write!(f, "{channel} deviates from the model ({share:.1} times its band): suspect {suspect}")
+        write!(
+            f,
+            "{channel} deviates from the model ({share:.1} times its band): suspect {suspect}"
+        )
     }
 }

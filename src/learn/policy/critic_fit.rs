@@ -85,7 +85,7 @@ impl Default for ValuationRecipe {
 #[derive(Debug, thiserror::Error)]
 pub enum ValuationError {
     /// The loss is not finite.
-    #[error("the loss of the critics is no longer a number after {0} updates; lower --rate")]
+    #[error("the loss of the critics is not finite after {0} updates; lower --rate")]
     Loss(u64),
     /// A network cannot be used.
     #[error("the critics: {0}")]

@@ -63,9 +63,7 @@ impl Default for PolicyRecipe {
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
     /// The loss is not finite.
-    #[error(
-        "the loss of the critics is no longer a number after {0} steps; lower the learning rates"
-    )]
+    #[error("the loss of the critics is not finite after {0} steps; lower the learning rates")]
     Loss(u64),
     /// A network cannot be used.
     #[error("the networks: {0}")]

@@ -51,7 +51,7 @@ pub enum SerialFault {
     Busy,
     /// The port does not support this baud rate.
     #[error(
-        "it does not work at {0} baud; give a rate that it knows, such as 921600, 115200 or 57600"
+        "it does not work at {0} baud; give a rate that it supports, such as 921600, 115200 or 57600"
     )]
     Baud(u32),
     /// The file is not a serial port.

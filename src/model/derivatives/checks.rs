@@ -31,7 +31,7 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
         let x = of(name)?;
         (x > -least).then(|| {
             let text = format!(
-                "{} = {x:.4} beside CLalpha = {slope:.2}: {}; {} are textbook estimates",
+                "{} = {x:.4} with CLalpha = {slope:.2}: {}; {} are textbook estimates",
                 &name[1..],
                 tool.of_damping(),
                 rates.iter().map(|r| &r[1..]).collect::<Vec<_>>().join(", ")

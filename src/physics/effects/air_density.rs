@@ -29,7 +29,7 @@ impl Effect for AirDensity {
             Channel::Yaw,
         ],
         look_alikes: &["mass_error", "airspeed_scale"],
-        separated_by: "two altitudes under one known atmosphere; at one altitude, with free coefficients, no manoeuvre tells it: it scales them all",
+        separated_by: "two altitudes under one known atmosphere; at one altitude, with free coefficients, no manoeuvre identifies it: it scales them all",
         example: &[0.2],
         starts: &[],
     });

@@ -9,7 +9,7 @@ pub struct Asymmetry;
 
 impl Effect for Asymmetry {
     const ID: &'static str = "asymmetry";
-    const DESCRIPTION: &'static str = "The airframe is bent: it rolls, yaws and slides by itself.";
+    const DESCRIPTION: &'static str = "The airframe is bent: it rolls, yaws and sideslips without a command.";
     const FORMULA: &'static str = "l = Q b Cl0, n = Q b Cn0, Y = Q CY0";
     const SOURCE: &'static str = "GSFM26 eqs. (42), (44), (46)";
     const COEFFICIENTS: &'static [Coefficient] = &[

@@ -14,7 +14,7 @@ impl Effect for ThrottleCurve {
         "The thrust bends over the throttle; without and at full throttle it stays.";
     const FORMULA: &'static str = "T += Tb δt (δt − 1)";
     const SOURCE: &'static str =
-        "thrust goes with the square of a propeller's speed, and that with the voltage: BM12 section 4.3";
+        "thrust is proportional to the square of a propeller's speed, and that to the voltage: BM12 section 4.3";
     const COEFFICIENTS: &'static [Coefficient] = &[coefficient(
         "Tb_n",
         "four times the thrust missing at half throttle",

@@ -76,7 +76,7 @@ fn try_at(
         .map(|(k, v)| format!("{} = {}", v.name(), value(k, *v)))
         .collect();
     Err(format!(
-        "the formula is no number at {}; keep what is divided by, and what stands under a root, above zero with max",
+        "the formula is not finite at {}; keep divisors and arguments of roots above zero with max",
         words.join(", ")
     ))
 }

@@ -115,7 +115,7 @@ pub fn parse(text: &str) -> Result<Written, String> {
     let shapes: Vec<Expression> = lines.iter().map(|l| l.line.shape.clone()).collect();
     for (k, name) in names.iter().enumerate() {
         if !shapes.iter().any(|s| s.any(&|node| *node == Node::Parameter(k))) {
-            return Err(format!("parameters.{name} stands in no shape; use it or take it out"));
+            return Err(format!("parameters.{name} is in no shape; use it or remove it"));
         }
     }
     let linear = split::linear(&shapes, names.len());

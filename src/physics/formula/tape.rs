@@ -182,7 +182,7 @@ impl Tape {
             Node::Variable(v) => self.leaf(Operation::Variable(*v)),
             Node::Parameter(k) => match places.get(*k).copied().flatten() {
                 Some(place) => self.leaf(Operation::Constant(place)),
-                None => Err("a coefficient stands where only shape constants may".into()),
+                None => Err("a coefficient is used where only shape constants are allowed".into()),
             },
             Node::Power(base, n) => {
                 self.push(base, places)?;

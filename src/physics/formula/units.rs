@@ -112,7 +112,7 @@ fn same(left: Measure, right: Measure, at: &Expression, name: &str) -> Result<Me
         (Measure::Of(a), Measure::Of(b)) => Err(Fault {
             at: at.at,
             why: format!(
-                "the units do not balance: left of {name:?} stands {a}, right of it {b}; give a number that has \
+                "the units do not balance: left of {name:?} is {a}, right of it {b}; give a number that has \
                  a unit as a parameter, or divide by a speed or length"
             ),
         }),

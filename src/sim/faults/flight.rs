@@ -243,7 +243,7 @@ fn set(desk: &mut Desk, Setting { name, times }: &Setting) -> Result<(), FaultsE
         ));
     };
     let ParameterValue::Real(default) = pilot.parameters()[place].value else {
-        return Err(refused("it is no real number and has no multiples".into()));
+        return Err(refused("it is not a real number and has no multiples".into()));
     };
     match pilot.set_parameter(place, ParameterValue::Real(default * *times as f32)) {
         Verdict::Rejected(why) | Verdict::Denied(why) => Err(refused(why)),

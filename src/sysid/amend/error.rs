@@ -48,8 +48,8 @@ pub enum AmendError {
     },
     /// The flights do not excite any free coefficient.
     #[error(
-        "cannot fit {model}: these flights tell no coefficient better than the model file does, for \
-         the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
+        "cannot fit {model}: these flights determine no coefficient better than the model file does, \
+         because the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
          throttle, and turns at several speeds"
     )]
     NoExcitation {

@@ -192,7 +192,7 @@ pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
         .map(|p| {
             let cure = match p.value == 0.0 {
                 true => format!(
-                    "the flights want the other sign or do not tell it from the rest; check the sign of that control in \
+                    "the flights give the opposite sign or do not separate it from the rest; check the sign of that control in \
                      the mapping, or hold {} by a smaller sd in the model file",
                     p.name
                 ),

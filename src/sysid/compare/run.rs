@@ -143,7 +143,7 @@ fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, Compar
         }
         if flight.noise.iter().chain(&flight.force_noise).all(|sd| !sd.is_finite()) {
             notes.push(format!(
-                "{}: the sensors' noise is not known, so all that is left over counts as unexplained",
+                "{}: the sensors' noise is not known, so the whole residual counts as unexplained",
                 flight.name
             ));
         }

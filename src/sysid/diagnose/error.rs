@@ -34,7 +34,7 @@ pub enum DiagnoseError {
     },
     /// No channel's residual can be computed.
     #[error(
-        "cannot diagnose {model}: its residuals cannot be worked out over these flights; check its figures \
+        "cannot diagnose {model}: its residuals cannot be computed over these flights; check its figures \
          with `greylag compare` first"
     )]
     Unusable {

@@ -80,7 +80,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
         ..measured(&Entry {
             channels: &[],
             look_alikes: &["propeller_gyro", "asymmetry", "external_load", "thrust_scale"],
-            separated_by: "steady flight on several headings and banks, and a stand still before take-off",
+            separated_by: "steady flight on several headings and banks, and a standstill before take-off",
             example: &[],
             starts: &[],
         })
@@ -153,7 +153,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
         ..measured(&Entry {
             channels: &[],
             look_alikes: &["time_delay", "actuator_lag", "unsteady_lift"],
-            separated_by: "fast rolls and pull-ups: kinematics tell the skew without the surfaces",
+            separated_by: "fast rolls and pull-ups: kinematics determine the skew without the surfaces",
             example: &[],
             starts: &[],
         })

@@ -280,7 +280,7 @@ pub fn unseen(places: &[usize], has: &Present, options: &Options) -> Vec<String>
             _ => ("they", "keep their priors", "them"),
         };
         format!(
-            "The data of {} cannot tell {}: {they} {keep}; {remedy} to see {them}.",
+            "The data of {} do not determine {}: {they} {keep}; {remedy} to see {them}.",
             options.name,
             names.join(", ")
         )

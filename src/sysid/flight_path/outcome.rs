@@ -336,7 +336,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     }
     if smoothed.levels.gusts > ROUGH {
         notes.push(format!(
-            "The air was rough: gusts of about {:.1} m/s beside the mean wind.",
+            "The air was rough: gusts of about {:.1} m/s in addition to the mean wind.",
             smoothed.levels.gusts
         ));
     }

@@ -17,9 +17,7 @@ const FLYING_FLOOR: f64 = 3.0;
 
 /// Error of a flight whose sampling interval is outside 1e-6 to 1 s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "flight {flight} has a sampling interval of {step_s} s; it must be 1e-6 to 1 s"
-)]
+#[error("flight {flight} has a sampling interval of {step_s} s; it must be 1e-6 to 1 s")]
 pub struct ClockError {
     /// Name of the flight.
     pub flight: String,

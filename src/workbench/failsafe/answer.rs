@@ -28,7 +28,7 @@ pub(super) fn html(flown: &Flown) -> String {
 
 /// Legend of the bands' colours, as HTML.
 const KEY: &str = "<ul class=\"tones\"><li><i class=\"tone-asked\"></i>flies what is asked</li>\
-                   <li><i class=\"tone-safe\"></i>flies level by itself</li><li><i class=\"tone-begins\"></i>on the way, or a failsafe's mode</li>\
+                   <li><i class=\"tone-safe\"></i>flies level without a command</li><li><i class=\"tone-begins\"></i>on the way, or a failsafe's mode</li>\
                    <li><i class=\"tone-wrong\"></i>fault, failsafe</li><li><i class=\"tone-idle\"></i>does nothing</li></ul>\n";
 
 fn events(flown: &Flown) -> String {

@@ -161,7 +161,7 @@ impl Form {
             ("no", _) => Ok(Vec::new()),
             ("yes", Some("ArduPilot")) => Ok(vec![bound_radio()]),
             ("yes", _) => {
-                Err(self.wrong("radio", "is for ArduPilot: only that is played with a radio"))
+                Err(self.wrong("radio", "is for ArduPilot: only that is simulated with a radio"))
             }
             _ => Err(self.wrong("radio", "is no choice; choose yes or no")),
         }
@@ -373,7 +373,7 @@ mod tests {
             ("controller", "hybrid", "choose one of pid,"),
             ("mode", "return", "choose offboard or hold"),
             ("request", "land", "is no request"),
-            ("radio", "yes", "only that is played with a radio"),
+            ("radio", "yes", "only that is simulated with a radio"),
             ("turbulence", "9", "choose 0, 3, 4 or 6"),
         ] {
             let wrong = chosen(&[(field, value)]).unwrap_err();

@@ -60,7 +60,7 @@ impl Inner {
         let own = self.designed.iter().map(|d| Choice {
             id: d.name.clone(),
             description: format!(
-                "{} {} times: tells {} apart.",
+                "{} {} times: distinguishes {}.",
                 d.manoeuvre,
                 d.times,
                 d.between.join(" and ")

@@ -175,7 +175,7 @@ fn named(
             let is_share = name.contains("norm");
             if is_share {
                 notes.push(format!(
-                    "{name} is a share of a deflection that the file does not tell: {SHARE_RAD} rad are assumed, and only the \
+                    "{name} is a share of a deflection that the file does not state: {SHARE_RAD} rad are assumed, and only the \
                      {}'s effect at full command is known", role.name
                 ));
             }

@@ -82,7 +82,9 @@ impl LinkError {
                 "add your user to the group that owns the device (dialout), then log in again"
             }
             io::ErrorKind::NotFound => "plug the device in, or give the name that it has here",
-            io::ErrorKind::InvalidInput => "give a baud rate that the port knows, such as 921600",
+            io::ErrorKind::InvalidInput => {
+                "give a baud rate that the port supports, such as 921600"
+            }
             _ => "stop other programs that use it, and check the name given with --link",
         };
         LinkError::Serial { address: address.clone(), source, remedy }

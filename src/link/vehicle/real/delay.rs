@@ -96,8 +96,9 @@ impl Real {
     /// unknown.
     pub fn delay_obstacle(&self) -> Option<String> {
         let (left, words) = self.left()?;
-        (left <= 0.0)
-            .then(|| format!("the delay exceeds the controller's margin: {words}; {}", self.shorter()))
+        (left <= 0.0).then(|| {
+            format!("the delay exceeds the controller's margin: {words}; {}", self.shorter())
+        })
     }
 
     pub(super) fn delay_warning(&self) -> Option<String> {

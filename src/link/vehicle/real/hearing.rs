@@ -128,7 +128,7 @@ impl Real {
                 self.notices.push_back(Notice::Engaged);
             }
             Shown::Taken => self.notices.push_back(Notice::HandedBack(format!(
-                "the controller left {name} by itself or by its pilot's hand"
+                "the controller left {name}: its own decision or its pilot's"
             ))),
             Shown::Confirmed => self.say(
                 Severity::Notice,

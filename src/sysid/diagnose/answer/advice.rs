@@ -20,7 +20,7 @@ pub fn advice(
         for other in &c.indistinguishable_from {
             list.push(Advice {
                 manoeuvre: separating(&c.id),
-                why: format!("it tells {} from {other}", c.id),
+                why: format!("it distinguishes {} from {other}", c.id),
                 between: Some([c.id.clone(), other.clone()]),
             });
         }
@@ -30,7 +30,7 @@ pub fn advice(
         if let [a, b] = open[..] {
             list.push(Advice {
                 manoeuvre: separating(&a.id),
-                why: format!("{} is the closest shape; this tells whether it is the cause", a.id),
+                why: format!("{} is the closest shape; this shows whether it is the cause", a.id),
                 between: Some([a.id.clone(), b.id.clone()]),
             });
         }

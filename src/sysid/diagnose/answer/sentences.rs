@@ -159,7 +159,7 @@ fn beyond(content: &Content) -> Vec<String> {
     let more = found.remainder.total > found.remainder.total_threshold;
     if verdict == Verdict::Effect && more && found.learnable() >= SHOWN {
         all.push(format!(
-            "Beside that, a flexible model could remove {:.1} % of what the tuned model left beyond noise, \
+            "In addition, a flexible model could remove {:.1} % of what the tuned model left beyond noise, \
              more than by chance.",
             100.0 * found.learnable()
         ));

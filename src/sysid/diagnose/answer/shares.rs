@@ -57,7 +57,7 @@ fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
             if z > WORTH && best.as_ref().is_none_or(|(other, _)| z > *other) {
                 let id = ChannelId::ALL[channel];
                 let words = format!(
-                    "{} {:+.3} {} beside the model at {} {:.1} to {:.1} {}",
+                    "{} {:+.3} {} off the model at {} {:.1} to {:.1} {}",
                     id.name(),
                     m,
                     id.unit(),

@@ -82,7 +82,7 @@ pub(super) fn beyond(
             all.push((*channel, found));
         }
     }
-    report(progress, "judging the best free forms beside the library's", 0.8)?;
+    report(progress, "comparing the best free forms with the library's", 0.8)?;
     let mut forms: Vec<Form> =
         library.terms.iter().map(|t| t.form).chain(library.class.clone()).collect();
     for finalist in all.iter().flat_map(|(_, s)| &s.finalists) {
