@@ -68,7 +68,7 @@ struct Arguments {
     /// Controller that flies the aircraft.
     #[arg(long, default_value = "lqi")]
     controller: ControllerKind,
-    /// Settings of a planner in other than their usual size.
+    /// Settings of a planner that differ from the defaults.
     #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
     planner: Vec<Change>,
     /// Threads that are kept busy meanwhile.

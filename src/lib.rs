@@ -1,8 +1,9 @@
 //! Greylag: a MAVLink offboard autopilot companion for fixed-wing aircraft.
 //!
-//! It turns commanded roll and pitch into actuator outputs with a grey-box model of the
-//! aircraft. The modules below are declared in the order of their layers: each may use those
-//! above it, never those below (`tests/house/architecture.rs` holds them to it), so this list is the map. Each is a crate of its own, `greylag-num` to `greylag-workbench`.
+//! Greylag turns commanded roll and pitch into actuator outputs with a grey-box model of the aircraft. The modules
+//! below are declared in the order of their layers. Each layer may use only the layers above it;
+//! `tests/house/architecture.rs` checks this order. Each layer is a separate crate, `greylag-num` to
+//! `greylag-workbench`.
 //!
 //! ```text
 //! in flight   link ──► flight ──► link           flight ⇄ control ──► model ──► physics ──► num
@@ -18,11 +19,11 @@
 //!
 //! # One tick
 //!
-//! [`link::vehicle`] makes telemetry of a state frame; [`flight::pilot::Pilot::observe`] turns it
-//! into an observation with a target inside the envelope; a [`control::Controller`] answers with a
-//! command; [`flight::pilot::Pilot::decide`] takes that command, or the fallback's, limits how fast
-//! the surfaces move, and the link sends it. The pilot knows no socket and no clock: the same
-//! telemetry gives the same commands.
+//! [`link::vehicle`] decodes a state frame into telemetry. [`flight::pilot::Pilot::observe`] turns the telemetry into
+//! an observation with a target inside the envelope. A [`control::Controller`] computes a command.
+//! [`flight::pilot::Pilot::decide`] takes this command or the fallback's and limits the slew rate of surfaces and
+//! throttle. The link sends the result. The pilot uses no socket and no clock: the same telemetry gives the same
+//! commands.
 //!
 //! # From the paper to the code
 //!
@@ -78,31 +79,31 @@ pub use greylag_manoeuvres as manoeuvres;
 // MAVLink.
 pub use greylag_link as link;
 
-// Flight logs of any format.
+// Reading of flight logs.
 pub use greylag_logs as logs;
 
-// The companion in flight.
+// Pilot, runtime and recorder in flight.
 pub use greylag_flight as flight;
 
-// From a log to the missing effect.
+// System identification: finds missing effects in a log.
 pub use greylag_sysid as sysid;
 
-// Simulated and imagined flights, scored.
+// Simulated and imagined flights with their scores.
 #[cfg(any(feature = "demo", feature = "learn"))]
 pub use greylag_sim as sim;
 
-// Training; the home of burn.
+// Training. Only this layer uses burn.
 #[cfg(feature = "learn")]
 pub use greylag_learn as learn;
 
-// Many runs, resumable.
+// Campaigns of many runs, which can be resumed.
 #[cfg(feature = "study")]
 pub use greylag_campaign as campaign;
 
-// Pages.
+// Reports as pages.
 pub use greylag_report as report;
 
-// The session in a browser.
+// The workbench in a browser.
 #[cfg(feature = "study")]
 pub use greylag_workbench as workbench;
 

@@ -146,7 +146,7 @@ impl Scene {
             let said = texts.iter().filter(|text| text.contains(words)).count();
             assert!(said <= 1, "{what}: {said} times {words}: {texts:?}");
         }
-        assert!(!texts.iter().any(|text| text.contains("clock went back")), "{what}: {texts:?}");
+        assert!(!texts.iter().any(|text| text.contains("clock jumped back")), "{what}: {texts:?}");
         drop(self.vehicle.land());
         texts
     }
@@ -160,7 +160,7 @@ fn a_companion_that_is_stopped_in_a_turn_flies_on_and_names_the_stall() {
         let texts = scene.recovers(&format!("stopped for {ms} ms"));
         assert!(!texts.iter().any(|text| text.contains("lost")), "{ms} ms: {texts:?}");
         if ms > 500 {
-            let named = texts.iter().any(|text| text.contains("this computer was late by"));
+            let named = texts.iter().any(|text| text.contains("this computer stalled for"));
             assert!(named, "{ms} ms: {texts:?}");
         }
     }

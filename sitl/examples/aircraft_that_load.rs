@@ -1,4 +1,4 @@
-//! Prints how many aircraft of a JSBSim tree load and fly a second, with what is said of the others.
+//! Prints for each aircraft of a JSBSim tree whether it loads and flies for 1 s, or the error that prevents it.
 //!
 //! `cargo run --release --example aircraft_that_load -p greylag-sitl -- TREE/aircraft`
 

@@ -1,4 +1,4 @@
-//! Prints by which properties the aircraft of a JSBSim tree are steered, or why none does.
+//! Prints the properties that command the surfaces of each aircraft of a JSBSim tree, or the reason why none does.
 //!
 //! ```text
 //! cargo run --ignore-rust-version -p greylag-sitl --example aircraft_that_steer -- TREE/aircraft [NAME…]

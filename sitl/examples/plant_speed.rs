@@ -1,4 +1,4 @@
-//! Measures how many steps a second the plant flies on one core.
+//! Measures how many steps per second the plant simulates on one core.
 
 use std::time::Instant;
 

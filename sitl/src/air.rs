@@ -13,18 +13,18 @@ pub struct Air {
 
 /// Dryden turbulence of MIL-F-8785C in the discretisation of MIL-STD-1797A (JSBSim `ttMilspec`).
 ///
-/// Below 1000 ft the intensity is 0.1 of `wind_20ft_mps`; above 2000 ft it is read from the
-/// standard's table by `severity` alone; between them the two are blended linearly. An episode that
-/// starts at 600 m (1969 ft) therefore depends almost only on `severity`.
+/// Below 1000 ft the intensity is 0.1 of `wind_20ft_mps`. Above 2000 ft it is read from the standard's table, as a function of
+/// `severity` alone. Between these altitudes it is interpolated linearly. An episode that starts at 600 m (1969 ft) therefore
+/// depends almost only on `severity`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turbulence {
     /// Wind speed 20 ft above ground, m/s, not negative: 7.6 light, 15 moderate, 23 severe.
     pub wind_20ft_mps: f64,
-    /// Probability-of-exceedance curve, 1 to 7: 3 light, 4 moderate, 6 severe.
+    /// Index of the standard's probability-of-exceedance curve, 1 to 7: 3 light, 4 moderate, 6 severe.
     pub severity: u8,
 }
 
-/// A gust that rises as one minus cosine, holds, falls the same way (JSBSim `cosine-gust`).
+/// A gust whose velocity rises as one minus cosine, holds its peak and falls as one minus cosine (JSBSim `cosine-gust`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gust {
     /// Start, s of the plant's time; the gust begins in the first step at or after this time.
@@ -40,7 +40,7 @@ pub struct Gust {
 }
 
 impl Gust {
-    /// When the gust is over, s.
+    /// End of the gust, s of the plant's time.
     pub fn end_s(&self) -> f64 {
         self.start_s + self.rise_s + self.hold_s + self.fall_s
     }
@@ -87,14 +87,14 @@ pub enum AirError {
     },
 }
 
-/// Largest accepted air velocity, m/s.
+/// Largest accepted magnitude of an air velocity or of one of its components, m/s.
 const MAX_AIR_MPS: f64 = 100.0;
 
 impl Air {
-    /// The same air with its gusts in order of time.
+    /// Checks the air and returns it with its gusts sorted by start time.
     ///
     /// # Errors
-    /// [`AirError`] when a figure is out of range or gusts overlap.
+    /// [`AirError`] if a wind or turbulence figure is out of range, a gust has an invalid shape, or two gusts overlap.
     pub fn checked(mut self) -> Result<Self, AirError> {
         if let Some(&value) = self.wind_ned_mps.iter().find(|v| !is_speed(**v)) {
             return Err(AirError::Wind { value });
@@ -117,7 +117,7 @@ impl Air {
     }
 }
 
-/// JSBSim clears a gust two frames after its end.
+/// Least time from the end of a gust to the next start, s: JSBSim clears a gust two frames (of 10 ms) after its end.
 const GUST_GAP_S: f64 = 0.02;
 
 fn is_speed(v: f64) -> bool {

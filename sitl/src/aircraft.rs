@@ -35,7 +35,7 @@ const BUILT_IN: [(&str, &str); 12] = [
     ("c172p/Engines/c172p_direct.xml", include_str!("../aircraft/c172p/Engines/c172p_direct.xml")),
 ];
 
-/// Name of the aircraft that flies unless another is named.
+/// Name of the default aircraft.
 pub(crate) const BUILT_IN_NAME: &str = "x8";
 /// Names of the built-in aircraft.
 const BUILT_IN_NAMES: &str = "x8, aerosonde, x8-elevons, c172p";
@@ -49,7 +49,7 @@ pub enum AircraftError {
          {name}/{name}.xml with --aircraft-dir"
     )]
     NotBuiltIn {
-        /// The name asked for.
+        /// The requested name.
         name: String,
     },
     /// The aircraft's file does not exist or cannot be read.
@@ -60,7 +60,7 @@ pub enum AircraftError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// JSBSim refused the aircraft.
+    /// JSBSim cannot load the aircraft.
     #[error("JSBSim cannot load the aircraft '{name}': {source}; correct its XML")]
     Load {
         /// Name of the aircraft.
@@ -73,7 +73,7 @@ pub enum AircraftError {
     Hidden(#[from] HiddenError),
 }
 
-/// A JSBSim tree on disk or in memory with one document replaced.
+/// Files of a JSBSim tree; those in memory take precedence over those on disk.
 struct Tree {
     disk: Option<FileResolver>,
     memory: MemoryResolver,
@@ -93,11 +93,11 @@ impl Resolver for Tree {
     }
 }
 
-/// Loads `name` into `fdm`, with `effects` written into its XML.
+/// Loads the aircraft `name` into `fdm`, with `effects` written into its XML and the properties `held` declared.
 ///
-/// With `dir`, the file is `dir/NAME/NAME.xml`; engines are searched in its own `Engines` folder
-/// first and then in `dir/../engine`, as in a JSBSim tree. Set the time step before this call:
-/// JSBSim's filters keep the step that they have at loading.
+/// With `dir`, the file is `dir/NAME/NAME.xml`. JSBSim then searches an engine first in `dir/NAME/Engines`, then in
+/// `dir/../engine`, as in a JSBSim tree. Set the time step before this call: JSBSim's filters keep the step that is set at
+/// loading.
 pub(crate) fn load(
     fdm: &mut Fdm,
     dir: Option<&Path>,
@@ -123,8 +123,8 @@ pub(crate) fn load(
         .map_err(|source| AircraftError::Load { name: name.to_owned(), source })
 }
 
-/// The document with an added system that declares the held properties: an aircraft may read a property that only
-/// another program defines.
+/// The document with an added system that declares the `held` properties. Without it, an aircraft that reads a property of
+/// another program does not load.
 fn declared(document: &str, held: &[(String, f64)]) -> String {
     let end = document.rfind("</fdm_config>").filter(|_| !held.is_empty());
     let Some(end) = end else { return document.to_owned() };
@@ -148,7 +148,7 @@ fn declared(document: &str, held: &[(String, f64)]) -> String {
     [&document[..end], &system, &document[end..]].concat()
 }
 
-/// The text of the aircraft's main document.
+/// Reads the main document `NAME/NAME.xml` of a built-in aircraft, or of an aircraft in `dir`.
 pub(crate) fn read(dir: Option<&Path>, name: &str) -> Result<String, AircraftError> {
     match dir {
         None => {

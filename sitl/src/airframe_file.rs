@@ -1,5 +1,4 @@
-//! Surfaces, motors and conditions of the simulator's aircraft, read from an airframe file of the
-//! companion.
+//! Reads surfaces, motors and held conditions of the simulated aircraft from an airframe file of the companion.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +8,7 @@ use serde::Deserialize;
 use crate::plant::{Mixing, Moved, PlantOptions};
 use crate::text_file;
 
-/// Error of reading an airframe file; `why` names the entry.
+/// Why an airframe file cannot be used; `why` names the entry.
 #[derive(Debug, thiserror::Error)]
 #[error("airframe file {}: {why}", path.display())]
 pub struct AirframeError {
@@ -65,11 +64,11 @@ impl Effector {
     }
 }
 
-/// Gives `plant` the surfaces and conditions of the airframe file at `path`. A file without a `position` property
-/// leaves the plant on the aircraft's own control channels.
+/// Sets the mixing and the held properties of `plant` from the airframe file at `path`. If no entry of the file has a `position`,
+/// the plant keeps the control channels of the JSBSim aircraft.
 ///
 /// # Errors
-/// If the file cannot be read, or describes surfaces that cannot be flown.
+/// If the file cannot be read or parsed, a surface has no travel, an entry has no position, or the mixing is invalid.
 pub fn apply(path: &Path, plant: &mut PlantOptions) -> Result<(), AirframeError> {
     let fail = |why: String| AirframeError { path: path.to_owned(), why };
     let text = text_file::read(path).map_err(fail)?;

@@ -1,4 +1,4 @@
-//! The command line of `greylag-sitl`, in units a person writes.
+//! Command line of `greylag-sitl`: parses the arguments and converts them to options in SI units and radians.
 
 use std::path::{Path, PathBuf};
 
@@ -14,25 +14,26 @@ use crate::shim::{
 };
 use clap::{Args, Parser, ValueEnum};
 
-/// Flies an aircraft in JSBSim and plays its flight controller over MAVLink.
+/// Flies an aircraft in JSBSim and simulates its flight controller over MAVLink.
 ///
 /// Without options: real time, held at the start until the companion arms, sending to
 /// udpout:127.0.0.1:14600, where `cargo fly` listens.
 #[derive(Debug, Parser)]
 #[command(name = "greylag-sitl", version)]
 pub struct Cli {
-    /// Where the companion is met: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT; or
-    /// serial:DEVICE:BAUD; or pty:NAME, a pseudo-terminal that the companion opens under that name.
+    /// Address at which the companion connects: udpin:, udpout:, tcpin: or tcpout:, then HOST:PORT;
+    /// or serial:DEVICE:BAUD; or pty:NAME, a pseudo-terminal that the companion opens under that name.
     #[arg(long, value_name = "ADDRESS", default_value_t = ShimOptions::default_link())]
     link: Address,
-    /// Play this flight stack, with its modes, rates, parameters and failsafes, instead of the
+    /// Simulate this flight stack, with its modes, rates, parameters and failsafes, instead of the
     /// companion's own simulator link. It begins armed, in the air, flying by itself.
     #[arg(long, value_name = "STACK", value_enum, conflicts_with = "lockstep")]
     personality: Option<PersonalityName>,
     /// Set a parameter of that stack (may be repeated).
     #[arg(long, value_name = "NAME=VALUE", requires = "personality", value_parser = parameter)]
     parameter: Vec<(String, f64)>,
-    /// Set the parameters of a file, as params/x8/arduplane.parm: those that stack plays; --parameter goes on top.
+    /// Set the parameters of a file, such as params/x8/arduplane.parm: those that this stack simulates;
+    /// --parameter takes precedence.
     #[arg(long, value_name = "FILE", requires = "personality")]
     parameters: Option<PathBuf>,
     #[command(flatten)]
@@ -48,7 +49,7 @@ pub struct Cli {
     /// End after so much simulated flight; the time held at the start does not count.
     #[arg(long, value_name = "S")]
     duration_s: Option<f64>,
-    /// What the vehicle's clock shows at the start: 4294960 is seven seconds before its milliseconds wrap.
+    /// Initial value of the vehicle's clock: 4294960 is seven seconds before its milliseconds wrap.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     clock_start_s: f64,
     /// Seed of noise, frame faults and turbulence; equal seeds give equal flights in lockstep.
@@ -74,7 +75,7 @@ pub struct Cli {
     faults: FaultArgs,
 }
 
-/// A flight stack to be played.
+/// A flight stack that the shim can simulate.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum PersonalityName {
     /// PX4 with a fixed-wing airframe.
@@ -109,7 +110,7 @@ struct Px4Args {
     px4_noise: Px4NoiseName,
 }
 
-/// Where PX4 looks for its simulator.
+/// Default address at which stock PX4 SITL connects to its simulator.
 const PX4_ADDRESS: &str = "tcpin:127.0.0.1:4560";
 
 /// A preset of sensor noise.
@@ -151,7 +152,7 @@ struct ArdupilotArgs {
     ardupilot_pwm: Vec<ChannelRange>,
 }
 
-/// Where ArduPilot looks for its simulator.
+/// Default address to which stock ArduPlane SITL sends its servo packets.
 const ARDUPILOT_ADDRESS: &str = "udpin:127.0.0.1:9002";
 
 impl ArdupilotArgs {
@@ -188,16 +189,16 @@ struct StartArgs {
 }
 
 impl Cli {
-    /// Address of PX4 or ArduPilot if the shim is their simulator, else of the companion.
+    /// Address at which PX4 or ArduPilot connects if the shim is their simulator, otherwise the address of the companion.
     fn address(&self) -> &Address {
         let simulated = self.px4.px4_sim.as_ref().or(self.ardupilot.ardupilot_sim.as_ref());
         simulated.unwrap_or(&self.link)
     }
 
-    /// Options of the run that the command line describes.
+    /// Converts the command line into the options of a run.
     ///
     /// # Errors
-    /// If the airframe file or the parameter file cannot be used.
+    /// `CliError` if the airframe file or the parameter file cannot be read, or its content is invalid.
     pub fn options(&self) -> Result<ShimOptions, CliError> {
         let personality = self.personality.map(Personality::from);
         let (mut parameters, unplayed) = match (&self.parameters, personality) {
@@ -234,10 +235,10 @@ impl Cli {
     }
 }
 
-/// Parameters that the flight stack simulates, by name and value, and the names of the others.
+/// Simulated parameters by name and value, and the names of those that the flight stack does not simulate.
 type Played = (Vec<(String, f64)>, Vec<String>);
 
-/// The parameters of a file that `personality` simulates, and the names of the others.
+/// Reads a parameter file and separates the parameters that `personality` simulates from the others.
 fn played(path: &Path, personality: Personality) -> Result<Played, ParameterFileError> {
     let (played, others): (Vec<_>, Vec<_>) = parameter_file::read(path)?
         .into_iter()
@@ -287,7 +288,7 @@ impl StartArgs {
 mod tests {
     use super::*;
 
-    /// The options of `--personality stack` with a parameter file of this text, and `--parameter` words.
+    /// Options from `--personality stack`, a parameter file that contains `text`, and the further arguments `more`.
     fn options(stack: &str, text: &str, more: &[&str]) -> Result<ShimOptions, CliError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("some.parm");
@@ -309,6 +310,6 @@ mod tests {
     #[test]
     fn a_file_of_the_other_stack_is_refused() {
         let said = options("ardupilot", "COM_RC_IN_MODE 1\n", &[]).unwrap_err().to_string();
-        assert!(said.contains("the ArduPilot personality plays"), "{said}");
+        assert!(said.contains("the ArduPilot personality simulates"), "{said}");
     }
 }

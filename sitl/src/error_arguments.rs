@@ -54,7 +54,7 @@ pub struct SensorArgs {
     /// Constant error of the sideslip.
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     bias_beta_deg: f64,
-    /// The airspeed shown is this times the true one.
+    /// Ratio of measured to true airspeed.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     airspeed_scale: f64,
 }
@@ -63,7 +63,7 @@ pub struct SensorArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Frames")]
 pub struct FaultArgs {
-    /// Every state frame comes this much late (in lockstep rounded up to whole 10 ms).
+    /// Constant delay of every state frame (in lockstep rounded up to whole 10 ms).
     #[arg(long, value_name = "MS", default_value_t = 0.0)]
     delay_ms: f64,
     /// A state frame is lost with this probability.

@@ -1,9 +1,8 @@
-//! Hidden effects: terms of the flight dynamics that JSBSim simulates and that no message to the
-//! companion reveals.
+//! Hidden effects: terms of the flight dynamics that JSBSim simulates and that no message to the companion reports.
 //!
-//! An effect is written into the aircraft's XML before JSBSim loads it, as further aerodynamic
-//! functions, flight-control components, external forces, or changed mass figures. With no effect,
-//! or with amplitude 0, the XML is the aircraft's own to the byte.
+//! An effect is written into the aircraft's XML before JSBSim loads it, as further aerodynamic functions, flight-control
+//! components, external forces, or changed mass properties. Without an effect, or at amplitude 0, the XML stays identical byte
+//! for byte.
 
 mod document;
 mod effects;
@@ -17,15 +16,15 @@ pub(crate) use document::THRUST_PROPERTY;
 use document::{Axis, Document};
 pub use effects::EFFECTS;
 
-/// An effect that can be hidden, under the id it has in the catalogue of effects.
+/// A type of hidden effect, as the catalogue of effects lists it.
 pub struct Effect {
     /// Identifier in the catalogue of effects, stable between versions.
     pub id: &'static str,
-    /// Contribution of an amplitude a, with Q = ½ρV²S; δ are deflections in rad, δt the throttle position.
+    /// Contribution at amplitude a, as text. Q = ½ρV²S, δ are deflections in rad, and δt is the throttle position, 0 to 1.
     pub formula: &'static str,
     /// Unit of the amplitude; empty for a dimensionless one.
     pub unit: &'static str,
-    /// Smallest and largest amplitude allowed.
+    /// Smallest and largest amplitude allowed, in the unit `unit`.
     pub bounds: (f64, f64),
     write: fn(&mut Document, f64) -> Result<(), HiddenError>,
 }
@@ -56,13 +55,13 @@ impl fmt::Debug for Effect {
 pub struct Hidden {
     effect: &'static Effect,
     amplitude: f64,
-    /// Functions that an effect outside the list adds.
+    /// Functions that the effect adds if it is not from the catalogue; otherwise empty.
     functions: &'static [(Place, String)],
-    /// Filters whose outputs those functions read.
+    /// Filters whose outputs `functions` reads.
     filters: &'static [Filter],
 }
 
-/// A filter of the flight controls that an effect reads.
+/// A filter in the flight controls whose output the functions of a hidden effect can read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
     /// Input of the filter, an expression of JSBSim's functions.
@@ -83,14 +82,13 @@ pub enum FilterKind {
 }
 
 impl Filter {
-    /// Placeholder in an expression for the output property of the filter at `place` of the
-    /// effect's list.
+    /// Placeholder in an expression for the output property of the filter at index `place`, from 0, of the effect's list.
     pub fn placeholder(place: usize) -> String {
         format!("{{filter-{place}}}")
     }
 }
 
-/// Axis or propulsion on which an added function acts.
+/// Aerodynamic axis or propulsion on which an added function acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Drag along the wind axis, lbf, rearward positive.
@@ -101,19 +99,20 @@ pub enum Place {
     Lift,
     /// Thrust of the propulsion, lbf, forward positive.
     Thrust,
-    /// Rolling moment, lbf ft.
+    /// Rolling moment, lbf ft, right wing down positive.
     Roll,
-    /// Pitching moment, lbf ft.
+    /// Pitching moment, lbf ft, nose up positive.
     Pitch,
-    /// Yawing moment, lbf ft.
+    /// Yawing moment, lbf ft, nose right positive.
     Yaw,
 }
 
 impl Hidden {
-    /// The effect `id` with `amplitude`, in the effect's unit; 0 hides nothing.
+    /// The effect `id` of the catalogue with `amplitude`, in the effect's unit; an amplitude of 0 changes nothing.
     ///
     /// # Errors
-    /// [`HiddenError::Unknown`] and [`HiddenError::Amplitude`].
+    /// [`HiddenError::Unknown`] if the catalogue has no effect `id`, and [`HiddenError::Amplitude`] if `amplitude` is out of
+    /// bounds.
     pub fn new(id: &str, amplitude: f64) -> Result<Self, HiddenError> {
         let effect = EFFECTS
             .iter()
@@ -127,9 +126,9 @@ impl Hidden {
         Ok(Hidden { effect, amplitude, functions: &[], filters: &[] })
     }
 
-    /// An effect `id` outside the list, given as expressions of JSBSim's functions, each with the axis on which it acts.
-    /// `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` in them stand for the position properties,
-    /// [`Filter::placeholder`] for the output of one of `filters`. The effect stays in memory until the process ends.
+    /// An effect `id` outside the catalogue, given as expressions of JSBSim's functions, each with the axis on which it acts. In
+    /// an expression, `{aileron}`, `{elevator}`, `{rudder}` (rad) and `{throttle}` stand for the position properties.
+    /// [`Filter::placeholder`] stands for the output of one of `filters`. The effect stays in memory until the process ends.
     pub fn written(id: &str, functions: Vec<(Place, String)>, filters: Vec<Filter>) -> Self {
         let effect = Effect {
             id: id.to_owned().leak(),
@@ -166,7 +165,7 @@ impl Hidden {
         (self.effect.write)(document, self.amplitude)
     }
 
-    /// The effect that is hidden.
+    /// The type of the effect.
     pub fn effect(&self) -> &'static Effect {
         self.effect
     }
@@ -229,7 +228,7 @@ pub enum HiddenError {
         /// Identifiers of all known effects.
         known: String,
     },
-    /// The amplitude is outside what the effect takes.
+    /// The amplitude is outside the bounds of the effect.
     #[error(
         "hidden effect {id}: amplitude {amplitude} {unit} is outside {min} to {max} {unit}; give one within"
     )]
@@ -242,7 +241,7 @@ pub enum HiddenError {
         min: f64,
         /// Largest amplitude that is allowed.
         max: f64,
-        /// Unit of the three.
+        /// Unit of `amplitude`, `min` and `max`; empty for a dimensionless amplitude.
         unit: &'static str,
     },
     /// The delay is not a whole number of steps.
@@ -275,7 +274,7 @@ fn known() -> String {
     EFFECTS.iter().map(|effect| effect.id).collect::<Vec<_>>().join(", ")
 }
 
-/// The aircraft document `xml`, to be flown in steps of `step_s`, with `effects` written into it.
+/// The aircraft document `xml` with `effects` written into it, for a simulation in steps of `step_s`, s.
 pub(crate) fn write_into(
     xml: &str,
     properties: &Properties,

@@ -1,4 +1,4 @@
-//! JSBSim in process, and the MAVLink shim that plays the flight controller.
+//! Simulation of an aircraft with JSBSim in the same process, and the MAVLink shim that simulates its flight controller.
 
 pub mod air;
 mod aircraft;

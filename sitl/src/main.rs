@@ -32,7 +32,7 @@ fn fly(cli: &Cli) -> anyhow::Result<()> {
     print(format_args!("greylag-sitl: {}", intent(&options)));
     if !options.unplayed.is_empty() {
         let (count, names) = (options.unplayed.len(), options.unplayed.join(", "));
-        print(format_args!("{count} parameters of the file are not played: {names}"));
+        print(format_args!("{count} parameters of the file are not simulated: {names}"));
     }
     let mut tell =
         |notice: shim::Notice| print(format_args!("{:9.2} s  {}", notice.time_s, notice.event));
@@ -41,7 +41,7 @@ fn fly(cli: &Cli) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints a line; a reader that has gone away does not end the flight.
+/// Prints a line and ignores a write error: a closed pipe must not end the flight.
 fn print(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }

@@ -1,4 +1,4 @@
-//! Parameter files of flight controllers: those of ArduPilot and of ground stations.
+//! Reads parameter files of flight controllers, as ArduPilot and ground stations write them.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ pub enum ParameterFileError {
     },
     /// The flight stack simulates none of the file's parameters.
     #[error(
-        "{path} has no parameter that the {stack} personality plays; give the file of that stack",
+        "{path} has no parameter that the {stack} personality simulates; give the file of that stack",
         path = path.display()
     )]
     Foreign {
@@ -41,13 +41,13 @@ pub enum ParameterFileError {
     },
 }
 
-/// Names and values of the file at `path`, in its order.
+/// Reads the names and values of the file at `path`, in the order of its lines.
 ///
-/// A line has one of two forms: `NAME VALUE`, separated by white space, a comma or `=` (ArduPilot, MAVProxy, Mission Planner);
-/// or system, component, name, value and type (QGroundControl). A `#` begins a comment.
+/// A line has one of two forms. The first is `NAME VALUE`, separated by white space, a comma or `=` (ArduPilot, MAVProxy, Mission
+/// Planner). The second is system, component, name, value and type (QGroundControl). A `#` begins a comment.
 ///
 /// # Errors
-/// If it cannot be read, is longer than a mebibyte, or has a line of another form.
+/// If the file cannot be read, is longer than 1 MiB, or has a line of another form.
 pub fn read(path: &Path) -> Result<Vec<(String, f64)>, ParameterFileError> {
     let text = text_file::read(path)
         .map_err(|why| ParameterFileError::Read { path: path.to_owned(), why })?;
@@ -68,7 +68,7 @@ fn uncommented(line: &str) -> &str {
     line.split('#').next().unwrap_or_default().trim()
 }
 
-/// Name and value of a line.
+/// Name and value of a line; `None` if the line has neither accepted form.
 fn parameter(line: &str) -> Option<(String, f64)> {
     let between = |c: char| c.is_whitespace() || matches!(c, ',' | '=');
     let words: Vec<&str> = line.split(between).filter(|word| !word.is_empty()).collect();

@@ -1,4 +1,4 @@
-//! The plant: one aircraft flown by JSBSim in this process, step by step in its own time.
+//! The plant: one aircraft that JSBSim simulates in this process, step by step in simulated time.
 
 pub mod discovery;
 mod linked;
@@ -28,10 +28,10 @@ pub use travel::{Stops, Travel};
 /// Default length of one step, s.
 pub const DT_S: f64 = 0.01;
 
-/// Range of steps in which the integrators and filters are known to be stable.
+/// Range of step lengths, s, in which the integrators and filters are known to be stable.
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.001..=DT_S;
 
-/// Why the plant cannot fly on.
+/// Why the plant cannot be loaded, started or stepped.
 #[derive(Debug, thiserror::Error)]
 pub enum PlantError {
     /// The aircraft could not be loaded.
@@ -57,7 +57,7 @@ pub enum PlantError {
     Engine {
         /// Name of the aircraft.
         aircraft: String,
-        /// The engine, from 0.
+        /// Index of the engine, from 0.
         engine: usize,
     },
     /// A surface does not follow its command, so its travel is unknown.
@@ -70,7 +70,7 @@ pub enum PlantError {
         /// The property that does not move.
         property: String,
     },
-    /// Nothing steers the aircraft about an axis.
+    /// No command moves the aircraft about an axis.
     #[error(
         "no command of the aircraft '{aircraft}' {does} it: {tried}; either ailerons and an elevator do not steer it, or its own names must be \
          given with --property (as KEY=NAME, KEY=-NAME*SCALE or KEY=NAME,-NAME)"
@@ -93,7 +93,7 @@ pub enum PlantError {
         aircraft: String,
         /// Property that is not defined.
         property: String,
-        /// Where it is read.
+        /// JSBSim's description of where the property is read.
         place: String,
     },
     /// The aircraft cannot fly from this start.
@@ -107,10 +107,10 @@ pub enum PlantError {
         /// The step as given, s.
         step_s: f64,
     },
-    /// A command is not a number; nothing was stepped.
+    /// A command is not finite; the plant did not step.
     #[error("command {0:?} is not finite: nothing was stepped; send finite commands")]
     Inputs(Inputs),
-    /// JSBSim's state is no longer a number.
+    /// A quantity of JSBSim's state is no longer finite.
     #[error(
         "the state became non-finite at {time_s:.2} s ({quantity}): reset the plant or restore a snapshot"
     )]
@@ -130,7 +130,7 @@ pub enum PlantError {
     },
 }
 
-/// A saved state of a [`Plant`], to be restored onto a plant made from the same options.
+/// A saved state of a [`Plant`]; a plant with the same options can restore it.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     fdm: jsbsim::Snapshot,
@@ -139,7 +139,7 @@ pub struct Snapshot {
     next_gust: usize,
 }
 
-/// One aircraft in the air.
+/// One aircraft that JSBSim simulates step by step.
 pub struct Plant {
     fdm: Fdm,
     nodes: Nodes,
@@ -154,7 +154,8 @@ impl Plant {
     /// Loads the aircraft and puts it at [`Start::NEUTRAL`].
     ///
     /// # Errors
-    /// [`PlantError`] when the aircraft, a property, a hidden effect or the air is wrong.
+    /// [`PlantError`] if the step is too short or too long, the aircraft cannot be loaded or started, a property is missing, or a
+    /// hidden effect or the air is invalid.
     pub fn new(options: &PlantOptions) -> Result<Self, PlantError> {
         let mut options = options.clone();
         options.air = options.air.checked()?;
@@ -174,11 +175,12 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Puts the aircraft at `start` with centred surfaces and no throttle, and time at zero.
+    /// Puts the aircraft at `start` with centred surfaces and closed throttle, and sets its time to zero.
     ///
     /// # Errors
-    /// [`PlantError::Start`] for a start that cannot be flown from, [`PlantError::Jsbsim`] and
-    /// [`PlantError::NonFinite`] when the aircraft cannot be evaluated there.
+    /// [`PlantError::Start`] if `start` is outside the accepted range. `PlantError::Engine` if an engine does not run, and
+    /// `PlantError::Undefined` if the aircraft reads an undefined property. [`PlantError::Jsbsim`] and [`PlantError::NonFinite`]
+    /// if the aircraft cannot be evaluated at `start`.
     pub fn reset(&mut self, start: &Start) -> Result<Truth, PlantError> {
         if !start.is_flyable() {
             return Err(PlantError::Start(*start));
@@ -203,7 +205,7 @@ impl Plant {
         }
     }
 
-    /// Notes on the aircraft before it is flown, one sentence each.
+    /// Notes for the user about the aircraft, one sentence each; empty unless the aircraft is a glider.
     pub fn notes(&self) -> Vec<String> {
         let glider = format!(
             "the aircraft '{}' has no throttle: it flies as a glider, and throttle commands move nothing",
@@ -212,11 +214,11 @@ impl Plant {
         self.nodes.is_glider().then_some(glider).into_iter().collect()
     }
 
-    /// Flies one step of [`PlantOptions::step_s`] with `inputs`, limited to their ranges.
+    /// Simulates one step of [`PlantOptions::step_s`] with `inputs`, limited to their ranges.
     ///
     /// # Errors
-    /// [`PlantError::Inputs`] when a command is not finite: nothing is stepped.
-    /// [`PlantError::NonFinite`] when the state is no longer a number.
+    /// [`PlantError::Inputs`] if a command is not finite; the plant then makes no step. [`PlantError::NonFinite`] if the state is
+    /// no longer finite. [`PlantError::Jsbsim`] if JSBSim fails.
     pub fn step(&mut self, inputs: Inputs) -> Result<Truth, PlantError> {
         if !inputs.is_finite() {
             return Err(PlantError::Inputs(inputs));
@@ -267,7 +269,7 @@ impl Plant {
         self.options.seed = seed;
     }
 
-    /// Reads any property of the aircraft in JSBSim's own unit.
+    /// Reads any property of the aircraft, in the unit in which JSBSim holds it.
     ///
     /// # Errors
     /// [`PlantError::Property`] when the aircraft has no such property.
@@ -276,7 +278,7 @@ impl Plant {
         self.fdm.read_node(node).map_err(jsbsim("reading a property"))
     }
 
-    /// Writes any property of the aircraft in JSBSim's own unit; the next reset undoes it.
+    /// Writes any property of the aircraft, in the unit in which JSBSim holds it; the next reset restores the old value.
     ///
     /// # Errors
     /// [`PlantError::Property`] when the aircraft has no such property.
@@ -320,8 +322,8 @@ fn jsbsim(doing: &'static str) -> impl Fn(jsbsim::Error) -> PlantError {
     move |source| PlantError::Jsbsim { doing, source }
 }
 
-/// Maps an error of JSBSim's start to [`PlantError::Undefined`] if it names a missing property,
-/// else to [`PlantError::Jsbsim`].
+/// Maps an error of JSBSim's start to [`PlantError::Undefined`] if it names a missing property, otherwise to
+/// [`PlantError::Jsbsim`].
 fn starting(aircraft: &str) -> impl Fn(jsbsim::Error) -> PlantError {
     let aircraft = aircraft.to_owned();
     move |source| {

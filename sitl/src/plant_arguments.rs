@@ -1,4 +1,4 @@
-//! The options of a command line that choose an aircraft with its air.
+//! Command-line options that choose an aircraft and its air.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -53,7 +53,7 @@ struct AirArgs {
     /// MIL-spec turbulence: 3 light, 4 moderate, 6 severe.
     #[arg(long, value_name = "1..7")]
     turbulence_severity: Option<u8>,
-    /// Wind 20 ft above ground, which rules the turbulence near the ground; above 600 m the severity does.
+    /// Wind 20 ft above ground, which determines the turbulence near the ground; above 600 m the severity does.
     #[arg(
         long,
         value_name = "MPS",
@@ -101,7 +101,7 @@ impl<const N: usize> FromStr for Numbers<N> {
 }
 
 impl PlantArgs {
-    /// Options of the plant that the command line describes, with turbulence of `seed`.
+    /// Options of the plant with the turbulence seed `seed`.
     pub fn options(&self, seed: u32) -> PlantOptions {
         let mut plant = PlantOptions { seed, air: self.air.air(), ..Default::default() };
         plant.aircraft_dir = self.aircraft.aircraft_dir.clone();

@@ -1,16 +1,16 @@
-//! Hand-written text files: read whole, and refused above 1 MiB.
+//! Reads hand-written text files of at most 1 MiB.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Size of the longest file that is read, bytes: all parameters of a firmware take 60 KiB, an airframe file 10 KiB.
+/// Largest file size, bytes. For comparison, all parameters of a firmware take 60 KiB and an airframe file 10 KiB.
 const LONGEST: u64 = 1 << 20;
 
-/// The text of the file at `path`.
+/// Reads the text of the file at `path`.
 ///
 /// # Errors
-/// The reason with its remedy, if it cannot be read, is no UTF-8, or is longer than a mebibyte.
+/// A reason with its remedy if the file cannot be read, is not UTF-8, or is longer than 1 MiB.
 pub fn read(path: &Path) -> Result<String, String> {
     let mut text = String::new();
     File::open(path)

@@ -1,4 +1,4 @@
-//! How fast lockstep goes through the sockets with a companion that only echoes.
+//! Measures the lockstep frame rate over sockets, with a companion that sends a constant command.
 
 #[path = "../../tests/support/real_time.rs"]
 mod real_time;
@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use shim_companion::*;
 
-/// Frames measured: 20 s of flight.
+/// Number of measured frames: 20 s of flight.
 const FRAMES: usize = 2000;
 
 fn frames_per_second(mut companion: Companion, shim: Shim) -> f64 {
@@ -30,7 +30,7 @@ fn lockstep_is_at_least_twenty_times_real_time() {
     let shim = Shim::start(lockstep(&link));
     let tcp = frames_per_second(Companion::tcp_in(&listener), shim);
     println!("lockstep: {udp:.0} frames/s over UDP, {tcp:.0} over TCP (real time is 100)");
-    // The requirement: 20 times real time, for the shim's part over UDP.
+    // The requirement for the shim over UDP is 20 times real time.
     assert!(udp >= 2000.0, "{udp:.0} frames/s over UDP");
 }
 

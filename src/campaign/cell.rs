@@ -5,36 +5,36 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// Placeholder of the campaign's folder in a cell's words and in recorded commands.
+/// Placeholder of the campaign's folder in a cell's command line and in recorded commands.
 pub const OUT: &str = "$OUT";
-/// Digits of the identity in a folder name.
+/// Number of hexadecimal digits of the identity in a folder name.
 const SHORT: usize = 12;
 
-/// A planned cell.
+/// A planned cell: one run of a stage's command at one combination of levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
-    /// Its number, from 1: the index of a job array.
+    /// Number of the cell, from 1. A scheduler's job array uses it as its index.
     pub number: usize,
-    /// Stage and levels: `dynamics/severe/trainable/1`.
+    /// Identifier: stage and levels separated by `/`, such as `dynamics/severe/trainable/1`.
     pub id: String,
     /// Name of its stage.
     pub stage: String,
-    /// The level of each axis that its stage varies, including the seed.
+    /// The level of each axis that the cell's stage varies, including the seed.
     pub levels: BTreeMap<String, String>,
-    /// The command line without the program's name; [`OUT`] replaces the campaign's folder.
+    /// The command line without the program's name. [`OUT`] stands for the path of the campaign's folder.
     pub words: Vec<String>,
     /// SHA-256 of each input, by its name in the command.
     pub inputs: BTreeMap<String, String>,
-    /// Numbers of the cells whose folders it reads.
+    /// Numbers of the cells whose folders this cell reads.
     pub after: Vec<usize>,
-    /// SHA-256 over the program's version (not its commit), [`words`](Cell::words) and [`inputs`](Cell::inputs).
-    /// Earlier cells enter through their folders in `words`, whose names hold their identities; the cell's own folder
-    /// does not enter. The same identity means the same result.
+    /// SHA-256 over the program's version (not its commit), [`words`](Cell::words) and [`inputs`](Cell::inputs). The
+    /// folders of earlier cells in `words` contain the identities of those cells. The folder of this cell is excluded.
+    /// Equal identities mean equal results.
     pub identity: String,
 }
 
 impl Cell {
-    /// Folder name: another command or input gives another folder, so that results do not mix.
+    /// Name of the cell's folder. It contains the start of the identity: another command or input gives another folder.
     pub fn folder(&self) -> String {
         format!("{}-{}", self.stem(), &self.identity[..SHORT.min(self.identity.len())])
     }
@@ -44,29 +44,29 @@ impl Cell {
         self.id.replace('/', "-")
     }
 
-    /// The seed, if its stage varies it.
+    /// The random seed; `None` if the cell's stage does not vary the seed.
     pub fn seed(&self) -> Option<u64> {
         self.levels.get(super::file::SEED)?.parse().ok()
     }
 
-    /// Its words with [`OUT`] replaced by the campaign's folder.
+    /// The command line with [`OUT`] replaced by the path `folder`.
     pub fn words_in(&self, folder: &Path) -> Vec<String> {
         let folder = folder.display().to_string();
         self.words.iter().map(|word| word.replace(OUT, &folder)).collect()
     }
 
-    /// The command as recorded.
+    /// The command line as recorded: `greylag` and the words, separated by spaces.
     pub fn command(&self) -> String {
         self.words.iter().fold("greylag".into(), |line, word| line + " " + word)
     }
 }
 
-/// Result of a cell: a line of a campaign's results. It holds no time and no path of a machine, so that the same cell
-/// gives the same line to the bit.
+/// Result of a cell: one line of a campaign's results. It contains no time and no path of a machine. The same cell
+/// therefore gives the same line to the bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// Schema of the line.
+    /// Name and version of the line's schema.
     pub schema: String,
     /// Name of the campaign.
     pub campaign: String,
@@ -74,23 +74,23 @@ pub struct Record {
     pub cell: String,
     /// Name of its stage.
     pub stage: String,
-    /// Levels of its axes.
+    /// Level of each axis that the cell's stage varies.
     pub levels: BTreeMap<String, String>,
-    /// Its random seed.
+    /// Random seed of the cell; `None` if its stage does not vary the seed.
     pub seed: Option<u64>,
     /// Identity of the cell, [`identity`](Cell::identity).
     pub identity: String,
-    /// The program and its build.
+    /// Version and build of the program.
     pub program: String,
-    /// The command; `$OUT` is the campaign's folder.
+    /// The command line; `$OUT` stands for the path of the campaign's folder.
     pub command: String,
-    /// SHA-256 of its inputs.
+    /// SHA-256 of the cell's inputs, by their names in the command.
     pub inputs: BTreeMap<String, String>,
-    /// SHA-256 of its output files that other cells read.
+    /// SHA-256 of the output files that later cells read, by their names in the folder.
     pub files: BTreeMap<String, String>,
-    /// Measured quantities by name.
+    /// Measured quantities by name, such as `easy.mean_deg`.
     pub metrics: BTreeMap<String, f64>,
-    /// Points of a learning curve, by column.
+    /// Learning curve: the values of each column, by column name. Empty without a learning curve.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub curve: BTreeMap<String, Vec<f64>>,
 }
@@ -99,7 +99,7 @@ impl Record {
     /// The schema that this program writes.
     pub const SCHEMA: &str = "greylag.cell/1";
 
-    /// Whether it is a result of the stage `stage` with the given levels.
+    /// Whether this is a result of the stage `stage` with all of `levels`.
     pub fn has(&self, stage: &str, levels: &BTreeMap<String, String>) -> bool {
         let same = |(axis, level): (&String, &String)| self.levels.get(axis) == Some(level);
         self.stage == stage && levels.iter().all(same)

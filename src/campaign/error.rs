@@ -1,4 +1,4 @@
-//! Errors of campaigns.
+//! Errors of planning, reading and writing campaigns.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// A campaign cannot be planned, read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The campaign file cannot be read.
+    /// The campaign file cannot be read by the operating system.
     #[error("cannot read campaign file {path}: {source}; name a file such as params/campaigns/small.toml", path = path.display())]
     Read {
         /// Path of the file.
@@ -22,10 +22,10 @@ pub enum CampaignError {
         /// The fault and its remedy.
         why: String,
     },
-    /// A file of the campaign's folder or an input cannot be used.
+    /// An operation on an input or on a file in the campaign's folder failed.
     #[error("{doing} {path}: {source}", path = path.display())]
     Io {
-        /// The operation that failed.
+        /// The operation that failed, as the beginning of the message.
         doing: &'static str,
         /// Path of the file.
         path: PathBuf,
@@ -43,12 +43,12 @@ pub enum CampaignError {
 }
 
 impl CampaignError {
-    /// An operating system's error while `doing` something to `path`.
+    /// Converts an I/O error of the operation `doing` on `path`.
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> CampaignError {
         move |source| CampaignError::Io { doing, path: path.into(), source }
     }
 
-    /// A file with the wrong contents.
+    /// An error for the file `path` with wrong contents; `why` completes a sentence that begins with the path.
     pub(super) fn content(path: &Path, why: impl ToString) -> CampaignError {
         CampaignError::Content { path: path.into(), why: why.to_string() }
     }

@@ -8,9 +8,9 @@ use serde::Deserialize;
 use super::error::CampaignError;
 use greylag_model::residual::hash;
 
-/// The schema that this program reads.
+/// Version of the file schema that this program reads.
 const SCHEMA: u32 = 1;
-/// The axis that every campaign has.
+/// Name of the seed axis, which every campaign has.
 pub const SEED: &str = "seed";
 
 /// Contents of a campaign file.
@@ -23,12 +23,12 @@ pub struct CampaignFile {
     /// Purpose in one sentence.
     #[serde(default)]
     pub about: String,
-    /// Random seeds of the runs.
+    /// Random seeds: the levels of the seed axis.
     pub seeds: Vec<u64>,
     /// Axes in addition to the seed.
     #[serde(default)]
     pub axes: BTreeMap<String, Vec<Level>>,
-    /// The stages in order: a stage may use those before it.
+    /// Stages in order. A stage may read the output of the stages before it.
     #[serde(rename = "stage")]
     pub stages: Vec<StageFile>,
     /// Tables of summary statistics.
@@ -48,7 +48,7 @@ pub struct CampaignFile {
 pub struct Level {
     /// Name in tables.
     pub name: String,
-    /// The words; may be empty.
+    /// Words that the level inserts into a command; may be empty.
     pub words: String,
 }
 
@@ -68,20 +68,21 @@ impl From<LevelFile> for Level {
     }
 }
 
-/// A stage: one command over some axes.
+/// A stage: one command, run for every combination of the levels of its axes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageFile {
-    /// Its name; `{name}` in a later command is its output folder.
+    /// Name of the stage. `{name}` in the command of a later stage is replaced by the output folder of this stage.
     pub name: String,
-    /// The axes that it varies.
+    /// The axes that the stage varies.
     pub over: Vec<String>,
-    /// The command line without `greylag`; `{out}`, `{seed}`, `{axis}` and `{stage}` are substituted.
+    /// The command line without `greylag`. Its placeholders are `{out}` (the cell's folder), `{seed}`, `{axis}` (the
+    /// level of an axis) and `{stage}` (the folder of an earlier stage's cell).
     pub command: String,
-    /// Files that the command reads without naming them.
+    /// Further input files, which the command line does not name.
     #[serde(default)]
     pub inputs: Vec<String>,
-    /// Estimated core time of a cell, s, until cells have been measured.
+    /// Estimated processor time of a cell, core seconds, for cells without a measured time.
     pub core_seconds: Option<f64>,
 }
 
@@ -91,20 +92,20 @@ pub struct StageFile {
 pub struct TableFile {
     /// Title of the table.
     pub title: String,
-    /// The stage whose cells it summarises, and their required levels: `stage axis=level …`.
+    /// The stage whose cells the table summarises, and the levels that these cells must have: `stage axis=level …`.
     pub stage: String,
-    /// The axes that form its rows; cells of a row that differ in others are its strata.
+    /// Axes that form the rows. All other axes except the seed divide the cells of a row into strata.
     pub rows: Vec<String>,
     /// Names of the quantities in a result, such as `easy.mean_deg`.
     pub metrics: Vec<String>,
-    /// Unit of the quantities.
+    /// Unit of the quantities as text; may be empty.
     #[serde(default)]
     pub unit: String,
-    /// The published table for comparison: one of those in [`super::published`].
+    /// The published table for comparison, one of those in [`super::published`]; `None` without comparison.
     pub paper: Option<String>,
 }
 
-/// A claim: one row of a stage is smaller than another in a quantity.
+/// A claim: a quantity is smaller in one group of cells than in another.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClaimFile {
@@ -114,27 +115,28 @@ pub struct ClaimFile {
     pub metric: String,
     /// Stage and levels of the cells claimed to be smaller: `stage axis=level …`.
     pub less: String,
-    /// Stage and levels of the cells they are compared with.
+    /// Stage and levels of the cells for comparison: `stage axis=level …`.
     pub than: String,
 }
 
 impl CampaignFile {
-    /// Reads and checks a campaign file.
+    /// Reads a campaign file and checks its contents.
     ///
     /// # Errors
     ///
-    /// If it cannot be read, is invalid, or names something that does not exist.
+    /// If the file cannot be read, does not follow the schema, or names an axis, level, stage or published table that
+    /// does not exist.
     pub fn load(path: &Path) -> Result<CampaignFile, CampaignError> {
         let text = greylag_physics::text_file::read(path)
             .map_err(|source| CampaignError::Read { path: path.into(), source })?;
         CampaignFile::parse(&text).map_err(|why| CampaignError::File { path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error describes the fault.
+    /// Parses and checks the text of a campaign file. The error describes the fault.
     ///
     /// # Errors
     ///
-    /// If it is invalid or names something that does not exist.
+    /// If the text does not follow the schema, or names an axis, level, stage or published table that does not exist.
     pub fn parse(text: &str) -> Result<CampaignFile, String> {
         let mut file: CampaignFile =
             toml::from_str(text).map_err(|e| greylag_physics::airframe::toml_error(text, &e))?;
@@ -211,11 +213,11 @@ impl CampaignFile {
         Err(format!("there is no axis {axis}; there are {}", known.join(", ")))
     }
 
-    /// The stage with that name.
+    /// The stage called `name`.
     ///
     /// # Errors
     ///
-    /// If there is none.
+    /// If the campaign has no such stage. The text of the error lists the stages.
     pub fn stage(&self, name: &str) -> Result<&StageFile, String> {
         self.stages.iter().find(|stage| stage.name == name).ok_or_else(|| {
             let known: Vec<&str> = self.stages.iter().map(|s| s.name.as_str()).collect();
@@ -236,7 +238,7 @@ impl CampaignFile {
         Ok((stage.name.clone(), levels))
     }
 
-    /// Fails if the axis lacks the level.
+    /// Fails if the axis does not exist or does not have the level.
     pub(super) fn known_level(&self, axis: &str, level: &str) -> Result<(), String> {
         self.known_axis(axis)?;
         let known = self.levels(axis);
@@ -249,7 +251,7 @@ impl CampaignFile {
         }
     }
 
-    /// The levels of an axis, including the seeds.
+    /// The levels of `axis`; for the seed axis, the seeds. Empty for an unknown axis.
     pub fn levels(&self, axis: &str) -> Vec<Level> {
         if axis != SEED {
             return self.axes.get(axis).cloned().unwrap_or_default();
@@ -259,7 +261,7 @@ impl CampaignFile {
     }
 }
 
-/// Levels written as `axis=level`.
+/// Parses levels written as `axis=level`.
 pub(super) fn levels<'a>(
     words: impl Iterator<Item = &'a str>,
 ) -> Result<BTreeMap<String, String>, String> {
@@ -271,7 +273,7 @@ pub(super) fn levels<'a>(
         .collect()
 }
 
-/// Fails for a name that is not portable as a folder name.
+/// Fails unless `name` consists of characters that are portable in folder names.
 fn plain(what: &str, name: &str) -> Result<(), String> {
     let good = |c: char| c.is_ascii_alphanumeric() || "_-.+".contains(c);
     match !name.is_empty() && name.chars().all(good) {

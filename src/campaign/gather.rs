@@ -1,4 +1,4 @@
-//! Collects the results of a campaign's cells and lists missing ones.
+//! Collects the results of a campaign's cells and lists the cells without a result.
 
 use std::path::Path;
 
@@ -12,28 +12,28 @@ use super::store::{Failure, Standing, Store, Times, whole};
 pub struct Gathered {
     /// The results, in the order of the cells.
     pub records: Vec<Record>,
-    /// Computing times of the cells for which they are known; [`Times::cell`] is the name of the cell.
+    /// Computing times of the finished cells, as far as recorded. [`Times::cell`] is the id of the cell.
     pub times: Vec<Times>,
-    /// Failed cells, with the reasons.
+    /// Ids of the failed cells, with the reasons.
     pub failed: Vec<(String, Failure)>,
-    /// Cells that have started and not finished.
+    /// Ids of the cells that have started and have no result.
     pub begun: Vec<String>,
-    /// Cells whose results belong to another command or to other inputs.
+    /// Cells that have only a result of another command or of other inputs.
     pub stale: Vec<String>,
-    /// Cells without any result.
+    /// Cells that have not started.
     pub missing: Vec<String>,
 }
 
 /// Outcome of an import of results.
 #[derive(Clone, Debug, Default)]
 pub struct Joined {
-    /// Results that were imported.
+    /// Number of imported results.
     pub taken: usize,
-    /// Results of cells that are finished here too, with the same measurements.
+    /// Number of results of cells that already have a result with equal measurements.
     pub twice: usize,
-    /// Results of cells that are finished here too, with other measurements.
+    /// Cells that already have a result with different measurements.
     pub differing: Vec<String>,
-    /// Results of no cell of the plan, or of another command or input.
+    /// Number of results that belong to no cell of the plan, or to another command or input.
     pub foreign: usize,
 }
 
@@ -41,7 +41,7 @@ pub struct Joined {
 ///
 /// # Errors
 ///
-/// If a file of the campaign's folder cannot be read.
+/// If a file of the campaign's folder cannot be read or belongs to another cell.
 pub fn gather(plan: &Plan, store: &Store) -> Result<Gathered, CampaignError> {
     let mut all = Gathered::default();
     for cell in &plan.cells {
@@ -66,11 +66,10 @@ impl Gathered {
         Ok(())
     }
 
-    /// Imports the results of `others`, for instance from another machine, for the cells of `plan` that are not
-    /// finished here.
+    /// Imports the results `others`, for instance from another machine, for the cells of `plan` without a result here.
     ///
-    /// A result of another command or input than the plan's is left out. Where a cell was run in both places, the
-    /// result from here is kept.
+    /// Results of another command or input are not imported. If a cell has a local and an imported result, the local
+    /// result is kept.
     pub fn join(&mut self, plan: &Plan, others: Vec<Record>) -> Joined {
         let mut joined = Joined::default();
         for other in others {
@@ -97,17 +96,17 @@ impl Gathered {
         joined
     }
 
-    /// Whether every cell is finished.
+    /// Whether every cell has a result.
     pub fn is_whole(&self) -> bool {
         let rest = [&self.begun, &self.stale, &self.missing];
         self.failed.is_empty() && rest.iter().all(|cells| cells.is_empty())
     }
 }
 
-/// Writes each of `lines` as one line of JSON.
+/// Writes `lines` to a file, one line of JSON each.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// If a line cannot be written as JSON, or the file cannot be written.
 pub fn write_lines<T: serde::Serialize>(path: &Path, lines: &[T]) -> Result<(), CampaignError> {
     let mut text = String::new();
     for line in lines {
@@ -117,11 +116,11 @@ pub fn write_lines<T: serde::Serialize>(path: &Path, lines: &[T]) -> Result<(), 
     whole(path, text)
 }
 
-/// The results in a file written by [`write_lines`].
+/// Reads the results from a file written by [`write_lines`].
 ///
 /// # Errors
 ///
-/// If it cannot be read, or a line is not a result.
+/// If the file cannot be read, or a line is not a valid result.
 pub fn read_lines(path: &Path) -> Result<Vec<Record>, CampaignError> {
     let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
     let line = |(number, line): (usize, &str)| {
@@ -218,7 +217,7 @@ mod tests {
 
         // results from another machine for cells that are not finished here
         let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());
-        // a value whose last bit an inexact parser of decimals would change
+        // an inexact decimal parser would change the last bit of this value
         elsewhere[1].metrics.insert("easy.mean_deg".to_owned(), 0.001_848_630_997_957_734_2);
         write_lines(&path, &elsewhere).unwrap();
         assert_eq!(read_lines(&path).unwrap(), elsewhere);
@@ -233,7 +232,7 @@ mod tests {
         assert_eq!(partly.missing, [absent[6].cell.as_str()]);
         assert_eq!(partly.records, all.records[..8]);
 
-        // another input gives the cells another identity: the old results are stale
+        // another input changes the identities of the cells: the old results are stale
         std::fs::write(&input, "2").unwrap();
         let planned_again = planned(&input);
         finish(&store, &planned_again.cells[0], 0.0);

@@ -1,4 +1,4 @@
-//! Extracts quantities and output files from the folder of a finished command.
+//! Extracts measured quantities and hashes of output files from the folder of a finished command.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,17 +8,18 @@ use serde_json::Value;
 use super::error::CampaignError;
 use greylag_model::residual::hash;
 
-/// File of `greylag evaluate` with its scores, in a cell's folder.
+/// Name of the file with the scores that `greylag evaluate` writes to a cell's folder.
 pub const SCORES: &str = "evaluation.json";
-/// File of `greylag train dynamics` with its report.
+/// Name of the report that `greylag train dynamics` writes.
 const TRAINING: &str = "training.json";
-/// File of `greylag train policy` with its learning curve.
+/// Name of the learning curve that `greylag train policy` writes.
 const CURVE: &str = "curve.csv";
 /// Columns of a learning curve that do not depend on the speed of the machine.
 const COLUMNS: [&str; 5] = ["steps", "easy_deg", "hard_deg", "divergence_rate", "reward"];
 /// Suffixes of the files that later cells read.
 const READ_LATER: [&str; 3] = ["safetensors", "toml", "csv"];
-/// Files that are not hashed: they hold computing times, or state from which only the same cell resumes.
+/// Files that are not hashed. The learning curve contains computing times. Only the same cell resumes from the
+/// checkpoint.
 const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 
 /// Output of a cell.
@@ -26,17 +27,17 @@ const OWN: [&str; 2] = ["checkpoint.safetensors", CURVE];
 pub struct Harvest {
     /// SHA-256 of the files that later cells read, by their names in the folder.
     pub files: BTreeMap<String, String>,
-    /// Measured quantities by name.
+    /// Measured quantities by name, such as `easy.mean_deg`.
     pub metrics: BTreeMap<String, f64>,
-    /// Points of a learning curve.
+    /// Learning curve: the values of each column, by column name. Empty without a learning curve.
     pub curve: BTreeMap<String, Vec<f64>>,
 }
 
-/// Extracts the output of a cell's command from `folder`.
+/// Extracts the output of a cell's command from the cell's folder `folder`.
 ///
 /// # Errors
 ///
-/// If a file cannot be read or is invalid.
+/// If a file cannot be read, or is not valid JSON or CSV.
 pub fn harvest(folder: &Path) -> Result<Harvest, CampaignError> {
     let mut harvest = Harvest { files: files(folder)?, ..Harvest::default() };
     if let Some(scores) = document(&folder.join(SCORES))? {
@@ -52,7 +53,7 @@ pub fn harvest(folder: &Path) -> Result<Harvest, CampaignError> {
     Ok(harvest)
 }
 
-/// The scores of each controller: `easy.mean_deg`, prefixed with the controller if there are several.
+/// The scores by name, such as `easy.mean_deg`. With several controllers, the controller's name is the prefix.
 fn evaluated(document: &Value) -> Vec<(String, f64)> {
     let controllers = list(document, "controllers");
     let mut all = Vec::new();
@@ -80,8 +81,8 @@ fn evaluated(document: &Value) -> Vec<(String, f64)> {
     all
 }
 
-/// Quality measures: `easy.surface_travel` for the median over the targets, `easy.load_factor_max.worst` for the
-/// worst.
+/// Quality measures over the targets of a group. `easy.surface_travel` is the median over the targets,
+/// `easy.load_factor_max.worst` the worst value.
 fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (id, spread) in measures.as_object().into_iter().flatten() {
@@ -92,7 +93,8 @@ fn measured(measures: &Value, before: &str) -> Vec<(String, f64)> {
     all
 }
 
-/// The free-run errors of a learned model on test flights after some steps, with those of its prior.
+/// Free-run errors of the learned model and of its prior on test flights, after each number of steps. The median
+/// relative error of the coefficients is included if their true values are known.
 fn trained(document: &Value) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     for (who, before) in [("learned", ""), ("prior", "prior.")] {
@@ -112,7 +114,7 @@ fn trained(document: &Value) -> Vec<(String, f64)> {
     all
 }
 
-/// Relative error of a learned coefficient.
+/// Relative error of a learned coefficient; `None` if its true value is unknown or zero.
 fn relative(coefficient: &Value) -> Option<f64> {
     let (value, truth) = (coefficient["value"].as_f64()?, coefficient["truth"].as_f64()?);
     (truth != 0.0).then(|| (value / truth - 1.0).abs())
@@ -138,7 +140,7 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
     let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for row in reader.deserialize() {
         let row: BTreeMap<String, f64> = row.map_err(wrong)?;
-        // JSON has no NaN, which stands for a value that was not measured
+        // NaN marks a value that was not measured; JSON cannot represent NaN, so the row is omitted
         let finite = |x: &f64| x.is_finite();
         if !COLUMNS.iter().all(|column| row.get(*column).is_some_and(finite)) {
             continue;
@@ -150,7 +152,7 @@ fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
     Ok(columns)
 }
 
-/// SHA-256 of the files that later cells read; a folder of flights counts as one.
+/// SHA-256 of the files that later cells read. A folder has one hash over its files.
 fn files(folder: &Path) -> Result<BTreeMap<String, String>, CampaignError> {
     let mut all = BTreeMap::new();
     for path in sorted(folder)? {

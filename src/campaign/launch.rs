@@ -1,5 +1,6 @@
-//! Scripts that submit a campaign to a scheduler: a job array per stage, each job `greylag campaign run FILE --cell
-//! N`.
+//! Scripts that submit a campaign to a scheduler.
+//!
+//! Each stage is a job array. Each job runs `greylag campaign run FILE --cell N`.
 
 use super::file::StageFile;
 use super::plan::Plan;
@@ -11,11 +12,11 @@ pub enum Launcher {
     Slurm,
     /// Task arrays of HyperQueue.
     Hyperqueue,
-    /// GNU parallel on this machine, or on those in its options.
+    /// GNU parallel on this machine, or on the machines named in its options.
     Parallel,
 }
 
-/// Values of a script.
+/// Values that are inserted into a script.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// Path of the program.
@@ -24,7 +25,7 @@ pub struct Job {
     pub file: String,
     /// Path of the campaign's folder.
     pub out: String,
-    /// Attempts at a cell that fails temporarily (exit status 75).
+    /// Largest number of attempts at a cell that fails temporarily (exit status 75).
     pub attempts: usize,
     /// Further options of the scheduler, such as a partition and a time limit.
     pub options: String,
@@ -34,7 +35,7 @@ const SLURM: &str = include_str!("launch/slurm.sh");
 const HYPERQUEUE: &str = include_str!("launch/hyperqueue.sh");
 const PARALLEL: &str = include_str!("launch/parallel.sh");
 
-/// The script that submits `plan`.
+/// The script that submits `plan` with the scheduler `launcher`.
 pub fn script(launcher: Launcher, plan: &Plan, job: &Job) -> String {
     let template = match launcher {
         Launcher::Slurm => SLURM,
@@ -52,7 +53,7 @@ pub fn script(launcher: Launcher, plan: &Plan, job: &Job) -> String {
         .replace("@STAGES@", stages.trim_end())
 }
 
-/// The call of the script's function for a stage: its name, and its first and last cell.
+/// The script's line for a stage: its name, and the numbers of its first and last cell.
 fn line(plan: &Plan, stage: &StageFile) -> String {
     let numbers: Vec<usize> = plan.of_stage(&stage.name).map(|cell| cell.number).collect();
     let (first, last) = (numbers.first().unwrap_or(&0), numbers.last().unwrap_or(&0));

@@ -2,10 +2,11 @@
 //!
 //! A campaign file names axes, seeds and stages. [`plan`](plan()) expands it into *cells*: command lines of this
 //! program, each with an identity derived from its command, its input files and the cells before it. [`store`] keeps
-//! the result of a cell: one JSON line, written atomically. [`gather`] collects the lines; [`tables`] summarises them
-//! over seeds.
+//! the result of each cell as one JSON line, written atomically. [`gather`] collects these lines, and [`tables`]
+//! summarises them over seeds.
 //!
-//! This crate runs no cell: `greylag campaign run` does, and a cluster's scheduler calls it ([`launch`]).
+//! This crate runs no cells. `greylag campaign run` runs them. A cluster's scheduler can call this command
+//! ([`launch`]).
 
 pub mod cell;
 pub mod error;

@@ -1,4 +1,4 @@
-//! Expands a campaign file into its cells.
+//! Expands a campaign file into cells.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use super::file::{CampaignFile, Level, StageFile, levels};
 use greylag_model::GreyBox;
 use greylag_model::residual::hash;
 
-/// The placeholder of the folder that a cell writes.
+/// Placeholder of the cell's output folder in a stage's command.
 const OWN: &str = "{out}";
 
 /// A campaign with its cells.
@@ -17,15 +17,15 @@ const OWN: &str = "{out}";
 pub struct Plan {
     /// The campaign file.
     pub file: CampaignFile,
-    /// The cells in order: a cell follows those that it reads.
+    /// The cells in order: each cell follows the cells whose folders it reads.
     pub cells: Vec<Cell>,
 }
 
-/// The cells of `file`, read from `path`; `find` locates a file that a command names.
+/// Expands `file`, which was read from `path`, into cells. `find` returns the location of a file that a command names.
 ///
 /// # Errors
 ///
-/// If a command has an unknown placeholder, or names a file that does not exist.
+/// If a command has an unknown placeholder, or names a file that does not exist or cannot be read.
 pub fn plan(
     file: CampaignFile,
     path: &Path,
@@ -55,11 +55,11 @@ pub fn plan(
 }
 
 impl Plan {
-    /// The cell with that number or id.
+    /// The cell whose number or id is `name`.
     ///
     /// # Errors
     ///
-    /// If there is none.
+    /// If the campaign has no such cell.
     pub fn cell(&self, name: &str) -> Result<&Cell, String> {
         let number: Option<usize> = name.parse().ok();
         let wanted = |cell: &&Cell| cell.id == name || Some(cell.number) == number;
@@ -78,7 +78,7 @@ impl Plan {
     }
 }
 
-/// Every combination of the levels of a stage's axes, the last axis fastest.
+/// Every combination of the levels of a stage's axes. The last axis varies fastest.
 fn combinations(file: &CampaignFile, stage: &StageFile) -> Vec<Vec<(String, Level)>> {
     stage.over.iter().fold(vec![Vec::new()], |all, axis| {
         let with = |start: &Vec<(String, Level)>| {
@@ -98,12 +98,12 @@ struct Draft<'a> {
 }
 
 impl Draft<'_> {
-    /// The words of the command, and the numbers of the cells whose folders they name.
+    /// The words of the command line, and the numbers of the cells whose folders these words name.
     fn words(&self) -> Result<(Vec<String>, Vec<usize>), String> {
         let (mut words, mut after) = (Vec::new(), Vec::new());
         for word in self.stage.command.split_whitespace() {
             match self.level_of(word) {
-                // a level may be replaced by several words, or by none
+                // a level may insert several words, or none
                 Some(level) => {
                     for word in level.words.split_whitespace() {
                         words.push(self.word(word, &mut after)?);
@@ -140,7 +140,8 @@ impl Draft<'_> {
         Ok(text + rest)
     }
 
-    /// The folder of the cell of an earlier stage: `stage`, or `stage:axis=level,…` for levels other than its own.
+    /// Folder of an earlier stage's cell. `name` is `stage`, or `stage:axis=level,…` with levels that replace those of
+    /// the present cell.
     fn upstream(&self, name: &str, after: &mut Vec<usize>) -> Result<String, String> {
         let (stage, chosen) = name.split_once(':').unwrap_or((name, ""));
         let given = levels(chosen.split(',').filter(|part| !part.is_empty()))?;
@@ -189,16 +190,16 @@ fn cell(
     cell
 }
 
-/// The files that a command names: words with a slash that are not folders of the campaign, and the additional ones
-/// of its stage.
+/// Input files of a command: its words with a slash, except folders of the campaign, and the additional inputs of its
+/// stage.
 fn named_files(words: &[String], stage: &StageFile) -> Vec<String> {
     let named = words.iter().filter(|w| w.contains('/') && !w.contains(OUT) && !w.contains(OWN));
-    // `--env model:FOLDER`
+    // in `--env model:FOLDER` the path follows the colon
     let path = |word: &String| word.rsplit_once(':').map_or(word.as_str(), |(_, p)| p).to_owned();
     named.map(path).chain(stage.inputs.iter().cloned()).collect()
 }
 
-/// SHA-256 of a file, of a folder's files, or of a model with all files that it reads.
+/// SHA-256 of a file, of all files in a folder, or of a model with all files that the model reads.
 fn content(path: &Path) -> Result<String, String> {
     let cannot = |e: std::io::Error| format!("cannot read {}: {e}", path.display());
     if path.extension().is_some_and(|e| e == "toml")

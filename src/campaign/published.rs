@@ -1,13 +1,14 @@
-//! The paper's tables of statistics over seeds, for comparison with a campaign's.
+//! Published statistics over seeds from \[GSFM26\], for comparison with a campaign.
 //!
-//! `published.csv` holds Tables IV, VIII, IX, X (with III in it) and XI of \[GSFM26\] as printed. Its rows are named
-//! by the levels of a campaign here (`severe/trainable`, `parallel`, `hybrid`), its targets as by `greylag evaluate`.
+//! `published.csv` contains Tables IV, VIII, IX, X (which includes Table III) and XI of \[GSFM26\] as printed. Rows
+//! have the names of campaign levels, such as `severe/trainable`, `parallel` and `hybrid`. Target groups have the names
+//! that `greylag evaluate` gives them.
 
 use std::sync::LazyLock;
 
 use super::statistics::Estimate;
 
-/// A row of the file.
+/// A row of `published.csv`.
 struct Line {
     table: &'static str,
     row: &'static str,
@@ -27,15 +28,16 @@ fn line(text: &'static str) -> Option<Line> {
     Some(Line { table, row, targets, statistic, estimate })
 }
 
-/// Published tables by number.
+/// Numbers of the published tables, such as `IV`, in the order of the file.
 pub fn tables() -> Vec<&'static str> {
     let mut tables: Vec<&str> = LINES.iter().map(|line| line.table).collect();
     tables.dedup();
     tables
 }
 
-/// Median, interquartile mean and mean of a table's row for a quantity by its name in a result, such as
-/// `easy.mean_deg`; of `easy.divergence_rate` the mean, as a fraction.
+/// Published median, interquartile mean and mean of the quantity `metric` in one row of a table; `None` for a statistic
+/// that is not published. `easy.mean_deg` and the like are in degrees. `easy.divergence_rate` and the like are
+/// fractions, of which only the mean is published.
 pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] {
     let (targets, quantity) = metric.rsplit_once('.').unwrap_or(("", metric));
     let find = |statistic: &str| {
@@ -49,7 +51,7 @@ pub fn published(table: &str, row: &str, metric: &str) -> [Option<Estimate>; 3] 
     }
 }
 
-/// Percent as a fraction.
+/// Converts an estimate from percent to a fraction.
 fn part(percent: Estimate) -> Estimate {
     Estimate { value: percent.value / 100.0, ci95: percent.ci95.map(|end| end / 100.0) }
 }
@@ -60,7 +62,7 @@ mod tests {
 
     #[test]
     fn every_line_is_read_and_lies_in_its_interval() {
-        // 3 statistics of 15 rows in IV and XI, 18 in X, 9 in IX; one of 15 in VIII
+        // rows with three statistics: 15 in IV and in XI, 18 in X, 9 in IX; rows with one statistic: 15 in VIII
         assert_eq!(LINES.len(), 3 * (15 + 15 + 18 + 9) + 15);
         assert_eq!(tables(), ["X", "IX", "XI", "IV", "VIII"]);
         for Line { table, row, estimate: Estimate { value, ci95: [low, high] }, .. } in LINES.iter()

@@ -1,21 +1,22 @@
-//! Statistics over seeds: median, interquartile mean and mean, each with its 95 % interval.
+//! Statistics over seeds: median, interquartile mean and mean, each with its 95 % confidence interval.
 //!
-//! As in rliable (Agarwal et al. 2021): the interquartile mean leaves a quarter of all runs out at each end; intervals
-//! are percentiles of a bootstrap that draws seeds with replacement within each stratum (task). Departs from it: the median
-//! is that of all runs, not the median over tasks of their means; \[GSFM26\] does not specify which its tables hold.
+//! The method follows rliable (Agarwal et al. 2021). The interquartile mean omits a quarter of all runs at each end.
+//! Intervals are percentiles of a bootstrap that draws seeds with replacement within each stratum (task). One
+//! definition differs from rliable: the median is taken over all runs, not over the means of the tasks. \[GSFM26\] does
+//! not specify which median its tables contain.
 
 use greylag_num::bootstrap;
 use greylag_num::statistics::{interquartile_mean, mean, quantile};
 
-/// Seed of the bootstrap: the same runs give the same intervals.
+/// Seed of the bootstrap. It is constant, so the same runs give the same intervals.
 const SEED: u64 = 95;
 
-/// A statistic with its interval.
+/// A statistic with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Value of the statistic.
     pub value: f64,
-    /// Bounds of its 95 % interval.
+    /// Bounds of its 95 % confidence interval.
     pub ci95: [f64; 2],
 }
 
@@ -36,7 +37,7 @@ pub struct Aggregate {
     pub max: f64,
 }
 
-/// Summarises runs; `strata` are the scores of the seeds, task by task. `None` without runs.
+/// Summarises all runs. `strata` holds one vector for each task, with one score for each seed. `None` without runs.
 pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     let runs: Vec<f64> = strata.concat();
     let estimate = |statistic: &dyn Fn(&[f64]) -> f64| Estimate {
@@ -53,7 +54,7 @@ pub fn aggregate(strata: &[Vec<f64>]) -> Option<Aggregate> {
     })
 }
 
-/// Mean of `b` minus mean of `a`, each resampled independently; `None` without runs.
+/// Mean of `b` minus mean of `a`, with `a` and `b` resampled independently. `None` if either is empty.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     if a.is_empty() || b.is_empty() {
         return None;
@@ -64,7 +65,8 @@ pub fn difference(a: &[f64], b: &[f64]) -> Option<Estimate> {
     Some(Estimate { value: gap(&strata.concat()), ci95 })
 }
 
-/// Mean of the differences of paired runs, resampled within each stratum; `None` without pairs.
+/// Mean of paired differences. `strata` holds the differences of each stratum, which is resampled separately. `None`
+/// without pairs.
 pub fn paired_difference(strata: &[Vec<f64>]) -> Option<Estimate> {
     let gaps = strata.concat();
     if gaps.is_empty() {
@@ -78,7 +80,8 @@ pub fn paired_difference(strata: &[Vec<f64>]) -> Option<Estimate> {
 mod tests {
     use super::*;
 
-    /// rliable's numbers of ten runs, by numpy and scipy: `np.median`, `scipy.stats.trim_mean(x, 0.25)`, `np.mean`.
+    /// Reference values for ten runs from numpy and scipy, as in rliable: `np.median`, `scipy.stats.trim_mean(x,
+    /// 0.25)`, `np.mean`.
     #[test]
     fn ten_runs_are_summed_up_as_rliable_does() {
         let runs = vec![0.91, 1.2, 0.7, 0.85, 1.4, 0.95, 1.05, 0.6, 2.5, 1.1];
@@ -86,7 +89,7 @@ mod tests {
         assert_eq!(all.count, 10);
         for (value, wanted) in [
             (all.median.value, 1.0),
-            // scipy cuts int(0.25 · 10) = 2 at each end: mean of 0.85 0.91 0.95 1.05 1.1 1.2
+            // scipy omits int(0.25 · 10) = 2 runs at each end; the mean is that of 0.85 0.91 0.95 1.05 1.1 1.2
             (all.iqm.value, 6.06 / 6.0),
             (all.mean.value, 1.126),
             (all.min, 0.6),
@@ -99,8 +102,8 @@ mod tests {
         }
     }
 
-    /// Two tasks that differ by ten and whose seeds agree have no spread within a task: resampling across tasks would
-    /// give the mean an interval of some units.
+    /// The two tasks differ by 10, and within a task all seeds agree. Resampling across tasks would give the mean an
+    /// interval several units wide.
     #[test]
     fn strata_keep_the_difference_of_tasks_out_of_the_interval() {
         let all = aggregate(&[vec![1.0; 5], vec![11.0; 5]]).unwrap();

@@ -1,4 +1,4 @@
-//! A campaign on disk: a folder per cell with one result, written atomically.
+//! A campaign on disk: one folder per cell with one result, which is written atomically.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const RESULT: &str = "result.json";
 const FAILURE: &str = "failure.json";
 /// File with a cell's computing time.
 const TIMES: &str = "times.json";
-/// Lock file while a cell runs.
+/// Lock file, which is locked while the cell runs.
 const LOCK: &str = "lock";
 /// File that marks a started cell.
 const BEGUN: &str = "begun";
@@ -30,11 +30,11 @@ pub struct Store {
 pub enum Standing {
     /// It has a result.
     Done(Box<Record>),
-    /// It failed, and would fail again.
+    /// It failed permanently: another run would fail as well.
     Failed(Failure),
-    /// It has started and has no result: it runs, or was stopped.
+    /// It has started and has no result: it is running or was interrupted.
     Begun,
-    /// It has a result of another command or of other inputs, which is not valid.
+    /// Only a result of another command or of other inputs exists, which is not valid for this cell.
     Stale,
     /// It has not started.
     Missing,
@@ -45,35 +45,35 @@ pub enum Standing {
 pub struct Failure {
     /// Text of the error.
     pub error: String,
-    /// The program and its build.
+    /// Version and build of the program.
     pub program: String,
 }
 
-/// Computing time and machine of a cell: separate from its result, which is the same everywhere.
+/// Computing time and processor of a cell. They are stored apart from the result, which does not depend on the machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Times {
     /// Id of the cell.
     pub cell: String,
-    /// Wall time of the session that finished it, s.
+    /// Wall time of the session that finished the cell, s.
     pub seconds: f64,
-    /// Processor time in that session, s.
+    /// Processor time of that session over all cores, s.
     pub core_seconds: f64,
-    /// Whether an earlier session had started it, so that the times are incomplete.
+    /// Whether an earlier session had started the cell. If so, the times exclude that session.
     pub resumed: bool,
-    /// End, seconds since 1970 UTC.
+    /// Time at which the cell ended, s since 1970-01-01 UTC.
     pub ended_unix_s: u64,
     /// Model of the processor.
     pub processor: String,
-    /// The program and its build.
+    /// Version and build of the program.
     pub program: String,
 }
 
-/// The lock on a cell: no other process of any machine with the same disk holds it.
+/// Exclusive lock on a cell among all processes that share the disk, on any machine.
 #[derive(Debug)]
 pub struct Claimed {
     /// Folder of the cell.
     pub folder: PathBuf,
-    /// Whether an earlier session had started it.
+    /// Whether an earlier session had started the cell.
     pub resumed: bool,
     _lock: File,
 }
@@ -94,11 +94,11 @@ impl Store {
         self.folder.join(cell.folder())
     }
 
-    /// State of a cell.
+    /// State of a cell, from the files in the campaign's folder.
     ///
     /// # Errors
     ///
-    /// If a result exists and cannot be read.
+    /// If a result or a failure record exists and cannot be read, or if the result belongs to another cell.
     pub fn standing(&self, cell: &Cell) -> Result<Standing, CampaignError> {
         let folder = self.folder_of(cell);
         if let Some(record) = read::<Record>(&folder.join(RESULT))? {
@@ -119,7 +119,7 @@ impl Store {
         Ok(if self.has_other(cell) { Standing::Stale } else { Standing::Missing })
     }
 
-    /// Whether there is a result of the same stage and levels with another identity.
+    /// Whether a result with another identity exists for the stage and levels of `cell`.
     fn has_other(&self, cell: &Cell) -> bool {
         let (stem, own) = (cell.stem() + "-", cell.folder());
         let Ok(entries) = std::fs::read_dir(&self.folder) else { return false };
@@ -131,11 +131,12 @@ impl Store {
         })
     }
 
-    /// Locks a cell; `None` while another process holds the lock.
+    /// Locks a cell, marks it as started and removes an earlier failure record. `None` while another process holds the
+    /// lock.
     ///
     /// # Errors
     ///
-    /// If the folder cannot be created or locked.
+    /// If the folder or one of its files cannot be created, locked or removed.
     pub fn claim(&self, cell: &Cell) -> Result<Option<Claimed>, CampaignError> {
         let folder = self.folder_of(cell);
         std::fs::create_dir_all(&folder).map_err(CampaignError::io("cannot make", &folder))?;
@@ -153,7 +154,7 @@ impl Store {
         Ok(Some(Claimed { folder, resumed, _lock: lock }))
     }
 
-    /// Computing time of a cell, if known.
+    /// Computing time of a cell; `None` if it is not recorded.
     ///
     /// # Errors
     ///
@@ -164,11 +165,11 @@ impl Store {
 }
 
 impl Claimed {
-    /// Writes the result, which finishes the cell.
+    /// Writes the computing time and the result. The result marks the cell as finished.
     ///
     /// # Errors
     ///
-    /// If it cannot be written.
+    /// If one of the two files cannot be written.
     pub fn finish(&self, record: &Record, times: &Times) -> Result<(), CampaignError> {
         write(&self.folder.join(TIMES), times)?;
         write(&self.folder.join(RESULT), record)
@@ -178,7 +179,7 @@ impl Claimed {
     ///
     /// # Errors
     ///
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn fail(&self, failure: &Failure) -> Result<(), CampaignError> {
         write(&self.folder.join(FAILURE), failure)
     }
@@ -190,8 +191,7 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, Campai
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(CampaignError::io("cannot read", path)(e)),
     };
-    let wrong =
-        |e| CampaignError::content(path, format!("is not what it should be: {e}; delete it"));
+    let wrong = |e| CampaignError::content(path, format!("has invalid contents: {e}; delete it"));
     serde_json::from_str(&text).map(Some).map_err(wrong)
 }
 

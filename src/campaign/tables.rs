@@ -1,4 +1,4 @@
-//! Tables of a campaign: each quantity summarised over seeds beside the paper's value, and tests of its claims.
+//! Tables of a campaign: summaries over seeds with the published values, and tests of the claims.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,24 +14,24 @@ pub struct Summary {
     pub title: String,
     /// Unit of its quantities.
     pub unit: String,
-    /// The paper's table for comparison.
+    /// Number of the published table for comparison; `None` without comparison.
     pub paper: Option<String>,
     /// Rows of the table.
     pub rows: Vec<SummaryRow>,
 }
 
-/// A quantity of the cells with the same levels.
+/// A quantity, summarised over the cells with the same levels.
 #[derive(Clone, Debug)]
 pub struct SummaryRow {
-    /// The levels, joined by `/`.
+    /// The levels of the row's axes, joined by `/`.
     pub name: String,
     /// Name of the quantity.
     pub metric: String,
-    /// Summary over the seeds.
+    /// Summary over the seeds and strata of the row.
     pub ours: Aggregate,
-    /// The single values.
+    /// The values of the individual cells.
     pub runs: Vec<Run>,
-    /// The paper's median, interquartile mean and mean.
+    /// The published median, interquartile mean and mean; `None` where a statistic is not published.
     pub paper: [Option<Estimate>; 3],
 }
 
@@ -40,7 +40,7 @@ pub struct SummaryRow {
 pub struct Run {
     /// Id of the cell.
     pub cell: String,
-    /// Its random seed.
+    /// Random seed of the cell; `None` if its stage does not vary the seed.
     pub seed: Option<u64>,
     /// Value of the quantity.
     pub value: f64,
@@ -53,20 +53,20 @@ pub struct Finding {
     pub says: String,
     /// Result of the test.
     pub outcome: Outcome,
-    /// The values of both sides, as a sentence.
+    /// The values of both sides and their difference, as a sentence.
     pub because: String,
 }
 
 /// Result of a claim's test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Confirmed: the interval of the difference is above zero.
+    /// Confirmed: the 95 % interval of the difference `than − less` is above zero.
     Holds,
-    /// Refuted: the interval is below zero.
+    /// Refuted: the 95 % interval of the difference is below zero.
     Contradicted,
-    /// Undecided: the interval contains zero.
+    /// Undecided: the 95 % interval of the difference contains zero, or one side has fewer than three cells.
     Undecided,
-    /// No cells for the test.
+    /// Not tested: one side has no cell with the quantity.
     NoData,
 }
 
@@ -82,7 +82,7 @@ impl Outcome {
     }
 }
 
-/// The tables of a campaign file.
+/// The tables of a campaign file, summarised over `records`.
 pub fn summaries(file: &CampaignFile, records: &[Record]) -> Vec<Summary> {
     file.tables.iter().map(|table| summary(file, table, records)).collect()
 }
@@ -106,7 +106,7 @@ fn summary(file: &CampaignFile, table: &TableFile, records: &[Record]) -> Summar
     }
 }
 
-/// Every combination of levels that forms a row, in the order of the file.
+/// Every combination of levels that forms a row, in the order of the campaign file.
 fn row_levels(file: &CampaignFile, table: &TableFile) -> Vec<Vec<(String, String)>> {
     table.rows.iter().fold(vec![Vec::new()], |all, axis| {
         let levels = file.levels(axis);
@@ -143,11 +143,12 @@ fn row(
     Some(SummaryRow { name, metric: metric.into(), ours, runs, paper })
 }
 
-/// Number of runs below which an interval over seeds is meaningless: one run has no spread.
+/// Least number of runs for which an interval over seeds is used. A single run has no spread.
 const FEWEST: usize = 3;
 
 impl Summary {
-    /// Rows where our interval and the paper's are disjoint, a sentence each.
+    /// One sentence for each row whose 95 % interval of the mean is disjoint from the published interval. Rows with
+    /// fewer than three runs are omitted.
     pub fn departures(&self) -> Vec<String> {
         self.rows.iter().filter_map(SummaryRow::departure).collect()
     }
@@ -163,7 +164,7 @@ impl SummaryRow {
         let word = if b < c { "less" } else { "more" };
         (b < c || d < a).then(|| {
             format!(
-                "{}, {}: mean {} here ({} runs), {} in the paper: {word}, the intervals have nothing in common.",
+                "{}, {}: mean {} here ({} runs), {} in the paper: {word}, the intervals are disjoint.",
                 self.name,
                 self.metric,
                 said(&ours),
@@ -174,13 +175,13 @@ impl SummaryRow {
     }
 }
 
-/// A value with its interval as text.
+/// The value and its 95 % interval as text, with three decimals.
 pub fn said(estimate: &Estimate) -> String {
     let Estimate { value, ci95: [low, high] } = estimate;
     format!("{value:.3} [{low:.3}, {high:.3}]")
 }
 
-/// Tests of the claims of a campaign file.
+/// Tests the claims of a campaign file against `records`.
 ///
 /// # Errors
 ///
@@ -189,7 +190,7 @@ pub fn findings(file: &CampaignFile, records: &[Record]) -> Result<Vec<Finding>,
     file.claims.iter().map(|claim| finding(file, claim, records)).collect()
 }
 
-/// The levels of a cell that a claim leaves open, including its seed.
+/// The levels of a cell on the axes that a claim leaves open, including the seed.
 type Levels = BTreeMap<String, String>;
 
 fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result<Finding, String> {
@@ -241,8 +242,8 @@ fn left(record: &Record, fixed: &dyn Fn(&str) -> bool) -> Levels {
     open.map(|(axis, level)| (axis.clone(), level.clone())).collect()
 }
 
-/// The gaps `than − less` of cells that agree in all open levels, by stratum (all of them but the seed); `None` unless
-/// every cell of both sides has exactly one partner.
+/// Differences `than − less` between cells with equal open levels, by stratum. The open levels without the seed form
+/// the stratum. `None` unless every cell of both sides has exactly one partner.
 fn pairs(less: &[(Levels, f64)], than: &[(Levels, f64)]) -> Option<Vec<Vec<f64>>> {
     let of: BTreeMap<&Levels, f64> = than.iter().map(|(key, value)| (key, *value)).collect();
     let own: BTreeSet<&Levels> = less.iter().map(|(key, _)| key).collect();
@@ -266,7 +267,7 @@ mod tests {
         [("prior", prior.to_owned()), (SEED, seed.to_string())].map(|(a, l)| (a.into(), l)).into()
     }
 
-    /// Seeds differ by 10 and the two sides by 1, so only the paired test can show the difference.
+    /// Seeds differ by 10 and the two sides by 1. Only the paired test can detect the difference.
     #[test]
     fn cells_of_one_seed_are_compared_with_each_other() {
         let side = |more: f64| -> Vec<(Levels, f64)> {

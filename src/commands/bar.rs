@@ -1,4 +1,4 @@
-//! Progress of a long command, and its cancellation by Ctrl-C.
+//! Progress display of a long command, and its cancellation by Ctrl-C.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -23,7 +23,7 @@ static LISTENING: Once = Once::new();
 /// Whether `--quiet` was given.
 static SILENT: AtomicBool = AtomicBool::new(false);
 
-/// Shows no progress from now on, if `quiet`.
+/// Switches the progress display off if `quiet`.
 pub fn silence(quiet: bool) {
     SILENT.store(quiet, Ordering::Relaxed);
 }
@@ -40,8 +40,8 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// A bar for a long task that begins. From now on a first Ctrl-C ends the task, and a second one ends the
-    /// program.
+    /// Starts the progress display of a long task. From then on, the first Ctrl-C cancels the task, and a second Ctrl-C
+    /// ends the program.
     pub fn new() -> Bar {
         LISTENING.call_once(|| {
             let press = || {
@@ -65,7 +65,7 @@ impl Bar {
         Bar { bar, last: Mutex::default() }
     }
 
-    /// Shows a stage; ends the task if Ctrl-C was pressed.
+    /// Shows a stage. The result is a break if Ctrl-C was pressed.
     pub fn update(&self, stage: Stage<'_>) -> ControlFlow<()> {
         match &self.bar {
             Some(bar) => {
@@ -80,7 +80,7 @@ impl Bar {
     /// Fails if Ctrl-C was pressed. Call it before a command writes its files.
     ///
     /// # Errors
-    /// Ctrl-C was pressed.
+    /// If Ctrl-C was pressed.
     pub fn go_on(&self) -> Result<(), Cancelled> {
         not_cancelled(pressed())
     }
@@ -94,7 +94,7 @@ impl Bar {
         }
     }
 
-    /// Writes a stage that differs from the one before.
+    /// Writes a stage on standard error, unless it is the same as before.
     fn line(&self, doing: &str) {
         let Ok(mut last) = self.last.lock() else { return };
         if *last != doing && !is_silent() {
@@ -104,7 +104,7 @@ impl Bar {
     }
 }
 
-/// Start and end of the work and of the report, as fractions of the progress bar; without a report the work fills the
+/// Start and end of the work and of the report, as fractions of the progress bar. Without a report the work fills the
 /// bar.
 #[cfg(feature = "study")]
 pub fn shares(report: Option<&std::path::Path>) -> [[f64; 2]; 2] {
@@ -112,7 +112,7 @@ pub fn shares(report: Option<&std::path::Path>) -> [[f64; 2]; 2] {
     [[0.0, end], [end, 1.0]]
 }
 
-/// Whether the task shall go on.
+/// A break if Ctrl-C was pressed.
 fn pressed() -> ControlFlow<()> {
     match PRESSED.load(Ordering::Relaxed) {
         0 => ControlFlow::Continue(()),

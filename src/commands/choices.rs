@@ -1,16 +1,16 @@
-//! Options whose values are the names of a list, so that `--help` shows them.
+//! Options whose values are the names of a list. `--help` shows these names.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::control::ControllerKind;
 
-/// The controllers of [`crate::control`].
+/// Option values: the names of the controllers.
 pub fn controller() -> impl TypedValueParser<Value = ControllerKind> {
     PossibleValuesParser::new(ControllerKind::ALL.iter().map(|kind| kind.name()))
         .try_map(|name| name.parse::<ControllerKind>())
 }
 
-/// The groups of targets.
+/// Option values: the names of the groups of targets.
 #[cfg(feature = "demo")]
 pub fn group() -> impl TypedValueParser<Value = crate::sim::Group> {
     use crate::sim::Group;

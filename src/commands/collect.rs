@@ -1,4 +1,4 @@
-//! `greylag collect`: exploration flights in JSBSim, from which models are learned.
+//! `greylag collect`: flies exploration flights in JSBSim, from which models are learned.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(fly(arguments, &Interruption::watch()?)?.into())
 }
 
-/// As [`run`], until `stop` is set.
+/// Simulates like [`run`] until `stop` is set.
 pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models: Vec<GreyBox> = arguments.model.iter().map(load).collect::<Result<_, _>>()?;
@@ -97,7 +97,7 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     Ok(Ended::Done)
 }
 
-/// An episode's file is written as a whole, so that an existing one need not be flown again.
+/// Writes the file of an episode completely or not at all. An episode with a file need not be flown again.
 fn save(flight: &crate::logs::Flight, path: &Path) -> Result<()> {
     let part = path.with_extension("part");
     let _ = std::fs::remove_file(&part);

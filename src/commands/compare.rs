@@ -1,4 +1,4 @@
-//! `greylag compare`: where models fail against flight logs.
+//! `greylag compare`: compares models with flight logs.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -62,7 +62,8 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Reads, reconstructs, compares; prints the sentences and the tables; writes JSON and report.
+/// Reads and reconstructs the flights and compares the models with them. Prints the results, and writes JSON and
+/// report.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     for path in arguments.json.iter().chain(&arguments.report).chain(&arguments.predictions) {
@@ -101,8 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The answer split into the parts of tuning and of the added effect, if the second of two models was made from the
-/// first.
+/// The answer with separate parts for tuning and for the added effect, if the second of two models was made from the
+/// first. `None` otherwise.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,
@@ -176,7 +177,7 @@ fn print(comparison: &Comparison) {
     print_summary(&comparison.answer);
 }
 
-/// The forecasts without aerodynamics in one line.
+/// Errors of the forecasts without aerodynamics at the answer's horizon, in one line.
 fn baselines(comparison: &Comparison) -> Option<String> {
     let horizon = comparison.answer.numbers.horizon_s;
     let error = |f: &crate::sysid::compare::forecast::ForecastResult| {
@@ -188,7 +189,8 @@ fn baselines(comparison: &Comparison) -> Option<String> {
     (!all.is_empty()).then_some(said)
 }
 
-/// Free-run errors in the units of each state. If a model's file has constants of the flights, also without them.
+/// Free-run errors in the units of each state. If a model's file has constants of the flights, the table also has the
+/// errors without these constants.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
         "", "s", "NRMSE", "lost", "roll °", "pitch °", "V m/s", "p °/s", "q °/s", "r °/s", "α °",
@@ -243,7 +245,7 @@ fn channel_table(models: &[ModelResult]) -> Table {
     table
 }
 
-/// Three significant figures; a dash for an unknown value.
+/// Formats `x` with three significant figures; a dash if `x` is not finite.
 fn number(x: f64) -> String {
     match x {
         x if !x.is_finite() => "–".into(),

@@ -1,4 +1,4 @@
-//! `greylag completions`: what a shell needs to complete a command line.
+//! `greylag completions`: writes the completion script of a shell.
 
 use std::process::ExitCode;
 
@@ -17,7 +17,7 @@ pub struct Arguments {
 
 /// Writes the completions of `command`.
 pub fn run(arguments: &Arguments, command: &mut clap::Command) -> Result<ExitCode> {
-    // not straight to standard output, whose reader may have gone: the generator panics then
+    // not directly to standard output: the generator panics if the reader has closed it
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, command, "greylag", &mut script);
     print!("{}", String::from_utf8(script)?);

@@ -13,10 +13,11 @@ use crate::model::GreyBox;
 /// Folder of the default policy, which was trained in the default model.
 pub const POLICY: &str = "params/x8/learned/policy";
 
-/// The controller `kind` of `model`, with the policy in `folder` as [`policy`] finds it.
+/// Builds the controller `kind` for `model`, with the policy in `folder` (see [`policy`]) and `changes` of the
+/// planner's settings.
 ///
 /// # Errors
-/// If the policy cannot be used, or the model does not allow the controller.
+/// If the policy cannot be read or belongs to another airframe, or the model does not allow the controller.
 pub fn controller(
     kind: ControllerKind,
     model: &GreyBox,
@@ -29,11 +30,11 @@ pub fn controller(
 
 /// The policy in `folder` for the controller `kind` of `model`.
 ///
-/// `None` if the controller uses no policy. `None` too if the controller can work without a policy and `folder` is the
-/// default folder, whose policy belongs to another airframe. Notes on the policy are printed on standard error.
+/// `None` if the controller uses no policy. It is also `None` if the controller can work without a policy and `folder`
+/// is the default folder, whose policy belongs to another airframe. Notes on the policy are printed on standard error.
 ///
 /// # Errors
-/// If the policy cannot be used.
+/// If the policy cannot be read or belongs to another airframe.
 pub fn policy(
     kind: ControllerKind,
     model: &GreyBox,
@@ -60,7 +61,7 @@ pub fn policy(
     Ok(Some(agent))
 }
 
-/// Note for a policy that was trained in another model than the one that flies with it.
+/// A note if the policy of `origin` was trained in another model than `model`.
 fn foreign_policy_note(origin: &Origin, model: &GreyBox, folder: &Path) -> Option<String> {
     (origin.model_sha256 != model.sha256).then(|| {
         format!(

@@ -1,4 +1,4 @@
-//! `greylag design`: the manoeuvre that distinguishes two effects.
+//! `greylag design`: finds the manoeuvre that best distinguishes two effects.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -37,14 +37,13 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// How well each manoeuvre distinguishes the effects, as JSON. There is no value where the aircraft would leave its
-/// bounds.
+/// Separation of the effects by each manoeuvre, as JSON. A value is null if the aircraft would leave its bounds.
 #[derive(Serialize)]
 struct Document<'a> {
     between: [&'a str; 2],
     manoeuvres: Vec<Manoeuvre<'a>>,
     chosen: Option<&'a str>,
-    /// Duration of the chosen manoeuvre that suffices, s.
+    /// Flight time with the chosen manoeuvre that suffices, s.
     chosen_s: Option<f64>,
 }
 
@@ -75,10 +74,10 @@ fn document<'a>(
     }
 }
 
-/// Simulates each manoeuvre with both effects, prints how well it distinguishes them, and writes the best schedule.
+/// Simulates each manoeuvre with either effect, prints the separations, and writes the best schedule.
 ///
 /// # Errors
-/// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two.
+/// If the model, an effect or the file cannot be used, or no manoeuvre distinguishes the two effects.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     if let Some(path) = &arguments.out {

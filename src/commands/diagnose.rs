@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Seed of everything that is drawn.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.
+    /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
     /// Ids to be left out of the catalogue.

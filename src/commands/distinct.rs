@@ -1,4 +1,4 @@
-//! Refusal of two logs of the same flight: it would be counted twice, or a fit would be judged by its own data.
+//! Refuses two logs of the same flight. A fit would count the flight twice, or be validated on its own data.
 
 use std::path::{Path, PathBuf};
 
@@ -10,8 +10,8 @@ use crate::model::residual::hash;
 /// because one file can have several paths and copies.
 ///
 /// # Errors
-/// If two files have the same content; the error names both. A file that cannot be read is skipped: the command that
-/// reads it reports the error.
+/// If two files have the same content. The error names both. A file that cannot be read is skipped, because the command
+/// that reads it reports the error.
 pub fn distinct(fitted: &[PathBuf], held: &[PathBuf]) -> Result<()> {
     let known = |paths: &[PathBuf]| -> Vec<(PathBuf, String)> {
         let content = |p: &PathBuf| Some((p.clone(), hash(&std::fs::read(p).ok()?)));

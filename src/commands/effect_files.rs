@@ -1,4 +1,4 @@
-//! Effects that a user names: by id, or by a file of their own.
+//! Effects that a user names by id, by effect file or by a folder of effect files.
 
 use std::path::Path;
 
@@ -29,12 +29,12 @@ pub fn named_effects(effects: &[String]) -> Result<Vec<String>> {
     Ok(ids)
 }
 
-/// Whether `named` is a file's name rather than an id, which has neither a dot nor a slash.
+/// Whether `named` is the name of a file. An id has neither a dot nor a slash.
 pub fn is_file(named: &str) -> bool {
     named.contains(['.', '/', '\\'])
 }
 
-/// Those of `ids` whose effects come from files.
+/// The `ids` whose effects come from effect files.
 pub fn own_effects(ids: &[String]) -> Vec<String> {
     let own = |id: &&String| Kind::from_id(id).is_some_and(|kind| kind.written().is_some());
     ids.iter().filter(own).cloned().collect()

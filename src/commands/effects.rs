@@ -1,4 +1,4 @@
-//! `greylag effects`: the catalogue of physical effects.
+//! `greylag effects`: shows the catalogue of physical effects.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -101,7 +101,7 @@ struct Listed {
     effects: Vec<Document>,
 }
 
-/// Where effects act, in the order of the list.
+/// What an effect acts on, in the order of the list.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
     Forces,
@@ -121,7 +121,7 @@ impl Place {
     }
 }
 
-/// Every effect that the program knows.
+/// All effects of the program, with what they act on.
 fn catalogue() -> Vec<(Place, Description)> {
     let (missing, prior): (Vec<_>, Vec<_>) = on_air().partition(|about| about.entry.is_some());
     let inputs = inputs::Kind::ALL.iter().map(|kind| kind.describe());
@@ -135,7 +135,7 @@ fn catalogue() -> Vec<(Place, Description)> {
         .collect()
 }
 
-/// Prints the list or one entry; writes its page.
+/// Prints the list, one effect or the variables of formulas. Writes the page of the effect.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::List(json) => {
@@ -170,7 +170,9 @@ fn list() -> String {
             about.description.to_owned(),
         ]);
     }
-    format!("{table}\n`greylag effects show ID` tells more of one; --report draws its signature.\n")
+    format!(
+        "{table}\n`greylag effects show ID` describes one in full; --report draws its signature.\n"
+    )
 }
 
 /// The letters of an effect's channels.
@@ -198,14 +200,14 @@ fn variables() -> String {
     for v in Variable::ALL {
         text += &format!("  {:12} {:18} {}\n", v.name(), v.alias(), v.meaning());
     }
-    text += "functions, beside + - * / ^\n";
+    text += "functions, in addition to + - * / ^\n";
     for f in Function::ALL.iter().filter(|f| !f.is_operator()) {
         text += &format!("  {:12} {}\n", f.name(), f.meaning());
     }
     text + "  clamp        clamp(x, low, high)\n  table        table(x; x1:y1, x2:y2, …): linear between, constant beyond\n"
 }
 
-/// The effect of an id or of a file.
+/// The effect with the id `name`, or of the effect file `name`.
 fn named(name: &str) -> Result<(Place, Description)> {
     if is_file(name) {
         let read = register::load(&shipped(Path::new(name)))?;
@@ -272,7 +274,7 @@ fn show(show: &Show) -> Result<()> {
     files::write(path, &report.page().render(), overwrite)
 }
 
-/// Prints all that is known of an effect.
+/// Prints the description and the parameters of an effect.
 fn print(place: Place, about: &Description, channels: &str) {
     println!("{}", about.id);
     for [name, text] in effect_facts(about, place.words(), channels) {
@@ -292,7 +294,7 @@ fn print(place: Place, about: &Description, channels: &str) {
     }
 }
 
-/// Coefficients for the signature: the example of the catalogue, or for part of a prior the values of the model.
+/// Coefficients for the signature: the example of the catalogue, or the values of the model for an effect of a prior.
 fn example(model: &GreyBox, about: &Description) -> Vec<f64> {
     match about.entry {
         Some(entry) => entry.example.into(),

@@ -1,4 +1,4 @@
-//! `greylag evaluate`: score controllers on the target file.
+//! `greylag evaluate`: flies controllers to targets and scores them.
 
 mod any;
 mod draws;
@@ -59,7 +59,7 @@ pub struct Arguments {
     /// Folders of trained policies, for controllers that need one.
     #[arg(long = "policy", value_name = "DIR", num_args = 1.., default_values_os_t = [PathBuf::from(controllers::POLICY)])]
     policies: Vec<PathBuf>,
-    /// Settings of the planners in other than their usual size, as KEY=VALUE.
+    /// Settings of the planners that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// File of the targets to fly.
@@ -135,7 +135,7 @@ struct Document<'a> {
     controllers: &'a [Evaluation],
 }
 
-/// Flies, prints the table, writes the JSON.
+/// Flies and scores the controllers, prints the tables, and writes JSON and page.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     for path in arguments.json.iter().chain(&arguments.report) {
@@ -147,7 +147,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let rows = targets::rows(arguments)?;
     let mut plant = arguments.plant.options(arguments.seed);
-    // everything that can be wrong is found before the first flight
+    // all errors of the options are reported before the first flight
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models = arguments.models.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let rows = targets::within_envelope(rows, arguments, &models[0].airframe)?;
@@ -191,7 +191,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Roll and pitch, degrees, of the paper's Figures 7 to 9.
 const SHOWN: [[f64; 2]; 3] = [[-58.0, -21.0], [55.0, 28.0], [20.0, 10.0]];
 
-/// Flies every controller to the targets that are shown.
+/// Flies every controller to the targets `SHOWN`.
 fn flights(entrants: &[Entrant], plant: &PlantOptions) -> Result<Vec<(Target, Vec<Tracking>)>> {
     let mut simulator = Simulator::new(plant)?;
     let mut all = Vec::new();
@@ -229,9 +229,9 @@ fn page(
     report.page().render()
 }
 
-/// The command that flies the best controller in the demonstration, a whole flight with its page. It is empty if several
-/// models or policies flew, because a controller's name does not identify their files, and if the user's own aircraft
-/// flew, because the command would have to repeat its options.
+/// The command that flies the best controller in the demonstration. It is empty if several models or policies flew,
+/// because a controller's name does not identify their files. It is also empty for a user's own aircraft, because the
+/// command would have to repeat its options.
 fn next(arguments: &Arguments, evaluations: &[Evaluation], plant: &PlantOptions) -> String {
     match (evaluation_best(evaluations), &arguments.models[..], &arguments.policies[..]) {
         (Some(best), [model], [policy]) if plant.aircraft_dir.is_none() => format!(
@@ -258,14 +258,14 @@ fn subtitle(arguments: &Arguments) -> String {
     format!("Flown in JSBSim: {}", flown.join("; "))
 }
 
-/// A controller ready to fly, with the name of its model, or the folder of its policy.
+/// A controller ready to fly, with the name of its model and the folder of its policy.
 struct Entrant {
     kind: ControllerKind,
     model: String,
     controller: Box<dyn Controller>,
 }
 
-/// Every controller on every model or policy that it may be built from; one that needs neither enters
+/// Every controller with every model or policy from which it can be built. A controller that needs neither is built
 /// once.
 fn entrants(arguments: &Arguments, models: &[GreyBox]) -> Result<Vec<Entrant>> {
     let (models, none) = (models.iter(), PathBuf::new());
@@ -319,7 +319,7 @@ fn one(
     Ok(Evaluation::measured([kind.name(), model], courses, &outcomes, limits))
 }
 
-/// A bar on a terminal, one plain line elsewhere.
+/// A progress bar on a terminal. Elsewhere one plain line is printed.
 fn progress(length: u64, of: &str, what: &str) -> ProgressBar {
     if bar::is_silent() {
         return ProgressBar::hidden();

@@ -1,12 +1,11 @@
-//! Access control of the clients' links: this machine only, holders of the key, or explicitly
-//! anybody.
+//! Access control of the clients' links: links of this machine, signed links, or links that the user allows explicitly.
 
 use anyhow::{Result, bail};
 
 use crate::link::address::Address;
 
-/// Refuses links that other machines reach without a signature, unless the user asked for them;
-/// then returns a warning.
+/// Refuses unsigned links that other machines can reach, unless the user allows them. Returns a warning for allowed
+/// links, and `None` if no other machine can reach an unsigned link.
 pub fn check<'a>(
     unsigned: impl Iterator<Item = &'a Address>,
     asked: Asked,
@@ -29,9 +28,9 @@ pub fn check<'a>(
 /// Exposure that the user allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// Safe options only.
+    /// Only signed links, and links of this machine.
     Nothing,
-    /// Links that anybody may use.
+    /// Unsigned links that other machines can reach.
     Insecure,
 }
 

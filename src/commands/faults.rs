@@ -1,4 +1,4 @@
-//! `greylag faults`: a campaign of seeded flights under faults, judged automatically.
+//! `greylag faults`: flies a campaign of seeded flights under faults and checks them automatically.
 
 mod ledger;
 mod monitor;
@@ -42,7 +42,7 @@ pub struct Arguments {
     /// Controllers that fly the campaign.
     #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["lqi"], value_parser = choices::controller())]
     controller: Vec<ControllerKind>,
-    /// The simulator's aircraft; the played flight controllers have gains for the X8, so others fly with the
+    /// The simulator's aircraft; the simulated flight controllers have gains for the X8, so others fly with the
     /// counterpart sitl.
     #[arg(long, value_name = "NAME", default_value = AIRCRAFT, conflicts_with = "resume")]
     aircraft: String,
@@ -72,7 +72,7 @@ pub struct Arguments {
     /// Fly the scenario in this file (JSON, as `--search` prints it) and show how far each rule is from being broken.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["flights", "resume", "show", "search", "json"])]
     scenario: Option<PathBuf>,
-    /// Fly this number of flights, healthy and with each failure, under the model monitor, beside a
+    /// Fly this number of flights, healthy and with each failure, under the model monitor, with a
     /// simulated ArduPlane whose attitude has errors drawn for each flight: false alarms and
     /// delays. `--first` is the first seed.
     #[arg(long, value_name = "N", conflicts_with_all = ["flights", "resume", "show", "search", "scenario", "json"])]
@@ -106,11 +106,11 @@ fn counterparts() -> impl TypedValueParser<Value = Counterpart> {
     })
 }
 
-/// Flies the campaign; the exit status is 0 if the companion itself never failed and every
-/// aircraft that left its envelope is explained.
+/// Flies the campaign. The exit status is 0 if the companion itself never failed and every other finding has a fault as
+/// its cause.
 ///
 /// # Errors
-/// If an aircraft or a controller cannot be made, or the file of `--resume` cannot be used.
+/// If an aircraft or a controller cannot be built, or the file of `--resume` cannot be used.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
     let quiet = arguments.json.takes_stdout();
@@ -169,10 +169,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// The default companions of scenarios: the controller `kind` of the default model, with the X8.
+/// Factory of the default companions of scenarios: the controller `kind` of the default model, with the X8.
 ///
 /// # Errors
-/// If the model or the policy that are shipped cannot be used.
+/// If the shipped model or policy cannot be read.
 #[cfg(feature = "study")]
 pub fn shipped(kind: ControllerKind) -> Result<CompanionFactory> {
     let model = fly::model(fly::MODEL.as_ref(), None)?;
@@ -180,7 +180,7 @@ pub fn shipped(kind: ControllerKind) -> Result<CompanionFactory> {
     factory(kind, &model, &plant)
 }
 
-/// The simulator's aircraft as the airframe of `model` describes it, at its usual start.
+/// The simulator's aircraft with the airframe of `model`, at its default start.
 fn plant(aircraft: &str, model: &GreyBox) -> Result<PlantOptions> {
     let models = std::slice::from_ref(model);
     let mut plant = PlantOptions { aircraft: aircraft.into(), ..PlantOptions::default() };
@@ -198,8 +198,8 @@ fn factory(
     Ok(CompanionFactory::new(companion, model)?.with_aircraft(plant.clone()))
 }
 
-/// Prints a table of faults by counterparts: the number of flights with the fault, and how many of them have a
-/// finding.
+/// Prints a table of faults by counterparts: the number of flights with the fault, and the number of these flights with
+/// a finding.
 fn print_faults(controller: ControllerKind, counterparts: &[Counterpart], entries: &[Entry]) {
     println!("\n{}: findings of flights of 60 s with each fault", controller.name());
     let mut table = Table::new();
@@ -283,7 +283,7 @@ mod tests {
     fn a_few_flights_with_every_fault_leave_the_companion_sound() {
         roomy(|| {
             let factory = factory();
-            // Over this many seeds each kind of fault is drawn first once; the seeds are spread over the
+            // Over this many seeds each kind of fault is the first fault once. The seeds are distributed over the
             // counterparts.
             for seed in 0..FaultKind::DRAWN.len() as u64 {
                 let counterpart = Counterpart::ALL[seed as usize % Counterpart::ALL.len()];

@@ -1,4 +1,4 @@
-//! The files a user names on the command line.
+//! Files that a user names on the command line.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use crate::report;
 /// Whether an existing file may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// Keep it and fail with an error.
+    /// An existing file is kept, and the command fails.
     Never,
-    /// Replace it (option `--force`).
+    /// An existing file is replaced (option `--force`).
     Force,
 }
 
@@ -37,7 +37,7 @@ pub struct JsonArgument {
     json: Option<PathBuf>,
 }
 
-/// Result of a command, with the name of its layout and the program.
+/// Result of a command, with its schema and the program's version.
 #[derive(Serialize)]
 struct Document<'a, T> {
     schema: &'static str,
@@ -52,12 +52,12 @@ impl JsonArgument {
         self.json.as_ref().map_or(Ok(()), |path| writable(path, overwrite))
     }
 
-    /// Whether standard output is the JSON's alone.
+    /// Whether the JSON goes to standard output, which then holds nothing else.
     pub fn takes_stdout(&self) -> bool {
         is_stdout(self.json.as_deref())
     }
 
-    /// Writes `content` with the name of its layout to the file of `--json`; does nothing without that option.
+    /// Writes `content` with its schema to the file of `--json`. Does nothing without this option.
     pub fn write(
         &self,
         schema: &'static str,
@@ -71,7 +71,7 @@ impl JsonArgument {
     }
 }
 
-/// Fails at once if `path` may not be written later, so that no long task is lost to it.
+/// Fails at once if `path` could not be written later. Otherwise a long task would be lost.
 pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     if is_stdout(Some(path)) {
         return Ok(());
@@ -86,7 +86,7 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
     Ok(())
 }
 
-/// Writes a file through a temporary one: it exists completely or not at all.
+/// Writes a file through a temporary file. The file is either complete or absent. The path `-` is standard output.
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {

@@ -1,4 +1,5 @@
-//! Model and controller of a recorded flight, written beside the recording so that `replay` and `report` need no options.
+//! Model and controller of a recorded flight, stored in the recording's folder. `replay` and `report` then need no
+//! options.
 
 use std::path::{Path, PathBuf};
 
@@ -11,9 +12,9 @@ use crate::control::ControllerKind;
 use crate::control::cem::Change;
 use crate::model::GreyBox;
 
-/// The file's name in a recording.
+/// File name in a recording.
 pub const FILE: &str = "flown-with.toml";
-/// The layout that this program reads and writes.
+/// Schema of the file.
 const SCHEMA: u32 = 1;
 
 /// Controller, model and link of a flight.
@@ -69,7 +70,7 @@ pub struct Chosen<'a> {
     pub commanded: CommandName,
 }
 
-/// Path that finds a file from any working directory; a file shipped with the program keeps its name.
+/// A path that is valid in any working directory. A path of a shipped file stays as it is.
 fn lasting(path: &Path) -> PathBuf {
     std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
@@ -97,10 +98,11 @@ impl FlownWith {
         files::write(&folder.join(FILE), &text, Overwrite::Never)
     }
 
-    /// Reads the file from a recording; `None` if the recording has none, as recordings made before November 2026.
+    /// Reads the file from a recording; `None` if the recording has no such file. Recordings from before November 2026
+    /// have none.
     ///
     /// # Errors
-    /// If the file cannot be used.
+    /// If the file cannot be read, is invalid or has another schema.
     pub fn read(folder: &Path) -> Result<Option<FlownWith>> {
         let path = folder.join(FILE);
         if !path.exists() {
@@ -119,7 +121,7 @@ impl FlownWith {
     /// The settings of the planner.
     ///
     /// # Errors
-    /// If one cannot be read.
+    /// If a setting cannot be parsed.
     pub fn changes(&self) -> Result<Vec<Change>> {
         Ok(self.planner.iter().map(|text| text.parse()).collect::<Result<_, _>>()?)
     }

@@ -1,4 +1,4 @@
-//! `greylag fly`: the companion on a real or simulated vehicle.
+//! `greylag fly`: runs the companion on a real or simulated vehicle.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -81,7 +81,7 @@ pub struct Arguments {
     /// Folder of the trained policy, for controllers that use one.
     #[arg(long, value_name = "DIR", default_value = POLICY)]
     policy: PathBuf,
-    /// Settings of the planner in other than their usual size, as KEY=VALUE.
+    /// Settings of the planner that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// Airframe file in place of the one that the model names.
@@ -133,7 +133,7 @@ pub enum CommandName {
 }
 
 impl ProfileName {
-    /// The stack of a real controller.
+    /// The stack of a real flight controller; `None` for the simulator.
     pub fn stack(self) -> Option<Stack> {
         match self {
             ProfileName::Sitl => None,
@@ -144,7 +144,7 @@ impl ProfileName {
 }
 
 impl CommandName {
-    /// Authority of the companion over a real controller.
+    /// Authority of the companion over a real flight controller.
     pub fn authority(self) -> Authority {
         match self {
             CommandName::Surfaces => Authority::Surfaces,
@@ -154,12 +154,12 @@ impl CommandName {
 }
 
 impl Arguments {
-    /// The links to clients, those declared local among them.
+    /// All links to clients, including those declared local.
     fn all_clients(&self) -> impl Iterator<Item = &Address> {
         self.clients.iter().chain(&self.local)
     }
 
-    /// The links to clients on which nothing is signed.
+    /// The links to clients whose messages are not signed.
     fn unsigned(&self) -> impl Iterator<Item = &Address> {
         let signed = self.sign.is_some();
         self.clients.iter().filter(move |_| !signed).chain(&self.local)
@@ -170,7 +170,7 @@ impl Arguments {
         self.sign.clone().map(|key| Signing { key, vehicle, local: self.local.clone() })
     }
 
-    /// Options that are recorded beside the log.
+    /// Options that are recorded in the folder of the log.
     fn chosen(&self) -> Chosen<'_> {
         Chosen {
             controller: self.controller,
@@ -202,8 +202,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Flies until Ctrl-C or the end of the duration.
 ///
 /// # Errors
-/// If a file cannot be used, a link cannot be opened or a recording cannot be created; nothing
-/// has been started then.
+/// If a file cannot be read or is invalid, a link cannot be opened or a recording cannot be created. Nothing has been
+/// started then.
 pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let asked = if arguments.insecure { Asked::Insecure } else { Asked::Nothing };
     let exposed = exposure::check(arguments.unsigned(), asked)?;
@@ -234,7 +234,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         punctual::print_timing(class);
     }
     if let Some(folder) = &flight.recording {
-        // the flight continues: the recording is complete without it
+        // the flight continues, because the recording is complete without this file
         if let Err(why) = FlownWith::write(folder, &arguments.chosen(), &model) {
             eprintln!("greylag: `replay` will need this flight's options: {why:#}");
         }
@@ -273,10 +273,10 @@ fn options(arguments: &Arguments, model: &GreyBox) -> FlightOptions {
     }
 }
 
-/// A model file, with another airframe if one is given. Paths below `params/` are looked for as [`shipped`] does.
+/// Loads a model file, with another airframe if one is given. [`shipped`] resolves paths below `params/`.
 ///
 /// # Errors
-/// If a file cannot be used.
+/// If the model file or the airframe file cannot be read or is invalid.
 pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     let mut model = GreyBox::load(&shipped(path))?;
     if let Some(path) = airframe {
@@ -285,13 +285,14 @@ pub fn model(path: &Path, airframe: Option<&Path>) -> anyhow::Result<GreyBox> {
     Ok(model)
 }
 
-/// A pilot with its controllers, behind the envelope limiter of `model`. The controller `kind` flies, with the policy in
-/// `folder` as [`controllers::policy`](crate::commands::controllers::policy) finds it. The fallback is an LQI of the same
+/// A pilot with its controllers, behind the envelope limiter of `model`. The controller `kind` flies, with the policy
+/// in `folder`, see [`controllers::policy`](crate::commands::controllers::policy). The fallback is an LQI of the same
 /// model. If no LQI can be designed, the fallback is `pid-retuned`, with a line on standard error.
 ///
 /// # Errors
-/// If the policy cannot be used, if the model does not allow `kind`, or if the model can be trimmed at its cruise
-/// airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the fallback is no error.
+/// If the policy cannot be read or belongs to another airframe, if the model does not allow `kind`, or if the model can
+/// be trimmed at its cruise airspeed neither in level flight nor in a glide. An LQI that cannot be designed as the
+/// fallback is no error.
 pub fn companion_with(
     kind: ControllerKind,
     model: &GreyBox,
@@ -300,10 +301,10 @@ pub fn companion_with(
     companion_with_planner(kind, model, folder, &[])
 }
 
-/// As [`companion_with`], with `changes` of the planner's settings.
+/// The same as [`companion_with`], with `changes` of the planner's settings.
 ///
 /// # Errors
-/// As [`companion_with`], and if there are changes and no planner.
+/// The same as [`companion_with`], or if there are changes and no planner.
 pub fn companion_with_planner(
     kind: ControllerKind,
     model: &GreyBox,
@@ -312,7 +313,7 @@ pub fn companion_with_planner(
 ) -> anyhow::Result<Companion> {
     check_changes(&[kind], changes)?;
     let controller = controller(kind, model, folder, changes)?;
-    // The design of an LQI takes a moment; it is not made twice.
+    // The design of an LQI takes time, so it is not repeated for the fallback.
     let fallback = if matches!(kind, ControllerKind::Lqi | ControllerKind::LqiDamped) {
         controller.boxed_clone()
     } else {
@@ -325,7 +326,8 @@ pub fn companion_with_planner(
     Ok(Companion { pilot, controller, placement })
 }
 
-/// The fallback of `model`: an LQI, or `pid-retuned`, with a line on standard error, where no LQI can be designed.
+/// The fallback controller of `model`: an LQI. If no LQI can be designed, it is `pid-retuned`, with a line on standard
+/// error.
 ///
 /// # Errors
 /// If `pid-retuned` cannot be built either.

@@ -1,4 +1,4 @@
-//! Hints for a log given as a model and a model given as a log.
+//! Detects a log that is given as a model, and a model that is given as a log.
 
 use std::fs::File;
 use std::io::Read;
@@ -13,7 +13,7 @@ use crate::model::GreyBox;
 /// Number of bytes at the start of a file that identify it.
 const HEAD: u64 = 4096;
 
-/// The model at `path`, or where the program ships it.
+/// Loads the model at `path`, which may be a path below the shipped `params/`.
 ///
 /// # Errors
 /// If the file cannot be read, or is a flight log.
@@ -43,14 +43,14 @@ pub fn log(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether a file begins like a log, and is not called a model.
+/// Whether a file has the content of a log, and no `.toml` name.
 fn is_log(path: &Path) -> bool {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return false;
     }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    // a comment or JSON may hold a comma, too
+    // a text that starts as a comment or as JSON is no log, although it may contain commas
     let other = matches!(head.first(), Some(b'#' | b'{' | b'['));
     read.is_ok() && !other && Format::of(&head).is_some()
 }

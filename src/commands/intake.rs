@@ -1,4 +1,4 @@
-//! The options that name flight logs, from the files to reconstructed flights.
+//! Options that name flight logs, and the reconstruction of the flights in these logs.
 
 use std::path::{Path, PathBuf};
 
@@ -48,11 +48,11 @@ pub struct Reading {
 /// Flights read from the logs.
 #[derive(Default)]
 pub struct Intake {
-    /// The flights that could be reconstructed; at least one.
+    /// The reconstructed flights, at least one.
     pub flights: Vec<Reconstruction>,
-    /// Findings about the logs, including those that were left out.
+    /// Findings about the logs, and the reasons why logs were left out.
     pub notes: Vec<String>,
-    /// Whether a log was left out or holds what makes the figures wrong.
+    /// Whether a log was left out, or has a problem that makes the results wrong.
     pub in_doubt: bool,
 }
 
@@ -72,13 +72,13 @@ impl Intake {
 }
 
 impl LogArguments {
-    /// Other logs, read in the same way.
+    /// The logs `paths`, with the same reading options.
     #[cfg(feature = "study")]
     pub fn of(&self, paths: Vec<PathBuf>) -> LogArguments {
         LogArguments { paths, ..self.clone() }
     }
 
-    /// The same logs, read in the same way, as words of a command line that begin with a space.
+    /// The logs and the reading options as words of a command line, with a leading space.
     pub fn words(&self) -> String {
         let logs: String = self.paths.iter().map(|log| format!(" {}", quoted(log))).collect();
         format!(" --log{logs}{}", self.reading.words())
@@ -95,7 +95,7 @@ impl LogArguments {
         mapping.chain(sources).chain(given).collect()
     }
 
-    /// Reads and reconstructs the logs; prints an error for each that cannot be used, and skips it.
+    /// Reads and reconstructs the logs. A log that cannot be used is skipped with an error message.
     pub fn take_in(&self, model: &GreyBox, clock: ActuatorClock) -> Result<Intake> {
         self.reading.take_in(&self.paths, model, clock)
     }
@@ -113,7 +113,7 @@ impl Reading {
         Ok(logs::Options { tolerance, mapping, flies, sources })
     }
 
-    /// The logs and options for a workbench.
+    /// The reading options for a workbench.
     #[cfg(feature = "study")]
     pub fn of_workbench(&self) -> workbench::Reading {
         workbench::Reading {
@@ -138,10 +138,10 @@ impl Reading {
         if self.lenient { Tolerance::Lenient } else { Tolerance::Strict }
     }
 
-    /// As [`LogArguments::take_in`], of `paths`.
+    /// Reads and reconstructs the logs `paths`. A log that cannot be used is skipped with an error message.
     ///
     /// # Errors
-    /// If the mapping cannot be read, or no log is left.
+    /// If the mapping cannot be read, or no log can be used.
     pub fn take_in(
         &self,
         paths: &[PathBuf],
@@ -223,8 +223,8 @@ fn units_first(path: &Path, error: logs::LogError) -> anyhow::Error {
     )
 }
 
-/// Refuses a log whose figures would be wrong. If a mapping can correct the log, the error names the command that
-/// writes it.
+/// Refuses a log with a problem that would make the results wrong. If a mapping can correct the log, the error names
+/// the command that writes it.
 fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
     let problems: Vec<&Finding> =
         findings.iter().filter(|f| f.severity == Severity::Problem).collect();
@@ -232,7 +232,7 @@ fn refuse_problems(path: &Path, findings: &[Finding]) -> Result<()> {
         return Ok(());
     }
     let log = quoted(path);
-    // a problem that a factor corrects is named by its column only: the command below explains it
+    // A problem that a factor corrects is named by its column only. The command in the message explains the problem.
     let said = |f: &&Finding| match &f.cure {
         Some(cure) => {
             format!("{} has a wrong unit or sign (read it times {:.4})", cure.column, cure.scale)

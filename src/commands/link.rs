@@ -1,4 +1,4 @@
-//! `greylag link`: what a link to a flight controller carries, and what it lacks.
+//! `greylag link`: checks a link to a flight controller, and makes signing keys.
 
 mod key;
 mod shown;
@@ -36,10 +36,10 @@ use print_to;
 
 /// Time within which the flight controller must send a heartbeat.
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(4);
-/// Largest share of a serial port's rate for state messages. The rest is for parameters, commands and routed
+/// Largest fraction of a serial port's data rate for state messages. The rest is for parameters, commands and routed
 /// messages.
 const BUDGET: f64 = 0.6;
-/// A stream below this share of its nominal rate counts as missing.
+/// Fraction of the nominal rate below which a stream counts as missing.
 const ENOUGH: f64 = 0.8;
 
 /// The arguments of `greylag link`.
@@ -230,7 +230,7 @@ impl Document {
     }
 }
 
-/// Prints what was found; fails when the profile cannot be flown.
+/// Prints the results. The exit status is 1 if the profile cannot be flown.
 fn report(check: &Check, real: &Real, out: &mut dyn Write) -> Result<ExitCode> {
     let Some((autopilot, armed)) = real.controller() else {
         bail!("the controller fell silent while it was measured: check cable and power");

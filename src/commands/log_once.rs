@@ -1,13 +1,12 @@
-//! Warnings on standard error, each printed once: every worker that loads an aircraft has the same
-//! ones.
+//! Warnings on standard error, each printed once. Every worker that loads an aircraft issues the same warnings.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::sync::Mutex;
 
-/// Lines that were printed.
+/// Lines already printed.
 static PRINTED: Mutex<BTreeSet<Vec<u8>>> = Mutex::new(BTreeSet::new());
-/// Largest number of lines that are remembered; later ones are printed each time.
+/// Largest number of stored lines. Further lines are printed each time.
 const REMEMBERED: usize = 1000;
 
 /// Standard error without repetitions.

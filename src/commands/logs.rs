@@ -1,4 +1,4 @@
-//! `greylag logs`: what a flight log holds, or the same as a CSV table.
+//! `greylag logs`: shows, converts and reconstructs flight logs.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -102,7 +102,7 @@ struct Reading {
 }
 
 impl Reading {
-    /// The settings of the readers for logs of the aircraft of `model`, if one is named.
+    /// The reader settings for logs of the aircraft of `model`; `None` if the model is not given.
     fn options(&self, model: Option<&GreyBox>) -> Result<Options> {
         let mapping = self.mapping.as_deref().map(Mapping::load).transpose()?.unwrap_or_default();
         let airframe = self.airframe.as_deref().map(|path| Airframe::load(&files::shipped(path)));
@@ -178,7 +178,7 @@ fn csv_file(flight: &Flight, output: &Path, force: bool) -> Result<()> {
     files::write(output, &text, force.into())
 }
 
-/// Decimals that show two digits of a standard deviation, at least five.
+/// Number of decimals, 5 to 9, that shows two digits of a standard deviation.
 fn decimals(sd: f64) -> usize {
     if sd > 0.0 { (1.0 - sd.log10()).clamp(5.0, 9.0) as usize } else { 5 }
 }
@@ -291,7 +291,7 @@ fn print_purposes(info: &Info) {
     }
 }
 
-/// Instances of the topics that have several.
+/// Prints the instances of topics that have several.
 fn print_sources(info: &Info) {
     if info.sources.is_empty() {
         return;
@@ -311,7 +311,7 @@ fn print_sources(info: &Info) {
     }
 }
 
-/// Largest number of phases and of gaps that are printed; `--json` has them all.
+/// Largest number of phases and of gaps that are printed. `--json` has all.
 const SHOWN: usize = 12;
 
 fn more(count: usize) {

@@ -1,4 +1,4 @@
-//! `greylag man`: the manual pages.
+//! `greylag man`: writes the manual pages.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,7 +17,7 @@ pub struct Arguments {
     folder: PathBuf,
 }
 
-/// Writes the pages of `command`.
+/// Writes the manual pages of `command`.
 ///
 /// # Errors
 /// If the folder cannot be written.

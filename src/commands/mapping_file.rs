@@ -5,16 +5,16 @@ use std::fmt::Write;
 
 use crate::logs::info::Info;
 
-/// Columns that share a unit: a finding names only the first of each group.
+/// Columns that share a unit. A finding names only the first column of a group.
 const ALIKE: [(&str, [&str; 2]); 2] =
     [("roll_rad", ["pitch_rad", "yaw_rad"]), ("p_radps", ["q_radps", "r_radps"])];
 
-/// The text of the mapping; `None` if a factor corrects none of the findings.
+/// The text of the mapping; `None` if no finding can be corrected by a factor.
 pub fn mapping(logs: &[Info]) -> Option<String> {
     let mut columns = BTreeMap::new();
     for log in logs {
         let cures = || log.findings.iter().filter_map(|f| f.cure.as_ref());
-        // a sign can be judged only after the units are right
+        // signs can be checked only with correct units
         let units = cures().any(|cure| cure.scale > 0.0);
         for cure in cures().filter(|cure| !units || cure.scale > 0.0) {
             let column = cure.column.as_str();

@@ -8,9 +8,9 @@ use crate::control::{ControllerKind, Pace, build};
 use crate::flight::delay_margin;
 use crate::model::GreyBox;
 
-/// The delay margin of `kind` on `model`: the smallest delay at which its loop oscillates. For planners and policies it is that
-/// of the LQI, which is their fallback: a planner takes too long to simulate, and a policy has no design. `None` if the LQI
-/// cannot be designed, or the loop is stable up to the largest delay simulated.
+/// The delay margin of `kind` on `model`: the smallest delay at which its loop oscillates. For planners and policies it
+/// is the delay margin of the LQI, which is their fallback. A planner takes too long to simulate, and a policy has no
+/// loop design. `None` if the LQI cannot be designed, or the loop is stable up to the largest delay simulated.
 ///
 /// # Errors
 /// If the controller cannot be built.
@@ -25,7 +25,7 @@ pub fn of(kind: ControllerKind, model: &GreyBox) -> Result<Option<Duration>> {
     let kind = if designed && kind.pace() != Pace::Planned { kind } else { ControllerKind::Lqi };
     match build(kind, model) {
         Ok(controller) => Ok(delay_margin(controller.as_ref(), model)),
-        // No LQI: the substitute was reported already, and its delay margin is unknown.
+        // Without an LQI, the substitute was reported already, and its delay margin is unknown.
         Err(_) if !designed => Ok(None),
         Err(why) => Err(why.into()),
     }

@@ -22,7 +22,7 @@ pub fn text(error: &anyhow::Error) -> String {
     }
 }
 
-/// Remedy for an error of the operating system; `None` where its own text must suffice.
+/// Remedy for an error of the operating system; `None` if the system's text must suffice.
 fn cure(kind: ErrorKind) -> Option<&'static str> {
     match kind {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {

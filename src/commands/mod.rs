@@ -200,21 +200,22 @@ fn end_with_the_reader() {
     }));
 }
 
-/// The arguments of the command line; clap ends the program where they are wrong.
+/// Parses the command line. An error ends the program.
 fn parse() -> Arguments {
     let line = with_signs(<Arguments as clap::CommandFactory>::command());
     let found = line.get_matches();
     <Arguments as clap::FromArgMatches>::from_arg_matches(&found).unwrap_or_else(|e| e.exit())
 }
 
-/// The command with negative numbers allowed for all options that take a value: the option's parser checks the range.
+/// The command with negative numbers allowed for all options that take a value. The parser of an option checks the
+/// range.
 fn with_signs(command: clap::Command) -> clap::Command {
     let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
     let command = command.mut_args(|a| if takes(&a) { a.allow_negative_numbers(true) } else { a });
     command.mut_subcommands(with_signs)
 }
 
-/// Runs the subcommand of the command line; an error is printed in one line.
+/// Runs the subcommand of the command line. An error is printed in one line.
 pub fn main() -> ExitCode {
     let Arguments { command, verbose, quiet } = parse();
     bar::silence(quiet);
@@ -224,7 +225,7 @@ pub fn main() -> ExitCode {
         (_, 1) => LevelFilter::INFO,
         (_, 2..) => LevelFilter::DEBUG,
     };
-    // our notes replace the warnings of the JSBSim library on an aircraft's XML
+    // notes of this program replace the warnings of the JSBSim library on an aircraft's XML
     let port = if level == LevelFilter::WARN { LevelFilter::OFF } else { level };
     let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter =
@@ -234,7 +235,7 @@ pub fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(|| log_once::LogOnce);
     tracing_subscriber::registry().with(filter).with(lines).init();
-    // a flight must continue when nobody reads its output
+    // a flight must continue after the reader of its output has ended
     if !matches!(command, Command::Fly(_)) {
         end_with_the_reader();
     }
@@ -299,7 +300,7 @@ fn run(command: Command) -> Result<ExitCode> {
     }
 }
 
-/// The subcommand of a line that does not hold the program's name.
+/// Parses the subcommand of a command line without the program's name.
 #[cfg(feature = "study")]
 fn command_of(line: &[OsString]) -> Result<Command> {
     let words = std::iter::once(OsString::from("greylag")).chain(line.iter().cloned());
@@ -318,7 +319,7 @@ fn check_line(line: &[OsString]) -> Result<()> {
     }
 }
 
-/// Runs a learning stage or a campaign cell until `stop` is set; an evaluation does not look at `stop`.
+/// Runs a learning stage or a campaign cell until `stop` is set. An evaluation ignores `stop`.
 #[cfg(feature = "study")]
 #[cfg_attr(not(any(feature = "demo", feature = "learn")), expect(unused_variables))]
 fn carry_out(line: &[OsString], stop: &Interruption) -> Result<Ended> {

@@ -1,4 +1,4 @@
-//! `greylag mystery`: flights of an aircraft that has an effect which its model lacks.
+//! `greylag mystery`: makes flights of an aircraft with an effect that its model lacks.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -20,11 +20,11 @@ use crate::sim::missing::{Craft, Missing, MissingKind};
 use crate::sim::starting_model::starting_model;
 use crate::sim::trial::{Subject, Trial};
 
-/// The file of the answer.
+/// File name of the sealed answer.
 const SEALED: &str = "answer.sealed";
-/// File of the diagnosis that is compared with the answer.
+/// File name of the diagnosis that is compared with the answer.
 const DIAGNOSIS: &str = "diagnosis.json";
-/// The layout of the answer.
+/// Schema of the answer.
 const SCHEMA: &str = "greylag.mystery/1";
 
 /// Options of `greylag mystery`.
@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Hide the effect of this file, with the values that the file has.
     #[arg(long, value_name = "FILE", group = "what")]
     hide: Option<PathBuf>,
-    /// How much of it, in its own unit; of an effect of a file, its first coefficient.
+    /// Amplitude in the effect's unit; for an effect of a file, its first coefficient.
     #[arg(long, requires = "what", allow_negative_numbers = true)]
     amplitude: Option<f64>,
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
@@ -80,7 +80,7 @@ struct Answer {
     parameters: Vec<(String, f64)>,
 }
 
-/// Writes a folder with a hidden effect, or reveals the effect of one.
+/// Writes a folder with a hidden effect, or reveals the hidden effect of a folder.
 ///
 /// # Errors
 /// If the folder exists, the effect cannot be hidden or flown with, or there is no answer to open.
@@ -117,7 +117,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
         turbulence: arguments.turbulence_severity,
         installed: Installation::TRUE,
     };
-    // written under another name first, so that the folder is either complete or absent
+    // The folder is written under another name first. Its final name then denotes a complete folder or no folder.
     let beside = tempfile::Builder::new().prefix(".mystery").tempdir_in(parent);
     let beside = beside.with_context(|| {
         format!("cannot make a folder in {}, so name another place with --out", parent.display())
@@ -172,7 +172,7 @@ fn airframe(path: &Path, model: &str) -> Result<String> {
     std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))
 }
 
-/// The effect to hide: that of a file, one by its id, or one drawn at random.
+/// The effect to hide: from an effect file, by its id, or drawn at random.
 fn missing(arguments: &Arguments, reference: &GreyBox, seed: u64) -> Result<Missing> {
     let Some(file) = &arguments.hide else {
         let craft = Craft::of(reference);
@@ -225,7 +225,7 @@ fn coefficient_names(id: &str) -> Vec<&'static str> {
         .map_or(Vec::new(), |about| about.coefficients.iter().map(|c| c.name).collect())
 }
 
-/// JSON in hexadecimal digits, so that it is not read by accident.
+/// JSON in hexadecimal digits. The digits keep a user from reading the answer by accident.
 fn seal(answer: &Answer) -> Result<String> {
     let mut out = String::new();
     for line in serde_json::to_vec(answer)?.chunks(32) {
@@ -283,12 +283,12 @@ fn open(folder: &Path) -> Result<ExitCode> {
     println!("hidden: {} = {} {}", answer.id, answer.amplitude, answer.unit);
     let path = folder.join(DIAGNOSIS);
     if !path.exists() {
-        println!("{} is not there: nothing to set beside it", path.display());
+        println!("{} does not exist: no diagnosis to compare", path.display());
         return Ok(ExitCode::SUCCESS);
     }
     let text = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
     let said: serde_json::Value = serde_json::from_slice(&text)
-        .with_context(|| format!("{} is no diagnosis; write it anew", path.display()))?;
+        .with_context(|| format!("{} is not a diagnosis; write it again", path.display()))?;
     beside(&answer, &said);
     Ok(ExitCode::SUCCESS)
 }
@@ -316,7 +316,7 @@ fn beside(answer: &Answer, said: &serde_json::Value) {
     table.column_iter_mut().skip(1).for_each(|c| c.set_cell_alignment(CellAlignment::Right));
     for parameter in effect["parameters"].as_array().unwrap_or(&none) {
         let name = parameter["name"].as_str().unwrap_or("?");
-        // names come as in model files, with or without the effect before them
+        // names may have the effect's id as a prefix, as in model files
         let own = name.rsplit('.').next().unwrap_or(name);
         let hidden = answer.parameters.iter().find(|(n, _)| n == own).map(|(_, v)| *v);
         let number = |x: Option<f64>| x.map_or("–".into(), |x| format!("{x:.4}"));

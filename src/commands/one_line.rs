@@ -1,6 +1,6 @@
 //! One-line text of an error and its causes without repetition.
 
-/// `error` with those of its causes that its text does not hold already.
+/// Joins `error` and its causes in one line. A cause that the text already contains is omitted.
 pub fn one_line(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |said, cause| {
         match (said.is_empty(), said.contains(&cause)) {

@@ -2,16 +2,16 @@
 
 use crate::sysid::per_flight::PerFlight;
 
-/// Largest standard deviation of an angle, °: beyond it the approximation of small angles fails.
+/// Largest standard deviation of an angle, °. Beyond this value the small-angle approximation fails.
 const MOST_DEG: f64 = 10.0;
-/// Largest factor on the trims' widths.
+/// Largest factor on the standard deviations of the trims.
 const MOST_TIMES: f64 = 100.0;
 
 /// Constants that may differ from flight to flight.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct PerFlightArguments {
-    /// Estimate trims for each flight (CD0, CL0, CY0, Cl0, Cm0, Cn0, a share of the thrust) beside
-    /// the common coefficients; FACTOR times their usual standard deviations.
+    /// Estimate trims for each flight (CD0, CL0, CY0, Cl0, Cm0, Cn0, a share of the thrust) together
+    /// with the common coefficients; FACTOR times their usual standard deviations.
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, require_equals = true, default_missing_value = "1",
           value_parser = factor)]
     flight_trims: Option<f64>,

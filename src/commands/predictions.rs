@@ -10,7 +10,7 @@ use crate::sysid::compare::free_run::{self, START_EVERY_S};
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 use crate::sysid::weak_form::prepared::Prepared;
 
-/// Two-sided 95 % point of the normal distribution.
+/// Half width of a 95 % interval of the normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
 
 /// A predicted and a measured state.
@@ -71,7 +71,7 @@ fn header() -> String {
     names.join(",") + "\n"
 }
 
-/// Moments at which free runs start, as `compare` has them.
+/// Times (s) at which free runs start, the same as in `compare`.
 fn starts(flight: &Prepared) -> Vec<f64> {
     let every = ((START_EVERY_S / flight.dt).round() as usize).max(1);
     let of = flight.segments.iter().flat_map(|s| s.iter().take(s.len() - 1).step_by(every));

@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Write all results as JSON; `-` for standard output, with nothing else on it.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Effect files (TOML) or folders of them, tried as candidates beside the catalogue.
+    /// Effect files (TOML) or folders of them, tried as candidates in addition to the catalogue.
     #[arg(long = "effect", value_name = "FILE", num_args = 1..)]
     effects: Vec<String>,
     /// Ids to be left out of the catalogue.

@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use crate::flight::runtime::{Class, Punctuality, take_real_time};
 
-/// Duration of the measurement: two hundred cycles.
+/// Duration of the measurement: two hundred cycles of 10 ms.
 const MEASURED: Duration = Duration::from_secs(2);
 
-/// The scheduling class of the flight: real time if `wanted` and permitted. Threads started later inherit it.
+/// Sets and returns the scheduling class of the flight: real time if `wanted` and permitted. Threads started later
+/// inherit the class.
 pub fn class(wanted: bool) -> Class {
     if !wanted {
         return Class::Usual;
@@ -24,8 +25,7 @@ pub fn class(wanted: bool) -> Class {
     }
 }
 
-/// Measures for two seconds beside the flight, then prints the timing jitter of this computer with
-/// advice.
+/// Measures the timing jitter of this computer for 2 s during the flight, then prints it with advice.
 pub fn print_timing(class: Class) {
     let measured = move || {
         let punctuality = Punctuality::measure(MEASURED);

@@ -1,4 +1,4 @@
-//! A recording, read back and drawn as a report.
+//! Reads a recording and draws its report.
 
 use std::path::Path;
 
@@ -36,13 +36,13 @@ pub struct Reporter<'a> {
     pub model: &'a GreyBox,
     /// Path of the model's file.
     pub model_file: &'a Path,
-    /// Seed of everything random, where it is known.
+    /// Seed of all random numbers; `None` if it is unknown.
     pub seed: Option<u64>,
     /// The attitudes that were to be tracked.
     pub segments: Vec<Segment>,
     /// Texts that the companion sent, with their times, s.
     pub texts: Vec<(f64, String)>,
-    /// Insight into the planner after each command.
+    /// Candidates of the planner shortly after each new target.
     pub sights: Vec<Sight>,
 }
 
@@ -82,7 +82,7 @@ impl Reporter<'_> {
 }
 
 impl Reporter<'_> {
-    /// Prediction errors of the model on `flight`; a flight that cannot be compared is still reported.
+    /// Prediction errors of the model on `flight`; `None` if the flight cannot be compared.
     fn compared(&self, flight: &Flight) -> Option<Comparison> {
         let options = flight_path::Options {
             gravity: self.model.atmosphere.gravity,
@@ -104,11 +104,11 @@ impl Reporter<'_> {
     }
 }
 
-/// Ticks after a command at which the planner's rollouts are taken: by then the plan has begun to move the aircraft.
+/// Ticks after a new target at which the planner's rollouts are taken. By then the plan has begun to move the aircraft.
 const REPORTED_AFTER: usize = 20;
 
-/// Insight into the planner of `companion` a moment after each command, by a replay of the
-/// recording in `folder`; prints whether its commands are reproduced to the bit.
+/// Candidates of the planner of `companion`, `REPORTED_AFTER` ticks after each new target, from a replay of the
+/// recording in `folder`. Prints how many commands are reproduced to the bit.
 pub fn sights(folder: &Path, companion: Companion, vehicle: Vehicle) -> Result<Vec<Sight>> {
     println!("replaying the recording, to show what the planner saw");
     let mut all = Vec::new();
@@ -146,7 +146,7 @@ pub fn segment(
 /// Shortest time for which a target must be in force to be scored, s.
 const SHORTEST_S: f64 = 3.0;
 
-/// The parts of the flight in which a target stayed for some seconds, in time order.
+/// The parts of the flight in which a target was in force for at least 3 s, in time order.
 pub fn segments(flight: &Flight) -> Vec<Segment> {
     let same = |a: &Sample, b: &Sample| wants(b, [a.roll_target_rad, a.pitch_target_rad]);
     let runs = flight.samples.chunk_by(same).filter(|run| {
@@ -164,8 +164,8 @@ pub fn segments(flight: &Flight) -> Vec<Segment> {
     runs.map(score).collect()
 }
 
-/// Whether the target of a sample is this one (roll, pitch, rad). A recorded target has passed through a quaternion
-/// in single precision, accurate to 1e-7.
+/// Whether a sample has this target (roll, pitch, rad). A recorded target has passed through a quaternion in single
+/// precision, accurate to 1e-7.
 fn wants(s: &Sample, [roll, pitch]: [f64; 2]) -> bool {
     (s.roll_target_rad - roll).abs() + (s.pitch_target_rad - pitch).abs() < 1e-5
 }
@@ -194,7 +194,7 @@ fn event((time_s, text): &(f64, String)) -> Event {
     Event { time_s: *time_s, kind, text: text.clone() }
 }
 
-/// The loop's cycles, from the recording's own column.
+/// Cycles of the control loop, from the latency column of the recording.
 fn timing(path: &Path) -> Result<LoopTiming> {
     let broken = || format!("reading the loop timing back from {}", path.display());
     let mut reader = ::csv::Reader::from_path(path).with_context(broken)?;

@@ -1,4 +1,4 @@
-//! `greylag replay`: the pilot on a recorded flight, its commands compared bit by bit.
+//! `greylag replay`: replays a recorded flight and compares the pilot's commands bit by bit.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -82,10 +82,10 @@ pub struct Again {
 }
 
 impl FlownArguments {
-    /// Model and controller of the recording in `folder`, from the options or else from the recording.
+    /// Model and controller of the recording in `folder`. Options replace the entries of the recording.
     ///
     /// # Errors
-    /// If a file cannot be used.
+    /// If the model, policy, schedule or options of the recording cannot be read or are invalid.
     pub fn again(&self, folder: &Path) -> Result<Again> {
         let said = FlownWith::read(folder)?;
         let said = said.as_ref();
@@ -110,7 +110,7 @@ impl FlownArguments {
             (None, None) => fly::CONTROLLER.parse()?,
         };
         let changes = match said {
-            // another controller may have no such settings
+            // another controller may not have these settings
             Some(said) if self.changes.is_empty() && self.controller.is_none() => said.changes()?,
             _ => self.changes.clone(),
         };
@@ -137,7 +137,7 @@ struct Document {
     differences: Vec<Differing>,
 }
 
-/// A command that did not come out as recorded: aileron, elevator, throttle.
+/// A command that differs from the recorded one: aileron, elevator, throttle.
 #[derive(Serialize)]
 struct Differing {
     time_s: f64,
@@ -164,10 +164,10 @@ impl From<&Outcome> for Document {
     }
 }
 
-/// Replays; the exit status is 0 if every command equals the recorded one.
+/// Replays the flight. The exit status is 0 if every command equals the recorded one.
 ///
 /// # Errors
-/// If a file cannot be used.
+/// If a file of the recording, the model or the policy cannot be read or is invalid.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
     let Again { companion, vehicle, .. } = arguments.flown.again(&arguments.folder)?;

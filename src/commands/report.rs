@@ -1,4 +1,4 @@
-//! `greylag report`: a recorded flight as a page.
+//! `greylag report`: draws a recorded flight as a page.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,10 +27,10 @@ pub struct Arguments {
     flown: FlownArguments,
 }
 
-/// Draws attitude, commands, timing, the model's error, and what a planner saw.
+/// Draws attitude, commands, timing, the model's error, and the planner's candidates.
 ///
 /// # Errors
-/// If a file cannot be used or written.
+/// If a file of the recording, the model or the policy cannot be read, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let folder = &arguments.folder;
     let page = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));

@@ -1,4 +1,4 @@
-//! The folder `params/` as the program ships it: looked for on the machine, else unpacked from the program.
+//! Finds the folder `params/` on the machine, or unpacks the copy inside the program.
 
 use std::ffi::OsString;
 use std::io;
@@ -10,11 +10,12 @@ use crate::model::residual::hash;
 
 static PARAMS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/params");
 
-/// Name of the folder, in the source tree and below the folders that are looked through.
+/// Name of the folder, in the source tree and below the folders that are searched.
 const FOLDER: &str = "params";
 
-/// A path as given, if it exists. A relative path below `params/` is looked for in `$XDG_CONFIG_HOME/greylag` and
-/// `/etc/greylag` next; last comes the program's own copy, unpacked into `$XDG_CACHE_HOME/greylag`.
+/// Resolves a path. A path that exists is returned as given. A relative path below `params/` is searched in
+/// `$XDG_CONFIG_HOME/greylag`, then in `/etc/greylag`, then in the program's copy, which is unpacked into
+/// `$XDG_CACHE_HOME/greylag`.
 pub fn shipped(path: &Path) -> PathBuf {
     if path.exists() || !path.starts_with(FOLDER) {
         return path.into();
@@ -45,7 +46,7 @@ fn home(variable: &str, below: &str, of: &dyn Fn(&str) -> Option<OsString>) -> O
     named.or_else(|| Some(Path::new(&of("HOME")?).join(below)))
 }
 
-/// The folder below `cache` that holds the program's `params/`, unpacked there if it does not yet.
+/// The folder below `cache` with the program's `params/`, which is unpacked there if necessary.
 fn unpacked(cache: &Path) -> io::Result<PathBuf> {
     let folder = cache.join(format!("{}-{}", env!("CARGO_PKG_VERSION"), &fingerprint()[..12]));
     if is_whole(&folder) {
@@ -60,13 +61,13 @@ fn unpacked(cache: &Path) -> io::Result<PathBuf> {
         std::fs::remove_dir_all(&folder)?;
     }
     match std::fs::rename(part.path(), &folder) {
-        // another greylag was faster
+        // another process was faster
         Err(_) if is_whole(&folder) => Ok(folder),
         done => done.map(|()| folder),
     }
 }
 
-/// Whether `folder` holds every file as the program does.
+/// Whether `folder` holds every file with the program's content.
 fn is_whole(folder: &Path) -> bool {
     let same = |file: &&File<'_>| {
         let path = folder.join(FOLDER).join(file.path());
@@ -75,7 +76,7 @@ fn is_whole(folder: &Path) -> bool {
     files(&PARAMS).iter().all(same)
 }
 
-/// SHA-256 over names and contents, hexadecimal.
+/// SHA-256 over names and contents of the program's files, hexadecimal.
 fn fingerprint() -> String {
     let one =
         |file: &File<'_>| [file.path().as_os_str().as_encoded_bytes(), file.contents()].concat();
@@ -103,7 +104,7 @@ mod tests {
         std::fs::write(&model, "spoiled").unwrap();
         unpacked(cache.path()).unwrap();
         crate::model::GreyBox::load(&model).unwrap();
-        // nothing half written is left
+        // no incomplete folder is left
         assert_eq!(std::fs::read_dir(cache.path()).unwrap().count(), 1);
     }
 

@@ -9,7 +9,8 @@ use crate::sim::described::describe as describe_aircraft;
 
 /// The aircraft that starts under the conditions of the paper.
 const X8: &str = "x8";
-/// Relative difference accepted between the travel in the airframe file and in the simulator: files have four digits.
+/// Accepted relative difference between the travel in the airframe file and in the simulator. Numbers in files have
+/// four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 
 /// Where an episode begins.
@@ -29,7 +30,8 @@ impl StartArguments {
     /// The start of `aircraft`, flown with controllers of `models`.
     ///
     /// # Errors
-    /// If no airspeed is known, or one of the models does not fly that slowly.
+    /// If neither the option nor a model gives an airspeed, or if the airspeed is below the smallest airspeed of a
+    /// model.
     pub fn start(&self, aircraft: &str, models: &[GreyBox]) -> Result<Start> {
         let cruise = models.first().map(|m| m.airframe.envelope.airspeed_cruise_mps);
         let default = if aircraft == X8 { Some(Start::NEUTRAL.airspeed_mps) } else { cruise };
@@ -52,19 +54,19 @@ impl StartArguments {
     }
 }
 
-/// The start of `aircraft` where none is given.
+/// The default start of `aircraft`, flown with controllers of `models`.
 ///
 /// # Errors
-/// As [`StartArguments::start`].
+/// The same as [`StartArguments::start`].
 pub fn usual(aircraft: &str, models: &[GreyBox]) -> Result<Start> {
     let start_altitude_m = Start::NEUTRAL.altitude_m;
     StartArguments { start_airspeed_mps: None, start_altitude_m }.start(aircraft, models)
 }
 
-/// The simulator's aircraft as the airframe of the first of `models` describes it.
+/// Applies the airframe of the first of `models` to the simulator's aircraft.
 ///
 /// # Errors
-/// If its surfaces cannot be flown.
+/// If the simulator cannot move the airframe's surfaces.
 pub fn describe(plant: &mut PlantOptions, models: &[GreyBox]) -> Result<()> {
     let Some(model) = models.first() else { return Ok(()) };
     describe_aircraft(plant, &model.airframe)

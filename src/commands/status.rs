@@ -1,7 +1,7 @@
-//! Exit statuses that several commands share; clap's 2 is a wrong command line.
+//! Exit statuses that several commands share. The status 2 of clap means a wrong command line.
 
-/// Done, but in doubt: a log was left out or holds what makes figures wrong, an effect was refused, flights contradict
-/// one another.
+/// Done, but in doubt: a log was left out or has a problem that makes the results wrong, an effect was refused, or
+/// flights contradict one another.
 pub const IN_DOUBT: u8 = 3;
 /// Not done, and a later attempt may succeed: `EX_TEMPFAIL` of sysexits.h.
 #[cfg(feature = "study")]

@@ -1,4 +1,4 @@
-//! `greylag targets`: write a target file.
+//! `greylag targets`: writes a target file.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! Output on a terminal: tables that fit it, the answer in colour, the summary last.
+//! Output on a terminal: tables of limited width, the answer in colour, the summary last.
 
 use std::io::IsTerminal;
 
@@ -8,10 +8,10 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyl
 
 use crate::sysid::compare::Answer;
 
-/// Half width of a 95 % interval in standard deviations: what ± means in every output.
+/// Half width of a 95 % interval, in standard deviations. The symbol ± means this half width in every output.
 #[cfg(feature = "study")]
 pub const NORMAL_95: f64 = 1.96;
-/// Columns of a terminal that tables fit.
+/// Largest width of tables and texts, terminal columns.
 pub const WIDTH: u16 = 100;
 
 /// Length up to which a name in the first column is never broken into lines, characters.
@@ -24,7 +24,7 @@ const LINES: TableStyle = TableStyle::new()
     .header_separator(LineStyle::none().fill('─').junction('─'))
     .bottom_border(LineStyle::none().fill('─').junction('─'));
 
-/// A table no wider than [`WIDTH`], whose columns from number `words` on hold numbers.
+/// A table no wider than [`WIDTH`]. Columns from index `words` on hold numbers and are aligned to the right.
 pub fn table<const N: usize>(header: [&str; N], words: usize) -> Table {
     let mut table = Table::new();
     table.load_style(LINES);
@@ -36,7 +36,7 @@ pub fn table<const N: usize>(header: [&str; N], words: usize) -> Table {
     table
 }
 
-/// `table` with the names of its first column whole, as long as they leave room for the others.
+/// `table` without line breaks in the names of its first column, if the longest name has at most 40 characters.
 #[cfg(feature = "study")]
 pub fn whole_names(mut table: Table) -> Table {
     let longest = table
@@ -62,7 +62,7 @@ pub enum Tone {
     Plain,
 }
 
-/// `text` in colour on a terminal, as it is elsewhere or where NO_COLOR is set.
+/// `text` in the colour of `tone` on a terminal. The text is unchanged elsewhere, or if NO_COLOR is set.
 pub fn painted(text: &str, tone: Tone) -> String {
     let plain = !std::io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
     match tone {
@@ -73,7 +73,7 @@ pub fn painted(text: &str, tone: Tone) -> String {
     }
 }
 
-/// `text` in lines of at most [`WIDTH`] characters, broken between words; a longer word keeps a line of its own.
+/// `text` in lines of at most [`WIDTH`] characters, broken between words. A longer word has a line to itself.
 #[cfg(any(feature = "demo", test))]
 pub fn broken(text: &str) -> String {
     let mut lines = vec![String::new()];

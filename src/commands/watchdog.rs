@@ -1,4 +1,4 @@
-//! Systemd's watchdog, fed while the control thread runs.
+//! Notifies systemd's watchdog while the control thread runs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 
-/// Notifies systemd's watchdog twice in each of its periods if `rounds` has grown since the last time. Does nothing
-/// if systemd has no watchdog for this process. If the control thread hangs, the notifications stop, and systemd
-/// restarts the process.
+/// Notifies systemd's watchdog twice per watchdog period if `rounds` has changed since the last check. Does nothing if
+/// systemd has no watchdog for this process. If the control thread hangs, the notifications stop, and systemd restarts
+/// the process.
 pub fn feed(rounds: Arc<AtomicU64>) {
     let Some(period) = sd_notify::watchdog_enabled() else { return };
     let started = std::thread::Builder::new().name("watchdog".into()).spawn(move || {
@@ -16,7 +16,7 @@ pub fn feed(rounds: Arc<AtomicU64>) {
         loop {
             let now = rounds.load(Ordering::Relaxed);
             if last != Some(now) {
-                // no watchdog without systemd's socket
+                // an error means that there is no systemd socket, and no watchdog
                 let _ = sd_notify::notify(&[NotifyState::Watchdog]);
             }
             last = Some(now);

@@ -1,4 +1,4 @@
-//! `greylag workbench`: see where a model fails, accept an effect, watch the error fall, in a browser.
+//! `greylag workbench`: analyses and amends a model with flight logs, in a browser.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -38,7 +38,7 @@ pub struct Arguments {
     reading: Reading,
 }
 
-/// The model that the option names; for a new session without the option, the one that the environment names.
+/// The model of the option. A new session without the option takes the model of the environment variable.
 fn model(arguments: &Arguments) -> Option<PathBuf> {
     let new = !arguments.folder.join(FILE).exists();
     let environment = || std::env::var_os("GREYLAG_MODEL").filter(|_| new).map(PathBuf::from);
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let token = random_token().context("cannot draw a token for the page")?;
     serve(given, arguments.port, &token, |address| {
         let session = arguments.folder.display();
-        // the starter may have stopped reading; the page is served regardless
+        // The reader of standard output may have closed it. The page is served regardless.
         let _ = write!(
             std::io::stdout(),
             "the workbench is open at {address}\nsession: {session}; Ctrl-C ends it\n"

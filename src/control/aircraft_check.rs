@@ -11,8 +11,8 @@ use greylag_model::{GreyBox, Trim, TrimError};
 
 /// Number of airspeeds in the trim table.
 const SPEEDS: usize = 7;
-/// Fraction of a surface's travel used by trim above which a finding is reported: a fifth is left for manoeuvres and
-/// gusts.
+/// Fraction of a surface's travel used by trim above which a finding is reported. The remaining fifth is kept for
+/// manoeuvres and gusts.
 const MUCH_TRAVEL: f64 = 0.8;
 /// Total delay of sensing, link and servo that is typical of a small aircraft, s.
 const USUAL_DELAY: f64 = 0.04;
@@ -21,8 +21,7 @@ const LEVEL_WITHIN_MPS: f64 = 0.01;
 /// Roll rate at full aileron below which the roll authority is reported as low, rad/s (20°/s).
 const SLOW_ROLL: f64 = 0.35;
 
-/// Steady straight flight at one airspeed: level, or the descent at full or idle throttle where level flight is not
-/// possible.
+/// Steady straight flight at one airspeed. Where level flight is not possible, it is a descent at full throttle or at idle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Level {
     /// True airspeed V_a, m/s.
@@ -33,7 +32,7 @@ pub struct Level {
     pub elevator: f64,
     /// Throttle command as a fraction, 0..1.
     pub throttle: f64,
-    /// Flight-path angle above the horizon, rad: zero in level flight, negative in a descent.
+    /// Flight-path angle, rad, positive above the horizon.
     pub path: f64,
 }
 
@@ -46,16 +45,16 @@ pub struct Advised {
     pub delay_s: f64,
 }
 
-/// Results of [`check`], all at the model's reference altitude.
+/// Results of [`check`] at the model's reference altitude.
 #[derive(Clone, Debug, Serialize)]
 pub struct AircraftCheck {
     /// Trimmed straight flight over the envelope's airspeeds, where a trim exists.
     pub levels: Vec<Level>,
     /// The modes at the cruise airspeed.
     pub modes: Vec<Mode>,
-    /// Fastest level flight, m/s; `None` if the whole envelope can be flown level.
+    /// Fastest level flight, m/s. `None` if level flight is possible at the highest airspeed, or not even at cruise.
     pub level_up_to: Option<f64>,
-    /// The recommended controller: its delay margin covers the usual delay of link and servo.
+    /// The recommended controller.
     pub controller: Advised,
     /// Control authority at the cruise airspeed.
     pub authority: Authority,
@@ -65,13 +64,13 @@ pub struct AircraftCheck {
     pub findings: Vec<String>,
 }
 
-/// The model cannot be trimmed or stabilised at its cruise airspeed.
+/// Reason why a model cannot be checked.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// No trim exists at the cruise airspeed.
     #[error(transparent)]
     Trim(#[from] TrimError),
-    /// No LQI gain stabilises it there.
+    /// No LQI gain stabilises the aircraft at the cruise airspeed.
     #[error(transparent)]
     Margins(#[from] MarginsError),
 }
@@ -79,7 +78,7 @@ pub enum CheckError {
 /// Checks the aircraft that `model` describes, at its reference altitude.
 ///
 /// # Errors
-/// If it cannot be trimmed or stabilised at the cruise airspeed.
+/// If no trim or no stabilising LQI gain exists at the cruise airspeed.
 pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     let envelope = model.airframe.envelope;
     let altitude = model.airframe.reference.altitude;
@@ -101,7 +100,7 @@ pub fn check(model: &GreyBox) -> Result<AircraftCheck, CheckError> {
     Ok(check)
 }
 
-/// The LQI, or the damped LQI where the LQI's delay margin is too small and the damped one's is larger.
+/// Recommends the LQI. If its delay margin is below `USUAL_DELAY` and the damped LQI's is larger, recommends the damped LQI.
 fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
     let least = |weights: &Weights| -> Result<f64, MarginsError> {
@@ -116,14 +115,14 @@ fn advised(model: &GreyBox) -> Result<Advised, CheckError> {
     Ok(if damped.delay_s > plain.delay_s { damped } else { plain })
 }
 
-/// Whether some throttle within its stops holds level flight at `airspeed`, m/s.
+/// Whether a throttle within 0..1 holds level flight at `airspeed`, m/s.
 fn flies_level(model: &GreyBox, airspeed: f64) -> bool {
     let trim = Trim::level(model, airspeed, model.airframe.reference.altitude);
     trim.is_ok_and(|t| (0.0..=1.0).contains(&t.controls.throttle))
 }
 
-/// The fastest level flight (m/s) between cruise and the end of the envelope; `None` if all of it can be flown level, or
-/// none.
+/// The fastest level flight between the cruise airspeed and the envelope's highest airspeed, m/s. `None` if level flight
+/// is possible at the highest airspeed, or not even at cruise.
 pub fn fastest_level(model: &GreyBox) -> Option<f64> {
     let envelope = model.airframe.envelope;
     let (mut slow, mut fast) = (envelope.airspeed_cruise_mps, envelope.airspeed_max_mps);
@@ -155,7 +154,7 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
             100.0 * elevator.abs()
         ));
     }
-    // above the cruise airspeed the envelope allows dives
+    // above the cruise airspeed, a descent at full throttle is not reported
     let cruises = airspeed <= model.airframe.envelope.airspeed_cruise_mps;
     if cruises && throttle == 1.0 && path < 0.0 {
         out.push(format!(
@@ -167,7 +166,7 @@ fn findings_in_level(model: &GreyBox, level: &Level) -> Vec<String> {
     out
 }
 
-/// All findings as sentences, most severe first; empty if there are none.
+/// All findings as sentences, with the most severe first.
 fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String> {
     let mut out = Vec::new();
     let Authority { roll_rate, pitch_acceleration, yaw_acceleration } = check.authority;
@@ -198,7 +197,7 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
     let Advised { name, delay_s } = check.controller;
     if delay_s < USUAL_DELAY {
         out.push(format!(
-            "the loops of {name} bear {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \
+            "the loops of {name} tolerate {:.0} ms of delay, sensors, link and servos have up to {:.0} ms: make the link \
              faster, or correct Clda, Cmde or the inertia",
             1e3 * delay_s,
             1e3 * USUAL_DELAY
@@ -244,7 +243,7 @@ mod tests {
                 found.loops
             );
             assert!(found.authority.roll_rate > SLOW_ROLL);
-            // the delay margin of the LQI decides what is reported of them
+            // their only findings concern the delay margin of the LQI
             assert!(found.findings.iter().all(|f| f.contains("of delay")), "{:?}", found.findings);
             assert_eq!(found.modes.iter().filter(|m| m.name == "short period").count(), 1);
         }

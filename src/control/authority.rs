@@ -1,18 +1,19 @@
-//! Control authority: roll rates and accelerations at full travel of the surfaces.
+//! Control authority: steady roll rate, and pitch and yaw accelerations, at full travel of the surfaces.
 
 use serde::Serialize;
 
 use greylag_model::modes::rates;
 use greylag_model::{GreyBox, Trim};
 
-/// Control authority at full travel, in level flight at the cruise airspeed.
+/// Control authority about a trim, at the smaller of a surface's two travel limits. Rates and accelerations are about the body
+/// axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Authority {
-    /// Steady roll rate, rad/s.
+    /// Steady roll rate at full positive aileron, rad/s. Positive to the right.
     pub roll_rate: f64,
-    /// Initial pitching acceleration, rad/s².
+    /// Initial pitch acceleration at full positive elevator, rad/s². Positive nose up.
     pub pitch_acceleration: f64,
-    /// Yawing acceleration by the rudder, rad/s²; `None` without a rudder.
+    /// Initial yaw acceleration at full positive rudder, rad/s², positive nose right. `None` without a rudder.
     pub yaw_acceleration: Option<f64>,
 }
 
@@ -24,15 +25,15 @@ impl Authority {
         let full = |place: usize, column: usize, travel: f64| linear.b[(place, column)] * travel;
         let rudder = figures.rudder.filter(|_| model.has_rudder());
         Authority {
-            // the roll rate is steady where damping balances the aileron
+            // the roll rate is steady when roll damping balances the aileron's moment
             roll_rate: full(3, 0, figures.aileron.travel.smallest()) / -linear.a[(3, 3)],
             pitch_acceleration: full(4, 1, figures.elevator.travel.smallest()),
             yaw_acceleration: rudder.map(|rudder| full(5, 3, rudder.travel.smallest())),
         }
     }
 
-    /// Steady roll rate with full aileron in level flight at the cruise airspeed, rad/s; `None` if there is no level flight
-    /// at that speed or the aileron does not roll to its side.
+    /// Steady roll rate with full aileron in level flight at the cruise airspeed, rad/s. `None` if level flight at this
+    /// airspeed is not possible or positive aileron does not roll to the right.
     pub(crate) fn roll_rate(model: &GreyBox) -> Option<f64> {
         let altitude = model.airframe.reference.altitude;
         let trim =

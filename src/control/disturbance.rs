@@ -1,7 +1,7 @@
-//! Estimate of the acceleration that the model does not explain, taken as constant over a plan.
+//! Estimate of the disturbance: the state rate that the model does not explain, constant over a plan.
 //!
-//! Offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the disturbance on the
-//! states: at steady state the planner's model is also steady, whatever its error.
+//! The method is offset-free model predictive control (Pannocchia and Rawlings, AIChE J. 49, 2003) with the disturbance on
+//! the states. In steady flight the planner's model with the disturbance is also steady, at any model error.
 
 use crate::Observation;
 use greylag_model::{GreyBox, Memory, STEP};
@@ -12,20 +12,20 @@ use greylag_physics::actuators::Actuators;
 pub(crate) const NONE: State =
     State { roll: 0.0, pitch: 0.0, airspeed: 0.0, p: 0.0, q: 0.0, r: 0.0, alpha: 0.0, beta: 0.0 };
 
-/// Default time constant of the estimate, s: a shorter one follows the noise, a longer one lags behind manoeuvres.
+/// Default time constant of the estimate, s. A shorter one follows the noise, a longer one lags behind manoeuvres.
 pub(crate) const TIME_CONSTANT_S: f64 = 0.3;
-/// Default limit of the relative prediction error for the model to be planned with. In still air `params/x8/learned`
+/// Default limit of the relative prediction error at which planning uses the model. In still air `params/x8/learned`
 /// stays below it and `prior-as-printed` almost always exceeds it (`results/notes/2026-11-27-learned-models.md`).
 pub(crate) const TRUST: f64 = 0.5;
-/// Averaging time of the comparison of predictions with measurements, s: a few periods of the short-period mode.
+/// Averaging time of the squared prediction errors and measured changes, s: a few periods of the short-period mode.
 const MEMORY_S: f64 = 0.5;
-/// Averaging time of the regression of prediction errors on predictions, s: gusts average out.
+/// Averaging time of the regression of prediction errors on predictions, s. Gusts average out over this time.
 const SLOPE_MEMORY_S: f64 = 2.0;
-/// Regression slope of the error on the prediction beyond which the model is rejected: near 0 in gusts, −1 where the
-/// predicted change did not happen at all. Values for right and wrong models: `docs/validation/controllers.md`, in
-/// turbulence.
+/// Magnitude of the regression slope of the error on the prediction beyond which the model is rejected. The slope is near
+/// 0 in gusts, and −1 if the predicted change did not happen at all. `docs/validation/controllers.md` has values in
+/// turbulence for right and wrong models.
 const SLOPE: f64 = 0.7;
-/// Accelerations below which nothing is compared, in x_c per second: calm flight cannot show a model error.
+/// Scale of the accelerations below which the comparison shows no model error, in x_c (eq. 21) per second: calm flight.
 const CALM: f64 = 0.02;
 
 /// Recursive estimate of the disturbance and of the model's prediction error.
@@ -36,7 +36,7 @@ pub(crate) struct Disturbance {
     last: Option<Observation>,
     memory: Memory,
     rate: State,
-    /// Mean squares over [`MEMORY_S`] of the prediction error and of the measured change, x_c per second.
+    /// Mean squares over [`MEMORY_S`] of the prediction error and of the measured change, (x_c per second)².
     missed: f64,
     happened: f64,
     /// Means over [`SLOPE_MEMORY_S`] of error times prediction and of the squared prediction, for the rates p, q, r.
@@ -51,8 +51,8 @@ impl Disturbance {
         Disturbance { time_constant, last: None, memory, rate: NONE, missed, happened, slope }
     }
 
-    /// Compares `seen` with the model's prediction from the last tick. A gap between ticks and values that are not
-    /// finite are skipped.
+    /// Compares `seen` with the model's prediction from the last tick. After a gap between ticks there is no comparison.
+    /// Values that are not finite do not change the estimate.
     pub fn update(&mut self, model: &GreyBox, seen: &Observation) {
         let follows = |last: &Observation| {
             let gap = seen.time.since(last.time).as_secs_f64();
@@ -72,7 +72,7 @@ impl Disturbance {
             - std::f64::consts::PI;
         let step = seen.state.advance(&last.state, -1.0);
         self.compare(model, &error.advance(&self.rate, -STEP), &step);
-        // e is the deviation from the model's prediction after one step: its rate is e / STEP
+        // e is the deviation from the model's prediction after one step, and e / STEP is the corresponding rate
         let part = STEP / self.time_constant;
         let moved = self.rate.advance(&self.rate, -part).advance(&error, part / STEP);
         if moved.is_finite() {
@@ -82,9 +82,9 @@ impl Disturbance {
         }
     }
 
-    /// Updates the error statistics with one step's prediction error and measured change.
+    /// Updates the error statistics with one step's prediction error `missed` and measured change `happened`.
     fn compare(&mut self, model: &GreyBox, missed: &State, happened: &State) {
-        // rates and flow angles, in x_c a second: attitude and airspeed are their integrals
+        // only rates and flow angles, in x_c per second: attitude and airspeed are their integrals
         let scale = model.scale();
         let scaled = |change: &State| -> [f64; 5] {
             let change = change.to_array();
@@ -92,8 +92,8 @@ impl Disturbance {
         };
         let (missed, happened) = (scaled(missed), scaled(happened));
         let square = |x: &[f64]| -> f64 { x.iter().map(|x| x * x).sum() };
-        // flow angles are left out of the slope: a gust changes them immediately, the rates only through the moments
-        // that follow
+        // the slope excludes flow angles: a gust changes them immediately, but the body rates only through the moments that
+        // follow
         let predicted: [f64; 3] = std::array::from_fn(|i| happened[i] - missed[i]);
         let product: f64 = missed.iter().zip(predicted).map(|(m, p)| m * p).sum();
         let means = [square(&missed), square(&happened), product, square(&predicted)];
@@ -108,16 +108,16 @@ impl Disturbance {
         follow(&mut self.slope[1], predicted, SLOPE_MEMORY_S);
     }
 
-    /// Whether the model must not be planned with: the root-mean-square prediction error of the last half second
-    /// exceeds `most` of the motion, and the error is correlated with the prediction. The correlation excludes gusts,
-    /// which no model predicts.
+    /// Whether planning must not use the model. Two conditions must hold: the root-mean-square prediction error of the last
+    /// half second exceeds the fraction `most` of the motion, and the error is correlated with the prediction. The
+    /// correlation excludes gusts, which no model predicts.
     pub fn is_wrong(&self, most: f64) -> bool {
         let part = (self.missed / (self.happened + CALM * CALM)).sqrt();
         let [product, predicted] = self.slope;
         part > most && (product / (predicted + CALM * CALM)).abs() > SLOPE
     }
 
-    /// Estimated disturbance, added to the model's state rate, per second.
+    /// Estimated disturbance: the addition to the model's state rate, in units of the state per second.
     pub fn rate(&self) -> State {
         self.rate
     }
@@ -137,7 +137,7 @@ mod tests {
     use std::path::Path;
     use std::time::Duration;
 
-    /// A moment that the model lacks is found, and nothing else.
+    /// A constant moment that the model lacks is found in the pitch rate only.
     #[test]
     fn a_constant_rate_is_found() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
@@ -160,18 +160,19 @@ mod tests {
             seen.time = seen.time.plus(Duration::from_secs_f64(STEP));
         }
         let found = disturbance.rate();
-        // five time constants: 0.7 % are missing
+        // after five time constants the estimate is low by 0.7 %
         assert!((found.q - 0.3).abs() < 0.005, "{found:?}");
         let others = State { q: 0.0, ..found };
         assert!(others.to_array().iter().all(|x| x.abs() < 1e-9), "{found:?}");
-        // after a gap nothing is learned from what happened meanwhile
+        // a change during a gap does not enter the estimate
         seen.time = seen.time.plus(Duration::from_secs(1));
         seen.state.q += 5.0;
         disturbance.update(&model, &seen);
         assert_eq!(disturbance.rate(), found);
     }
 
-    /// 10 s of a `truth` with its surfaces at work, the rates kicked at random by `gust` (rad/s a step), as `model` predicts it.
+    /// The estimate after 10 s of flight with `truth`, predicted by `model`. Aileron and elevator move, and at each step random
+    /// gusts change the rates by up to `gust` (rad/s).
     fn predicted(model: &str, truth: &str, gust: f64) -> Disturbance {
         let load = |name: &str| {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8").join(name);

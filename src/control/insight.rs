@@ -1,19 +1,19 @@
-//! Candidates and choice of one planner tick, for display.
+//! Candidates and chosen plan of one planner tick, for display.
 
 use std::time::Duration;
 
-/// Roll and pitch (rad) of a simulated aircraft, now and after each step.
+/// Roll and pitch (rad) of a simulated aircraft, at the present and after each step.
 pub type Path = Vec<[f64; 2]>;
 
 /// One tick of a planner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Insight {
-    /// Some of the last candidates, simulated with the model.
+    /// Some of the candidates of the last iteration, simulated with the model.
     pub candidates: Vec<Path>,
-    /// The path that was chosen.
+    /// The path of the commands that are flown, simulated with the model.
     pub chosen: Path,
-    /// Whether the search's plan is flown; otherwise the base controller or the policy flies.
+    /// Whether the search's plan is flown. If false, the base controller or the policy flies.
     pub searched: bool,
-    /// Processing time of each part of the tick, in order.
+    /// Computation time of each phase of the tick, in order.
     pub phases: Vec<(&'static str, Duration)>,
 }

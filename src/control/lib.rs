@@ -1,4 +1,4 @@
-//! Controllers: from observation and target to a command, once every 10 ms.
+//! Controllers: they map an observation and a target to a command every 10 ms.
 
 pub mod adaptive;
 pub mod aircraft_check;
@@ -23,10 +23,10 @@ use insight::Insight;
 
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// Input of a controller: eq. (27) of \[GSFM26\] plus the altitude, which sets the air density.
+/// Input of a controller: eq. (27) of \[GSFM26\], and the altitude, which sets the air density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Time of the measurement, vehicle clock.
+    /// Time of the measurement on the vehicle's clock.
     pub time: Time,
     /// Physical state s^p, eq. (4) of \[GSFM26\].
     pub state: State,
@@ -34,12 +34,12 @@ pub struct Observation {
     pub actuators: ActuatorState,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
-    /// The commands of the last two ticks, newest first: with `actuators` they determine the state of the actuator
-    /// filters.
+    /// The commands of the last two ticks, newest first. Together with `actuators` they determine the state of the
+    /// actuator filters.
     pub previous: [Command; 2],
 }
 
-/// Commanded attitude (φ*, θ*) and the airspeed V_a* to hold meanwhile.
+/// Commanded attitude (φ*, θ*) and the airspeed V_a* to be held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target<R = f64> {
     /// Commanded roll φ*, rad.
@@ -61,7 +61,7 @@ impl<R: Copy> Target<R> {
 /// A command that the envelope limiter changed before it was flown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overruled {
-    /// The controller's command, in range.
+    /// The controller's command, clamped to its range.
     pub wanted: Command,
     /// The command that was flown instead.
     pub flown: Command,
@@ -70,33 +70,33 @@ pub struct Overruled {
 /// A control law, called every 10 ms of vehicle time.
 ///
 /// Order of calls: [`Controller::reset`] before the first tick of an engagement, then [`Controller::command`] once
-/// per tick, [`Controller::prepare`] optionally between two ticks; [`Controller::overruled`] before the next command
-/// where the last one was limited. [`Controller::insight`] describes the last command. Errors occur only on construction
-/// ([`build`]); a tick without a command returns NaN.
+/// per tick. [`Controller::prepare`] is optional between two ticks. If the last command was limited,
+/// [`Controller::overruled`] precedes the next command. [`Controller::insight`] describes the last command. Errors occur
+/// only on construction ([`build`]). A tick without a command returns NaN.
 pub trait Controller: Send + Sync {
-    /// The name that selects it on the command line.
+    /// The name that selects the controller on the command line.
     fn name(&self) -> &'static str;
     /// Clears the internal state (integrators, warm starts) before take-off or on re-engagement.
     ///
-    /// The first command afterwards may differ from the one in force: the caller limits the slew rate of the
+    /// The first command after a reset may differ from the present deflections. The caller limits the slew rate of the
     /// surfaces.
     fn reset(&mut self, seed: u64);
-    /// The command for this tick; it need not be in range. A call neither allocates nor blocks.
+    /// The command for this tick, not necessarily in range. A call neither allocates memory nor blocks.
     ///
-    /// A controller without a command, such as a planner without a plan, returns NaN: the caller must check
-    /// [`Command::is_finite`] and fly another controller, as the pilot does with its fallback.
+    /// A controller without a command, such as a planner without a plan, returns NaN. The caller must check
+    /// [`Command::is_finite`] and fly another controller, as the pilot does with its fallback controller.
     fn command(&mut self, seen: &Observation, target: &Target) -> Command;
-    /// Informs the controller, before its next command, that its last one was limited: an integrator must not wind up
-    /// behind a limit.
+    /// Informs the controller, before its next command, that its last command was limited. Its integrators must not wind
+    /// up at a limit.
     fn overruled(&mut self, _by: &Overruled) {}
-    /// Computes in advance what the next tick needs, when there is time between two commands. It never changes the
+    /// Computes part of the next tick in advance, in the time between two commands. The call does not change the
     /// commands.
     fn prepare(&mut self) {}
-    /// The candidates from which the last command was chosen, given the observation `seen`; `None` for a controller
-    /// that does not plan.
+    /// The candidates from which the last command was chosen, for the observation `seen`. `None` for a controller that does
+    /// not plan.
     fn insight(&self, _seen: &Observation) -> Option<Insight> {
         None
     }
-    /// A copy of this controller for another thread; the design is not repeated.
+    /// A copy of this controller for another thread. The copy does not repeat the design.
     fn boxed_clone(&self) -> Box<dyn Controller>;
 }

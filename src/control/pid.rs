@@ -1,18 +1,18 @@
-//! PID: three independent loops, roll by aileron, pitch by elevator, airspeed by throttle.
+//! PID controller with three independent loops: roll by aileron, pitch by elevator, airspeed by throttle.
 
 use crate::{Controller, Observation, Overruled, Target};
 use greylag_model::STEP;
 use greylag_physics::Command;
 
-/// Gains of one loop: output = trim + kp·e + ki·∫e − kd·rate, in units of the output (rad of
-/// surface, or throttle) per unit of the error (rad, or m/s).
+/// Gains of one loop: output = trim + kp·e + ki·∫e − kd·rate. They are in units of the output (rad of surface, or throttle)
+/// per unit of the error (rad, or m/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Proportional gain on the error.
     pub kp: f64,
-    /// Integral gain on the error, per second.
+    /// Integral gain on the error, output per unit of the error and second.
     pub ki: f64,
-    /// Derivative gain on the measured body rate, output per rad/s; it is subtracted. The airspeed loop has none.
+    /// Gain on the measured body rate, output per rad/s, with a negative sign in the law. Zero in the airspeed loop.
     pub kd: f64,
 }
 
@@ -21,17 +21,17 @@ pub struct Gains {
 pub struct Tuning {
     /// Name in the controller registry.
     pub name: &'static str,
-    /// Roll error (rad) to aileron (rad).
+    /// Gains from the roll error (rad) to the aileron (rad).
     pub roll: Gains,
-    /// Pitch error (rad) to elevator (rad).
+    /// Gains from the pitch error (rad) to the elevator (rad).
     pub pitch: Gains,
-    /// Airspeed error (m/s) to throttle.
+    /// Gains from the airspeed error (m/s) to the throttle (0..1).
     pub airspeed: Gains,
     /// Throttle at zero airspeed error, 0..1.
     pub throttle_trim: f64,
-    /// Deflection at full command, rad.
+    /// Deflection of aileron and elevator at full command, rad.
     pub deflection: f64,
-    /// Airspeed to hold instead of the target's, m/s.
+    /// Airspeed that is held instead of the target airspeed, m/s. `None` holds the target airspeed.
     pub airspeed_override: Option<f64>,
     /// Anti-windup: behaviour of an integrator while its output saturates.
     pub windup: Windup,
@@ -40,14 +40,14 @@ pub struct Tuning {
 /// Integrator behaviour under saturation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Windup {
-    /// The integrator keeps integrating, as in the public controller.
+    /// The integrator continues to integrate, as in the public controller.
     Free,
-    /// Conditional integration: the integrator stops where it would drive the output further into saturation.
+    /// Conditional integration: the integrator stops when it would drive the output further into saturation.
     Clamped,
 }
 
-/// Gains published with the simulator FW-JSBGym (its latest `pid_eval`, read 2026; an earlier version had 1.0, 0, 0.5
-/// for roll and −4, −0.75, −0.1 for pitch). They are the baseline of comparisons.
+/// Gains published with the simulator FW-JSBGym, the baseline of comparisons. They are from its latest `pid_eval`, read in
+/// 2026. An earlier version had 1.0, 0, 0.5 for roll and −4, −0.75, −0.1 for pitch.
 pub const PUBLIC: Tuning = Tuning {
     name: "pid",
     roll: Gains { kp: 1.5, ki: 0.1, kd: 0.1 },
@@ -59,8 +59,8 @@ pub const PUBLIC: Tuning = Tuning {
     windup: Windup::Free,
 };
 
-/// Gains retuned in the simulator (random search over the shipped targets, 240 trials), at an
-/// airspeed that leaves a margin before the stall.
+/// Gains tuned in the simulator by random search over the shipped targets (240 trials). The controller holds an airspeed
+/// with a margin before the stall.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const RETUNED: Tuning = Tuning {
     name: "pid-retuned",
@@ -83,12 +83,12 @@ pub struct Pid {
 }
 
 impl Pid {
-    /// A controller with these gains and empty integrators.
+    /// A controller with the gains of `tuning` and zero integrators.
     pub fn new(tuning: Tuning) -> Pid {
         Pid { tuning, integrals: [0.0; 3], added: [0.0; 3] }
     }
 
-    /// One loop; `stops` are the saturation limits of its output.
+    /// Output of one loop, limited to `stops` (minimum, maximum).
     fn step(
         &mut self,
         axis: usize,

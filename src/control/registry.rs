@@ -1,4 +1,4 @@
-//! The registry of controllers by name.
+//! The registry of controllers: their names, needs and construction.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use crate::policy::{Agent, Policy};
 use crate::{Controller, adaptive, any, cem, ilqr, lqi, pid};
 use greylag_model::GreyBox;
 
-/// A controller cannot be built.
+/// Reason why a controller cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
     /// The name is not in the registry.
@@ -16,7 +16,7 @@ pub enum SetupError {
         /// The name that was requested.
         name: String,
     },
-    /// No controller can be designed from the model.
+    /// No LQI can be designed from the model.
     #[error(
         "cannot design an LQI from model {model}: it has no steady flight that can be stabilised at \
          roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at any airspeed; use a better model (--model)"
@@ -40,10 +40,10 @@ pub enum SetupError {
         /// Name of the effect.
         effect: &'static str,
     },
-    /// The controller needs a trained policy, and none was given.
+    /// The controller needs a trained policy, but no policy was given.
     #[error("a controller that was trained needs its files; give their folder with --policy")]
     Untrained,
-    /// The policy for any aircraft that the program ships cannot be used.
+    /// The shipped policy for all aircraft cannot be used.
     #[error(
         "the policy for any aircraft cannot be read: {why}; train it again with params/any/train.py and build anew"
     )]
@@ -51,7 +51,7 @@ pub enum SetupError {
         /// Description of the error.
         why: String,
     },
-    /// The planner needs critics, and the policy has none.
+    /// The planner needs critics, but the policy has none.
     #[error(
         "controller {name} values the end of its plans with critics, and this policy has none; fly it as \
          `policy` or `cem-policy`, or export it with its critics"
@@ -62,12 +62,12 @@ pub enum SetupError {
     },
 }
 
-/// Inputs for building a controller.
+/// Inputs from which a controller is built.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// The model that a design or planner uses.
+    /// The model used by a design or planner.
     pub model: &'a GreyBox,
-    /// The networks of a trained policy.
+    /// The networks of a trained policy. `None` if there is no policy.
     pub agent: Option<&'a Agent>,
     /// Overrides of the planner's default settings.
     pub changes: &'a [cem::Change],
@@ -84,13 +84,12 @@ impl<'a> Source<'a> {
         self.agent.ok_or(SetupError::Untrained)
     }
 
-    /// A planner with `settings` and the overrides.
+    /// A planner with `settings` and the overrides, without a base controller.
     fn planner(&self, name: &'static str, settings: cem::Settings) -> Result<cem::Cem, SetupError> {
         self.planner_over(None, name, settings)
     }
 
-    /// A planner with the model's LQI as base controller. Without a policy the search starts from the LQI's plan
-    /// alone.
+    /// A planner with the model's LQI as base controller. Without a policy the search starts from the LQI's plan only.
     fn planner_over_lqi(
         &self,
         name: &'static str,
@@ -119,19 +118,19 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Where a controller has to be executed.
+/// The thread on which a controller must run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// In the control loop: it needs microseconds.
+    /// In the control loop. The controller needs microseconds per command.
     Immediate,
-    /// On its own thread: it plans, and so may miss the deadline.
+    /// On its own thread. The controller plans and may miss the deadline.
     Planned,
 }
 
-/// Inputs that a controller is built from.
+/// Inputs that a controller requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
-    /// Fixed gains of its own.
+    /// Only the controller's fixed gains or weights, and the airframe.
     Gains,
     /// A model of the aircraft.
     Model,
@@ -139,7 +138,7 @@ pub enum Needs {
     Policy,
     /// A model and a policy.
     Both,
-    /// A model; a policy is optional, and its plans are tried beside the controller's own.
+    /// A model and optionally a policy, whose plans are then among the candidates.
     ModelAndAnyPolicy,
 }
 
@@ -160,27 +159,28 @@ macro_rules! controllers {
             /// All controllers of the registry.
             pub const ALL: &'static [ControllerKind] = &[$(ControllerKind::$kind),*];
 
-            /// The name on the command line.
+            /// The name of the controller on the command line.
             pub const fn name(self) -> &'static str {
                 match self { $(ControllerKind::$kind => $name,)* }
             }
 
-            /// Where it has to be executed.
+            /// The thread on which the controller must run.
             pub const fn pace(self) -> Pace {
                 match self { $(ControllerKind::$kind => Pace::$seat,)* }
             }
 
-            /// The inputs it is built from.
+            /// The inputs that the controller requires.
             pub const fn needs(self) -> Needs {
                 match self { $(ControllerKind::$kind => Needs::$needs,)* }
             }
         }
 
-        /// Builds a controller from the inputs that [`ControllerKind::needs`] names.
+        /// Builds a controller from the inputs that [`ControllerKind::needs`] requires.
         ///
         /// # Errors
         ///
-        /// If the model does not allow the design, or a required policy is missing.
+        /// If the model does not allow the design or has an effect that was not accepted, if a required policy or its critics are
+        /// missing, or if the shipped policy cannot be read.
         pub fn build<'a>(
             kind: ControllerKind,
             source: impl Into<Source<'a>>,
@@ -197,24 +197,24 @@ macro_rules! controllers {
 controllers! {
     Pid "pid" Immediate Gains "PID with the gains published with the simulator." => |_from| pid::Pid::new(pid::PUBLIC),
     PidRetuned "pid-retuned" Immediate Gains "PID retuned, at a safer airspeed." => |_from| pid::Pid::new(pid::RETUNED),
-    Adaptive "adaptive" Immediate Gains "Attitude hold of an aircraft that nobody has modelled: control powers are estimated in flight." => |from| adaptive::Adaptive::new(&from.model.airframe),
+    Adaptive "adaptive" Immediate Gains "Attitude hold of an aircraft without a model: control powers are estimated in flight." => |from| adaptive::Adaptive::new(&from.model.airframe),
     Any "any" Immediate Gains "One recurrent policy for any fixed wing, trained on aircraft drawn from a distribution." => |from| any::AnyPolicy::new(&from.model.airframe)?,
     Lqi "lqi" Immediate Model "Gain-scheduled LQI designed from the model." => |from| lqi::Lqi::new(from.model)?,
     LqiDamped "lqi-damped" Immediate Model "The LQI with softer loops, for a link with more delay." => |from| lqi::Lqi::weighted("lqi-damped", from.model, &lqi::Weights::DAMPED)?,
-    Ilqr "ilqr" Planned Model "iLQR over half a second, beside the model's LQI: offset-free." => |from| ilqr::Ilqr::new(from.model, lqi::Lqi::new(from.model)?),
+    Ilqr "ilqr" Planned Model "iLQR over half a second, together with the model's LQI: offset-free." => |from| ilqr::Ilqr::new(from.model, lqi::Lqi::new(from.model)?),
     HybridIlqr "hybrid-ilqr" Planned ModelAndAnyPolicy "iLQR along a path inside the envelope, started from its last plan, the LQI's and the policy's: offset-free." => |from| ilqr::Ilqr::with("hybrid-ilqr", from.model, lqi::Lqi::new(from.model)?, from.agent, ilqr::Settings::HYBRID),
     Cem "cem" Planned Model "CEM-MPC over five steps of the model." => |from| from.planner("cem", cem::Settings::PAPER)?,
     Mppi "mppi" Planned Model "MPPI over the same five steps." => |from| from.planner("mppi", cem::Settings::MPPI)?,
     CemPolicy "cem-policy" Planned Both "CEM-MPC with the policy's proposals." => |from| from.planner("cem-policy", cem::Settings::POLICY)?,
-    CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' value of the end." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
+    CemCritic "cem-critic" Planned Both "CEM-MPC with the critics' terminal value." => |from| from.planner("cem-critic", cem::Settings::CRITICS)?,
     Hybrid "hybrid" Planned Both "The hybrid controller: proposals and critics, eq. (26)." => |from| from.planner("hybrid", cem::Settings::HYBRID)?,
-    HybridPolicy "hybrid-policy" Planned Both "The hybrid whose policy flies on behind each plan." => |from| from.planner("hybrid-policy", cem::Settings::OVER_POLICY)?,
-    HybridLqi "hybrid-lqi" Planned ModelAndAnyPolicy "The hybrid over the model's LQI, which flies on behind each plan: offset-free." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::OVER_LQI)?,
+    HybridPolicy "hybrid-policy" Planned Both "The hybrid whose policy continues after each plan." => |from| from.planner("hybrid-policy", cem::Settings::OVER_POLICY)?,
+    HybridLqi "hybrid-lqi" Planned ModelAndAnyPolicy "The hybrid over the model's LQI, which continues after each plan: offset-free." => |from| from.planner_over_lqi("hybrid-lqi", cem::Settings::OVER_LQI)?,
     Policy "policy" Immediate Policy "A trained policy alone." => |from| Policy::new(from.agent()?),
 }
 
 impl ControllerKind {
-    /// Whether it searches with [`cem::Settings`], so that a [`cem::Change`] has an effect.
+    /// Whether the controller searches with [`cem::Settings`]. If true, a [`cem::Change`] has an effect.
     pub fn searches(self) -> bool {
         self.pace() == Pace::Planned
             && !matches!(self, ControllerKind::Ilqr | ControllerKind::HybridIlqr)

@@ -3,14 +3,14 @@
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::{Controls, State};
 
-/// Step size as a fraction of the travel.
+/// Step size as a fraction of the surface's travel.
 pub const STEPPED: f64 = 0.25;
 /// Simulated time after the step, s.
 const FLOWN_S: f64 = 3.0;
 /// Integration step, s.
 const STEP_S: f64 = 0.005;
 
-/// A step response over time.
+/// Response of a model to a step of one surface.
 #[derive(Clone, Debug, Default)]
 pub struct StickResponse {
     /// Times since the step, s.
@@ -19,12 +19,12 @@ pub struct StickResponse {
     pub states: Vec<State>,
 }
 
-/// Responses to a quarter of full aileron (roll right), then of full elevator (nose up), from straight flight at the
-/// cruise airspeed with ideal servos.
+/// Responses to a step of a quarter of full aileron (roll right), then of full elevator (nose up). They start from straight
+/// flight at the cruise airspeed. The servos are ideal.
 ///
 /// # Errors
 ///
-/// The model has no straight-flight trim there.
+/// If the model has no straight-flight trim at the cruise airspeed.
 pub fn stick_responses(model: &GreyBox) -> Result<[StickResponse; 2], TrimError> {
     let altitude = model.airframe.reference.altitude;
     let trim = Trim::straight(model, model.airframe.envelope.airspeed_cruise_mps, altitude)?;
@@ -38,7 +38,7 @@ pub fn stick_responses(model: &GreyBox) -> Result<[StickResponse; 2], TrimError>
     ])
 }
 
-/// States after a step to `controls`, by the classical Runge–Kutta method.
+/// States after a step to `controls`, by the classical Runge–Kutta method. The response ends at a state that is not finite.
 fn flown(model: &GreyBox, from: State, controls: Controls, altitude: f64) -> StickResponse {
     let rate = |x: [f64; 8]| model.rate(&State::from_array(x), &controls, altitude).to_array();
     let along = |x: [f64; 8], k: [f64; 8], h: f64| std::array::from_fn(|i| x[i] + h * k[i]);
@@ -72,7 +72,7 @@ mod tests {
         let at = |r: &StickResponse, t: f64| r.states[(t / STEP_S) as usize];
         assert!(at(&roll, 0.5).p > 0.1 && at(&roll, 0.5).roll > 0.02);
         assert!(at(&pitch, 0.2).q > 0.01 && at(&pitch, 0.5).alpha > at(&pitch, 0.0).alpha);
-        // sideslip and its dihedral take part of the roll rate that the aileron alone would give
+        // sideslip and the dihedral effect reduce the roll rate below that of the aileron alone
         let full = crate::aircraft_check::check(&model).unwrap().authority.roll_rate;
         let share = at(&roll, 0.4).p / (STEPPED * full);
         assert!((0.4..1.1).contains(&share), "{share}");

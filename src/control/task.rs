@@ -1,4 +1,4 @@
-//! The reinforcement-learning task: the reward for tracking an attitude, eq. (30) of \[GSFM26\].
+//! The reinforcement-learning task: the reward for attitude tracking, eq. (30) of \[GSFM26\].
 
 use crate::Target;
 use greylag_num::Real;
@@ -7,19 +7,19 @@ use greylag_physics::State;
 /// The constants of the reward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Task {
-    /// Scale of the roll error c_φ, rad.
+    /// Scale c_φ of the roll error, rad.
     pub roll_scale: f64,
-    /// Cap of the roll term κ_φ.
+    /// Cap κ_φ of the roll term.
     pub roll_cap: f64,
-    /// Scale of the pitch error c_θ, rad.
+    /// Scale c_θ of the pitch error, rad.
     pub pitch_scale: f64,
-    /// Cap of the pitch term κ_θ.
+    /// Cap κ_θ of the pitch term.
     pub pitch_cap: f64,
-    /// Scale of the airspeed error c_v, m/s.
+    /// Scale c_v of the airspeed error, m/s.
     pub airspeed_scale: f64,
-    /// Cap of the airspeed term κ_v.
+    /// Cap κ_v of the airspeed term.
     pub airspeed_cap: f64,
-    /// Discount γ per step (Table VII).
+    /// Discount factor γ per step (Table VII).
     pub discount: f64,
 }
 
@@ -35,18 +35,18 @@ impl Task {
         discount: 0.99,
     };
 
-    /// The smallest reward of a step: every term at its cap.
+    /// The smallest reward of a step, with every term at its cap.
     pub fn worst(&self) -> f64 {
         -(self.roll_cap + self.pitch_cap + self.airspeed_cap)
     }
 
-    /// The reward of the step that loses the aircraft: the smallest reward for ever, discounted. Without it, ending
-    /// an episode early would avoid the cost of the remaining steps.
+    /// The reward of the step in which the aircraft is lost: the discounted sum of the smallest reward over infinitely many
+    /// steps. Without it, an early end of an episode would avoid the cost of the remaining steps.
     pub fn of_loss(&self) -> f64 {
         self.worst() / (1.0 - self.discount)
     }
 
-    /// The reward of `state` for `target`: at most 0.
+    /// The reward of `state` for `target`. It is at most 0.
     #[inline(always)]
     pub fn reward<R: Real>(&self, state: &State<R>, target: &Target<R>) -> R {
         #[inline(always)]
@@ -73,7 +73,7 @@ mod tests {
         assert!((Task::PAPER.reward(&off, &target) + 0.25).abs() < 1e-12);
         let far = State { roll: -3.0, pitch: 1.5, airspeed: 99.0, ..on };
         assert!((Task::PAPER.reward(&far, &target) - Task::PAPER.worst()).abs() < 1e-12);
-        // 0.5 + 0.5 + 0.1, for ever at γ = 0.99
+        // the sum of (0.5 + 0.5 + 0.1) over infinitely many steps at γ = 0.99
         assert!((Task::PAPER.of_loss() + 110.0).abs() < 1e-9);
     }
 }

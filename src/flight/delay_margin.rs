@@ -1,4 +1,4 @@
-//! Delay margin of a controller's surface loops: the smallest delay with a limit cycle, found by simulation.
+//! Delay margin of a controller's surface loops, found by simulation: the smallest delay with a limit cycle.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -9,28 +9,29 @@ use greylag_model::{GreyBox, Integrator, Trim, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
-/// Step of the delays that are tried, ms.
+/// Step between the simulated delays, ms.
 const STEP_MS: usize = 4;
-/// Largest delay that is tried, ms; a loop that is stable with it has enough margin.
+/// Largest simulated delay, ms. A loop that is stable with this delay has enough margin.
 const LONGEST_MS: usize = 120;
 /// Length of a simulation, ticks.
 const TICKS: usize = 1000;
-/// Ticks of the full-deflection pulse.
+/// Ticks of the full-deflection pulse: 0.1 s, beginning after 1 s.
 const PULSE: std::ops::Range<usize> = 100..110;
-/// First tick that is judged: the last two seconds count, as in JSBSim with `examples/delay_margin.rs`.
+/// First evaluated tick: only the last 2 s of a simulation count, as in JSBSim with `examples/delay_margin.rs`.
 const END: usize = 800;
-/// Peak-to-peak rate at the end of a simulation that counts as an oscillation, rad/s (10 °/s).
+/// Peak-to-peak rate at the end of a simulation above which the loop oscillates, rad/s (10 °/s).
 const SWING: f64 = 0.17;
 /// Control period in ms.
 const TICK_MS: usize = 10;
 
-/// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate after a pulse of
-/// full deflection, in level flight at the cruise airspeed. `None` if it is stable up to 0.12 s, or if the trim fails.
+/// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate. The simulation
+/// starts in level flight at the cruise airspeed and applies a pulse of full deflection. `None` if the loops are stable
+/// up to 0.12 s, or if the trim fails.
 ///
 /// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
 /// The search takes about a second for a controller that computes its command in microseconds.
 pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
-    // JSBSim's Euler steps delay the attitude by one cycle, which no aircraft does
+    // JSBSim's Euler steps delay the attitude by one cycle, unlike an aircraft
     let model = &{
         let mut continuous = model.clone();
         continuous.integrator = Integrator::Rk4;
@@ -43,14 +44,14 @@ pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Dura
     delays.find(|delay| swings(*delay)).map(|ms| Duration::from_millis(ms as u64))
 }
 
-/// The axis whose surface is delayed.
+/// The axis whose surface command is delayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Axis {
     Pitch,
     Roll,
 }
 
-/// Whether the oscillation persists after the pulse.
+/// Whether the rate about `axis` still oscillates at the end of a simulation with the delay `delay_ms`.
 fn swings(controller: &dyn Controller, model: &GreyBox, axis: Axis, delay_ms: usize) -> bool {
     let envelope = &model.airframe.envelope;
     let airspeed = envelope.airspeed_cruise_mps;
@@ -115,7 +116,8 @@ fn surface(command: &mut Command, axis: Axis) -> &mut f64 {
     }
 }
 
-/// The command that acts: one surface delayed by whole cycles and a fraction, interpolated between two commands.
+/// The command at the actuators: one surface is delayed, the others are not. A fraction of a cycle is interpolated
+/// linearly between two commands.
 fn delayed(late: &VecDeque<Command>, now: Command, axis: Axis, delay_ms: usize) -> Command {
     let (whole, share) = (delay_ms / TICK_MS, (delay_ms % TICK_MS) as f64 / TICK_MS as f64);
     let newest = late.len() - 1;
@@ -144,8 +146,8 @@ mod tests {
 
     #[test]
     fn the_model_says_of_delay_what_the_official_simulator_does() {
-        // JSBSim with steps of 1 ms oscillates after a pulse of full deflection: `lqi` from 46 ms in pitch on,
-        // `lqi-damped` from 104 ms (`examples/delay_margin.rs`)
+        // JSBSim with steps of 1 ms oscillates after a pulse of full deflection: with `lqi` from 46 ms on, in pitch;
+        // with `lqi-damped` from 104 ms on (`examples/delay_margin.rs`).
         let model = GreyBox::load(Path::new(concat!(
             env!("CARGO_MANIFEST_DIR"),
             "/../../params/x8/jsbsim.toml"

@@ -1,7 +1,7 @@
-//! The companion without threads, sockets or a wall clock: bytes in, bytes out, time as an argument.
+//! The companion as a function of received bytes and time, without threads, sockets or a wall clock.
 //!
-//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime), for campaigns of thousands of
-//! flights in one process, and for replays.
+//! It runs the same pilot, vehicle link and controller as [`runtime`](super::runtime). It serves campaigns of thousands
+//! of flights in one process, and replays.
 
 use std::time::Duration;
 
@@ -19,14 +19,14 @@ const WIRE: PeerId = PeerId { link: LinkId(0), address: SERIAL };
 
 /// A companion whose input and time are arguments.
 ///
-/// Call [`Desk::receive`] with received bytes and [`Desk::poll`] every 10 ms; both append the bytes to send. `host`
-/// must not decrease.
+/// Call [`Desk::receive`] with received bytes, and [`Desk::poll`] every 10 ms. Both append the bytes to send to `out`.
+/// The host time `host` must not decrease from call to call.
 pub struct Desk {
     pilot: Pilot,
     controller: Box<dyn Controller>,
     vehicle: Vehicle,
     outputs: Outputs,
-    /// Host and vehicle time of the newest state.
+    /// Host time and vehicle time of the newest state.
     anchor: Option<(Duration, Time)>,
     recorder: Option<Recorder>,
     /// All texts sent to the ground stations.
@@ -34,8 +34,8 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// A companion at a vehicle from which nothing was received yet. The controller is called synchronously, even one
-    /// that has a thread of its own in flight.
+    /// A companion for `vehicle`, before any byte is received. The controller runs synchronously, even if it has a
+    /// separate thread in flight.
     pub fn new(companion: Companion, vehicle: Vehicle) -> Self {
         let mut pilot = companion.pilot;
         pilot.take_on(&vehicle);
@@ -50,12 +50,13 @@ impl Desk {
         }
     }
 
-    /// Starts recording.
+    /// Starts recording with `recorder`.
     pub fn record(&mut self, recorder: Recorder) {
         self.recorder = Some(recorder);
     }
 
-    /// Takes bytes that arrive at `host`, appends the replies to `out`, and calls `watch` with each state and its decision.
+    /// Processes `bytes` that arrive at the host time `host`, and appends the replies to `out`. Calls `watch` with each
+    /// state and its decision.
     pub fn receive(
         &mut self,
         host: Duration,
@@ -92,7 +93,7 @@ impl Desk {
         self.heed(host);
     }
 
-    /// Performs the periodic duties at `host`, as every 10 ms in flight.
+    /// Performs the periodic duties (timeouts, due messages, texts) at the host time `host`. Call it every 10 ms.
     pub fn poll(&mut self, host: Duration, out: &mut Vec<u8>) {
         let now = self.now(host);
         self.pilot.advance(now);
@@ -107,7 +108,7 @@ impl Desk {
     fn heed(&mut self, host: Duration) {
         while let Some(notice) = self.vehicle.take_notice() {
             if let Some(words) = notice.ending() {
-                // forced disarming is never refused
+                // a forced disarming is never refused
                 let _ = self.pilot.disarm(self.now(host), true);
                 self.pilot.send_text(Severity::Critical, &words);
             }
@@ -119,12 +120,13 @@ impl Desk {
         }
     }
 
-    /// Vehicle time at `host`: between states it advances with host time.
+    /// Vehicle time at the host time `host`, extrapolated from the newest state; zero before the first state.
     pub fn now(&self, host: Duration) -> Time {
         self.anchor.map_or(Time::default(), |(at, time)| time.plus(host.saturating_sub(at)))
     }
 
-    /// Arms and so engages, as a client would.
+    /// Arms the companion, as a client's request does. An obstacle to the engagement of the vehicle is returned as a
+    /// rejection.
     pub fn arm(&mut self, host: Duration) -> Verdict {
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(obstacle),
@@ -132,12 +134,12 @@ impl Desk {
         }
     }
 
-    /// The pilot, for requests of a client.
+    /// The pilot, for the requests of a client.
     pub fn pilot(&mut self) -> &mut Pilot {
         &mut self.pilot
     }
 
-    /// Link to the vehicle.
+    /// The link to the vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }

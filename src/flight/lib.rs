@@ -1,4 +1,4 @@
-//! Flight: the pilot, which decides; the runtime with threads and clocks; the recorder; and the desk for tests.
+//! The companion in flight: pilot, runtime, recorder, replay and model monitor, and a desk for tests.
 
 mod delay_margin;
 pub mod desk;

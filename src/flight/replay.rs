@@ -14,10 +14,10 @@ use greylag_link::peer::{LinkId, PeerId, SERIAL};
 use greylag_link::vehicle::{Order, Telemetry, Vehicle};
 use greylag_physics::{Command, Time};
 
-/// Number of differences kept for display.
+/// Largest number of differences that are kept.
 const SHOWN: usize = 10;
 
-/// A flight cannot be replayed.
+/// A recorded flight cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// A file of the recording cannot be read.
@@ -28,20 +28,20 @@ pub enum ReplayError {
         /// The operating system's error.
         source: std::io::Error,
     },
-    /// The calls have another format version.
+    /// The file of calls has another format version.
     #[error("{} does not begin with `{HEADER}`: it was recorded by another version", path.display())]
     Header {
         /// Path of the file.
         path: PathBuf,
     },
-    /// A line before the last is invalid.
+    /// A line other than the last is invalid.
     #[error("{}, line {line}: {source}", path.display())]
     Line {
         /// Path of the file.
         path: PathBuf,
         /// Line number, from 1.
         line: usize,
-        /// Why it is invalid.
+        /// Reason for which the line is invalid.
         source: CallError,
     },
 }
@@ -49,7 +49,7 @@ pub enum ReplayError {
 /// A tick whose replayed command differs from the recorded one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Time of the state, vehicle clock.
+    /// Vehicle time of the state.
     pub time: Time,
     /// The command in the recording.
     pub recorded: Command,
@@ -62,15 +62,15 @@ pub struct Difference {
 pub struct Outcome {
     /// Number of ticks replayed.
     pub ticks: u64,
-    /// Commands that differ in any bit.
+    /// Number of commands that differ in any bit.
     pub different: u64,
-    /// Plans of the controller that differ in any bit from the recorded ones.
+    /// Number of plans of the controller that differ in any bit from the recorded plans.
     pub plans_different: u64,
-    /// Ticks whose state is missing in the telemetry; the commands after such a tick cannot be compared.
+    /// Number of ticks whose state is missing in the telemetry. The commands after such a tick cannot be compared.
     pub without_state: u64,
-    /// The first differences, in order.
+    /// The first differences, at most ten, in order.
     pub differences: Vec<Difference>,
-    /// Whether the recording ends inside an entry, as after a crash.
+    /// Whether the recording ends inside an entry, for instance after a crash.
     pub cut_short: bool,
 }
 
@@ -83,7 +83,7 @@ struct States {
 }
 
 impl States {
-    /// The state of `time`; earlier ones without a call arrived late.
+    /// The state of vehicle time `time`. Earlier states without a call arrived late and are skipped.
     fn next(&mut self, time: Time) -> Option<(Duration, Telemetry)> {
         loop {
             while let Some((host, state)) = self.ready.pop_front() {
@@ -99,13 +99,13 @@ impl States {
         }
     }
 
-    /// Timestamp of the next record.
+    /// Timestamp of the next record, µs since 1970.
     fn stamp(&self) -> Option<u64> {
         Some(u64::from_be_bytes(*self.bytes.get(self.at..)?.first_chunk()?))
     }
 
-    /// Reads the frames of one packet, which share a timestamp: all are handled before any state is answered, as in
-    /// flight.
+    /// Reads the frames of one packet, which share a timestamp. As in flight, all frames are processed before any state
+    /// is answered.
     fn read_packet(&mut self) -> Option<()> {
         let (stamp, mut read) = (self.stamp()?, None);
         while self.stamp() == Some(stamp) && self.read_one(stamp).is_some() {
@@ -114,7 +114,7 @@ impl States {
         read
     }
 
-    /// Reads one record: eight bytes of time, then a frame.
+    /// Reads one record: eight bytes of time (big-endian, µs since 1970), then a frame.
     fn read_one(&mut self, stamp: u64) -> Option<()> {
         let rest = self.bytes.get(self.at + 8..)?;
         let len = frame_len(rest).filter(|len| *len <= rest.len())?;
@@ -137,7 +137,7 @@ impl States {
 ///
 /// # Errors
 ///
-/// If a file cannot be read, or is not part of a recording.
+/// If a file cannot be read, has another format version, or contains an invalid line.
 pub fn replay(
     folder: &Path,
     companion: Companion,
@@ -149,7 +149,7 @@ pub fn replay(
 /// Callback for each planned tick of a replay: time, request, and the controller after its command.
 pub type Watch<'a> = dyn FnMut(Time, &Request, &dyn Controller) + 'a;
 
-/// Replays with the callback `watch`.
+/// Replays like [`replay`], and calls `watch` for each planned tick.
 ///
 /// # Errors
 ///
@@ -198,12 +198,12 @@ struct Replayed<'w, 'f> {
     companion: Companion,
     states: States,
     outcome: Outcome,
-    /// A reset that the planner has not received, because it was busy.
+    /// Whether the controller is still to be reset, because the planner was busy at the last engagement.
     owed: bool,
 }
 
 impl Replayed<'_, '_> {
-    /// Makes one call; `false` when the telemetry has ended. Verdicts are not repeated.
+    /// Makes one call. Returns `false` when the telemetry has ended. Verdicts are not compared.
     fn make(&mut self, call: &Call) -> bool {
         let pilot = &mut self.companion.pilot;
         match *call {
@@ -224,7 +224,7 @@ impl Replayed<'_, '_> {
     fn tick(&mut self, time: Time, planned: Planned, recorded: Command) -> bool {
         let Some((host, state)) = self.states.next(time) else {
             self.outcome.without_state += 1;
-            // at the end of a truncated recording the telemetry may end first
+            // the telemetry of a truncated recording may end before its calls
             let ended = self.states.at + 8 >= self.states.bytes.len();
             self.outcome.cut_short |= ended;
             return !ended;
@@ -252,7 +252,7 @@ impl Replayed<'_, '_> {
             Planned::None => Plan::None,
         };
         let decision = self.companion.pilot.decide(plan);
-        // The session of a flight controller models the actuators from the commands that it has sent.
+        // The vehicle link of a flight controller models the actuators from the commands that were sent.
         self.states.vehicle.answer(host, state.time, &decision.demand());
         self.outcome.ticks += 1;
         if !same(&decision.command, &recorded) {

@@ -1,7 +1,7 @@
 //! Threads, queues and counters shared by control, planner and recorder.
 //!
-//! Other modules import them from here only, so that `tests/interleavings.rs` can compile the same sources with those
-//! of shuttle, which explores other interleavings in each run.
+//! Other modules import them only from here. `tests/interleavings.rs` can therefore compile the same sources with the
+//! types of shuttle, which explores other interleavings in each run.
 
 pub use std::sync::atomic::{AtomicU64, Ordering};
 pub use std::thread::{Builder, JoinHandle};

@@ -2,9 +2,9 @@
 
 /// State of Adam (Kingma and Ba, 2015, algorithm 1) for a list of parameters.
 ///
-/// burn's Adam requires the parameters in its tensors; these are updated by a kernel of this crate 500
-/// times a second, equal to the bit after a resume, so that copying them would cost more code than the
-/// algorithm. A test compares it with a case calculated by hand.
+/// burn's Adam requires the parameters in burn's tensors. A kernel of this crate updates these parameters 500 times a
+/// second. A resumed training must be equal to the bit. Copying the parameters to tensors would take more code than the
+/// algorithm. A test compares the algorithm with a case calculated by hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
     /// Running means of the gradients.
@@ -29,8 +29,8 @@ impl Adam {
         self.steps += 1;
     }
 
-    /// The change of parameter `place` at learning rate `rate` for its `gradient`; to be called once for each
-    /// parameter between two calls of [`begin`](Adam::begin).
+    /// The change of parameter `place` for its `gradient` at the learning rate `rate`. The function must be called once
+    /// for each parameter between two calls of [`begin`](Adam::begin).
     pub fn move_of(&mut self, place: usize, gradient: f64, rate: f64) -> f64 {
         let (m, v) = (&mut self.mean[place], &mut self.square[place]);
         *m = BETA[0] * *m + (1.0 - BETA[0]) * gradient;

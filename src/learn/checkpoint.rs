@@ -54,7 +54,7 @@ pub enum CheckpointError {
     Other,
 }
 
-/// The scalars of a checkpoint, as the one entry of the metadata.
+/// The scalars of a checkpoint, the only entry of the metadata.
 #[derive(Serialize, Deserialize)]
 struct Header {
     schema: String,
@@ -69,12 +69,12 @@ const SCHEMA: &str = "greylag.checkpoint/1";
 const METADATA: &str = "greylag";
 
 impl Checkpoint {
-    /// Checks that it belongs to the training `identity` with this number of parameters, `coordinates` of the prior's
-    /// among them.
+    /// Checks that the checkpoint belongs to the training `identity`. The training has `parameters` parameters, of
+    /// which `coordinates` are the prior's.
     ///
     /// # Errors
     ///
-    /// If it does not.
+    /// If the checkpoint belongs to another training.
     pub fn fits(
         &self,
         identity: &str,
@@ -89,11 +89,11 @@ impl Checkpoint {
         if fits { Ok(()) } else { Err(CheckpointError::Other) }
     }
 
-    /// Writes the file `path` atomically; a reader sees the old version or the new one.
+    /// Writes the file `path` atomically. A reader sees either the old version or the new one.
     ///
     /// # Errors
     ///
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
         let bytes =
             self.to_bytes().map_err(|why| CheckpointError::Content { path: path.into(), why })?;
@@ -193,7 +193,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".greylag-").suffix(".part");
-    // a temporary file is private by default; a model is as readable as the umask lets it be
+    // A temporary file is private by default. A model file must have the permissions that the umask allows.
     #[cfg(unix)]
     let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]

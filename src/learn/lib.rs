@@ -1,5 +1,5 @@
-//! Learning: a grey-box model from flights, prior and residual together (section IV-A of \[GSFM26\]), and policies in
-//! a model or in JSBSim (section IV-B).
+//! Learning of grey-box models from flights, prior and residual together (section IV-A of \[GSFM26\]), and of policies
+//! in a model or in JSBSim (section IV-B).
 
 mod adam;
 mod checkpoint;

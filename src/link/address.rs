@@ -1,4 +1,4 @@
-//! Link addresses of the command line, such as `udpin:0.0.0.0:14550`.
+//! Link addresses on the command line, such as `udpin:0.0.0.0:14550`.
 
 use std::fmt;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -6,12 +6,12 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// A host name or number with a port, not yet looked up.
+/// A host name or IP address with a port. The name is not resolved yet.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct HostPort {
-    /// Name, IPv4 address, or IPv6 address without its brackets.
+    /// Host name, IPv4 address, or IPv6 address without its brackets.
     pub host: String,
-    /// Port number, 1..65535 (0 lets the system choose, for tests).
+    /// Port number, 1..65535. Tests use 0, with which the system chooses a free port.
     pub port: u16,
 }
 
@@ -20,13 +20,13 @@ pub struct HostPort {
 pub enum Address {
     /// Listens for datagrams on this address and replies to each sender.
     UdpIn(HostPort),
-    /// Sends the first datagram to this address, then replies to whoever answered.
+    /// Sends the first datagram to this address, then replies to the sender of each received datagram.
     UdpOut(HostPort),
     /// Listens for connections on this address.
     TcpIn(HostPort),
     /// Connects to this address, and reconnects when the connection is lost.
     TcpOut(HostPort),
-    /// A serial port at a baud rate.
+    /// A serial port with its baud rate.
     Serial {
         /// Device, such as `/dev/ttyACM0`.
         port: String,
@@ -35,7 +35,7 @@ pub enum Address {
     },
 }
 
-/// Why an address cannot be used.
+/// Reason for which an address cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum AddressError {
     /// The word before the first colon is not a kind of link.
@@ -50,7 +50,7 @@ pub enum AddressError {
     /// The port is not a number from 0 to 65535.
     #[error("address `{0}`: `{1}` is not a port number (0 to 65535)")]
     Port(String, String),
-    /// The baud rate is not a positive number.
+    /// The baud rate is missing or not a positive integer.
     #[error(
         "address `{0}`: `{1}` is not a baud rate; write for example serial:/dev/ttyACM0:921600"
     )]
@@ -77,7 +77,7 @@ impl HostPort {
         Ok(HostPort { host: host.into(), port })
     }
 
-    /// The first address that the host name resolves to.
+    /// The first address that the host name resolves to; an error if it does not resolve.
     pub fn resolve(&self) -> Result<SocketAddr, AddressError> {
         let failed = |reason: String| AddressError::Lookup { host: self.host.clone(), reason };
         (self.host.as_str(), self.port)
@@ -89,8 +89,8 @@ impl HostPort {
 }
 
 impl Address {
-    /// Whether the link is reachable from this machine only: a loopback address or a serial wire. A name that cannot
-    /// be resolved counts as reachable from elsewhere.
+    /// Whether the link is reachable only from this machine: a loopback address or a serial port. A name that cannot be
+    /// resolved counts as reachable from other machines.
     pub fn stays_here(&self) -> bool {
         match self {
             Address::UdpIn(at) | Address::UdpOut(at) | Address::TcpIn(at) | Address::TcpOut(at) => {
@@ -172,7 +172,7 @@ mod tests {
         assert!(complaint("14550").contains("unknown kind"));
         assert!(complaint("udpin:14550").contains("HOST:PORT"));
         assert!(complaint("udpin::14550").contains("HOST:PORT"));
-        // one more than the largest port number
+        // the largest port number plus one
         assert!(complaint("udpin:127.0.0.1:65536").contains("`65536` is not a port"));
         assert!(complaint("serial:/dev/ttyACM0").contains("baud"));
         assert!(complaint("serial:/dev/ttyACM0:fast").contains("`fast`"));

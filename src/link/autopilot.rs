@@ -1,15 +1,15 @@
-//! The interface of an autopilot to its MAVLink clients: the boundary between the protocol and the pilot.
+//! The interface of an autopilot to its MAVLink clients, which separates the protocol from the pilot.
 
 use greylag_physics::{ActuatorState, Command, Time};
 
-/// Flight modes, with the `custom_mode` numbers PX4 uses (main mode, sub mode).
+/// Flight modes, with their `custom_mode` numbers in PX4 (main mode, sub mode).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// Sticks command the surfaces directly. PX4 main mode 1.
     Manual,
     /// Wings level at the cruise airspeed. PX4 AUTO/LOITER, main 4 sub 3.
     Hold,
-    /// Return to launch: recognised only to be refused by name. PX4 AUTO/RTL, main 4 sub 5.
+    /// Return to launch, which is recognised but always refused. PX4 AUTO/RTL, main 4 sub 5.
     Return,
     /// Attitude setpoints from a client. PX4 main mode 6.
     Offboard,
@@ -28,23 +28,23 @@ pub enum Verdict {
     Denied(String),
 }
 
-/// An attitude setpoint decoded from SET_ATTITUDE_TARGET; all values are finite.
+/// An attitude setpoint from SET_ATTITUDE_TARGET. All its values are finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeSetpoint {
     /// Commanded roll, rad, not yet limited to the envelope.
     pub roll: f64,
     /// Commanded pitch, rad, not yet limited to the envelope.
     pub pitch: f64,
-    /// Commanded thrust 0..1; `None` when the sender masked it.
+    /// Commanded thrust, 0..1; `None` if the sender masked it.
     pub thrust: Option<f64>,
 }
 
-/// Stick positions from MANUAL_CONTROL, −1..1 (`throttle` 0..1); positive pitch stick is nose down.
+/// Stick positions from MANUAL_CONTROL, normalised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sticks {
-    /// Roll stick, positive right.
+    /// Roll stick, −1..1, positive right.
     pub roll: f64,
-    /// Pitch stick, positive forward (nose down).
+    /// Pitch stick, −1..1, positive forward (nose down).
     pub pitch: f64,
     /// Throttle stick position, 0..1.
     pub throttle: f64,
@@ -70,7 +70,7 @@ pub enum Severity {
 pub struct Text {
     /// Severity of the line.
     pub severity: Severity,
-    /// The text, of any length (it is sent in chunks of 50 characters).
+    /// The text, of any length. It is sent in chunks of 50 characters.
     pub words: String,
 }
 
@@ -79,29 +79,29 @@ pub struct Text {
 pub enum ParameterValue {
     /// A float (MAV_PARAM_TYPE_REAL32).
     Real(f32),
-    /// An integer (MAV_PARAM_TYPE_INT32), sent bytewise in the float field.
+    /// An integer (MAV_PARAM_TYPE_INT32). Its bytes are sent in the float field.
     Int(i32),
 }
 
-/// One entry of the parameter table; its position is its index.
+/// One entry of the parameter table. Its position in the table is its index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// At most 16 ASCII characters.
+    /// Name of the parameter, at most 16 ASCII characters.
     pub name: &'static str,
     /// Present value of the parameter.
     pub value: ParameterValue,
 }
 
-/// The autopilot's state from which telemetry streams are built. Unknown values are NaN.
+/// The autopilot's state, from which telemetry streams are built. Unknown values are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
     /// The active flight mode.
     pub mode: Mode,
-    /// Whether actuator outputs are live.
+    /// Whether actuator outputs are enabled.
     pub armed: bool,
-    /// Whether a failsafe is in force (MAV_STATE_CRITICAL).
+    /// Whether a failsafe is active (MAV_STATE_CRITICAL).
     pub failsafe: bool,
-    /// Whether the vehicle link delivers fresh state.
+    /// Whether the vehicle link delivers fresh states.
     pub vehicle_alive: bool,
     /// Euler angles roll, pitch, yaw, rad.
     pub attitude: [f64; 3],
@@ -115,40 +115,41 @@ pub struct Status {
     pub position: [f64; 2],
     /// Velocity over ground, NED, m/s.
     pub velocity: [f64; 3],
-    /// Commanded roll and pitch after envelope limits, rad.
+    /// Commanded roll and pitch after envelope limits, rad; NaN without a target.
     pub target: [f64; 2],
-    /// The actuator command in force.
+    /// The last actuator command.
     pub command: Command,
-    /// The observed actuator state.
+    /// The observed actuator state: surfaces in rad and rad/s, throttle 0..1.
     pub actuators: ActuatorState,
     /// Recent processing time of the control task as a fraction of its 10 ms cycle, 0..1.
     pub load: f64,
-    /// Model residuals: measured minus predicted, divided by the half width of the band (two standard deviations, see
-    /// `flight::monitor`), in the order of [`RESIDUALS`]; dimensionless, outside −1..1 is outside the band.
+    /// Model residuals (measured minus predicted) divided by the half width of their bands, two standard deviations
+    /// (see `flight::monitor`), in the order of [`RESIDUALS`]. They are dimensionless. Beyond −1..1 a residual is
+    /// outside its band.
     pub residuals: [f64; 6],
 }
 
-/// Names of the residuals: specific forces along body x, y, z, then angular accelerations.
+/// Names of the residuals: specific forces along body x, y, z, then angular accelerations about x, y, z.
 pub const RESIDUALS: [&str; 6] = ["res_fx", "res_fy", "res_fz", "res_roll", "res_pitch", "res_yaw"];
 
-/// An autopilot as its clients see it, implemented by `flight::pilot::Pilot` and by a double in the protocol tests.
+/// An autopilot as its clients see it. `flight::pilot::Pilot` and a test double in the protocol tests implement it.
 pub trait Autopilot {
-    /// Enables actuator outputs; `force` skips the pre-arm checks.
+    /// Enables the actuator outputs. `force` skips the pre-arm checks.
     fn arm(&mut self, now: Time, force: bool) -> Verdict;
-    /// Disables actuator outputs; `force` allows it in flight.
+    /// Disables the actuator outputs. `force` also allows it in flight.
     fn disarm(&mut self, now: Time, force: bool) -> Verdict;
     /// Requests a flight mode.
     fn set_mode(&mut self, now: Time, mode: Mode) -> Verdict;
-    /// Takes a valid attitude setpoint, which also restarts the offboard timeout.
+    /// Passes a valid attitude setpoint, which also restarts the offboard timeout.
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint);
-    /// Takes stick positions, which also restart their timeout.
+    /// Passes stick positions, which also restart the timeout of the sticks.
     fn sticks(&mut self, now: Time, sticks: Sticks);
-    /// The parameter table; its length and order never change.
+    /// The parameter table. Its length and order never change.
     fn parameters(&self) -> &[Parameter];
-    /// Sets a parameter. `value` already has the table's type; a refusal carries its reason.
+    /// Sets the parameter `index`. `value` already has the table's type. A refusal contains the reason.
     fn set_parameter(&mut self, index: usize, value: ParameterValue) -> Verdict;
     /// The present state, for telemetry streams.
     fn status(&self) -> Status;
-    /// Removes and returns the oldest text waiting for the ground stations.
+    /// Removes and returns the oldest queued text for the ground stations.
     fn take_text(&mut self) -> Option<Text>;
 }

@@ -1,6 +1,6 @@
-//! MAVLink server for ground stations and offboard programs, which see an autopilot.
+//! MAVLink server of an autopilot for ground stations and offboard programs.
 //!
-//! It has no sockets and no clock. See [`Clients`] for the order of calls.
+//! The server has no sockets and no clock. See [`Clients`] for the order of calls.
 
 mod commands;
 mod counts;
@@ -30,26 +30,26 @@ use session::{Session, Stay};
 use setpoint_authority::SetpointAuthority;
 use setpoints::OTHER_SETPOINT;
 
-/// Largest number of sessions.
+/// Largest number of simultaneous sessions.
 pub const MAX_SESSIONS: usize = 32;
-/// Silence after which a session may be replaced by a new one when all are taken.
+/// Silence after which a new peer may replace a session while all sessions are in use.
 const DISPLACEABLE: Duration = Duration::from_secs(3);
-/// Silence after which the session of a datagram peer ends.
+/// Time without frames after which the session of a datagram peer ends.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Texts taken from the autopilot in one call.
+/// Largest number of texts fetched from the autopilot per call of `poll`.
 const TEXTS_PER_POLL: usize = 8;
 /// Longest text that is sent, in characters: eight chunks.
 const TEXT_LENGTH: usize = 400;
 
-/// Host time and vehicle time of a call.
+/// Host time and vehicle time at a call.
 ///
-/// Host time paces heartbeats and streams, which continue when the vehicle stops; vehicle time drives the autopilot
-/// and stamps what is sent.
+/// Host time paces heartbeats and streams, which continue when the vehicle stops. Vehicle time is passed to the
+/// autopilot and stamps the messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Now {
     /// Time since the program's start, monotonic.
     pub host: Duration,
-    /// Time of the vehicle's clock.
+    /// Time of the vehicle's clock, which may stop or restart.
     pub vehicle: Time,
 }
 
@@ -63,13 +63,13 @@ pub struct Now {
 /// - output: [`Clients::drain`] returns the queued frames;
 /// - queries: [`Clients::peers`], [`Clients::counts`], [`Clients::session_count`], [`Clients::identity`].
 ///
-/// Order of calls: after any input, and after `poll` about every 10 ms, call `drain` and send its frames; frames that
-/// nobody drains are dropped beyond a bound and counted. `handle` and `poll` call the [`Autopilot`] synchronously.
+/// Order of calls: after any input, and after `poll` about every 10 ms, call `drain` and send its frames. The queue of
+/// frames is bounded; further frames are dropped and counted. `handle` and `poll` call the [`Autopilot`] synchronously.
 ///
-/// Rule of time: [`Now::host`] must not decrease between calls. [`Now::vehicle`] is passed on to the autopilot and
-/// into the messages; it may stop, and may restart with the vehicle.
+/// [`Now::host`] must not decrease between calls. [`Now::vehicle`] is passed to the autopilot and written into the
+/// messages; it may stop, and may restart with the vehicle.
 ///
-/// Work and memory per call are bounded, whatever arrives.
+/// Work and memory per call are bounded for any input.
 #[derive(Debug)]
 pub struct Clients {
     identity: Source,
@@ -89,7 +89,7 @@ pub struct Clients {
 }
 
 impl Clients {
-    /// A server without sessions; `identity` is the sender of its messages (system 1, component 1 with the shim).
+    /// A server without sessions. `identity` is the sender of its messages (system 1, component 1 with the shim).
     pub fn new(identity: Source) -> Self {
         Clients {
             identity,
@@ -109,14 +109,14 @@ impl Clients {
         }
     }
 
-    /// A server as the onboard computer of a controller that has not been received yet: only requests to this
-    /// component are served, and streams are sent only on request.
+    /// A server for the onboard computer of a controller that has not been received yet. It serves only requests to
+    /// this component, and streams only on request.
     pub fn onboard() -> Self {
         let identity = Source { system: 1, component: ONBOARD };
         Clients { role: Role::Onboard, ..Clients::new(identity) }
     }
 
-    /// Adopts the controller's system id.
+    /// Adopts the flight controller's system id for the messages of this server.
     pub fn adopt(&mut self, system: u8) {
         self.identity.system = system;
     }
@@ -131,8 +131,8 @@ impl Clients {
         self.sessions.iter().map(|session| session.peer)
     }
 
-    /// Opens a session before the peer has sent anything: the target of a `udpout:` link, or a TCP connection. It
-    /// lasts until [`Clients::forget`].
+    /// Opens a session before the peer has sent anything, for the target of a `udpout:` link or a TCP connection. The
+    /// session lasts until [`Clients::forget`].
     pub fn welcome(&mut self, now: Now, peer: PeerId) {
         match self.sessions.iter().position(|s| s.peer == peer) {
             Some(at) => self.sessions[at].stay = Stay::UntilForgotten,
@@ -142,14 +142,14 @@ impl Clients {
         }
     }
 
-    /// Ends a session, as when its connection is closed.
+    /// Ends the session of `peer`, for instance when its connection is closed.
     pub fn forget(&mut self, peer: PeerId) {
         self.sessions.retain(|s| s.peer != peer);
         self.setpoint_authority.release(peer);
         self.stick_authority.release(peer);
     }
 
-    /// Handles one datagram, or whole frames of a stream, from a peer.
+    /// Handles one datagram, or complete frames of a stream, from `peer`.
     pub fn handle(&mut self, now: Now, peer: PeerId, bytes: &[u8], autopilot: &mut dyn Autopilot) {
         let mut counts = FrameCounts::default();
         for frame in Frames::new(bytes, &mut counts) {
@@ -158,8 +158,8 @@ impl Clients {
         self.counts.frames.add(counts);
     }
 
-    /// Queues what is due: heartbeats, streams, parameters and texts. Call it from the control task, about every 10
-    /// ms.
+    /// Queues the messages that are due: heartbeats, streams, parameters and texts. The control task calls it about
+    /// every 10 ms.
     pub fn poll(&mut self, now: Now, autopilot: &mut dyn Autopilot) {
         self.sessions.retain(|s| {
             s.stay == Stay::UntilForgotten || now.host.saturating_sub(s.heard) < FORGOTTEN
@@ -208,7 +208,7 @@ impl Clients {
         }
     }
 
-    /// Opens a session, replacing the one with the longest silence when all are taken.
+    /// Opens a session. If all sessions are in use, it replaces the session with the longest silence.
     fn admit(&mut self, now: Now, peer: PeerId, stay: Stay) -> Option<usize> {
         if self.sessions.len() >= MAX_SESSIONS {
             let silent = |s: &Session| now.host.saturating_sub(s.heard);
@@ -223,7 +223,7 @@ impl Clients {
         }
         let mut session = Session::new(peer, stay, now.host);
         if self.role == Role::Onboard {
-            // Group 0 is all that is streamed by default.
+            // Group 0 contains all default streams.
             session.streams.set_group(0, None, now.host);
         }
         self.sessions.push(session);
@@ -258,7 +258,7 @@ impl Clients {
                 self.set_parameter(now, at, from, name, value, autopilot)
             }
             Request::Mission { step, kind } => self.reply(at, &mission(step, kind, from)),
-            // a reply must not be replied to: 128 is ACK, 129 NAK
+            // a reply must not be answered: 128 is ACK, 129 NAK
             Request::File { opcode: 128 | 129, .. } => {}
             Request::File { sequence, session, opcode } => {
                 self.reply(at, &answer::file_nak(sequence, session, opcode, from));
@@ -275,7 +275,7 @@ impl Clients {
         }
     }
 
-    /// Handles SET_MODE, which has no acknowledgement: the heartbeat shows the mode, and a refusal is sent as text.
+    /// Handles SET_MODE, which has no acknowledgement. The heartbeat shows the new mode. A refusal is sent as text.
     fn set_mode(
         &mut self,
         now: Now,
@@ -306,7 +306,7 @@ impl Clients {
         self.sessions[at].say(severity, words, self.text_id, self.identity, &mut self.outbox);
     }
 
-    /// Queues a warning for one client, within its rate limit.
+    /// Queues a warning for one client, unless its rate limit is exceeded.
     fn complain(&mut self, now: Now, at: usize, words: &str) {
         if self.sessions[at].may_complain(now.host) {
             self.say(at, Severity::Warning, words);
@@ -314,7 +314,7 @@ impl Clients {
     }
 }
 
-/// Reply to a mission message. Missions are not supported: the list is empty, and uploads are refused.
+/// Reply to a mission message. Missions are not supported: the list is empty and uploads are refused.
 fn mission(step: MissionStep, kind: u8, from: Source) -> Message {
     match step {
         MissionStep::List => answer::empty_mission(kind, from),

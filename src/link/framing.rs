@@ -1,10 +1,9 @@
 //! Parser and encoder of MAVLink frames.
 //!
-//! [`Frames`] parses a datagram, [`StreamCutter`] a byte stream. Both accept MAVLink 1 and 2, check
-//! the CRC, and resynchronise on the next start marker after bytes that are not a frame. Signed
-//! frames (incompatibility flag 0x01) are accepted without a check of the signature, which
-//! `signing::Signer::believed` does. Frames with any other incompatibility flag are refused, as the
-//! MAVLink guide requires.
+//! [`Frames`] parses a datagram, [`StreamCutter`] a byte stream. Both accept MAVLink 1 and 2 and check the CRC. After
+//! bytes that are not a frame they resynchronise on the next start marker. Signed frames (incompatibility flag 0x01)
+//! are accepted without a check of the signature, which `signing::Signer::believed` does. Frames with any other
+//! incompatibility flag are refused, as the MAVLink guide requires.
 
 use mavlink::calculate_crc;
 
@@ -14,26 +13,26 @@ use super::wire::crc_extra;
 const STX_V1: u8 = 0xFE;
 /// Start marker of MAVLink 2.
 const STX_V2: u8 = 0xFD;
-/// Bytes before the payload, MAVLink 1 and 2.
+/// Length of the header before the payload in MAVLink 1 and 2, bytes.
 const HEADER_V1: usize = 6;
 const HEADER_V2: usize = 10;
 const CHECKSUM: usize = 2;
 const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
-/// The longest frame: MAVLink 2, full payload, signed.
+/// Length of the longest frame, bytes: MAVLink 2 with full payload and signature.
 pub const MAX_FRAME: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
-/// False starts in one datagram or chunk after which the rest is dropped: each costs a CRC over up
-/// to 267 bytes, so that noise takes a few microseconds at most.
+/// Number of false starts in one datagram or chunk after which the rest is dropped. Each costs a CRC over up to 267
+/// bytes. The limit bounds the time for noise to a few microseconds.
 const MAX_FALSE_STARTS: u32 = 32;
-/// Frames taken from one datagram or chunk; senders pack to an MTU, which holds fewer.
+/// Largest number of frames from one datagram or chunk. Senders pack to an MTU, which holds fewer.
 const MAX_FRAMES: u32 = 128;
 
 /// MAVLink protocol version of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
-    /// Start marker 0xFE, message numbers to 255.
+    /// MAVLink 1: start marker 0xFE, message ids up to 255.
     V1,
-    /// Start marker 0xFD, message numbers to 2²⁴ − 1, trailing zeros of the payload cut off.
+    /// MAVLink 2: start marker 0xFD, message ids up to 2²⁴ − 1, trailing zeros of the payload truncated.
     V2,
 }
 
@@ -57,9 +56,9 @@ pub struct Frame<'a> {
     pub source: Source,
     /// Message id.
     pub id: u32,
-    /// Payload as sent: MAVLink 2 truncates trailing zeros.
+    /// Payload as sent. MAVLink 2 truncates its trailing zeros.
     pub payload: &'a [u8],
-    /// Whether it carries a signature; it is not checked here.
+    /// Whether the frame has a signature. The signature is not checked here.
     pub signed: bool,
     /// The frame from its start marker to its last byte, for logs and routing.
     pub bytes: &'a [u8],
@@ -72,9 +71,9 @@ pub struct FrameCounts {
     pub good: u64,
     /// Candidates with an invalid CRC.
     pub bad_crc: u64,
-    /// Plausible frames of a message outside the dialect, whose CRC cannot be checked.
+    /// Plausible frames of messages outside the dialect, whose CRC cannot be checked.
     pub unknown: u64,
-    /// Candidates that end after the datagram.
+    /// Candidates that are longer than the rest of the datagram.
     pub truncated: u64,
     /// Candidates with an unsupported incompatibility flag.
     pub refused: u64,
@@ -99,7 +98,7 @@ impl FrameCounts {
     }
 }
 
-/// Classification of the bytes at a start marker.
+/// Classification of the bytes from a start marker on.
 enum Candidate<'a> {
     Frame(Frame<'a>),
     BadCrc,
@@ -162,9 +161,9 @@ fn examine(bytes: &[u8]) -> Candidate<'_> {
 
 /// One item found by [`Frames`].
 enum Piece<'a> {
-    /// A frame of the dialect with a valid CRC.
+    /// A frame with a valid CRC whose message is in the dialect.
     Known(Frame<'a>),
-    /// A plausible frame of a message outside the dialect: it can be forwarded, not decoded.
+    /// A plausible frame of a message outside the dialect. It can be forwarded but not decoded.
     Unknown(&'a [u8]),
 }
 
@@ -174,7 +173,7 @@ pub struct Frames<'a, 'c> {
     counts: &'c mut FrameCounts,
     frames_left: u32,
     starts_left: u32,
-    /// Whether more bytes may follow, so that an incomplete candidate is kept.
+    /// Whether more bytes may follow. An incomplete candidate is then kept.
     waits: bool,
 }
 
@@ -190,7 +189,7 @@ impl<'a, 'c> Frames<'a, 'c> {
         }
     }
 
-    /// Skips a false start: to the byte after the marker, or to the end when there were too many.
+    /// Skips a false start: one byte, or all bytes after too many false starts.
     fn false_start(&mut self) {
         match self.starts_left.checked_sub(1) {
             Some(left) => {
@@ -207,8 +206,8 @@ impl<'a, 'c> Frames<'a, 'c> {
     }
 }
 
-/// Whether a frame of `len` bytes with an unknown message ends at the end of the bytes or before another start
-/// marker. Otherwise it is taken for noise: skipping its length could drop valid frames.
+/// Whether a frame of `len` bytes with an unknown message ends at the end of the bytes or before another start marker.
+/// Otherwise it counts as noise, because skipping its length could drop valid frames.
 fn ends_well(bytes: &[u8], len: usize) -> bool {
     bytes.get(len).is_none_or(|next| matches!(*next, STX_V1 | STX_V2))
 }
@@ -269,7 +268,8 @@ impl<'a> Iterator for Frames<'a, '_> {
     }
 }
 
-/// Delivers every frame unmodified, unknown messages included, with its decoded header where known: for a router.
+/// Delivers every frame unmodified for a router, including unknown messages. Known frames come with their decoded
+/// header.
 pub fn pieces<'a>(bytes: &'a [u8], mut deliver: impl FnMut(&'a [u8], Option<Frame<'a>>)) {
     let mut counts = FrameCounts::default();
     let mut frames = Frames::new(bytes, &mut counts);
@@ -281,7 +281,7 @@ pub fn pieces<'a>(bytes: &'a [u8], mut deliver: impl FnMut(&'a [u8], Option<Fram
     }
 }
 
-/// Parses frames from a byte stream, holding less than one frame between chunks.
+/// Parses frames from a byte stream. Between chunks it buffers less than one frame.
 #[derive(Clone, Debug, Default)]
 pub struct StreamCutter {
     pending: Vec<u8>,
@@ -290,14 +290,14 @@ pub struct StreamCutter {
 }
 
 impl StreamCutter {
-    /// Takes the next chunk and delivers each completed frame.
+    /// Parses the next chunk and delivers each completed frame.
     pub fn push(&mut self, chunk: &[u8], deliver: impl FnMut(Frame<'_>)) {
         self.pending.extend_from_slice(chunk);
         self.cut(true, deliver);
     }
 
-    /// Discards an incomplete candidate, as after a silence of the stream: a false start marker must not hold back
-    /// the frames behind it.
+    /// Discards an incomplete candidate, for instance after a silence of the stream, and delivers the frames behind it.
+    /// A false start marker would otherwise delay these frames.
     pub fn flush(&mut self, deliver: impl FnMut(Frame<'_>)) {
         self.cut(false, deliver);
     }
@@ -307,13 +307,13 @@ impl StreamCutter {
         !self.pending.is_empty()
     }
 
-    /// [`StreamCutter::push`] for a router: delivers each frame's bytes, unknown messages included.
+    /// Like [`StreamCutter::push`], for a router: delivers the bytes of each frame, including unknown messages.
     pub fn push_pieces(&mut self, chunk: &[u8], deliver: impl FnMut(&[u8])) {
         self.pending.extend_from_slice(chunk);
         self.cut_pieces(true, deliver);
     }
 
-    /// [`StreamCutter::flush`] for a router.
+    /// Like [`StreamCutter::flush`], for a router.
     pub fn flush_pieces(&mut self, deliver: impl FnMut(&[u8])) {
         self.cut_pieces(false, deliver);
     }

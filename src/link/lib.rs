@@ -1,11 +1,10 @@
-//! MAVLink: addresses, transports, frames, and the two sides of the companion.
+//! MAVLink: addresses, transports, frames, and the links to the vehicle and to clients.
 //!
-//! Only the transport has sockets and a clock: elsewhere bytes and time are arguments, and bytes
-//! are return values. [`transport`] runs on tokio and passes datagrams and streams through
-//! channels. [`vehicle`] connects to the flight controller, [`client`] to ground stations and
-//! offboard programs; only `wire` uses MAVLink message types.
+//! Only the transport has sockets and a clock. All other modules take bytes and time as arguments and return bytes.
+//! [`transport`] runs on tokio and passes datagrams and streams through channels. [`vehicle`] connects to the flight
+//! controller, [`client`] to ground stations and offboard programs. Only `wire` uses MAVLink message types.
 //!
-//! How the control thread puts them together (`pilot` is any [`autopilot::Autopilot`]):
+//! Example of a control thread (`pilot` is any [`autopilot::Autopilot`]):
 //!
 //! ```no_run
 //! use std::time::Instant;

@@ -1,4 +1,4 @@
-//! An offboard client for the demonstration: the peer of [`client`](super::client).
+//! An offboard client for the demonstration, the counterpart of [`client`](super::client).
 
 use super::autopilot::Mode;
 use super::framing::{FrameCounts, Frames, Source, Version};
@@ -8,7 +8,7 @@ pub use super::wire::offboard::Heard;
 
 /// Address of the autopilot: system 1, component 1.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
-/// This client's ids: an onboard computer of the same system.
+/// Ids of this client: an onboard computer of the same system.
 const OURSELVES: Source = Source { system: 1, component: 191 };
 
 /// Command number of MAV_CMD_COMPONENT_ARM_DISARM.
@@ -16,7 +16,7 @@ pub const ARM: u32 = 400;
 /// Command number of MAV_CMD_DO_SET_MODE.
 pub const SET_MODE: u32 = 176;
 
-/// A session with one autopilot, free of sockets and clocks.
+/// A session with one autopilot, without sockets and clocks.
 #[derive(Clone, Debug, Default)]
 pub struct OffboardClient {
     sequence: u8,
@@ -24,12 +24,12 @@ pub struct OffboardClient {
 }
 
 impl OffboardClient {
-    /// Encodes a heartbeat, to be sent once a second.
+    /// Encodes a heartbeat, which is to be sent once a second.
     pub fn heartbeat(&mut self) -> Vec<u8> {
         self.frame(&offboard::heartbeat())
     }
 
-    /// Encodes an attitude setpoint: roll and pitch in rad, `time_ms` on the client's own clock.
+    /// Encodes an attitude setpoint with roll and pitch in rad. `time_ms` is the time of the client's clock, ms.
     pub fn setpoint(&mut self, time_ms: u32, roll: f64, pitch: f64) -> Vec<u8> {
         self.frame(&offboard::attitude_target(AUTOPILOT, time_ms, roll, pitch))
     }
@@ -44,7 +44,7 @@ impl OffboardClient {
         self.frame(&offboard::set_mode(AUTOPILOT, mode))
     }
 
-    /// Decodes a datagram; frames from others than the autopilot are skipped.
+    /// Decodes a datagram and passes each message to `hear`. Frames from senders other than the autopilot are skipped.
     pub fn read(&mut self, datagram: &[u8], mut hear: impl FnMut(Heard)) {
         for frame in Frames::new(datagram, &mut self.counts) {
             if frame.source == AUTOPILOT

@@ -1,21 +1,21 @@
-//! Peers of a link.
+//! Links and their peers as identifiers.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// A link of this program, numbered in the order of opening.
+/// Number of a link of this program, in the order of opening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LinkId(pub u16);
 
-/// Placeholder address of the peer on a serial wire, which has none.
+/// Placeholder for the address of the peer on a serial port, which has no address.
 pub const SERIAL: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED), 0);
 
-/// One peer on one link: a datagram's sender, one TCP connection, or the end of a serial wire.
+/// One peer on one link: the sender of datagrams, a TCP connection, or the device on a serial port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PeerId {
-    /// The link on which it was received.
+    /// The link on which the peer is reached.
     pub link: LinkId,
-    /// Its address and port.
+    /// Address and port of the peer.
     pub address: SocketAddr,
 }
 

@@ -1,5 +1,6 @@
-//! Routing between clients and a flight controller: frames for others are forwarded unmodified, to where their target
-//! was seen.
+//! Routing between clients and a flight controller.
+//!
+//! Frames for other components are forwarded unmodified to the peer from which their target was received.
 
 use std::time::Duration;
 
@@ -9,30 +10,30 @@ use super::wire::controller as wire;
 
 /// Largest number of routes.
 const MAX_ROUTES: usize = 64;
-/// Silence after which a route is removed.
+/// Time without frames after which a route is removed.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
 /// Destination of a client's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// Forwarded to the controller.
+    /// The frame is forwarded to the controller.
     Controller,
-    /// Handled here only.
+    /// The frame is only handled by this program.
     Ours,
-    /// Dropped: it would override whoever has control authority, or disclose a signing key.
+    /// The frame is dropped: it would override the holder of control authority, or disclose a signing key.
     Nowhere,
 }
 
-/// The routing table: which system and component was seen from which peer.
+/// The routing table: from which peer each system and component was received.
 #[derive(Clone, Debug, Default)]
 pub struct Router {
     routes: Vec<(Source, PeerId, Duration)>,
-    /// Number of frames withheld from the controller.
+    /// Number of clients' frames that were dropped instead of forwarded to the controller.
     pub held: u64,
 }
 
 impl Router {
-    /// Learns routes from a client's frames.
+    /// Adds a route for each sender in a client's frames.
     pub fn learn(&mut self, host: Duration, peer: PeerId, bytes: &[u8]) {
         pieces(bytes, |_, frame| {
             let Some(Frame { source, .. }) = frame else { return };
@@ -51,8 +52,8 @@ impl Router {
         self.routes.retain(|(_, at, _)| *at != peer);
     }
 
-    /// The frames of a client that are forwarded to the controller, unmodified. `us` is this program's identity,
-    /// `engaged` whether it has control authority.
+    /// The frames of a client that are forwarded to the controller, unmodified. `us` is this program's identity.
+    /// `engaged` is whether this program has control authority.
     pub fn to_controller(&mut self, bytes: &[u8], us: Source, engaged: bool) -> Vec<u8> {
         let mut on = Vec::new();
         let mut held = 0;
@@ -65,8 +66,8 @@ impl Router {
         on
     }
 
-    /// The frames of the controller that are forwarded to `peer`: broadcasts, and those for a system seen there;
-    /// never a signing key.
+    /// The frames of the controller that are forwarded to `peer`: broadcasts, and frames for a system that was received
+    /// from `peer`. A signing key is never forwarded.
     pub fn to_client(&self, bytes: &[u8], peer: PeerId) -> Vec<u8> {
         let mut on = Vec::new();
         pieces(bytes, |bytes, frame| {
@@ -93,7 +94,7 @@ impl Router {
 
 /// Destination of a client's frame.
 pub fn way(frame: Option<&Frame<'_>>, us: Source, engaged: bool) -> Way {
-    // unknown messages are not handled here
+    // this program does not handle unknown messages
     let Some(frame) = frame else { return Way::Controller };
     if frame.source == us || frame.id == wire::SETUP_SIGNING {
         return Way::Nowhere;

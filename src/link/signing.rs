@@ -1,8 +1,8 @@
-//! MAVLink 2 message signing: signs outgoing frames and verifies incoming ones.
+//! MAVLink 2 message signing: signs outgoing frames and verifies received frames.
 //!
-//! MAVLink guide: the signature is the first 48 bits of the SHA-256 of key, frame, link id and
-//! timestamp; timestamps (10 µs since 2015) increase in each stream of a sender. The codec's own
-//! signing is not used: its timestamp cannot be read, and so cannot be stored for the next start.
+//! According to the MAVLink guide, the signature is the first 48 bits of the SHA-256 of key, frame, link id and
+//! timestamp. Timestamps (10 µs since 2015) increase in each stream of a sender. The codec's signing is not used,
+//! because its timestamp cannot be read and stored for the next start.
 
 mod key;
 mod stamp;
@@ -20,17 +20,17 @@ pub use stamp::{StampError, StampFile};
 const STX: u8 = 0xFD;
 /// Incompatibility flag of a signed frame.
 const FLAG_SIGNED: u8 = 0x01;
-/// Bytes of header, checksum, signature block of MAVLink 2.
+/// Lengths of header, checksum and signature block of MAVLink 2, bytes.
 const HEADER: usize = 10;
 const CHECKSUM: usize = 2;
 const BLOCK: usize = 13;
 /// Length of the signature field in bytes.
 const SIGNATURE: usize = 6;
-/// Largest lag of the first timestamp of a new stream: a minute, in units of 10 µs.
+/// Largest lag of the first timestamp of a new stream: 1 min, in units of 10 µs.
 const MINUTE: u64 = 6_000_000;
-/// Largest number of streams remembered. Only a holder of the key can add one.
+/// Largest number of streams that are remembered. Only a holder of the key can add a stream.
 const MAX_STREAMS: usize = 1024;
-/// Largest timestamp: they have 48 bits.
+/// Largest timestamp, which has 48 bits.
 const STAMP_MAX: u64 = (1 << 48) - 1;
 /// 1 January 2015 in µs since 1970.
 const EPOCH_US: u64 = 1_420_070_400_000_000;
@@ -43,17 +43,18 @@ pub fn stamp_of(unix_us: u64) -> u64 {
 /// Counters of signed and verified frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SigningCounts {
-    /// Frames signed here.
+    /// Frames signed by this program.
     pub signed: u64,
-    /// Frames accepted with a valid signature.
+    /// Received frames with a valid signature.
     pub believed: u64,
-    /// Frames refused without a signature.
+    /// Received frames without a signature, which were refused.
     pub unsigned: u64,
-    /// Frames refused for an invalid signature: another key, or modified content.
+    /// Received frames with an invalid signature (another key or modified content), which were refused.
     pub forged: u64,
-    /// Frames refused for a timestamp that was used before or is more than a minute old.
+    /// Received frames that were refused for their timestamp: not newer than the last of its stream, or more than a
+    /// minute old in a new stream.
     pub replayed: u64,
-    /// MAVLink 1 frames not sent, as they cannot be signed.
+    /// MAVLink 1 frames that were not sent, because they cannot be signed.
     pub unsignable: u64,
 }
 
@@ -64,23 +65,23 @@ impl SigningCounts {
     }
 }
 
-/// A key with the timestamps of its streams.
+/// A signing key with the timestamps of all streams.
 #[derive(Debug)]
 pub struct Signer {
     key: Key,
-    /// The newest timestamp, sent or received.
+    /// The newest timestamp, sent or received, in units of 10 µs since 2015.
     stamp: u64,
     streams: HashMap<(u8, Source), u64>,
     counts: SigningCounts,
 }
 
 impl Signer {
-    /// A signer with `key`, starting from timestamp `stamp`.
+    /// A signer with `key` that continues from the timestamp `stamp`.
     pub fn new(key: Key, stamp: u64) -> Self {
         Signer { key, stamp, streams: HashMap::new(), counts: SigningCounts::default() }
     }
 
-    /// The newest timestamp, to be stored for the next start.
+    /// The newest timestamp in units of 10 µs since 2015, to be stored for the next start.
     pub fn stamp(&self) -> u64 {
         self.stamp
     }
@@ -90,8 +91,8 @@ impl Signer {
         self.counts
     }
 
-    /// The frames of `bytes`, each signed with link id `link` at `unix_us` (µs since 1970). A frame that is signed
-    /// already is forwarded unmodified; a MAVLink 1 frame is dropped.
+    /// The frames of `bytes`, signed with the link id `link` at `unix_us` (µs since 1970). A frame that already has a
+    /// signature stays unmodified. A MAVLink 1 frame is dropped.
     pub fn sign(&mut self, unix_us: u64, link: u8, bytes: &[u8]) -> Vec<u8> {
         let mut signed = Vec::with_capacity(bytes.len() + BLOCK);
         pieces(bytes, |frame, _| match (frame[0] == STX, frame[2] & FLAG_SIGNED != 0) {
@@ -109,8 +110,8 @@ impl Signer {
         let end = frame.len() - CHECKSUM;
         out.extend_from_slice(frame);
         out[from + 2] |= FLAG_SIGNED;
-        // The checksum is affine in the bytes that it covers: its change does not depend on the
-        // message's own extra byte, which is not known for every message.
+        // The checksum is affine in the bytes that it covers. Its change therefore does not depend on the message's
+        // CRC_EXTRA, which is not known for every message.
         let change =
             calculate_crc(&frame[1..end], 0) ^ calculate_crc(&out[from + 1..from + end], 0);
         let checksum = u16::from_le_bytes([frame[end], frame[end + 1]]) ^ change;
@@ -122,7 +123,7 @@ impl Signer {
         self.counts.signed += 1;
     }
 
-    /// The signature over the bytes before it.
+    /// The signature over the bytes `before` it.
     fn signature(&self, before: &[u8]) -> [u8; SIGNATURE] {
         let hash = Sha256::new().chain_update(self.key.bytes()).chain_update(before).finalize();
         let mut signature = [0; SIGNATURE];
@@ -130,7 +131,8 @@ impl Signer {
         signature
     }
 
-    /// The frames of `bytes` whose signature is valid at `unix_us` (µs since 1970), unmodified.
+    /// The frames of `bytes` whose signature is valid at `unix_us` (µs since 1970), unmodified. All other frames are
+    /// dropped and counted.
     pub fn believed(&mut self, unix_us: u64, bytes: &[u8]) -> Vec<u8> {
         self.stamp = self.stamp.max(stamp_of(unix_us));
         let mut believed = Vec::with_capacity(bytes.len());
@@ -186,7 +188,7 @@ mod tests {
     use super::*;
     use crate::framing::Version;
 
-    /// 21 November 2026 in µs since 1970, about.
+    /// About 21 November 2026, µs since 1970.
     const NOW: u64 = 1_795_000_000_000_000;
 
     fn key(byte: u8) -> Key {
@@ -208,7 +210,7 @@ mod tests {
         assert!(them.believed(NOW, &frames).is_empty());
         let counts = them.counts();
         assert_eq!((counts.believed, counts.replayed), (2, 2));
-        // One second later the timestamps have risen by 100,000.
+        // One second later the timestamps are larger by 100,000.
         let later = us.sign(NOW + 1_000_000, 3, &heartbeat(2));
         assert_eq!(them.believed(NOW, &later), later);
         assert_eq!(them.stamp(), stamp_of(NOW) + 100_000);
@@ -220,12 +222,12 @@ mod tests {
         assert!(them.believed(NOW, &heartbeat(0)).is_empty());
         let forged = Signer::new(key(2), 0).sign(NOW, 0, &heartbeat(0));
         assert!(them.believed(NOW, &forged).is_empty());
-        // Signed two minutes ago, by a stream that is not known here.
+        // Signed two minutes ago, by a stream that was not received before.
         let old = Signer::new(key(1), 0).sign(NOW - 120_000_000, 0, &heartbeat(0));
         assert!(them.believed(NOW, &old).is_empty());
         let counts = them.counts();
         assert_eq!((counts.unsigned, counts.forged, counts.replayed), (1, 1, 1));
-        // The link's number is signed as well.
+        // The link id is signed as well.
         let mut changed = Signer::new(key(1), 0).sign(NOW, 0, &heartbeat(0));
         let at = changed.len() - BLOCK;
         changed[at] ^= 1;
@@ -236,7 +238,7 @@ mod tests {
     #[test]
     fn a_frame_of_an_unknown_message_is_signed_and_a_signed_one_keeps_its_author() {
         let mut us = Signer::new(key(1), 0);
-        // A message number that no dialect has; the checksum covers an extra byte that we do not know.
+        // A message id that no dialect has. The CRC_EXTRA in its checksum is unknown.
         let mut unknown = vec![0xFD, 2, 0, 0, 5, 7, 1, 0x39, 0x30, 0x7F, 1, 2];
         let extra = 77;
         let checksum = calculate_crc(&unknown[1..], extra);

@@ -1,9 +1,8 @@
-//! Sockets and serial ports: all links of the program on one thread, with channels to the control
-//! thread.
+//! Sockets and serial ports: all links run on one thread, with channels to the control thread.
 //!
-//! Received bytes go into a bounded channel that the caller chooses for each link, so that the
-//! vehicle's traffic can be served before the clients'. Frames to send go into a bounded channel
-//! of the link. A full channel drops frames and counts them; no call blocks.
+//! Received bytes go into a bounded channel that the caller chooses for each link. Traffic of the vehicle can thus be
+//! served before that of the clients. Frames to send go into a bounded channel of the link. A full channel drops frames
+//! and counts them. No call blocks.
 
 mod flood;
 mod serial;
@@ -27,7 +26,7 @@ pub use serial::SerialFault;
 
 /// Capacity of a link's outgoing queue, frames.
 const OUTBOX: usize = 1024;
-/// Interval of the network thread's counted rounds.
+/// Interval between the counted rounds of the network thread.
 const ROUND: Duration = Duration::from_millis(10);
 
 /// Bytes from a peer: one datagram, or complete frames of a stream.
@@ -37,24 +36,24 @@ pub struct Packet {
     pub peer: PeerId,
     /// The received bytes.
     pub bytes: Vec<u8>,
-    /// When it arrived, host clock.
+    /// Time of arrival, host clock.
     pub arrived: Instant,
 }
 
-/// An event on a link.
+/// Event on a link.
 #[derive(Clone, Debug)]
 pub enum Arrival {
     /// Bytes were received.
     Packet(Packet),
-    /// A TCP connection is open: the peer can be sent to before it sends anything.
+    /// A TCP connection or a serial port was opened. Frames can be sent to the peer before it has sent any.
     Opened(PeerId),
     /// A TCP connection or a serial port was closed.
     Closed(PeerId),
-    /// A condition of the link to report to its user.
+    /// A condition of the link that is reported to the user.
     Remark(Remark),
 }
 
-/// A condition of a link to report to its user.
+/// A condition of a link that is reported to the user.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Remark {
     /// The serial port was disconnected.
@@ -63,7 +62,7 @@ pub enum Remark {
     /// The serial port is available again.
     #[error("serial port {0} is back")]
     Replugged(String),
-    /// Bytes are received, but no valid frame.
+    /// Bytes are received, but none of them form a valid frame.
     #[error(
         "bytes arrive on {port}, but no MAVLink frame among them: {baud} is probably not the baud \
          rate of the other end; set its port (SER_TEL2_BAUD on PX4, SERIAL2_BAUD on ArduPilot) or \
@@ -72,7 +71,7 @@ pub enum Remark {
     Noise {
         /// Name of the device.
         port: String,
-        /// Baud rate at which it is open.
+        /// Baud rate of the open port.
         baud: u32,
     },
 }
@@ -90,7 +89,7 @@ pub enum TransportError {
     InUse {
         /// Address of the link.
         address: Address,
-        /// The command-line option it came from, such as `--client`.
+        /// The command-line option that named the address, such as `--client`.
         option: &'static str,
     },
     /// The operating system refused the socket.
@@ -98,7 +97,7 @@ pub enum TransportError {
     Open {
         /// Address of the link.
         address: Address,
-        /// The command-line option it came from.
+        /// The command-line option that named the address.
         option: &'static str,
         /// The operating system's error.
         source: std::io::Error,
@@ -108,7 +107,7 @@ pub enum TransportError {
     Serial {
         /// Address of the link.
         address: Address,
-        /// The command-line option it came from.
+        /// The command-line option that named the address.
         option: &'static str,
         /// The reason, with its remedy.
         fault: SerialFault,
@@ -118,7 +117,7 @@ pub enum TransportError {
     Thread(std::io::Error),
 }
 
-/// Counters of traffic that was lost.
+/// Traffic counters of a link.
 #[derive(Debug, Default)]
 struct Counters {
     received: AtomicU64,
@@ -143,9 +142,9 @@ pub struct LinkCounts {
     pub outbox_full: u64,
     /// Frames that the operating system refused to send.
     pub send_failed: u64,
-    /// Datagrams dropped for their size.
+    /// Datagrams dropped because they were too long.
     pub oversize: u64,
-    /// Datagrams dropped by the rate limit of their sender.
+    /// Datagrams dropped by the rate limit on their sender.
     pub flooded: u64,
 }
 
@@ -153,7 +152,7 @@ fn count(counter: &AtomicU64) {
     counter.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The link as its receiving tasks use it.
+/// The link as its receiving tasks see it.
 #[derive(Clone)]
 struct Port {
     id: LinkId,
@@ -167,7 +166,7 @@ impl Port {
         PeerId { link: self.id, address }
     }
 
-    /// Passes bytes on, or drops them when the queue is full.
+    /// Queues received bytes, or drops and counts them if the queue is full.
     fn deliver(&self, address: SocketAddr, bytes: Vec<u8>) {
         count(&self.counters.received);
         let packet = Packet { peer: self.peer(address), bytes, arrived: Instant::now() };
@@ -176,8 +175,8 @@ impl Port {
         }
     }
 
-    /// Passes on that a connection was opened or closed. It waits for a full channel, off the control thread: if it
-    /// were lost, a session would outlive its connection.
+    /// Queues the opening or closing of a connection, or a remark. It waits while the channel is full, outside the
+    /// control thread. If a closing were lost, a session would outlive its connection.
     async fn announce(&self, mut arrival: Arrival) {
         while let Err(crossbeam_channel::TrySendError::Full(back)) = self.inbox.try_send(arrival) {
             arrival = back;
@@ -192,12 +191,12 @@ pub struct Network {
     rounds: Arc<AtomicU64>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
-    /// Whether the rate limit of datagram senders is off.
+    /// Whether the rate limit on datagram senders is disabled.
     takes_all: bool,
 }
 
 impl Network {
-    /// Starts the thread without links.
+    /// Starts the network thread without links.
     pub fn start() -> Result<Self, TransportError> {
         let runtime =
             Builder::new_current_thread().enable_all().build().map_err(TransportError::Thread)?;
@@ -215,18 +214,19 @@ impl Network {
         Ok(Network { handle, rounds, stop: Some(stop), thread: Some(thread), takes_all: false })
     }
 
-    /// Disables the rate limit on links opened from now on: a simulation in lockstep sends as fast as it is answered.
+    /// Disables the rate limit on links that are opened from now on. A simulation in lockstep sends as fast as it gets
+    /// replies.
     pub fn take_all(&mut self) {
         self.takes_all = true;
     }
 
-    /// Rounds of the thread, one per 10 ms while it runs: between two of them every socket was polled.
+    /// Rounds of the thread, one per 10 ms while it runs. Between two rounds every socket is polled.
     pub fn rounds(&self) -> u64 {
         self.rounds.load(Ordering::Relaxed)
     }
 
-    /// Opens a link whose arrivals go to `inbox`. Sockets are bound before this returns, so that a port in use is
-    /// reported at the start; `option` is the command-line option that the error names. A `tcpout:` link connects and
+    /// Opens a link whose arrivals go to `inbox`. Sockets are bound before the function returns, so a port in use is
+    /// reported at the start. `option` is the command-line option that the error names. A `tcpout:` link connects and
     /// reconnects by itself.
     pub fn open(
         &self,
@@ -244,7 +244,7 @@ impl Network {
             }
             _ => TransportError::Open { address: address.clone(), option, source },
         };
-        // Sockets are registered with the runtime of the thread that will serve them.
+        // Sockets are registered with the runtime of the thread that serves them.
         let _entered = self.handle.enter();
         let (local, target) = match address {
             Address::UdpIn(at) => {
@@ -280,7 +280,7 @@ impl Network {
 
 async fn go_rounds(rounds: Arc<AtomicU64>) {
     let mut due = tokio::time::interval(ROUND);
-    // After a stall the rounds that were missed stay missed.
+    // Rounds that were missed in a stall are not made up.
     due.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
         due.tick().await;
@@ -292,7 +292,7 @@ impl Drop for Network {
     fn drop(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
-            // A panic there has already been reported by its own thread.
+            // a panic of the thread has been reported by the thread
             let _ = thread.join();
         }
     }
@@ -319,12 +319,13 @@ impl Link {
         self.local
     }
 
-    /// The peer to send to before it has sent anything: the target of a `udpout:` link, or the end of a serial wire.
+    /// The peer to which frames can be sent before it has sent any: the target of a `udpout:` link or the device on a
+    /// serial port; otherwise `None`.
     pub fn target(&self) -> Option<PeerId> {
         self.target
     }
 
-    /// Queues one frame, or drops and counts it when the queue is full. Never blocks.
+    /// Queues one frame, or drops and counts it if the queue is full. Never blocks.
     pub fn send(&self, to: PeerId, frame: Vec<u8>) {
         if self.outbox.try_send((to.address, frame)).is_err() {
             count(&self.counters.outbox_full);

@@ -1,4 +1,4 @@
-//! The vehicle link: state frames in, actuator commands out.
+//! The vehicle link, which receives state frames and sends actuator commands.
 //!
 //! [`Vehicle`] is either the simulator's shim ([`sitl`]) or a real flight controller ([`real`]).
 
@@ -20,37 +20,39 @@ pub use sitl::{Sitl, VehicleCounts};
 
 pub use super::wire::sitl::Outputs;
 
-/// Standard deviations of angle of attack and sideslip from vanes, rad: typical of small aircraft.
+/// Standard deviations of angle of attack and sideslip from vanes, rad. The value is typical of small aircraft.
 pub const VANE_SD: [f64; 2] = [0.3 * std::f64::consts::PI / 180.0; 2];
 
 /// The vehicle's state at one instant, complete and in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
-    /// Time of the measurement, vehicle clock.
+    /// Vehicle time of the measurement.
     pub time: Time,
-    /// Order relative to the previous state.
+    /// Order relative to the previous state frame.
     pub order: Order,
-    /// Invalid parts of the state. Such a part keeps its last valid value, or that of the neutral state if there was none.
+    /// Invalid parts of the state. Such a part keeps its last valid value, or the neutral value before the first valid
+    /// one.
     pub faults: Faults,
-    /// The eight variables of flight.
+    /// The eight state variables: airspeed, flow angles, roll, pitch and body rates.
     pub state: State,
     /// Standard deviations of the angle of attack and the sideslip in `state`, rad.
     pub incidence_sd: [f64; 2],
     /// Yaw angle ψ, rad.
     pub yaw: f64,
-    /// Hold time of the body rates, s: a simulator keeps them constant over its step. 0 for rates sampled at the instant.
+    /// Hold time of the body rates, s. A simulator keeps them constant over its step; 0 for rates sampled at the
+    /// instant.
     pub rate_hold_s: f64,
-    /// Specific force, m/s², FRD.
+    /// Specific force along body x, y, z (forward, right, down), m/s².
     pub specific_force: [f64; 3],
-    /// Actuator positions and rates, normalised.
+    /// Actuator positions and rates: surfaces in rad and rad/s, throttle 0..1.
     pub actuators: ActuatorState,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
-    /// Latitude and longitude, degrees, last received; NaN before.
+    /// Latitude and longitude last received, degrees; NaN before the first position.
     pub position: [f64; 2],
-    /// Velocity over ground, NED, m/s, last received; NaN before.
+    /// Velocity over ground last received, NED, m/s; NaN before the first.
     pub velocity: [f64; 3],
-    /// Wind velocity, NED, m/s, last received; NaN before.
+    /// Wind velocity last received, NED, m/s; NaN before the first.
     pub wind: [f64; 3],
 }
 
@@ -59,25 +61,26 @@ pub struct Telemetry {
 pub enum Order {
     /// The first frame, or the first after a restart of the vehicle's clock.
     First,
-    /// A newer frame, after this many lost ones.
+    /// A newer frame.
     Next {
         /// Number of 10 ms frames lost before it.
         lost: u32,
     },
-    /// The previous frame again. A simulator in lockstep repeats it until it has a reply: reply, but do not process it.
+    /// The previous frame again. A simulator in lockstep repeats a frame until it gets a reply. The frame needs a reply
+    /// but must not be processed again.
     Repeated,
-    /// A frame older than one delivered already: ignore it.
+    /// A frame older than a delivered one, which must be ignored.
     Late,
 }
 
-/// What the companion demands of the vehicle at one control tick.
+/// The companion's demand on the vehicle at one control tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Commanded actuator outputs.
     pub outputs: Outputs,
-    /// Commanded roll and pitch, rad, for a controller that is commanded attitudes.
+    /// Commanded roll and pitch, rad, for a flight controller that is commanded attitudes.
     pub attitude: [f64; 2],
-    /// Fault for which control authority is to be returned; `None` to keep it.
+    /// Fault for which control authority is returned; `None` to keep control authority.
     pub fault: Option<Fault>,
 }
 
@@ -86,22 +89,22 @@ pub struct Demand {
 pub enum Notice {
     /// A text for the ground stations.
     Text(Severity, String),
-    /// The controller has given control authority.
+    /// The flight controller has given control authority.
     Engaged,
-    /// Return of control authority was requested for this reason, and is not confirmed.
+    /// Return of control authority was requested for this reason and is not confirmed yet.
     Released(String),
-    /// The flight controller has control again, for this reason. Do not engage again without a command.
+    /// The flight controller has control again, for this reason. The companion must not engage again without a command.
     HandedBack(String),
     /// System id of the flight controller, which the companion adopts as its own.
     System(u8),
 }
 
 impl Notice {
-    /// The text for the ground stations of a notice that ends the companion's control.
+    /// The text for the ground stations, if the notice ends the companion's control; otherwise `None`.
     pub fn ending(&self) -> Option<String> {
         match self {
             Notice::Released(reason) => {
-                Some(format!("hand-back asked, not confirmed yet: {reason}"))
+                Some(format!("hand-back requested, not confirmed yet: {reason}"))
             }
             Notice::HandedBack(reason) => Some(format!("handed back to the controller: {reason}")),
             Notice::Text(..) | Notice::Engaged | Notice::System(_) => None,
@@ -109,7 +112,7 @@ impl Notice {
     }
 }
 
-/// A connection to a vehicle of one of the profiles.
+/// A connection to a vehicle with one of the profiles.
 #[expect(clippy::large_enum_variant, reason = "a program has one of them, or two")]
 #[derive(Clone, Debug)]
 pub enum Vehicle {
@@ -120,8 +123,7 @@ pub enum Vehicle {
 }
 
 impl Vehicle {
-    /// Handles bytes from the link and delivers each state that they complete. `host` is the time since the program's
-    /// start.
+    /// Handles bytes from the link and delivers each completed state. `host` is the time since the program's start.
     pub fn handle(
         &mut self,
         host: Duration,
@@ -135,7 +137,7 @@ impl Vehicle {
         }
     }
 
-    /// The frames that reply to the state of `time`; empty if none are due.
+    /// The frames that reply to the state of vehicle time `time`; empty if none are due.
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         match self {
             Vehicle::Sitl(sitl) => sitl.command(time, demand.outputs),
@@ -143,7 +145,7 @@ impl Vehicle {
         }
     }
 
-    /// Frames due other than replies; `None` if there are none.
+    /// Frames other than replies that are due at `host`; `None` without such frames.
     pub fn due(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
         match self {
             Vehicle::Sitl(sitl) => sitl.heartbeat(host, outputs),
@@ -151,7 +153,7 @@ impl Vehicle {
         }
     }
 
-    /// Excludes `missed`, a stall of this computer, from all timeouts: frames of that time may still arrive.
+    /// Excludes `missed`, a stall of this computer, from all timeouts. Frames of that time may still arrive.
     pub fn excuse(&mut self, missed: Duration) {
         match self {
             Vehicle::Sitl(_) => {}
@@ -159,7 +161,7 @@ impl Vehicle {
         }
     }
 
-    /// Whether the commands are surface deflections that a flight controller passes on: their signs must be checked.
+    /// Whether the commands are surface deflections that pass through a flight controller. Their signs must be checked.
     pub fn has_channels(&self) -> bool {
         match self {
             Vehicle::Sitl(_) => false,
@@ -167,7 +169,7 @@ impl Vehicle {
         }
     }
 
-    /// Whether the companion commands the surfaces themselves, so that a recording may contain the commands as deflections.
+    /// Whether the companion commands the surfaces directly. A recording may then contain the commands as deflections.
     pub fn flies_surfaces(&self) -> bool {
         matches!(self, Vehicle::Sitl(_)) || self.has_channels()
     }
@@ -196,7 +198,7 @@ impl Vehicle {
         }
     }
 
-    /// The peer that the states come from.
+    /// The peer from which the states are received; `None` before the first frame.
     pub fn peer(&self) -> Option<PeerId> {
         match self {
             Vehicle::Sitl(sitl) => sitl.peer(),

@@ -1,4 +1,4 @@
-//! Excitations that are added to a target or a command for system identification.
+//! Excitations for system identification, which are added to a target or a command.
 
 use std::f64::consts::TAU;
 
@@ -6,9 +6,9 @@ use rand::RngExt;
 
 use greylag_num::stream::stream;
 
-/// Number of sines of a multisine.
+/// Number of sines in a multisine.
 const LINES: usize = 7;
-/// Fade-in and fade-out time of a multisine, s: a step at its ends would be an excitation of its own.
+/// Fade-in and fade-out time of a multisine, s. It avoids steps at the ends, which would be additional excitations.
 const FADE_S: f64 = 0.25;
 
 /// The excited command or target.
@@ -20,7 +20,7 @@ pub enum Axis {
     Elevator,
     /// The throttle command, 0..1.
     Throttle,
-    /// The rudder command, −1..1; without effect on an aircraft without a rudder.
+    /// The rudder command, −1..1. It has no effect on an aircraft without a rudder.
     Rudder,
     /// The roll target, rad.
     Roll,
@@ -59,9 +59,9 @@ impl Axis {
 /// Waveform of an excitation with unit amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// +1 for `width` (s), or to the end of the step.
+    /// +1 for `width` (s).
     Step {
-        /// Duration, s; infinite for the rest of the step.
+        /// Duration, s. If infinite, the excitation lasts to the end of the schedule's step.
         width: f64,
     },
     /// +1, then −1, each for `width` (s).
@@ -69,18 +69,18 @@ pub enum Shape {
         /// Duration of each part, s.
         width: f64,
     },
-    /// +1 for 3, −1 for 2, +1 for 1, −1 for 1 times `width` (s).
+    /// A 3-2-1-1: +1 for three, −1 for two, +1 for one and −1 for one times `width` (s).
     ThreeTwoOneOne {
         /// The unit duration, s.
         width: f64,
     },
-    /// Sines from `low` to `high` (Hz) with random phases, with the power of one sine of amplitude 1.
+    /// A sum of sines from `low` to `high` (Hz) with random phases and the power of one sine of amplitude 1.
     Multisine {
-        /// Lowest frequency in Hz.
+        /// Lowest frequency, Hz.
         low: f64,
-        /// Highest frequency in Hz.
+        /// Highest frequency, Hz.
         high: f64,
-        /// Seed of frequencies and phases; multisines of different seeds are independent.
+        /// Seed of frequencies and phases. Multisines of different seeds are independent.
         seed: u64,
         /// Angular frequency (rad/s) and phase (rad) of each line.
         lines: Vec<[f64; 2]>,
@@ -88,7 +88,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// A multisine from `low` to `high` (Hz) drawn from `seed`.
+    /// A multisine from `low` to `high` (Hz), drawn from `seed`.
     pub fn multisine(low: f64, high: f64, seed: u64) -> Shape {
         let mut random = stream(seed, &[3211]);
         let lines = (0..LINES)
@@ -106,30 +106,30 @@ impl Shape {
 pub struct Excitation {
     /// The excited axis.
     pub axis: Axis,
-    /// Amplitude in the axis's unit; negative reverses the sign.
+    /// Amplitude in the axis's unit. A negative amplitude reverses the sign.
     pub amplitude: f64,
-    /// Start, s after that of the step.
+    /// Start of the excitation after the start of the schedule's step, s.
     pub start: f64,
     /// Waveform of the excitation.
     pub shape: Shape,
-    /// Fraction (0..=1) of the controller's reaction on this axis that is applied during the excitation: a good
-    /// controller would cancel an excitation before the aircraft has responded. Unrelated to control authority on a
-    /// real vehicle.
+    /// Fraction (0..=1) of the controller's reaction on this axis that is applied during the excitation. With the full reaction,
+    /// a good controller would cancel the excitation before the aircraft has responded. The fraction does not concern the
+    /// control authority of a real vehicle.
     pub authority: f64,
 }
 
 impl Excitation {
-    /// `shape` on `axis` with `amplitude` (the axis's unit), `start` (s) after its step began.
+    /// `shape` on `axis` with `amplitude` (the axis's unit), from `start` (s) after the start of the schedule's step.
     pub fn new(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
         Excitation { axis, amplitude, start, shape, authority: 1.0 }
     }
 
-    /// The same with only a fraction `authority` (0..=1) of the controller's reaction.
+    /// The same excitation with only the fraction `authority` (0..=1) of the controller's reaction.
     pub fn against(self, authority: f64) -> Excitation {
         Excitation { authority, ..self }
     }
 
-    /// Duration, s; infinite to the end of the step.
+    /// Duration, s. If infinite, the excitation lasts to the end of the schedule's step.
     pub fn length(&self) -> f64 {
         match self.shape {
             Shape::Step { width } => width,
@@ -139,7 +139,7 @@ impl Excitation {
         }
     }
 
-    /// Largest absolute value, in the axis's unit.
+    /// Upper bound of the absolute value, in the axis's unit.
     pub fn peak(&self) -> f64 {
         match &self.shape {
             Shape::Multisine { lines, .. } => self.amplitude.abs() * (lines.len() as f64).sqrt(),
@@ -147,7 +147,8 @@ impl Excitation {
         }
     }
 
-    /// Its value `t` (s) after the start of a step of `duration` (s), while it lasts.
+    /// Value at `t` (s) after the start of a step of `duration` (s). `None` before the start and after the end of the
+    /// excitation.
     pub(super) fn at(&self, t: f64, duration: f64) -> Option<f64> {
         let into = t - self.start;
         if into < 0.0 || into >= self.length() {

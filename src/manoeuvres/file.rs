@@ -1,4 +1,4 @@
-//! Schedule files: TOML with steps and excitations, units in the keys.
+//! Schedule files: TOML with steps and excitations. Each key ends with its unit.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -11,12 +11,12 @@ use crate::{
 };
 use greylag_physics::airframe::{check_schema, named, toml_error};
 
-/// Highest frequency of a multisine, Hz: five samples a period at 100 Hz.
+/// Highest frequency of a multisine, Hz: five samples per period at 100 Hz.
 const FREQUENCY_MAX_HZ: f64 = 20.0;
 /// Largest amplitude of an excitation of the airspeed target, m/s.
 const AIRSPEED_AMPLITUDE_MAX_MPS: f64 = 50.0;
 
-/// A schedule cannot be used.
+/// Reason why a schedule cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ScheduleError {
     /// The file could not be read.
@@ -32,7 +32,7 @@ pub enum ScheduleError {
     Content {
         /// Path of the file.
         path: PathBuf,
-        /// The fault and its remedy.
+        /// Description of the error and its remedy.
         why: String,
     },
 }
@@ -59,7 +59,7 @@ struct StepFile {
     excitation: Vec<ExcitationFile>,
 }
 
-/// An excitation in the file; the required keys depend on axis and shape.
+/// An excitation in the file. The required keys depend on axis and shape.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct ExcitationFile {
@@ -81,18 +81,18 @@ impl Schedule {
     ///
     /// # Errors
     ///
-    /// If the file cannot be read, is not valid TOML of this schema, or exceeds the bounds of a schedule.
+    /// If the file cannot be read, is not valid TOML of this schema, or has a value outside the bounds of a schedule.
     pub fn load(path: &Path) -> Result<Schedule, ScheduleError> {
         let text = greylag_physics::text_file::read(path)
             .map_err(|why| ScheduleError::Read { path: path.into(), why })?;
         Self::parse(&text).map_err(|why| ScheduleError::Content { path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error describes the fault.
+    /// Reads a schedule from the text of a file, as [`load`](Self::load) does. The error describes the fault.
     ///
     /// # Errors
     ///
-    /// If the text is not valid TOML of this schema, or exceeds the bounds of a schedule.
+    /// If the text is not valid TOML of this schema, or has a value outside the bounds of a schedule.
     pub fn parse(text: &str) -> Result<Schedule, String> {
         let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(file.schema, 1)?;
@@ -108,7 +108,7 @@ impl Schedule {
         Schedule::new(named(file.name)?, file.description, steps)
     }
 
-    /// The text of a schedule file that parses to the same schedule.
+    /// The text of a schedule file from which `Schedule::parse` gives the same schedule.
     pub fn to_toml(&self) -> String {
         let quoted = |text: &str| toml::Value::String(text.into()).to_string();
         let mut out = format!("schema = 1\nname = {}\n", quoted(&self.name));
@@ -125,7 +125,7 @@ impl Schedule {
             );
             for excitation in &step.excitations {
                 out.push_str("[[step.excitation]]\n");
-                // a schedule holds only numbers and strings, which TOML can always write
+                // a schedule contains only numbers and strings, which TOML can always write
                 let content = toml::to_string(&ExcitationFile::from(excitation));
                 out.push_str(&content.unwrap_or_default());
             }
@@ -183,7 +183,7 @@ impl ExcitationFile {
         Ok(excitation.against(self.authority.unwrap_or(1.0)))
     }
 
-    /// The amplitude under the key for the axis's unit.
+    /// The amplitude in the axis's unit (angles in rad), from the key for this axis.
     fn amplitude(&self, axis: Axis) -> Result<f64, String> {
         let all = [
             ("amplitude", self.amplitude),
@@ -243,7 +243,7 @@ impl ExcitationFile {
     }
 }
 
-/// The first fault of `steps`, by the number of the step.
+/// Checks `steps`. The error is the first fault, with the number of its step.
 pub(super) fn check(steps: &[Step]) -> Result<(), String> {
     if steps.is_empty() {
         return Err(

@@ -1,4 +1,4 @@
-//! Complete test flights drawn from a seed: three for estimation and two for validation.
+//! Complete test flights drawn from a seed: three for training and two for validation.
 
 use rand::RngExt;
 
@@ -7,10 +7,10 @@ use crate::menu::{doublet, firm, loose, pulse, push, sines, stall};
 use crate::{Schedule, Shape, Step};
 use greylag_num::stream::{Stream, stream};
 
-/// Length of each flight, s.
+/// Length of each flight, s. Drawn steps that take longer extend it.
 pub const FLIGHT_S: f64 = 50.0;
 
-/// The three training flights of `seed`: pitch, roll with yaw, and everything at once.
+/// The three training flights of `seed`. They excite pitch, roll with yaw, and all axes at once.
 pub fn training(seed: u64) -> [Schedule; 3] {
     let flight = |k: u64, steps: fn(&mut Draw) -> Vec<Step>| {
         let name = format!("train-{k}");
@@ -19,7 +19,7 @@ pub fn training(seed: u64) -> [Schedule; 3] {
     [flight(1, along), flight(2, across), flight(3, mixed)]
 }
 
-/// The two test flights of `seed`: other manoeuvres, other times, other amplitudes.
+/// The two test flights of `seed`. Their manoeuvres, times and amplitudes differ from those of the training flights.
 pub fn testing(seed: u64) -> [Schedule; 2] {
     [1, 2].map(|k| {
         let name = format!("test-{k}");
@@ -27,7 +27,7 @@ pub fn testing(seed: u64) -> [Schedule; 2] {
     })
 }
 
-/// Random numbers with the variation of each step.
+/// Source of the random variations of the steps.
 struct Draw(Stream);
 
 impl Draw {
@@ -66,7 +66,7 @@ fn drawn(
     Schedule { name: name.into(), description: about.into(), steps }
 }
 
-/// Small sines on aileron, elevator and throttle in addition to any manoeuvre.
+/// Adds small sines on aileron, elevator and throttle to a step.
 fn shake(step: &mut Step, draw: &mut Draw) {
     let amplitudes = [(Aileron, 0.035), (Elevator, 0.03), (Throttle, 0.08)];
     for (axis, amplitude) in amplitudes {
@@ -75,14 +75,14 @@ fn shake(step: &mut Step, draw: &mut Draw) {
     }
 }
 
-/// A 3-2-1-1 on `axis` at `v` (m/s).
+/// A step with a 3-2-1-1 on `axis` at the airspeed `v` (m/s).
 fn three211(draw: &mut Draw, axis: Axis, amplitude: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width: draw.within(0.2, 0.3) };
     let amplitude = draw.about(amplitude) * draw.side();
     Step::hold(4.0, 0.0, draw.within(2.0, 5.0), v).with(loose(axis, amplitude, 0.8, shape))
 }
 
-/// Doublets of two sizes on `axis`.
+/// A step with a small and a large doublet on `axis` at the airspeed `v` (m/s).
 fn two_sizes(draw: &mut Draw, axis: Axis, v: f64) -> Step {
     let (small, large) = (draw.about(0.05), draw.about(0.38));
     let step = Step::hold(4.5, 0.0, draw.within(2.0, 5.0), v);
@@ -94,21 +94,21 @@ fn two_sizes(draw: &mut Draw, axis: Axis, v: f64) -> Step {
     ))
 }
 
-/// A step of the throttle up and down at `v` (m/s).
+/// A step with a throttle pulse up and one down at the airspeed `v` (m/s).
 fn throttle(draw: &mut Draw, v: f64) -> Step {
     let (up, down) = (draw.about(0.6), draw.about(0.5));
     let step = Step::hold(4.0, 0.0, draw.within(1.0, 5.0), v);
     step.with(pulse(Throttle, up, 0.4, 1.6)).with(pulse(Throttle, -down, 2.4, 1.4))
 }
 
-/// A fast roll to the other side with a pulse of the aileron.
+/// A fast roll to the bank on `side` (±1) with an aileron pulse.
 fn roll(draw: &mut Draw, side: f64, v: f64) -> Step {
     let (bank, amplitude) = (draw.within(32.0, 45.0), draw.about(0.3));
     let step = Step::hold(2.6, side * bank, draw.within(2.0, 6.0), v);
     step.with(firm(Aileron, side * amplitude, draw.within(0.1, 0.5), 0.4))
 }
 
-/// A pull-up in a bank, with roll excitation.
+/// A pull-up in a bank to `side` (±1) with an aileron pulse.
 fn pull(draw: &mut Draw, side: f64) -> Step {
     let (bank, amplitude) = (draw.within(40.0, 52.0), draw.about(0.25));
     let step = Step::hold(4.5, side * bank, 5.0, draw.within(20.0, 23.0));
@@ -116,7 +116,7 @@ fn pull(draw: &mut Draw, side: f64) -> Step {
     step.with(pulse(Elevator, -amplitude, 2.8, 0.4)).with(firm(Aileron, -0.2 * side, 2.8, 0.4))
 }
 
-/// Sideslip by slow aileron sines.
+/// Sideslip excited by slow aileron sines.
 fn skid(draw: &mut Draw, v: f64) -> Step {
     let amplitude = draw.about(0.35);
     Step::hold(5.5, 0.0, 4.0, v).with(sines(Aileron, amplitude, 0.45, 1.1, draw.seed()))
@@ -159,7 +159,7 @@ fn across(draw: &mut Draw) -> Vec<Step> {
     ]
 }
 
-/// Excites all axes, at three speeds, on all headings.
+/// Excites all axes at three airspeeds and several banks.
 fn mixed(draw: &mut Draw) -> Vec<Step> {
     let side = draw.side();
     let mut all = |duration: f64, roll: f64, pitch: f64, v: f64| {
@@ -188,7 +188,7 @@ fn mixed(draw: &mut Draw) -> Vec<Step> {
     steps
 }
 
-/// Random legs with doublets, sines, a roll, a slow flight and a push.
+/// Random legs with doublets and sines, then a stall, a push-over and two rolls.
 fn other(draw: &mut Draw) -> Vec<Step> {
     let mut steps = vec![Step::hold(1.5, 0.0, 3.0, 18.0)];
     for _ in 0..3 {

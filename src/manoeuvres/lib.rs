@@ -1,8 +1,8 @@
-//! Flight-test schedules: attitudes and airspeeds to hold, with excitations for system identification.
+//! Flight-test schedules: attitudes and airspeeds to be held, with excitations for system identification.
 //!
-//! A schedule is a pure function of time: [`Schedule::at`] gives the target and the excitation of the controller's
-//! command. [`Scheduled`] flies one, [`Overlay`] is its law; [`menu`] names standard manoeuvres, [`flights`] draws
-//! complete flights; the file form is [`Schedule::load`] and [`Schedule::to_toml`].
+//! A schedule is a pure function of time: [`Schedule::at`] gives the target, and the excitation of the controller's command.
+//! [`Scheduled`] flies a schedule and [`Overlay`] adds its excitation to a command. [`menu`] has standard manoeuvres by name.
+//! [`flights`] draws complete flights. [`Schedule::load`] and [`Schedule::to_toml`] read and write files.
 
 mod excitation;
 mod file;
@@ -23,24 +23,24 @@ pub const ROLL_MAX_DEG: f64 = 70.0;
 pub const PITCH_MAX_DEG: f64 = 35.0;
 /// Smallest and largest airspeed of a schedule, m/s.
 pub const AIRSPEED_MPS: [f64; 2] = [5.0, 400.0];
-/// Cruise airspeed (m/s) of the aircraft that the menu and the drawn flights are written for.
+/// Cruise airspeed of the aircraft for which the menu and the drawn flights are written, m/s.
 pub const CRUISE_MPS: f64 = 20.0;
-/// Longest schedule in seconds.
+/// Longest duration of a schedule, s.
 pub const DURATION_MAX_S: f64 = 3600.0;
 
-/// One step: an attitude and an airspeed held for a while, with excitations.
+/// One step of a schedule: an attitude and an airspeed held for a time, with excitations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// Duration of the step, s.
     pub duration: f64,
-    /// Target of the step.
+    /// Target attitude and airspeed.
     pub target: Target,
-    /// Excitations, all active during the same step.
+    /// Excitations of the step. Several may be active at the same time.
     pub excitations: Vec<Excitation>,
 }
 
 impl Step {
-    /// Holds `roll_deg`, `pitch_deg` and `airspeed_mps` for `duration_s`.
+    /// A step that holds `roll_deg`, `pitch_deg` and `airspeed_mps` for `duration_s`, without excitation.
     pub fn hold(duration_s: f64, roll_deg: f64, pitch_deg: f64, airspeed_mps: f64) -> Step {
         let target = Target {
             roll: roll_deg.to_radians(),
@@ -57,15 +57,15 @@ impl Step {
     }
 }
 
-/// Target and excitation of a schedule at a time.
+/// Target and excitation of a schedule at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// The attitude and the airspeed to hold.
+    /// The attitude and the airspeed to be held.
     pub target: Target,
     /// Excitation added to the controller's command.
     pub added: Command,
-    /// Fraction (0..=1) of the controller's reaction on aileron, elevator, throttle and rudder that is applied,
-    /// relative to its command at the start of the excitation.
+    /// Fraction (0..=1) of the controller's reaction on aileron, elevator, throttle and rudder that is applied. The reaction
+    /// is the change of the controller's command since the start of the excitation.
     pub authority: [f64; 4],
 }
 
@@ -76,7 +76,7 @@ impl Demand {
     }
 }
 
-/// A flight-test schedule; after its end the wings are level.
+/// A flight-test schedule. After its end the target is level flight at the last airspeed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     /// Name of the schedule.
@@ -87,11 +87,11 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// A schedule of `steps`.
+    /// A schedule with these `steps`.
     ///
     /// # Errors
     ///
-    /// The fault of a step, by its number: a value outside the bounds of this module.
+    /// If there is no step or a value is outside the bounds of this module. The error names the step by its number.
     pub fn new(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -101,20 +101,20 @@ impl Schedule {
         Ok(Schedule { name: name.into(), description: description.into(), steps })
     }
 
-    /// Steps of the schedule.
+    /// The steps of the schedule, in order.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// Its length in seconds.
+    /// Duration of the schedule, s.
     pub fn duration(&self) -> f64 {
         self.steps.iter().map(|step| step.duration).sum()
     }
 
     /// Target and excitation at `t` (s after the start).
     ///
-    /// Before the start it is the first step's target, after the end wings level at the last airspeed, both without
-    /// excitation.
+    /// Before the start, it is the target of the first step. After the end, it is the target of `Schedule::after`. Both
+    /// are without excitation.
     pub fn at(&self, t: f64) -> Demand {
         let mut begins = 0.0;
         for step in &self.steps {
@@ -126,14 +126,13 @@ impl Schedule {
         Demand::hold(self.after())
     }
 
-    /// The target after the end: wings level, zero pitch, the last airspeed.
+    /// The target after the end: level wings, zero pitch and the airspeed of the last step.
     pub fn after(&self) -> Target {
         let airspeed = self.steps.last().map_or(f64::NAN, |step| step.target.airspeed);
         Target { roll: 0.0, pitch: 0.0, airspeed }
     }
 
-    /// The same schedule with every excitation of a surface or the throttle multiplied by `factor`
-    /// in 0..=1.
+    /// The same schedule with every excitation of a surface or the throttle multiplied by `factor`, limited to 0..=1.
     pub fn gentler(&self, factor: f64) -> Schedule {
         let mut gentler = self.clone();
         let commands = [Axis::Aileron, Axis::Elevator, Axis::Throttle, Axis::Rudder];
@@ -143,7 +142,7 @@ impl Schedule {
         gentler
     }
 
-    /// The same schedule for an aircraft with cruise airspeed `cruise` (m/s): airspeeds are scaled from
+    /// The same schedule for an aircraft with the cruise airspeed `cruise` (m/s). All airspeeds are multiplied by its ratio to
     /// [`CRUISE_MPS`].
     pub fn at_cruise(mut self, cruise: f64) -> Schedule {
         let factor = cruise / CRUISE_MPS;
@@ -155,7 +154,7 @@ impl Schedule {
         self
     }
 
-    /// The same schedule with rudder sines in every step, drawn from `seed`.
+    /// The same schedule with a rudder multisine in every step, drawn from `seed`.
     pub fn with_rudder(mut self, seed: u64) -> Schedule {
         const AMPLITUDE: f64 = 0.12;
         for (k, step) in self.steps.iter_mut().enumerate() {

@@ -1,9 +1,9 @@
-//! Catalogue of flight-test manoeuvres, by name.
+//! Catalogue of flight-test manoeuvres by name.
 
 use crate::excitation::Axis::{self, Aileron, Elevator, Pitch, Roll, Throttle};
 use crate::{Excitation, Schedule, Shape, Step};
 
-/// Airspeeds at which speed-dependent effects are distinguished, m/s.
+/// Airspeeds at which effects that depend on airspeed are excited, m/s.
 const SPEEDS: [f64; 3] = [15.0, 19.0, 24.0];
 
 /// A manoeuvre of the menu.
@@ -25,15 +25,15 @@ impl Manoeuvre {
     }
 }
 
-/// A turn onto the opposite heading, to be flown between manoeuvres.
+/// A turn onto the opposite heading, for use between manoeuvres.
 pub const TURN: Manoeuvre = Manoeuvre {
     name: "turn",
     description: "A turn onto the opposite heading.",
-    // at 45° and 19 m/s the heading turns by 30 °/s
+    // at 45° and 19 m/s the turn rate is 30 °/s
     steps: || vec![Step::hold(6.5, 45.0, 5.0, 19.0)],
 };
 
-/// The manoeuvre with that name.
+/// The manoeuvre called `name`. `None` if the menu has no such manoeuvre.
 pub fn named(name: &str) -> Option<&'static Manoeuvre> {
     MENU.iter().find(|m| m.name == name)
 }
@@ -57,7 +57,7 @@ pub const MENU: &[Manoeuvre] = &[
     },
     Manoeuvre {
         name: "fast-multisine",
-        description: "Sines of 2 to 6 Hz on the surfaces: tells lags and delays apart.",
+        description: "Sines of 2 to 6 Hz on the surfaces: distinguishes lags from delays.",
         steps: || multisines(8.0, 2.0, 6.0, [0.20, 0.20, 0.0]),
     },
     Manoeuvre {
@@ -157,7 +157,7 @@ pub const MENU: &[Manoeuvre] = &[
     },
     Manoeuvre {
         name: "two-altitudes",
-        description: "The same doublets before and after a climb: what goes with air density.",
+        description: "The same doublets before and after a climb: what depends on air density.",
         steps: || {
             let shake = Step::hold(4.0, 0.0, 3.0, 19.0).with(doublet(Elevator, 0.15, 1.0, 0.4));
             vec![shake.clone(), Step::hold(20.0, 0.0, 25.0, 19.0), shake]
@@ -203,15 +203,15 @@ pub const MENU: &[Manoeuvre] = &[
     },
 ];
 
-/// Slows down nose up with the throttle closed into the stall, then pushes the nose down. The nose is held up for 3.2
-/// s + 0.8 s · `depth`: the menu uses 1, the drawn flights 1.7 to 2.3.
+/// Slows down into the stall with the nose up and the throttle closed, then pushes the nose down. The nose is held up for
+/// 3.2 s + 0.8 s · `depth`. The menu uses a `depth` of 1, the drawn flights use 1.7 to 2.3.
 pub(super) fn stall(depth: f64) -> Step {
     let up = 3.2 + 0.8 * depth;
     let step = Step::hold(up + 2.8, 0.0, 14.0, 12.0).with(pulse(Throttle, -1.0, 0.0, up));
     step.with(pulse(Pitch, (-20.0_f64).to_radians(), up, 1.2))
 }
 
-/// Pushes to a clearly negative angle of attack; `depth` (0..1) scales the elevator pulses.
+/// Pushes to a clearly negative angle of attack. `depth` (0..1) scales the elevator pulses.
 pub(super) fn push(depth: f64) -> Step {
     let step = Step::hold(4.0, 0.0, 10.0, 18.0);
     step.with(pulse(Elevator, 0.35 * depth, 1.2, 0.35)).with(pulse(
@@ -222,13 +222,13 @@ pub(super) fn push(depth: f64) -> Step {
     ))
 }
 
-/// A 3-2-1-1 of `axis` near level at `v` (m/s).
+/// A 3-2-1-1 on `axis` near level flight at the airspeed `v` (m/s).
 fn step_3211(axis: Axis, amplitude: f64, width: f64, pitch_deg: f64, v: f64) -> Step {
     let shape = Shape::ThreeTwoOneOne { width };
     Step::hold(7.0 * width + 4.0, 0.0, pitch_deg - 2.0, v).with(loose(axis, amplitude, 1.5, shape))
 }
 
-/// Sines on aileron, elevator and throttle at once, with slow changes of attitude.
+/// Sines on aileron, elevator and throttle at once, with slow changes of the roll target.
 fn multisines(duration: f64, low: f64, high: f64, [a, e, t]: [f64; 3]) -> Vec<Step> {
     let step = Step::hold(duration, 0.0, 3.0, 18.0);
     let step = step.with(sines(Aileron, a, low, high, 1)).with(sines(Elevator, e, low, high, 2));
@@ -236,7 +236,7 @@ fn multisines(duration: f64, low: f64, high: f64, [a, e, t]: [f64; 3]) -> Vec<St
     vec![step.with(sines(Roll, 0.2, 0.1, 0.25, 4))]
 }
 
-/// Doublets of both surfaces in turn, three widths each.
+/// Doublets of three widths, first on the elevator, then on the aileron.
 fn doublets(amplitude: f64) -> Vec<Step> {
     let on = |axis: Axis| {
         let step = Step::hold(6.0, 0.0, 3.0, 18.0);
@@ -247,31 +247,31 @@ fn doublets(amplitude: f64) -> Vec<Step> {
     vec![on(Elevator), on(Aileron)]
 }
 
-/// Fraction of the controller's reaction that is applied during surface pulses.
+/// Fraction of the controller's reaction that is applied while a surface is excited.
 const LOOSE: f64 = 0.25;
 
-/// `shape` on `axis`; on a surface with the controller's reaction reduced to [`LOOSE`].
+/// `shape` on `axis`. On aileron and elevator the controller's reaction is reduced to [`LOOSE`].
 pub(super) fn loose(axis: Axis, amplitude: f64, start: f64, shape: Shape) -> Excitation {
     let authority = if matches!(axis, Aileron | Elevator) { LOOSE } else { 1.0 };
     Excitation::new(axis, amplitude, start, shape).against(authority)
 }
 
-/// The same as [`pulse`] with the controller's full reaction: for pulses within a manoeuvre.
+/// The same as [`pulse`], but with the controller's full reaction.
 pub(super) fn firm(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     Excitation::new(axis, amplitude, start, Shape::Step { width })
 }
 
-/// +`amplitude` for `width` (s) from `start` (s) on.
+/// A pulse of `amplitude` for `width` (s) from `start` (s) on.
 pub(super) fn pulse(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     loose(axis, amplitude, start, Shape::Step { width })
 }
 
-/// ±`amplitude`, each for `width` (s), from `start` (s) on.
+/// A doublet: +`amplitude`, then −`amplitude`, each for `width` (s), from `start` (s) on.
 pub(super) fn doublet(axis: Axis, amplitude: f64, start: f64, width: f64) -> Excitation {
     loose(axis, amplitude, start, Shape::Doublet { width })
 }
 
-/// Sines from `low` to `high` (Hz) throughout.
+/// A multisine from `low` to `high` (Hz) during the whole step, with the controller's full reaction.
 pub(super) fn sines(axis: Axis, amplitude: f64, low: f64, high: f64, seed: u64) -> Excitation {
     Excitation::new(axis, amplitude, 0.0, Shape::multisine(low, high, seed))
 }

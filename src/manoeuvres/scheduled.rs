@@ -1,41 +1,42 @@
-//! A controller that flies a schedule by means of another controller.
+//! A controller that flies a schedule with another controller.
 
 use crate::{Demand, Schedule};
 use greylag_control::{Controller, Observation, Target};
 use greylag_physics::{Command, Time};
 
-/// A schedule in progress: adds its excitation to a controller's commands.
+/// A schedule in progress, whose excitation is added to a controller's commands.
 #[derive(Clone, Debug)]
 pub struct Overlay {
     schedule: Schedule,
     start: Option<Time>,
-    /// The controller's commands at the start of excitations that reduce its reaction.
+    /// The controller's commands at the start of excitations that reduce its reaction, one per control. `None` for a control
+    /// with full reaction.
     held: [Option<f64>; 4],
 }
 
 impl Overlay {
-    /// A new overlay of `schedule`.
+    /// An overlay of `schedule`, which has not started.
     pub fn new(schedule: Schedule) -> Overlay {
         Overlay { schedule, start: None, held: [None; 4] }
     }
 
-    /// Returns to the start.
+    /// Returns to the state before the start.
     pub fn reset(&mut self) {
         (self.start, self.held) = (None, [None; 4]);
     }
 
-    /// Target and excitation at `now`; the first call starts the schedule.
+    /// Target and excitation at `now`. The first call starts the schedule.
     pub fn demand(&mut self, now: Time) -> Demand {
         let start = *self.start.get_or_insert(now);
         self.schedule.at(now.since(start).as_secs_f64())
     }
 
-    /// Whether the schedule has ended at `now`.
+    /// Whether the schedule has ended at `now`. False before its start.
     pub fn is_over(&self, now: Time) -> bool {
         self.start.is_some_and(|start| now.since(start).as_secs_f64() >= self.schedule.duration())
     }
 
-    /// The command clamped to its ranges, `own` being the controller's.
+    /// The controller's command `own` with the excitation of `demand`, clamped to its ranges.
     pub fn command(&mut self, demand: &Demand, own: Command) -> Command {
         let mut of = |axis: usize, own: f64, added: f64| {
             let share = demand.authority[axis];
@@ -56,7 +57,7 @@ impl Overlay {
     }
 }
 
-/// An inner controller that tracks a schedule's targets, plus the schedule's excitation.
+/// A controller that tracks a schedule's targets with an inner controller and adds the schedule's excitation.
 ///
 /// The schedule starts with the first command after a reset.
 pub struct Scheduled {
@@ -65,7 +66,7 @@ pub struct Scheduled {
 }
 
 impl Scheduled {
-    /// A controller with `inner` and `schedule`.
+    /// A controller that flies `schedule` with `inner`.
     pub fn new(inner: Box<dyn Controller>, schedule: Schedule) -> Scheduled {
         Scheduled { inner, overlay: Overlay::new(schedule) }
     }
@@ -81,7 +82,7 @@ impl Controller for Scheduled {
         self.inner.reset(seed);
     }
 
-    /// The target is the schedule's; the argument is ignored.
+    /// Flies the schedule's target and ignores the argument.
     fn command(&mut self, seen: &Observation, _target: &Target) -> Command {
         let demand = self.overlay.demand(seen.time);
         let own = self.inner.command(seen, &demand.target);

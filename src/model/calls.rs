@@ -1,16 +1,16 @@
-//! Access to the long equations from a function: by calling the copy compiled for a scalar, or inlined.
+//! Two ways to evaluate the long equations of motion: by a call of the copy compiled for a scalar type, or inlined.
 //!
-//! Kernels that are compiled for several instruction sets inline the equations, because a called copy would not use
-//! the kernel's instruction set. Elsewhere inlining only increases the program's size and the time to compile it.
+//! Kernels that are compiled for several instruction sets inline the equations, because a called copy would not use the
+//! kernel's instruction set. In other functions inlining would only increase the program's size and the compile time.
 
 use super::{GreyBox, Residual};
 use greylag_num::Real;
 use greylag_physics::rigid_body::Vector;
 use greylag_physics::{AirData, Controls, State};
 
-/// Access to the forces of a model.
+/// Access to the forces and the residual of a model.
 pub(super) trait Forces: Copy {
-    /// Linear (m/s²) and angular (rad/s²) acceleration, body axes.
+    /// Linear acceleration (m/s²) and angular acceleration (rad/s²) in body axes.
     fn accelerations<R: Real>(
         self,
         model: &GreyBox,
@@ -18,7 +18,7 @@ pub(super) trait Forces: Copy {
         controls: &Controls<R>,
         air: &AirData<R>,
     ) -> (Vector<R>, Vector<R>);
-    /// The residual's contribution to the state's rates.
+    /// The residual's contribution to the rates of the state, per second.
     fn learned<R: Real>(
         self,
         residual: &Residual,
@@ -27,11 +27,11 @@ pub(super) trait Forces: Copy {
     ) -> State<R>;
 }
 
-/// Calls the copy for the scalar.
+/// Calls the copy compiled for the scalar type.
 #[derive(Clone, Copy)]
 pub(super) struct Called;
 
-/// Inlines all of it into the caller.
+/// Inlines the equations into the caller.
 #[derive(Clone, Copy)]
 pub(super) struct Inlined;
 

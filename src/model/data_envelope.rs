@@ -1,10 +1,9 @@
-//! Envelope of a residual's training data, with the distance of a point from it.
+//! Envelope of a residual's training data, and the distance of a point from the data.
 //!
-//! The distance is the square root of a leverage, scaled so that 99.9 % of the training samples lie within 1. The
-//! leverage is that of a linear regression on 1, the network's inputs and the units of its last hidden layer, x̂ᵀ
-//! (X̂ᵀX̂)⁻¹ x̂ over the training samples. It grows where inputs leave the range of the training data, and where
-//! units are active that were hardly active on that data; the variance of a Bayesian last layer is proportional to
-//! it.
+//! The distance is the square root of a leverage, scaled for 99.9 % of the training samples to lie within 1. The leverage is
+//! x̂ᵀ (X̂ᵀX̂)⁻¹ x̂ of a linear regression over the training samples. Its features x̂ are 1, the network's inputs and the units
+//! of its last hidden layer. The leverage grows if inputs leave the range of the training data. It also grows if units are
+//! active that were hardly active in the training data. The variance of a Bayesian last layer is proportional to it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,26 +11,26 @@ use crate::residual::INPUTS;
 use greylag_num::Dense;
 use greylag_num::dense::ON_STACK;
 
-/// Largest number of features: 1, the inputs, the widest hidden layer.
+/// Largest number of features: 1, the inputs and the widest hidden layer.
 const MOST: usize = 1 + INPUTS + ON_STACK;
 
-/// Ridge on the features' second moments, as a share of their mean, because a unit that was never active has a second
-/// moment of zero.
+/// Ridge on the features' second moments, as a fraction of their mean. It is needed because a unit that was never active has
+/// a second moment of zero.
 const RIDGE: f64 = 1e-4;
 
-/// Share of the training samples within a distance of 1.
+/// Fraction of the training samples within a distance of 1.
 const WITHIN: f64 = 0.999;
 
 /// Envelope of training data in the space of a network's features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataEnvelope {
-    /// Whitening matrix W, row-major and square: the distance of features x̂ is ‖W x̂‖.
+    /// Whitening matrix W, square, in row-major order. The distance of features x̂ is ‖W x̂‖.
     whitening: Vec<f32>,
 }
 
 impl DataEnvelope {
-    /// The envelope of `inputs`, the scaled inputs of `network` at the training samples; `None` if there are none or
-    /// one is not finite.
+    /// The envelope of `inputs`, the scaled inputs of `network` in the training samples. `None` if there are none or a value
+    /// is not finite.
     pub fn of(network: &Dense, inputs: &[[f64; INPUTS]]) -> Option<DataEnvelope> {
         let all: Vec<DVector<f64>> = inputs
             .iter()
@@ -55,10 +54,10 @@ impl DataEnvelope {
         DataEnvelope::new(scaled.iter().map(|w| *w as f32).collect(), network).ok()
     }
 
-    /// The envelope with the matrix W, row-major, for `network`.
+    /// The envelope with the matrix `whitening` (row-major) for `network`.
     ///
     /// # Errors
-    /// If its size is not that of the network's features, or an entry is not finite.
+    /// If the size of the matrix differs from the number of the network's features, or an entry is not finite.
     pub fn new(whitening: Vec<f32>, network: &Dense) -> Result<DataEnvelope, String> {
         let features = features(network, &[0.0; INPUTS]).1;
         if whitening.len() != features * features {
@@ -71,17 +70,17 @@ impl DataEnvelope {
         Ok(DataEnvelope { whitening })
     }
 
-    /// Whitening matrix W, row-major.
+    /// Whitening matrix W in row-major order.
     pub fn whitening(&self) -> &[f32] {
         &self.whitening
     }
 
-    /// Number of features: rows and columns of W.
+    /// Number of features, which is the number of rows and columns of W.
     pub fn features(&self) -> usize {
         self.whitening.len().isqrt()
     }
 
-    /// Distance of the scaled `inputs` of `network`: 99.9 % of the training samples lie within 1.
+    /// Distance of the scaled `inputs` of `network` from the training data. Within 1 lie 99.9 % of the training samples.
     pub fn distance(&self, network: &Dense, inputs: &[f64; INPUTS]) -> f64 {
         let (features, count) = features(network, inputs);
         let rows = self.whitening.chunks_exact(count);
@@ -92,7 +91,7 @@ impl DataEnvelope {
     }
 }
 
-/// Features (1, the inputs, the units of the last hidden layer) and their number.
+/// Features (1, the inputs, the units of the last hidden layer), and the number of features.
 fn features(network: &Dense, inputs: &[f64; INPUTS]) -> ([f64; MOST], usize) {
     let mut features = [0.0; MOST];
     features[0] = 1.0;
@@ -126,7 +125,7 @@ mod tests {
         assert!((beyond(&data) - 0.001).abs() < 5e-4, "{}", beyond(&data));
         let fresh: Vec<_> = (0..5000).map(|_| draw(1.0)).collect();
         assert!(beyond(&fresh) < 0.01, "{}", beyond(&fresh));
-        // each single input beyond the data is seen
+        // each input alone gives a distance above 1 beyond the data
         for k in 0..INPUTS {
             let mut point = [0.0; INPUTS];
             point[k] = 8.0;

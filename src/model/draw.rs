@@ -1,4 +1,4 @@
-//! Monte Carlo draws of models from the uncertainty of the coefficients.
+//! Monte Carlo draws of models from the uncertainty of their coefficients.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -6,11 +6,12 @@ use crate::{GreyBox, Named};
 use greylag_num::stream;
 use greylag_physics::effects::Kind;
 
-/// Number of the random stream.
+/// Number of the random stream for draws.
 const DRAWS: u64 = 40;
 
 impl GreyBox {
-    /// Physical bounds of the coefficient `name`, for an aircraft of this size.
+    /// Physical bounds of the coefficient `name` (`effect.coefficient`), for an aircraft of this size. `None` if there is no
+    /// such coefficient.
     pub fn bounds_of(&self, name: &str) -> Option<(f64, f64)> {
         let (effect, coefficient) = name.split_once('.')?;
         let about = Kind::from_id(effect)?.describe();
@@ -18,9 +19,8 @@ impl GreyBox {
         Some(self.size().bounds(found))
     }
 
-    /// Draw `k` of `seed`: every coefficient is normally distributed about its value, with its [width](Named::width)
-    /// as standard deviation, limited to its physical bounds. Mass, inertia, actuators and the residual are
-    /// unchanged.
+    /// Draw number `k` of `seed`. Every coefficient is normally distributed about its value, with its [width](Named::width) as
+    /// standard deviation, and limited to its physical bounds. Mass, inertia, actuators and the residual are unchanged.
     pub fn drawn(&self, seed: u64, k: u64) -> GreyBox {
         let mut rng = stream::stream(seed, &[DRAWS, k]);
         let draw = |c: &Named| {
@@ -50,7 +50,7 @@ mod tests {
             let values = draws.iter().map(|d| d.coefficients()[i].value - c.value);
             let square = values.map(|x| x * x).sum::<f64>() / draws.len() as f64;
             assert!(square.sqrt() <= 1.15 * c.width(), "{}", c.name);
-            // a bound may cut one side off
+            // a bound may cut off one side of the distribution
             assert!(square.sqrt() >= 0.5 * c.width(), "{}", c.name);
         }
         assert_eq!(model.drawn(7, 3).coefficients(), draws[3].coefficients());

@@ -1,15 +1,15 @@
-//! Edits of a model file's text: new values and effects, with everything else unchanged.
+//! Edits of a model file's text: new values and effects, with all other text unchanged.
 
 use crate::known::{FlightConstants, Known, SENSORS, TRIMS};
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-/// Error of editing a model file's text.
+/// Reason why the text of a model file cannot be edited.
 #[derive(Debug, thiserror::Error)]
 pub enum EditError {
     /// The text is not valid TOML.
-    #[error("cannot edit the model file: {0}; `greylag compare` tells what is wrong with it")]
+    #[error("cannot edit the model file: {0}; `greylag compare` names the fault")]
     Syntax(#[from] toml_edit::TomlError),
-    /// An entry is missing or has another type.
+    /// An entry is missing or has another type than in a model file.
     #[error("cannot edit the model file: {0} is not where a model file has it")]
     Place(String),
     /// The model already has the effect.
@@ -17,20 +17,20 @@ pub enum EditError {
     Present(String),
 }
 
-/// A number to write into a model file.
+/// A number that is to be written into a model file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Number {
     /// Name, `effect.coefficient`, as in the model file.
     pub name: String,
     /// Value in the coefficient's unit.
     pub value: f64,
-    /// Standard deviation, in the unit of the value.
+    /// Standard deviation, in the unit of the value. `None` leaves the file's unchanged.
     pub sd: Option<f64>,
-    /// Bounds in the unit of the value, if the model states its own.
+    /// Bounds in the unit of the value. `None` leaves the file's unchanged.
     pub bounds: Option<[f64; 2]>,
 }
 
-/// Changes to a model file.
+/// Changes of a model file.
 #[derive(Clone, Debug, Default)]
 pub struct Edit {
     /// New name of the model.
@@ -39,25 +39,25 @@ pub struct Edit {
     pub airframe: String,
     /// New values of existing coefficients.
     pub changed: Vec<Number>,
-    /// Coefficients of new effects, those of one effect in sequence, with the source of the effect's formula.
+    /// Coefficients of new effects. The coefficients of one effect are adjacent. Each has the source of the effect's formula.
     pub added: Vec<(Number, String)>,
     /// Coefficients set to zero, each with the effect that replaces its term.
     pub dropped: Vec<(String, &'static str)>,
-    /// Replaced texts: path of keys, outermost first, and the new text.
+    /// Replaced texts: the path of keys from the outermost, and the new text.
     pub replaced: Vec<(&'static [&'static str], &'static str)>,
-    /// Effect files outside the catalogue, relative to the new model file.
+    /// Paths of effect files outside the catalogue, relative to the new model file.
     pub effect_files: Vec<String>,
-    /// Flights that the values were fitted to, for their sources.
+    /// Flights to which the values were fitted, as text for the sources.
     pub fitted_to: String,
-    /// Constants of the installation and of flights that replace those in the file; `None` keeps the file's.
+    /// Constants of the installation and of flights that replace those in the file. `None` leaves the file's unchanged.
     pub known: Option<Known>,
 }
 
 impl Edit {
-    /// Applies the edit to `text`, a model file; comments and everything else are unchanged.
+    /// Applies the edit to `text`, the text of a model file. Comments and all other entries are unchanged.
     ///
     /// # Errors
-    /// The text is not a model file, or already has an effect to be added.
+    /// If the text is not that of a model file, or already has an effect that is to be added.
     pub fn apply(&self, text: &str) -> Result<String, EditError> {
         let mut document: DocumentMut = text.parse()?;
         for (key, new) in [("name", &self.name), ("airframe", &self.airframe)] {
@@ -133,7 +133,7 @@ impl Edit {
     }
 }
 
-/// Replaces the tables of the installation and of flights in `document` by those of `known`.
+/// Replaces the tables of the installation and of flights in `document` by the constants in `known`.
 fn write_known(document: &mut DocumentMut, known: &Known) {
     document.remove("installation");
     document.remove("flights");
@@ -174,7 +174,7 @@ fn constants(of: &FlightConstants) -> Table {
     table
 }
 
-/// Entry of the coefficient `name`.
+/// The entry of the coefficient `name`.
 fn entry<'a>(effects: &'a mut dyn TableLike, name: &str) -> Result<&'a mut Item, EditError> {
     let (id, short) = split(name)?;
     let effect = effects.get_mut(id).and_then(Item::as_table_like_mut);
@@ -207,7 +207,7 @@ fn split(name: &str) -> Result<(&str, &str), EditError> {
     name.split_once('.').ok_or_else(|| EditError::Place(name.into()))
 }
 
-/// Replaces the value `old` by `new`, with the surrounding spaces and comments unchanged.
+/// Replaces the value `old` by `new`. The surrounding spaces and comments are unchanged.
 fn replace(old: &mut Value, mut new: Value) {
     *new.decor_mut() = old.decor().clone();
     *old = new;
@@ -287,7 +287,7 @@ CLq = { value = 3.87, sd = 0.1, source = "Gryte" } # damps
         let source = dropped["source"].as_str();
         assert_eq!(source, Some("greylag amend: zero, lift_table stands in its place"));
         assert_eq!(read["effects"]["lift_stall"]["k"]["value"].as_float(), Some(1.0));
-        // amended again, the source names the last fit only
+        // after a second amendment the source names only the last fit
         let again = Edit { fitted_to: "b.csv".into(), added: Vec::new(), ..edit() };
         let read: toml::Table = toml::from_str(&again.apply(&text).unwrap()).unwrap();
         let source = read["effects"]["lift_linear"]["CLalpha"]["source"].as_str();

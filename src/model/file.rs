@@ -1,4 +1,4 @@
-//! Model files: TOML that names the effects and states every number with its source.
+//! Reader of model files: TOML that names the effects and states every number with its source.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,7 +35,7 @@ struct File {
     rigid_body: BodyFile,
     air: AirFile,
     residual: Option<String>,
-    /// Effect files and folders of them, relative to this file.
+    /// Effect files, and folders of effect files, relative to this file.
     #[serde(default)]
     effect_files: Vec<String>,
     effects: toml::Table,
@@ -91,18 +91,19 @@ struct TableFile {
 struct GridFile {
     throttle: Vec<f64>,
     airspeed_mps: Vec<f64>,
-    /// One row for each throttle.
+    /// The values, with one row per throttle.
     value: Vec<Vec<f64>>,
     #[serde(rename = "source")]
     _source: String,
 }
 
 impl GreyBox {
-    /// Reads a model file (`schema = 1`) and the airframe file it names, relative to itself.
+    /// Reads a model file (`schema = 1`) and the airframe file that it names. The path of the airframe file is relative to the
+    /// model file.
     ///
     /// # Errors
-    /// If a file cannot be read, has a syntax error or another schema, names an unknown effect or coefficient, lacks
-    /// one, or holds a number that is not physical.
+    /// If a file cannot be read, has a syntax error or another schema, names an unknown effect or coefficient, lacks a
+    /// coefficient, or has a number that is not physical.
     pub fn load(path: &Path) -> Result<GreyBox, FileError> {
         let what = "model file";
         let text = greylag_physics::text_file::read(path).map_err(|why| FileError::Read {
@@ -114,10 +115,10 @@ impl GreyBox {
         GreyBox::parse(&text, path)
     }
 
-    /// Parses the text of a model file stored, or to be stored, at `path`.
+    /// Parses the text of a model file. `path` is the file's present or intended place, to which other paths are relative.
     ///
     /// # Errors
-    /// As for [`GreyBox::load`].
+    /// The same as for [`GreyBox::load`], except that the model file itself is not read.
     pub fn parse(text: &str, path: &Path) -> Result<GreyBox, FileError> {
         let what = "model file";
         let content = |why| FileError::Content { what, path: path.into(), why };
@@ -144,11 +145,11 @@ impl GreyBox {
 }
 
 impl GreyBox {
-    /// A model from the texts of a model file and its airframe file, without files on disk. It has neither a residual
+    /// A model from the texts of a model file and its airframe file, without files on disk. The model has neither a residual
     /// nor effects from effect files.
     ///
     /// # Errors
-    /// The fault of a text, as for [`GreyBox::load`].
+    /// If a text has a fault as for [`GreyBox::load`], or names a residual or effect files.
     pub fn from_texts(model: &str, airframe: &str) -> Result<GreyBox, String> {
         let file: File = toml::from_str(model).map_err(|e| toml_error(model, &e))?;
         check_schema(file.schema, 1)?;
@@ -161,7 +162,7 @@ impl GreyBox {
     }
 }
 
-/// Range of moments of inertia of aircraft, kg m², from a few grams of mass to airliners.
+/// Accepted moments of inertia, kg m²: from aircraft of a few grams to airliners.
 const INERTIA: [f64; 2] = [1e-7, 1e9];
 
 fn inertia(field: &str, number: &Sourced) -> Result<f64, String> {
@@ -225,7 +226,7 @@ impl File {
     }
 }
 
-/// Rejects more effects with memory than a model can hold.
+/// Rejects a model with more input effects, lags or delays than a model's memory can hold.
 fn can_be_remembered(inputs: usize, terms: &[Term]) -> Result<(), String> {
     if inputs > inputs::MOST {
         return Err(format!(
@@ -280,7 +281,7 @@ impl AirFile {
     }
 }
 
-/// Coefficients and tables of one effect from its TOML table; missing ones of an effect file keep that file's values.
+/// Coefficients and tables of one effect from its TOML table. Missing coefficients have the values of their effect file.
 fn effect(
     about: &Description,
     written: Option<&Written>,
@@ -328,7 +329,7 @@ fn effect(
     Ok((named, points))
 }
 
-/// Coefficient of the effect `id` described by `about`, checked against its bounds.
+/// The coefficient described by `about` of the effect `id`, checked against its bounds for an aircraft of `size`.
 fn checked(id: &str, about: &Coefficient, number: &Sourced, size: &Size) -> Result<Named, String> {
     let name = about.name;
     let own = number.bounds.map(|[low, high]| (low, high));

@@ -1,10 +1,10 @@
 //! Forces and moments, accelerations and state rates of a model.
 //!
-//! Effects that need only the point are summed first, in separate code; a planner spends most of its time there. A
-//! model computes the input of the other effects, [`Base`], only if it has such effects.
+//! Effects that need only the point are summed first, in separate code, where a planner spends most of its time. The input
+//! of the other effects, [`Base`], is computed only if a model has such effects.
 //!
-//! Functions named `…_inlined` become part of their caller, so that a kernel compiled for several instruction sets
-//! stays within its own; other callers use the plain ones, which are compiled once.
+//! Functions with names `…_inlined` become part of their caller. A kernel compiled for several instruction sets must call
+//! only these. Other callers use the functions without this ending, which are compiled once.
 
 use super::GreyBox;
 use super::calls::{Called, Forces};
@@ -15,11 +15,11 @@ use greylag_physics::point::Base;
 use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, Point, State, Wrench};
 
-/// Fixed-point passes over the effects that depend on the state's rate. Each pass reduces the error by at least a
-/// factor of two within the bounds of `unsteady_lift`, by a factor of ten at usual values.
+/// Number of fixed-point passes over the effects that depend on the state's rate. Each pass reduces the error by at least a
+/// factor of two within the bounds of `unsteady_lift`, and by a factor of ten at usual values.
 const RATE_PASSES: usize = 4;
 
-/// Point of evaluation: state, controls, airflow.
+/// The point of evaluation: state, controls and airflow.
 #[derive(Clone, Copy)]
 struct Place<'a, R> {
     state: &'a State<R>,
@@ -27,9 +27,9 @@ struct Place<'a, R> {
     air: &'a AirData<R>,
 }
 
-/// Coefficients that weight the terms.
+/// Coefficients by which the terms are multiplied.
 pub trait Weights<R>: Copy {
-    /// Product of `amount` and the coefficient at index `place` of the model's list.
+    /// Product of `amount` and the coefficient at index `place` in the model's list.
     fn weigh(self, place: usize, amount: R) -> R;
 }
 
@@ -40,23 +40,23 @@ impl<R: Real> Weights<R> for &[Named] {
     }
 }
 
-/// Sum of terms weighted by their coefficients.
+/// Sum of terms multiplied by their coefficients.
 struct Sum<W, R> {
     weights: W,
-    /// Index of the reporting effect's first coefficient.
+    /// Index of the first coefficient of the effect that is being evaluated.
     first: usize,
     wrench: Wrench<R>,
 }
 
-/// Terms passed on with the index of their coefficient in the whole model.
+/// Passes each term on with the index of its coefficient in the model's list.
 struct Each<'a, F> {
     first: usize,
     term: &'a mut F,
 }
 
-/// Receiver of the terms of effects that start at a given index of the model's coefficients.
+/// Receiver of the terms of several effects, which is informed where each effect's coefficients start.
 pub trait Starting<R>: Terms<R> {
-    /// Announces the terms of an effect whose first coefficient has this index.
+    /// Announces the terms of the effect whose first coefficient has the index `first` in the model's list.
     fn start_at(&mut self, first: usize);
 }
 
@@ -88,7 +88,7 @@ impl<R: Real, F: FnMut(usize, Channel, R)> Starting<R> for Each<'_, F> {
     }
 }
 
-/// Evaluation points with the surfaces centred, and also without body rates.
+/// The point of evaluation with neutral surfaces, and the point with neutral surfaces and zero body rates.
 #[inline(always)]
 pub fn parted<R: Real>(
     state: &State<R>,
@@ -103,7 +103,7 @@ pub fn parted<R: Real>(
 }
 
 impl GreyBox {
-    /// Total force and moment of all effects.
+    /// Total forces (N) and moments (N m) of all effects, without gravity and the residual.
     pub fn wrench<R: Real>(
         &self,
         state: &State<R>,
@@ -128,8 +128,8 @@ impl GreyBox {
         self.with_dependent(&place, wrench).1
     }
 
-    /// Contribution of one unit of each coefficient: calls `term` with its index in
-    /// [`coefficients`](GreyBox::coefficients), a channel and the amount in N or N m.
+    /// Calls `term` with the contribution of one unit of each coefficient: the coefficient's index in
+    /// [`coefficients`](GreyBox::coefficients), a channel and the amount (N or N m).
     pub fn contributions<R: Real>(
         &self,
         state: &State<R>,
@@ -146,12 +146,12 @@ impl GreyBox {
         }
     }
 
-    /// Input of the effects that need more than the point.
+    /// Input of the effects that need more than the point: sums over the other effects.
     fn base<R: Real>(&self, place: &Place<R>) -> Base<R> {
         self.with_dependent(place, self.independent_sum(place)).0
     }
 
-    /// Reports the terms of effects that need only the point.
+    /// Passes the terms of the effects that need only the point to `terms`.
     #[inline(always)]
     fn independent_terms<R: Real>(&self, place: &Place<R>, terms: &mut impl Starting<R>) {
         let base = Base::zero();
@@ -163,7 +163,7 @@ impl GreyBox {
         }
     }
 
-    /// Reports the terms of the other effects, given their input `base`.
+    /// Passes the terms of the effects that need more than the point to `terms`. Their input is `base`.
     #[inline(always)]
     fn dependent_terms<R: Real>(
         &self,
@@ -198,8 +198,8 @@ impl GreyBox {
         Sum { weights: &self.coefficients, first: 0, wrench }
     }
 
-    /// Input of the other effects, where `independent` is the sum of those that need only the point, and the sum of
-    /// all.
+    /// Input of the effects that need more than the point, and the sum of all effects. `independent` is the sum of the
+    /// effects that need only the point.
     #[inline(always)]
     fn with_dependent<R: Real>(
         &self,
@@ -210,8 +210,8 @@ impl GreyBox {
         self.completed(place, independent, parts, self.coefficients.as_slice())
     }
 
-    /// [`with_dependent`](GreyBox::with_dependent) from `independent` and, where an effect needs them, its
-    /// [`parts`](GreyBox::parts), with the coefficients of the other effects from `weights`.
+    /// [`with_dependent`](GreyBox::with_dependent) with given [`parts`](GreyBox::parts), which are `None` if no effect needs
+    /// them. `weights` are the coefficients of the effects that need more than the point.
     #[inline(always)]
     fn completed<R: Real>(
         &self,
@@ -241,7 +241,7 @@ impl GreyBox {
         }
     }
 
-    /// Sums of the effects that need only the point with the surfaces centred, and also without body rates.
+    /// Sums of the effects that need only the point: with neutral surfaces, and with neutral surfaces and zero body rates.
     #[inline(always)]
     fn parts<R: Real>(&self, place: &Place<R>) -> [Wrench<R>; 2] {
         let mut sums = [Wrench::zero(); 2];
@@ -253,7 +253,7 @@ impl GreyBox {
         sums
     }
 
-    /// Reports the terms of effects that need only the point to `terms`; inlined into the caller.
+    /// Passes the terms of the effects that need only the point to `terms`. The code is inlined into the caller.
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn report_independent<R: Real>(
@@ -266,8 +266,8 @@ impl GreyBox {
         self.independent_terms(&Place { state, controls, air }, terms);
     }
 
-    /// [`accelerations`](GreyBox::accelerations) due to the effects that need only the point, inlined into the
-    /// caller; these are all effects if [`needs`](GreyBox::needs) is [`Needs::Point`].
+    /// [`accelerations`](GreyBox::accelerations) due to the effects that need only the point, inlined into the caller. These
+    /// are all effects if [`needs`](GreyBox::needs) is [`Needs::Point`].
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn independent_accelerations<R: Real>(
@@ -280,8 +280,8 @@ impl GreyBox {
         self.accelerations_under(&wrench, state, air)
     }
 
-    /// Sums of the effects that need only the point: unmodified, with the surfaces centred, and also without body
-    /// rates; the last two are zero if no effect needs them.
+    /// Sums of the effects that need only the point: at the point, with neutral surfaces, and with neutral surfaces and zero
+    /// body rates. The last two sums are zero if no effect needs them.
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn independent_sums<R: Real>(
@@ -298,8 +298,8 @@ impl GreyBox {
         sums
     }
 
-    /// Total force and moment from [`independent_sums`](GreyBox::independent_sums), with `weights` as the
-    /// coefficients of the other effects.
+    /// Total forces and moments from [`independent_sums`](GreyBox::independent_sums). `weights` are the coefficients of the
+    /// effects that need more than the point.
     #[cfg(feature = "learn")]
     #[inline(always)]
     pub fn whole_wrench<R: Real>(
@@ -324,8 +324,8 @@ impl GreyBox {
         })
     }
 
-    /// Linear acceleration (specific force plus gravity, body axes, m/s²) and angular acceleration
-    /// (rad/s²).
+    /// Linear acceleration (specific force plus gravity, m/s²) and angular acceleration (rad/s²) in body axes, without the
+    /// residual.
     #[inline(never)]
     pub fn accelerations<R: Real>(
         &self,
@@ -368,7 +368,7 @@ impl GreyBox {
         (acceleration, rigid_body::angular_acceleration(&body, state, moment))
     }
 
-    /// State derivative ṡ, units of [`State`] per second, at `altitude` (m).
+    /// Rate ṡ of the state at `altitude` (m), in units of [`State`] per second, including the residual.
     pub fn rate<R: Real>(
         &self,
         state: &State<R>,
@@ -378,7 +378,7 @@ impl GreyBox {
         self.rate_from(state, controls, altitude, Called)
     }
 
-    /// As `rate`, with `forces` called or inlined.
+    /// The same as `rate`, with `forces` that are called or inlined.
     #[inline(always)]
     pub(super) fn rate_from<R: Real>(
         &self,

@@ -1,4 +1,4 @@
-//! The grey-box dynamics model: physical effects with their coefficients on a rigid body, and a learned residual.
+//! The grey-box dynamics model: physical effects with coefficients on a rigid body, and a learned residual.
 
 use std::sync::Arc;
 
@@ -20,27 +20,27 @@ pub struct Named {
     pub name: String,
     /// Value, in the unit of the catalogue.
     pub value: f64,
-    /// Prior standard deviation, if the file states one; see [`Named::width`].
+    /// Prior standard deviation, in the unit of the value. `None` if the file states none, see [`Named::width`].
     pub sd: Option<f64>,
-    /// Bounds stated by the file or the user; if `None`, those of the catalogue for an aircraft of this size apply.
+    /// Bounds stated by the file or the user. If `None`, the catalogue's bounds for an aircraft of this size apply.
     pub bounds: Option<[f64; 2]>,
 }
 
-/// Id of the effect with a rudder's forces and moments.
+/// Id of the effect with the forces and moments of a rudder.
 pub const RUDDER: &str = "rudder_linear";
 
-/// Prior width of a coefficient whose file states none, as a share of its value.
+/// Prior standard deviation of a coefficient for which the file states none, as a fraction of its value.
 const WIDTH: f64 = 0.15;
 
 impl Named {
-    /// Prior standard deviation: the stated one, else 15 % of its value (`docs/explanation/diagnosis.md`, the
-    /// algebra). A coefficient of zero without a stated width is held.
+    /// Prior standard deviation: the stated one, or 15 % of the value if none is stated (`docs/explanation/diagnosis.md`, the
+    /// algebra). A coefficient of zero without a stated standard deviation is fixed.
     pub fn width(&self) -> f64 {
         self.sd.unwrap_or(WIDTH * self.value.abs())
     }
 }
 
-/// Table and grid of an effect.
+/// Table and grid of an effect. `None` if the effect has no table or no grid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Points {
     pub(super) table: Option<Table>,
@@ -48,91 +48,91 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// Combines them with the other data that belong to the effect.
+    /// Combines table and grid with the effect's shape constants and the index of its first lag.
     #[inline(always)]
     pub(super) fn own<'a>(&'a self, shape: &'a [f64], first_lag: usize) -> Own<'a> {
         Own { table: self.table.as_ref(), grid: self.grid.as_ref(), shape, first_lag }
     }
 }
 
-/// An effect of a model.
+/// An effect of a model, with its data.
 #[derive(Clone, Debug)]
 pub(super) struct Term {
     pub(super) kind: Kind,
-    /// Index of its first coefficient in the model's list.
+    /// Index of the effect's first coefficient in the model's list.
     pub(super) first: usize,
     pub(super) points: Points,
-    /// Values of its shape constants, copied from the coefficients for speed.
+    /// Values of the effect's shape constants, copied from the coefficients for speed.
     pub(super) shape: Vec<f64>,
-    /// Index of its first lag among those of the model.
+    /// Index of the effect's first lag among the lags of the model.
     pub(super) first_lag: usize,
 }
 
 impl Term {
-    /// A term whose coefficients start at index `first`.
+    /// A term whose coefficients start at index `first` in the model's list.
     pub(super) fn new(kind: Kind, first: usize, points: Points) -> Term {
         Term { kind, first, points, shape: vec![0.0; kind.describe().shape], first_lag: 0 }
     }
 }
 
-/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: physical effects on a rigid body, and
+/// Grey-box model ṡ = F_p(s, z; θ_p) + F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: physical effects F_p on a rigid body, and
 /// a learned residual F_a.
 ///
-/// The model has the parameters and equations but no flight state: all evaluations take `&self`, so one model can
-/// serve several threads. Units are SI and radians, body axes FRD. Its methods are of four kinds:
+/// The model has parameters and equations but no flight state. All evaluations take `&self`, and one model can serve
+/// several threads. Units are SI and radians, body axes FRD. Its methods are of four kinds:
 ///
-/// - Construction: [`load`](GreyBox::load) reads a model file with its airframe, [`parse`](GreyBox::parse) a text;
+/// - Construction: [`load`](GreyBox::load) reads a model file with its airframe, [`parse`](GreyBox::parse) a text.
 ///   [`join`](GreyBox::join) adds an effect.
 /// - Change of parameters: [`set_coefficient`](GreyBox::set_coefficient),
 ///   [`set_coefficients`](GreyBox::set_coefficients), [`set_body`](GreyBox::set_body),
 ///   [`set_bounds`](GreyBox::set_bounds), [`with_widths`](GreyBox::with_widths). Values are not checked against their
-///   bounds. Set mass and inertia with `set_body`, since the public `body` is computed from them and from the effects
-///   on them at each change.
+///   bounds. Mass and inertia are set with `set_body`. The public `body` is computed from them and from the effects on
+///   them at each change.
 /// - Evaluation at an instant: [`wrench`](GreyBox::wrench), [`contributions`](GreyBox::contributions),
-///   [`accelerations`](GreyBox::accelerations), [`rate`](GreyBox::rate), from the state and the deflections that act.
+///   [`accelerations`](GreyBox::accelerations), [`rate`](GreyBox::rate), from the state and the acting deflections.
 /// - Advance by one [`STEP`](crate::STEP), 0.01 s: first [`act`](GreyBox::act) converts the actuators' positions to
-///   the deflections that act, then [`step`](GreyBox::step) integrates with these held.
+///   the acting deflections, then [`step`](GreyBox::step) integrates with these deflections held.
 ///
-/// Time enters through the caller's memories alone: `act` and `step` each must be called exactly once in every
-/// [`STEP`](crate::STEP) of a run, with the [`InputMemory`] and the [`Memory`](crate::Memory) of that run. Start a
-/// run with [`at_rest`](GreyBox::at_rest) and the default integrator memory. A model without input effects and lags
-/// ([`acts_at_once`](GreyBox::acts_at_once)) needs no `act`. [`Twin`](crate::Twin) performs these calls in order for
-/// a simulated aircraft.
+/// Only the caller's memories depend on time. In every [`STEP`](crate::STEP) of a run, `act` and `step` must each be
+/// called exactly once, with the [`InputMemory`] and the [`Memory`](crate::Memory) of this run. A run starts with
+/// [`at_rest`](GreyBox::at_rest) and the default integrator memory. A model without input effects and lags
+/// ([`acts_at_once`](GreyBox::acts_at_once)) needs no `act`. [`Twin`](crate::Twin) makes these calls in order for a
+/// simulated aircraft.
 #[derive(Clone, Debug)]
 pub struct GreyBox {
     /// Name of the model, from its file.
     pub name: String,
     /// Description of the model, from its file.
     pub description: String,
-    /// SHA-256 of the files that it was read from, hexadecimal: model, residual, effect files.
+    /// SHA-256 of the model file, its residual and its effect files, hexadecimal.
     pub sha256: String,
     /// Geometry, actuators and limits of the aircraft.
     pub airframe: Airframe,
-    /// Mass and inertia including the effects on them; recomputed at each change of coefficients, see
+    /// Mass and inertia, including the effects on them. They are recomputed at each change of coefficients, see
     /// [`set_body`](GreyBox::set_body).
     pub body: RigidBody,
-    /// Mass and inertia without those effects.
+    /// Mass and inertia without the effects on them.
     pub(super) bare_body: RigidBody,
     /// Density law and gravity of the model.
     pub atmosphere: Atmosphere,
-    /// Axes of the model's aerodynamic forces.
+    /// Axes in which the model's aerodynamic forces are expressed.
     pub axes: ForceAxes,
     /// Time integration scheme.
     pub integrator: Integrator,
-    /// Learned residual F_a beside the effects, if there is one.
+    /// Learned residual F_a. `None` if the model has no residual.
     pub residual: Option<Residual>,
-    /// Effects, those that need only the point first, then sorted by their needs.
+    /// Effects, sorted by their needs: those that need only the point are first.
     pub(super) terms: Vec<Term>,
     /// Number of the terms that need only the point.
     pub(super) independent: usize,
-    /// Input effects with the index of their constant, in the order of [`inputs::Kind::ALL`].
+    /// Input effects, each with the index of its constant, in the order of [`inputs::Kind::ALL`].
     pub(super) inputs: Vec<(inputs::Kind, usize)>,
     pub(super) coefficients: Vec<Named>,
     /// Number of lags and delays in formulas, at most [`LAGS`].
     pub(super) lags: usize,
-    /// Whether the link carries no rudder command.
+    /// Whether the link has no rudder command.
     pub(super) rudder_is_left: bool,
-    /// Constants of the installation and of single flights from its file.
+    /// Constants of the installation and of single flights, from the model file.
     pub known: Arc<Known>,
 }
 
@@ -142,8 +142,8 @@ impl GreyBox {
         &self.coefficients
     }
 
-    /// Sets one coefficient by its full name; `false` if the model has none of that name. The value is not checked
-    /// against bounds, because a fit may pass through unphysical values.
+    /// Sets one coefficient by its full name (`effect.coefficient`). Returns `false` if the model has no such coefficient.
+    /// The value is not checked against bounds, because a fit may pass through unphysical values.
     pub fn set_coefficient(&mut self, name: &str, value: f64) -> bool {
         let Some(found) = self.coefficients.iter_mut().find(|c| c.name == name) else {
             return false;
@@ -153,17 +153,17 @@ impl GreyBox {
         true
     }
 
-    /// Sets all coefficients, in the order of [`coefficients`](GreyBox::coefficients), unchecked.
+    /// Sets all coefficients, in the order of [`coefficients`](GreyBox::coefficients), without a check of bounds.
     ///
     /// # Panics
-    /// If the number of `values` differs from that of the coefficients.
+    /// If the number of `values` differs from the number of coefficients.
     pub fn set_coefficients(&mut self, values: &[f64]) {
         assert_eq!(values.len(), self.coefficients.len(), "a value for each coefficient");
         self.coefficients.iter_mut().zip(values).for_each(|(c, v)| c.value = *v);
         self.renew();
     }
 
-    /// Sets mass and inertia; effects on them apply to the new values.
+    /// Sets mass and inertia. Effects on them apply to the new values.
     pub fn set_body(&mut self, body: RigidBody) {
         self.bare_body = body;
         self.renew();
@@ -174,7 +174,7 @@ impl GreyBox {
         &self.bare_body
     }
 
-    /// The largest need among the effects.
+    /// The largest need among the model's effects, without input effects.
     pub fn needs(&self) -> Needs {
         self.terms.last().map_or(Needs::Point, |term| term.kind.needs())
     }
@@ -184,7 +184,7 @@ impl GreyBox {
         self.effects().any(|about| about.id == id)
     }
 
-    /// Whether the model has a rudder that yaws the aircraft and is commanded.
+    /// Whether the model has a rudder that yaws the aircraft and that the link can command.
     pub fn has_rudder(&self) -> bool {
         let yaws = |c: &Named| c.name == "rudder_linear.Cndr" && c.value != 0.0;
         self.airframe.actuators.rudder.is_some()
@@ -192,7 +192,7 @@ impl GreyBox {
             && self.coefficients.iter().any(yaws)
     }
 
-    /// The same model with other prior standard deviations: `sd` returns that of a coefficient, or `None` to keep it.
+    /// The same model with other prior standard deviations. `sd` returns a coefficient's new one, or `None` to keep it.
     pub fn with_widths(mut self, sd: impl Fn(&Named) -> Option<f64>) -> GreyBox {
         for c in &mut self.coefficients {
             c.sd = sd(c).or(c.sd);
@@ -200,19 +200,19 @@ impl GreyBox {
         self
     }
 
-    /// Sets bounds for the coefficient `name` (`effect.coefficient`); `false` if the model has none of that name.
+    /// Sets the bounds of the coefficient `name` (`effect.coefficient`). Returns `false` if the model has no such coefficient.
     pub fn set_bounds(&mut self, name: &str, bounds: [f64; 2]) -> bool {
         let found = self.coefficients.iter_mut().find(|c| c.name == name);
         found.map(|c| c.bounds = Some(bounds)).is_some()
     }
 
-    /// Bounds of the coefficient at index `place`, described by `about` in the catalogue.
+    /// Bounds of the coefficient at index `place`, which the catalogue describes by `about`.
     pub fn bounds(&self, place: usize, about: &Coefficient) -> (f64, f64) {
         let own = self.coefficients[place].bounds;
         own.map_or_else(|| self.size().bounds(about), |[low, high]| (low, high))
     }
 
-    /// The same aircraft on a link without a rudder command; its rudder is not moved.
+    /// The same aircraft on a link without a rudder command. Its rudder does not move.
     pub fn leaving_rudder(mut self) -> GreyBox {
         self.rudder_is_left = true;
         self
@@ -224,27 +224,27 @@ impl GreyBox {
         self.terms.iter().map(|term| term.kind.describe()).chain(inputs)
     }
 
-    /// Effects that come from effect files.
+    /// The model's effects that come from effect files.
     pub fn written(&self) -> impl Iterator<Item = &'static Written> {
         self.terms.iter().filter_map(|term| term.kind.written())
     }
 
-    /// Id of an effect that a search proposed and no person has accepted, if there is one.
+    /// Id of an effect that a search proposed and no person has accepted. `None` if there is no such effect.
     pub fn proposed(&self) -> Option<&'static str> {
         self.written().find(|e| e.status == Status::Proposed).map(|e| e.about.id)
     }
 
-    /// Grid of thrust over throttle and airspeed, if there is one.
+    /// Grid of thrust over throttle and airspeed. `None` if the model has no such grid.
     pub fn thrust_grid(&self) -> Option<&Grid> {
         self.terms.iter().find_map(|t| t.points.grid.as_ref())
     }
 
-    /// Tables of the effects, with the effects' ids.
+    /// Tables of the effects, each with the effect's id.
     pub fn tables(&self) -> impl Iterator<Item = (&'static str, &Table)> {
         self.terms.iter().filter_map(|t| Some((t.kind.describe().id, t.points.table.as_ref()?)))
     }
 
-    /// Whether the model is linear in each coefficient, in their order.
+    /// Whether the model is linear in each coefficient, in the order of the coefficients.
     pub fn linear(&self) -> Vec<bool> {
         let mut linear = vec![false; self.coefficients.len()];
         for Term { kind, first, .. } in &self.terms {
@@ -279,7 +279,7 @@ impl GreyBox {
         }
     }
 
-    /// Deflections that act on the air when the actuators are measured at `controls`; must be called once every
+    /// Deflections that act on the air at the measured positions `controls`. To be called once every
     /// [`STEP`](crate::STEP).
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, memory: &mut InputMemory<R>) -> Controls<R> {
@@ -297,7 +297,7 @@ impl GreyBox {
         acting
     }
 
-    /// Initial memory of a run whose controls have settled at `controls`.
+    /// Initial memory of a run whose controls are in steady state at `controls`.
     #[inline(always)]
     pub fn at_rest<R: Real>(&self, controls: &Controls<R>) -> InputMemory<R> {
         let mut lagged = [R::zero(); LAGS];
@@ -305,7 +305,7 @@ impl GreyBox {
         InputMemory::at_rest(controls, lagged)
     }
 
-    /// Calls `of` for each lag and delay of the formulas: with its index, itself, and the shape constants of its
+    /// Calls `of` with the index of each lag and delay of the formulas, the lag or delay, and the shape constants of its
     /// effect.
     #[inline(always)]
     fn each_lag(&self, mut of: impl FnMut(usize, &Memory, &[f64])) {
@@ -317,7 +317,7 @@ impl GreyBox {
         }
     }
 
-    /// Whether the controls act as measured, independent of their past.
+    /// Whether the measured positions act directly, without dependence on past controls.
     pub fn acts_at_once(&self) -> bool {
         self.inputs.is_empty() && self.lags == 0
     }
@@ -327,7 +327,7 @@ impl GreyBox {
         self.lags
     }
 
-    /// Size of the aircraft, with which the physical bounds of the coefficients scale.
+    /// Size of the aircraft, with which the physical bounds of coefficients grow.
     pub fn size(&self) -> Size {
         Size::new(&self.bare_body, &self.airframe.geometry).lifted_at(
             self.airframe.envelope.airspeed_min_mps,
@@ -343,7 +343,7 @@ impl GreyBox {
         [1.0, 1.0, v0, 2.0 * v0 / span, 2.0 * v0 / chord, 2.0 * v0 / span, 1.0, 1.0]
     }
 
-    /// Airflow at `state` and `altitude` (m).
+    /// Air data at `state` and `altitude` (m).
     #[inline(always)]
     pub fn air<R: Real>(&self, state: &State<R>, altitude: f64) -> AirData<R> {
         let density = R::from_f64(self.atmosphere.density_at(altitude));

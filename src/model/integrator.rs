@@ -1,4 +1,4 @@
-//! Time integration: RK4, and JSBSim's scheme.
+//! Time integration of a model by RK4 or by JSBSim's scheme, and a complete simulated aircraft.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,30 +13,30 @@ use greylag_physics::{AirData, Command, Controls, State};
 /// The time step of control and simulation, s.
 pub const STEP: f64 = 0.01;
 
-/// Scheme by which a model advances by [`STEP`] with its controls held.
+/// Scheme by which a model advances by one [`STEP`] with constant controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
     /// Classical fourth-order Runge–Kutta, as in \[GSFM26\].
     Rk4,
-    /// JSBSim's default: rates and attitude by explicit Euler, velocity by Adams–Bashforth 2 in
-    /// earth axes (`FGPropagate`). It remembers the last acceleration.
+    /// JSBSim's default (`FGPropagate`): rates and attitude by explicit Euler, velocity by Adams–Bashforth 2 in earth
+    /// axes. The scheme stores the last acceleration.
     Jsbsim,
 }
 
-/// Memory of [`Integrator::Jsbsim`]: the last acceleration in the horizon frame, m/s².
+/// Memory of [`Integrator::Jsbsim`]: the last acceleration in the horizon frame, m/s². `None` at the start of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<R = f64>(Option<Vector<R>>);
 
 impl<R> Default for Memory<R> {
-    /// The memory at the start of a run.
+    /// The empty memory, for the start of a run.
     fn default() -> Self {
         Memory(None)
     }
 }
 
 impl<R: Real> Memory<R> {
-    /// Selects `then` where `chosen` is above zero, else this memory; an empty memory is replaced by the other one.
+    /// Selects `then` where `chosen` is above zero, else this memory. If one of the two is empty, selects the other one.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let (Some(mut all), Some(then)) = (self.0, then.0) else {
@@ -50,7 +50,7 @@ impl<R: Real> Memory<R> {
 }
 
 impl<R: Copy> Memory<R> {
-    /// Converts every number of the memory to another scalar.
+    /// Converts every number of the memory to another scalar type.
     #[inline(always)]
     pub fn map<S: Copy>(&self, f: impl FnMut(R) -> S) -> Memory<S> {
         match self.0 {
@@ -61,7 +61,7 @@ impl<R: Copy> Memory<R> {
 }
 
 impl GreyBox {
-    /// The state one [`STEP`] later, controls held, at `altitude` (m).
+    /// The state one [`STEP`] later, with constant controls at `altitude` (m).
     pub fn step<R: Real>(
         &self,
         state: &State<R>,
@@ -72,7 +72,7 @@ impl GreyBox {
         self.step_from(state, controls, altitude, memory, Called)
     }
 
-    /// [`step`](GreyBox::step), inlined into the caller, for kernels compiled for several instruction sets; elsewhere
+    /// [`step`](GreyBox::step) inlined into the caller, for kernels compiled for several instruction sets. In other functions
     /// it only increases the program's size.
     #[inline(always)]
     pub fn step_inlined<R: Real>(
@@ -109,7 +109,7 @@ impl GreyBox {
         forces: impl Forces,
     ) -> State<R> {
         let (mut at, mut next) = (*s, *s);
-        // step to the next stage and weight in the final sum of each slope, s
+        // per slope: the step to the next stage, and the weight in the final sum, s
         let stages = [
             (STEP / 2.0, STEP / 6.0),
             (STEP / 2.0, STEP / 3.0),
@@ -136,7 +136,7 @@ impl GreyBox {
         let air = self.air(s, altitude);
         let (mut acceleration, mut spin) = forces.accelerations(self, s, controls, &air);
         if let Some(residual) = &self.residual {
-            // this scheme uses accelerations only: the residual's φ̇ and θ̇ cannot enter it
+            // this scheme uses only accelerations, and the residual's φ̇ and θ̇ cannot enter it
             let learned = forces.learned(residual, s, controls);
             let push = rigid_body::acceleration_of(s, &air, &learned);
             for (sum, part) in acceleration.iter_mut().zip(push) {
@@ -152,8 +152,8 @@ impl GreyBox {
     }
 }
 
-/// Advances by one [`STEP`] with [`Integrator::Jsbsim`] from accelerations in body axes (m/s², rad/s²) and the last
-/// acceleration in the horizon frame, if there is one; returns the state and the acceleration to remember.
+/// Advances by one [`STEP`] with [`Integrator::Jsbsim`]. The accelerations are in body axes (m/s², rad/s²). `last` is the
+/// last acceleration in the horizon frame, `None` in the first step. Returns the state and the acceleration to be stored.
 #[inline(always)]
 pub fn advance_jsbsim<R: Real>(
     s: &State<R>,
@@ -191,19 +191,19 @@ pub fn advance_jsbsim<R: Real>(
     (next, to_heading(acceleration, turning))
 }
 
-/// One component of the velocity a step later, by Adams–Bashforth 2.
+/// One component of the velocity one step later, by Adams–Bashforth 2.
 #[inline(always)]
 fn adams_bashforth<R: Real>(velocity: R, acceleration: R, last: R) -> R {
     velocity + acceleration.scale(1.5 * STEP) - last.scale(0.5 * STEP)
 }
 
-/// Components of a horizon-frame vector for a heading changed by the angle of this sine and cosine.
+/// Components of a horizon-frame vector after a change of the heading by the angle with this sine and cosine.
 #[inline(always)]
 fn to_heading<R: Real>([n, e, d]: Vector<R>, (sin, cos): (R, R)) -> Vector<R> {
     [n * cos + e * sin, e * cos - n * sin, d]
 }
 
-/// Attitude after an explicit Euler step of the quaternion: roll, pitch, and the turn in heading.
+/// Attitude after an explicit Euler step of the quaternion: roll, pitch, and the change of heading, rad.
 #[inline(always)]
 fn euler_step_attitude<R: Real>(s: &State<R>) -> (R, R, R) {
     let (sr, cr) = s.roll.scale(0.5).sin_cos();
@@ -224,33 +224,33 @@ fn euler_step_attitude<R: Real>(s: &State<R>) -> (R, R, R) {
     (roll, pitch, turn)
 }
 
-/// A complete simulated aircraft: state, actuator filters, altitude and the integrator's memory.
+/// A complete simulated aircraft: state, actuator filters, altitude and the model's memories.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twin {
-    /// State of flight, as in [`State`].
+    /// Flight state.
     pub state: State,
     /// Actuator filters with their memories.
     pub actuators: Actuators,
     /// Altitude above mean sea level, m.
     pub altitude: f64,
     memory: Memory,
-    /// Memory of input effects and lags; `None` before the first step, until which all controls were at rest.
+    /// Memory of input effects and lags. `None` before the first step, until which all controls are at rest.
     inputs: Option<InputMemory>,
 }
 
 impl Twin {
-    /// An aircraft at `state` and `altitude` (m), actuators at zero.
+    /// An aircraft at `state` and `altitude` (m), with all controls at zero.
     pub fn new(state: State, altitude: f64) -> Twin {
         Twin::at_rest(state, &Controls::default(), altitude)
     }
 
-    /// An aircraft at `state` and `altitude` (m), with actuators and input effects settled at `controls`.
+    /// An aircraft at `state` and `altitude` (m), with actuators and input effects in steady state at `controls`.
     pub fn at_rest(state: State, controls: &Controls, altitude: f64) -> Twin {
         let actuators = Actuators::at_rest(controls);
         Twin { state, actuators, altitude, memory: Memory::default(), inputs: None }
     }
 
-    /// Advances by [`STEP`] in the simulator's order: the state is integrated with the present actuators, then the
+    /// Advances by one [`STEP`] in the simulator's order. First the state is integrated with the present actuators, then the
     /// actuators receive the command.
     pub fn step(&mut self, model: &GreyBox, command: &Command) {
         let air = model.air(&self.state, self.altitude);
@@ -264,8 +264,8 @@ impl Twin {
         self.actuators.step(command, &model.airframe.actuators);
     }
 
-    /// Specific force at the centre of gravity, body axes, m/s²: the reading of an accelerometer there. About −9.81
-    /// on z in level flight.
+    /// Specific force at the centre of gravity in body axes, m/s²: the reading of an accelerometer at that point. In level
+    /// flight its z component is about −9.81.
     pub fn specific_force(&self, model: &GreyBox) -> Vector<f64> {
         let air = model.air(&self.state, self.altitude);
         let measured = self.actuators.controls();

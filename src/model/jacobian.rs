@@ -1,15 +1,14 @@
-//! Jacobians by forward differentiation, four inputs at a time.
+//! Jacobians by forward-mode differentiation, four inputs at a time.
 //!
-//! Four derivatives fill a vector register. The model's equations are compiled for this one width instead of every
-//! number of inputs, because each further width takes the compiler seconds. Derivatives are bit-identical for every
-//! width.
+//! Four derivatives fill a vector register. The model's equations are compiled only for this number of derivatives, because
+//! each further number adds seconds to the compilation. Derivatives are bit-identical for every number.
 
 use greylag_num::{Dual, Real};
 
-/// A number with its derivatives by four inputs.
+/// A number with its derivatives with respect to four inputs.
 pub(super) type Four = Dual<4>;
 
-/// Values of `f` at `x` and rows ∂fᵢ/∂xⱼ.
+/// Values of `f` at `x`, and the Jacobian with the rows ∂fᵢ/∂xⱼ.
 pub(super) fn jacobian<const N: usize, const M: usize>(
     x: &[f64; N],
     f: impl Fn([Four; N]) -> [Four; M],

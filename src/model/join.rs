@@ -1,4 +1,4 @@
-//! Adding an effect to a model.
+//! Addition of an effect to a model.
 
 use super::grey_box::{Points, Term};
 use super::{GreyBox, Named};
@@ -6,7 +6,7 @@ use greylag_physics::actuators::LAGS;
 use greylag_physics::effects::{Coefficient, Description, Kind};
 use greylag_physics::inputs;
 
-/// Error of adding an effect to a model.
+/// Reason why an effect cannot be added to a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum JoinError {
     /// The effect does not exist.
@@ -33,7 +33,7 @@ pub enum JoinError {
         /// Name of the missing table.
         table: &'static str,
     },
-    /// A value is not possible, or their number is wrong.
+    /// A value is out of bounds, or the number of values is wrong.
     #[error("effect {id} takes {expected}; the values {values:?} do not fit")]
     Values {
         /// Id of the effect.
@@ -50,7 +50,7 @@ pub enum JoinError {
     Inputs {
         /// Name of the model.
         model: String,
-        /// Largest number possible.
+        /// Largest number of input effects.
         most: usize,
     },
     /// The model would have too many lags and delays in formulas.
@@ -60,7 +60,7 @@ pub enum JoinError {
     Lags {
         /// Name of the model.
         model: String,
-        /// Largest number possible.
+        /// Largest number of lags and delays.
         most: usize,
     },
     /// The resulting mass or inertia would be unphysical.
@@ -78,11 +78,12 @@ pub enum JoinError {
 }
 
 impl GreyBox {
-    /// Adds the effect `id` with `values` of its coefficients, in its own order. Coefficients whose term it replaces
-    /// become zero, and stay zero in a fit.
+    /// Adds the effect `id`. `values` are those of its coefficients, in the effect's order. Coefficients whose terms the effect
+    /// replaces become zero, and stay zero in a fit.
     ///
     /// # Errors
-    /// The effect is unknown, already present or needs a table, or the values are not possible.
+    /// If the effect is unknown, already present or needs a table, a value is out of bounds, the model would have too many
+    /// input effects or lags, or its mass or inertia would be unphysical.
     pub fn join(&mut self, id: &str, values: &[f64]) -> Result<(), JoinError> {
         let (about, kind) = match (Kind::from_id(id), inputs::Kind::from_id(id)) {
             (Some(kind), _) => (kind.describe(), Ok(kind)),
@@ -119,18 +120,18 @@ impl GreyBox {
         Ok(())
     }
 
-    /// Id of the effect that replaces the term of the coefficient `name`, if there is one.
+    /// Id of the effect that replaces the term of the coefficient `name`. `None` if no effect replaces it.
     pub fn replaced(&self, name: &str) -> Option<&'static str> {
         let gone = self.coefficients.iter().any(|c| c.name == name && c.value == 0.0);
         self.effects().find(|about| gone && about.replaces.contains(&name)).map(|about| about.id)
     }
 
-    /// [`join`](GreyBox::join) with the largest share of `values`, in hundredths, for which the change of the body
-    /// [is acceptable](greylag_physics::rigid_body::RigidBody::may_become): all of them, unless an estimate of mass
-    /// or inertia overshoots.
+    /// [`join`](GreyBox::join) with the largest fraction of `values` for which the change of the body
+    /// [is acceptable](greylag_physics::rigid_body::RigidBody::may_become). The fraction is in steps of 1 %. It is 100 % unless
+    /// an estimate of mass or inertia overshoots.
     ///
     /// # Errors
-    /// As [`join`](GreyBox::join).
+    /// The same as for [`join`](GreyBox::join).
     pub fn join_most(&mut self, id: &str, values: &[f64]) -> Result<(), JoinError> {
         let share = |percent: u32| {
             let mut with = self.clone();

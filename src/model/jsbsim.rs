@@ -1,4 +1,4 @@
-//! Export of a model as a JSBSim aircraft.
+//! Export of a model as a JSBSim aircraft: its files and what they omit.
 
 mod aerodynamics;
 mod conditions;
@@ -14,21 +14,21 @@ use greylag_physics::airframe::ActuatorFigures;
 use greylag_physics::rigid_body::ForceAxes;
 use greylag_physics::servos::Surface;
 
-/// Newtons per pound of force.
+/// Pound of force, N.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Length of a foot, m.
+/// Foot, m.
 const FT: f64 = 0.3048;
-/// Mass of a pound, kg.
+/// Pound of mass, kg.
 const LB: f64 = 0.453_592_37;
-/// Moment of inertia of a slug ft², kg m².
+/// Slug foot squared, kg m².
 const SLUG_FT2: f64 = 1.355_817_948_331_4;
 
-/// Files of an aircraft, by their paths below the folder with the aircraft's name.
+/// Files of an exported aircraft. Their paths are relative to the folder with the aircraft's name.
 #[derive(Clone, Debug)]
 pub struct Exported {
     /// Path and text of each file.
     pub files: Vec<(String, String)>,
-    /// Effects of the model that the export leaves out.
+    /// Properties of the model that the export omits, in words: effects, force axes, residual, rate limits.
     pub left_out: Vec<String>,
 }
 
@@ -39,28 +39,28 @@ const ELEVATOR: &str = "fcs/elevator-pos-rad";
 const RUDDER: &str = "fcs/rudder-pos-rad";
 const THROTTLE: &str = "fcs/throttle-pos-norm";
 
-/// Files of `model` as the aircraft `name` in a single condition, that of the model's airframe.
+/// Exports `model` as the aircraft `name` in a single condition, that of the model's airframe.
 pub fn export(model: &GreyBox, name: &str) -> Exported {
     written(&Conditions::one(model), name)
 }
 
-/// Files of the aircraft `name` that `models` describe in several conditions, for example flap settings.
+/// Exports the aircraft `name` that `models` describe in several conditions, for example flap settings.
 ///
 /// The models differ in their aerodynamic coefficients and in one property of their airframes' `[conditions]`. The
-/// aircraft reads that property: between two settings its aerodynamic forces and moments are interpolated, beyond the
-/// last they are constant.
+/// exported aircraft reads this property. Its aerodynamic forces and moments are interpolated between two settings. Beyond
+/// the lowest and highest setting they are constant.
 ///
 /// # Errors
-/// [`ConditionsError`], if the models differ in something else, or in no condition.
+/// [`ConditionsError`], if the models differ in another quantity, or do not differ in exactly one condition.
 pub fn export_in_conditions(models: &[GreyBox], name: &str) -> Result<Exported, ConditionsError> {
     Ok(written(&Conditions::of(models)?, name))
 }
 
-/// Effects of `model` that the export leaves out.
+/// Properties of `model` that the export omits.
 fn left_out(model: &GreyBox) -> Vec<String> {
     let effect = |full: &str| full.split('.').next().unwrap_or_default().to_owned();
     let known = |name: &str| aerodynamics::knows(name) || engine::knows(name);
-    // effects on mass and inertia are part of the exported mass and inertia
+    // the exported mass and inertia include the effects on them
     let of_body = |name: &str| name.starts_with("mass_error.") || name.starts_with("inertia_xz.");
     let lost = model
         .coefficients()
@@ -141,7 +141,7 @@ fn document(conditions: &Conditions, name: &str, [motor, thruster]: [&str; 2]) -
     out
 }
 
-/// Value of the coefficient `name`; zero if the model has none.
+/// Value of the coefficient `name`. Zero if the model has no such coefficient.
 fn coefficient(model: &GreyBox, name: &str) -> f64 {
     model.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
 }
@@ -162,7 +162,7 @@ fn controls(conditions: &Conditions, name: &str) -> String {
     out.push_str(&conditions.declaration());
     let apart = model.airframe.mixer.as_ref().and_then(|m| effectors::channels(m, figures));
     out.push_str(&apart.unwrap_or_else(|| usual_surfaces(figures)));
-    // b = k/(2 + k), k = step/lag
+    // b = k/(2 + k) with k = step/lag
     let [b, _] = figures.throttle;
     let lag = figures.step * (1.0 - b) / (2.0 * b);
     let _ = write!(
@@ -182,7 +182,7 @@ fn controls(conditions: &Conditions, name: &str) -> String {
     out
 }
 
-/// Filters of aileron, elevator and rudder on JSBSim's usual commands.
+/// Channels with the filters of aileron, elevator and rudder for JSBSim's usual commands.
 fn usual_surfaces(figures: &ActuatorFigures) -> String {
     let surfaces = [
         ("aileron", Some(&figures.aileron), AILERON),
@@ -196,7 +196,7 @@ fn usual_surfaces(figures: &ActuatorFigures) -> String {
     surfaces.into_iter().filter_map(one).collect()
 }
 
-/// Frequency (rad/s) and damping of a surface's filter, by the inverse bilinear transform.
+/// Natural frequency (rad/s) and damping ratio of a surface's filter, by the inverse bilinear transform. `step` is in s.
 fn analogue(surface: &Surface, step: f64) -> [f64; 2] {
     let [b, _, a2] = surface.filter;
     // b = w²/d, a2 = (4 − 4ζw + w²)/d, d = 4 + 4ζw + w²: 1 + a2 = (8 + 2w²)/d

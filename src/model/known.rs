@@ -1,13 +1,13 @@
-//! Constants of the sensors' installation and of single flights in a model file.
+//! Constants of a sensor installation and of single flights in a model file.
 //!
 //! ```toml
 //! [installation]                       # for every flight, unless its own entry states other axes or sensors
 //! source = "greylag amend: 3 flights"
-//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes against the body's
+//! axes_deg = [0.0, -9.2, 0.0]          # roll, pitch, yaw of the measured axes relative to the body's
 //!
 //! [flights."flight-1.csv"]
 //! source = "greylag amend"
-//! axes_deg = [0.3, -9.0, 0.1]          # in place of the installation's
+//! axes_deg = [0.3, -9.0, 0.1]          # replaces the installation's axes
 //! trims = { CL0 = 0.021, Cm0 = -0.004 }
 //! sensors = { airspeed_share = 0.01, alpha_rad = -0.002 }
 //! ```
@@ -16,51 +16,52 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-/// Names of the trims that a flight may have of its own.
+/// Names of the trims that a flight may have, as offsets of the model's coefficients.
 pub const TRIMS: [&str; 7] = ["CD0", "CL0", "CY0", "Cl0", "Cm0", "Cn0", "thrust_share"];
-/// Names of the sensor errors in the reconstructed state: a fraction of the airspeed, then offsets of body rates, α
-/// and β.
+/// Names of the sensor errors in the reconstructed state: a fraction of the airspeed, then offsets of body rates, α and
+/// β. Units are in the names.
 pub const SENSORS: [&str; 6] =
     ["airspeed_share", "p_radps", "q_radps", "r_radps", "alpha_rad", "beta_rad"];
-/// Largest rotation of the measured axes against the body axes, °; a mapping's `[board]` states larger ones.
+/// Largest rotation of the measured axes from the body axes, degrees. Larger rotations are stated in a mapping's `[board]`.
 pub const MOST_DEG: f64 = 30.0;
 
-/// Constants of a flight, or of the installation that flights share; a constant that is not stated is unknown.
+/// Constants of a flight, or of the installation that flights share. A constant that is not stated is unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlightConstants {
     /// Source of the constants.
     pub source: String,
-    /// The small rotation from body axes to the measured ones, about x, y and z of the body, °.
+    /// The small rotation from body axes to the measured axes, about x, y and z of the body, degrees.
     pub axes_deg: Option<[f64; 3]>,
-    /// Offsets of the model's coefficients, in the order of [`TRIMS`], dimensionless; absent in an installation.
+    /// Offsets of the model's coefficients, dimensionless, in the order of [`TRIMS`]. Always `None` in an installation.
     pub trims: Option<[f64; TRIMS.len()]>,
-    /// Errors of the sensors in the reconstructed state, in the order of [`SENSORS`].
+    /// Errors of the sensors in the reconstructed state, in the order and units of [`SENSORS`].
     pub sensors: Option<[f64; SENSORS.len()]>,
 }
 
-/// Constants in a model file besides those of the aircraft.
+/// Constants of installation and flights in a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
-    /// The installation.
+    /// Constants of the installation. `None` if the file has none.
     pub installation: Option<FlightConstants>,
-    /// Flights by their names.
+    /// Constants of flights, by the flights' names.
     pub flights: BTreeMap<String, FlightConstants>,
 }
 
 impl FlightConstants {
-    /// The rotation of the axes, rad; zero where none is known.
+    /// The rotation of the measured axes, rad. Zero if it is unknown.
     pub fn axes_rad(&self) -> [f64; 3] {
         self.axes_deg.unwrap_or_default().map(f64::to_radians)
     }
 }
 
 impl Known {
-    /// Whether nothing is known.
+    /// Whether the file has no constants of an installation or a flight.
     pub fn is_empty(&self) -> bool {
         self.installation.is_none() && self.flights.is_empty()
     }
 
-    /// Constants of `flight`: its own; axes and sensor errors that it does not state are those of the installation.
+    /// Constants of `flight`. Axes and sensor errors that its entry does not state are those of the installation. `None` if
+    /// there are neither.
     pub fn of(&self, flight: &str) -> Option<FlightConstants> {
         let shared = self.installation.as_ref();
         let Some(own) = self.flights.get(flight) else { return shared.cloned() };
@@ -70,13 +71,13 @@ impl Known {
         Some(own)
     }
 
-    /// Whether `flight` has constants of its own.
+    /// Whether the file has an entry for `flight`.
     pub fn names(&self, flight: &str) -> bool {
         self.flights.contains_key(flight)
     }
 }
 
-/// Constants as a model file has them.
+/// Constants in the form of a model file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ConstantsFile {
@@ -122,7 +123,7 @@ fn constants(place: &str, written: ConstantsFile) -> Result<FlightConstants, Str
     })
 }
 
-/// The `values` in the order of `names`, zero where one is absent.
+/// The `values` in the order of `names`. Absent values are zero.
 fn named<const N: usize>(
     place: &str,
     key: &str,

@@ -1,4 +1,4 @@
-//! The linear model about a flight condition, with exact derivatives.
+//! Linear model of one step about a flight condition, with exact derivatives.
 
 use nalgebra::SMatrix;
 
@@ -9,13 +9,14 @@ use greylag_num::{Dual, Real, each};
 use greylag_physics::{Controls, State};
 
 const STATES: usize = 8;
-/// States and controls.
+/// Number of inputs: states and controls.
 const INPUTS: usize = 12;
 
-/// Linear model of one step of 0.01 s about a condition: δs₊ = a δs + b δz, z = (δa, δe, δt, δr).
+/// Linear model of one step of 0.01 s about a condition: δs₊ = a δs + b δz with z = (δa, δe, δt, δr). Units are rad, m/s, rad/s
+/// and throttle 0..1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linear {
-    /// Jacobian ∂s₊/∂s, states in the order of eq. (4).
+    /// Jacobian ∂s₊/∂s, with states in the order of eq. (4).
     pub a: SMatrix<f64, 8, 8>,
     /// Jacobian ∂s₊/∂(δa, δe, δt, δr).
     pub b: SMatrix<f64, 8, 4>,
@@ -23,15 +24,15 @@ pub struct Linear {
 
 /// Linearises one step of `model` about `trim` at `altitude` (m).
 ///
-/// The integrator's memory is taken as steady: its last acceleration equals the present one. The controls are those
-/// that act; the model's input effects (lag, delay, dead zone) are left out, since they have their own memory.
+/// The integrator's memory is taken as steady: its last acceleration equals the present one. The controls are the acting
+/// deflections and throttle. The model's input effects (lag, delay, dead zone) are omitted, because they have their own memory.
 pub fn linearise(model: &GreyBox, trim: &Trim, altitude: f64) -> Linear {
     linearise_step(model, &trim.state, &trim.controls, altitude)
 }
 
-/// Linearises one step about any state, steady or not.
+/// Linearises one step of `model` about any state, steady or not, at `altitude` (m).
 ///
-/// No multiply-add is fused, so that all processors give bit-identical results.
+/// No multiply-add is fused. The results of all processors are therefore bit-identical.
 pub fn linearise_step(
     model: &GreyBox,
     state: &State,
@@ -54,7 +55,7 @@ pub fn linearise_step(
     Linear { a, b }
 }
 
-/// Rows of the Jacobian of a step, all twelve inputs at once: planners spend most of their time here.
+/// Rows of the Jacobian of a step, with all twelve inputs at once. Planners spend most of their time in this function.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn in_avx2(model: &GreyBox, x: &[f64; INPUTS], altitude: f64) -> [[f64; INPUTS]; STATES] {
@@ -67,7 +68,7 @@ fn in_avx2(model: &GreyBox, x: &[f64; INPUTS], altitude: f64) -> [[f64; INPUTS];
     each(next, |component| component.gradient)
 }
 
-/// Eight states, then aileron, elevator, throttle and rudder.
+/// The inputs of a step: eight states, then aileron, elevator, throttle and rudder.
 pub(super) fn inputs(state: &State, controls: &Controls) -> [f64; INPUTS] {
     let mut x = [controls.rudder; INPUTS];
     x[..STATES].copy_from_slice(&state.to_array());
@@ -79,7 +80,7 @@ pub(super) fn inputs(state: &State, controls: &Controls) -> [f64; INPUTS] {
     x
 }
 
-/// State and controls of [`inputs`].
+/// State and controls of an array from [`inputs`].
 #[inline(always)]
 pub(super) fn split<R: Copy>(x: [R; INPUTS]) -> (State<R>, Controls<R>) {
     let state = State::from_array([x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]]);
@@ -87,7 +88,7 @@ pub(super) fn split<R: Copy>(x: [R; INPUTS]) -> (State<R>, Controls<R>) {
     (state, Controls { aileron, elevator, throttle, rudder, lagged: None })
 }
 
-/// The Jacobian's parts by the states and by the controls.
+/// The parts of the Jacobian with respect to the states and to the controls.
 pub(super) fn matrices(
     rows: [[f64; INPUTS]; STATES],
 ) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 4>) {
@@ -113,7 +114,7 @@ mod tests {
                     model.step(&state, &controls, 100.0, &mut Memory::default()).to_array()
                 });
                 let linear = linearise_step(&model, &state, &trim.controls, 100.0);
-                // where no processor of the test has AVX2 both are the same code
+                // on a processor without AVX2 both are the same code
                 assert_eq!((linear.a, linear.b), matrices(rows), "{file}");
                 state.roll += 0.2;
                 state.alpha += 0.03 * f64::from(turn);

@@ -1,4 +1,4 @@
-//! Natural modes of steady level flight, with names and time constants.
+//! Natural modes of steady straight flight, with names, frequencies and time constants.
 
 use nalgebra::{Complex, Matrix4, SMatrix};
 use serde::Serialize;
@@ -11,12 +11,12 @@ use super::{GreyBox, Trim, TrimError};
 const LONGITUDINAL: [usize; 4] = [1, 2, 4, 6];
 const LATERAL: [usize; 4] = [0, 3, 5, 7];
 
-/// Continuous-time linear model about a condition: δṡ = a δs + b δz, z = (δa, δe, δt, δr).
+/// Continuous-time linear model about a condition: δṡ = a δs + b δz with z = (δa, δe, δt, δr).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rates {
-    /// Jacobian ∂ṡ/∂s, states in the order of eq. (4), 1/s.
+    /// Jacobian ∂ṡ/∂s, with states in the order of eq. (4), in units of the state per second and unit of the state.
     pub a: SMatrix<f64, 8, 8>,
-    /// Jacobian ∂ṡ/∂(δa, δe, δt, δr).
+    /// Jacobian ∂ṡ/∂(δa, δe, δt, δr), in units of the state per second and rad, or per unit of throttle.
     pub b: SMatrix<f64, 8, 4>,
 }
 
@@ -25,12 +25,12 @@ pub struct Rates {
 pub struct Mode {
     /// Usual name of the mode.
     pub name: &'static str,
-    /// Eigenvalue, 1/s; for a pair the one with the positive imaginary part.
+    /// Eigenvalue, 1/s. A complex pair is represented by the eigenvalue with the positive imaginary part.
     #[serde(serialize_with = "parts")]
     pub eigenvalue: Complex<f64>,
 }
 
-/// Serialises real and imaginary part.
+/// Serialises the real and the imaginary part.
 fn parts<S: serde::Serializer>(x: &Complex<f64>, to: S) -> Result<S::Ok, S::Error> {
     [x.re, x.im].serialize(to)
 }
@@ -41,23 +41,23 @@ impl Mode {
         self.eigenvalue.im > 0.0
     }
 
-    /// Natural frequency of the mode, rad/s.
+    /// Natural frequency of the mode, rad/s: the magnitude of its eigenvalue.
     pub fn frequency(&self) -> f64 {
         self.eigenvalue.norm()
     }
 
-    /// Damping ratio; negative for a divergent oscillation.
+    /// Damping ratio. Negative for a divergent oscillation.
     pub fn damping(&self) -> f64 {
         -self.eigenvalue.re / self.eigenvalue.norm()
     }
 
-    /// Time constant of decay, s; negative for divergence.
+    /// Time constant of decay, s. Negative for divergence.
     pub fn time_constant(&self) -> f64 {
         -1.0 / self.eigenvalue.re
     }
 }
 
-/// Linearises the rates of `model` about `trim` at `altitude` (m).
+/// Linearises the state rates of `model` about `trim` at `altitude` (m).
 pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
     let (_, rows) = jacobian(&inputs(&trim.state, &trim.controls), |x| {
         let (state, controls) = split(x);
@@ -67,14 +67,14 @@ pub fn rates(model: &GreyBox, trim: &Trim, altitude: f64) -> Rates {
     Rates { a, b }
 }
 
-/// Modes of straight flight at `airspeed` (m/s) and `altitude` (m): longitudinal, then lateral.
+/// Modes of straight flight at `airspeed` (m/s) and `altitude` (m): first longitudinal, then lateral.
 ///
 /// # Errors
-/// If the model cannot fly straight there.
+/// If the model has no straight-flight trim at this airspeed, or its linear model is not finite.
 pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>, TrimError> {
     let trim = Trim::straight(model, airspeed, altitude)?;
     let a = rates(model, &trim, altitude).a;
-    // the eigenvalue iteration does not end on NaN
+    // the eigenvalue iteration would not end on a NaN
     if !a.iter().all(|x| x.is_finite()) {
         return Err(TrimError {
             model: model.name.clone(),
@@ -90,10 +90,10 @@ pub fn modes(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Vec<Mode>,
     Ok(all)
 }
 
-/// Eigenvalues from fast to slow, for pairs the one with the positive imaginary part.
+/// Eigenvalues from fast to slow. A complex pair is represented by the eigenvalue with the positive imaginary part.
 fn eigenvalues(a: &Matrix4<f64>) -> Vec<Complex<f64>> {
     let mut all: Vec<Complex<f64>> = a.complex_eigenvalues().iter().copied().collect();
-    // rounding may leave a real one a trace of an imaginary part
+    // rounding may leave a small imaginary part in a real eigenvalue
     for x in &mut all {
         if x.im.abs() < 1e-9 * x.norm() {
             x.im = 0.0;
@@ -143,7 +143,7 @@ mod tests {
         let modes = modes(&model, 25.0, 100.0).unwrap();
         let names: Vec<_> = modes.iter().map(|m| m.name).collect();
         assert_eq!(names, ["short period", "phugoid", "roll", "Dutch roll", "spiral"]);
-        // Lanchester: the phugoid's frequency is sqrt(2) g / V; the book's roll damping gives
+        // by Lanchester the phugoid's frequency is sqrt(2) g / V, and the roll time constant from the textbook's damping is
         // 1/Lp = Jx 4 V / (rho V^2 S b^2 |Clp|), about 0.05 s
         let (phugoid, roll) = (&modes[1], &modes[2]);
         assert!((phugoid.frequency() / (2.0_f64.sqrt() * 9.806 / 25.0) - 1.0).abs() < 0.25);

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::jacobian::{Four, jacobian};
 
-/// Root of `f` near `start`; `None` if it does not converge in 60 damped steps.
+/// Root of `f` near `start`. `None` if the iteration does not converge in 60 steps.
 ///
-/// `largest` limits the step of each unknown, so that a poor start does not leave the region in which the equations
-/// are valid. Convergence: every residual below 1e-10.
+/// Convergence means that every residual is below 1e-10. `largest` limits the step of each unknown. Without this limit, a
+/// poor start could leave the region in which the equations are valid.
 pub(super) fn solve<const N: usize>(
     start: [f64; N],
     largest: [f64; N],

@@ -1,28 +1,28 @@
-//! Plausibility of an aircraft's measures, to detect wrong units.
+//! Plausibility checks of an aircraft's measures, which detect wrong units.
 //!
-//! H. Tennekes, "The Simple Science of Flight", 2nd ed., 2009: from insects to airliners the wing loading (N/m²) is near
-//! 47 times the cube root of the weight (N), within a factor of a few.
+//! From insects to airliners, the wing loading (N/m²) is near 47 times the cube root of the weight (N), within a factor of a
+//! few: H. Tennekes, "The Simple Science of Flight", 2nd ed., 2009.
 
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
 /// Factor of Tennekes' line, N^(2/3)/m².
 const LINE: f64 = 47.0;
-/// Wing loading relative to the line: a human-powered aircraft has 0.07, a supersonic fighter 2.4.
+/// Plausible wing loadings relative to Tennekes' line. A human-powered aircraft has 0.07, a supersonic fighter 2.4.
 const LOADING: [f64; 2] = [0.04, 6.0];
 /// Plausible aspect ratios of straight wings.
 const ASPECT: [f64; 2] = [2.0, 40.0];
-/// Plausible Reynolds numbers of the mean chord for textbook formulas of subsonic wings.
+/// Plausible Reynolds numbers of the mean chord, for which textbook formulas of subsonic wings are valid.
 const REYNOLDS: [f64; 2] = [1.5e4, 2e8];
 /// Kinematic viscosity of air at sea level, m²/s.
 const VISCOSITY: f64 = 1.46e-5;
-/// Plausible static thrust over weight.
+/// Plausible ratios of static thrust to weight.
 const THRUST: [f64; 2] = [0.03, 4.0];
-/// Plausible pitch speed over the airspeed of level flight at a lift coefficient of 0.6.
+/// Plausible ratios of the pitch speed to the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: [f64; 2] = [1.0, 12.0];
-/// Plausible static thrust times pitch speed per kilogram, W/kg.
+/// Plausible products of static thrust and pitch speed per mass, W/kg.
 const POWER: [f64; 2] = [5.0, 5000.0];
 
-/// Frequently confused units, with the factor to kg, m or m².
+/// Units that are often confused: the unit, the index of mass, span or area, and the factor to kg, m or m².
 const SLIPS: [(&str, usize, f64); 8] = [
     ("g", 0, 1e-3),
     ("t", 0, 1e3),
@@ -33,10 +33,10 @@ const SLIPS: [(&str, usize, f64); 8] = [
     ("mm²", 2, 1e-6),
     ("ft²", 2, 0.0929),
 ];
-/// Options with the units that they expect.
+/// Command-line options for mass, span and area, with their units.
 const OPTIONS: [(&str, &str); 3] = [("--mass-kg", "kg"), ("--span-m", "m"), ("--area-m2", "m²")];
 
-/// Mass (kg), span (m) and wing area (m²) of an aircraft.
+/// Mass, span and wing area of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     /// Total mass, kg.
@@ -58,7 +58,7 @@ impl Size {
         (2.0 * self.weight() / (SEA_LEVEL_DENSITY * self.area * 0.6)).sqrt()
     }
 
-    /// Why the measures are implausible, with the value that was probably meant; `None` if they are plausible.
+    /// Reason why the measures are implausible, with the value that was probably meant. `None` if they are plausible.
     pub fn doubt(self) -> Option<String> {
         let what = self.odd()?;
         let value = |place: usize, size: Size| [size.mass, size.span, size.area][place];
@@ -80,7 +80,7 @@ impl Size {
         Some(format!("{what}: {}", meant.unwrap_or_else(check)))
     }
 
-    /// Implausible property of these measures, in words.
+    /// Implausible property of these measures, in words. `None` if there is none.
     fn odd(self) -> Option<String> {
         let aspect = self.span * self.span / self.area;
         let loading = self.weight() / self.area / (LINE * self.weight().cbrt());
@@ -105,7 +105,7 @@ impl Size {
         })
     }
 
-    /// Why a propulsion of this static thrust (N) and pitch speed (m/s) is implausible for the aircraft; `None` if it
+    /// Reason why a propulsion with this static thrust (N) and pitch speed (m/s) is implausible for the aircraft. `None` if it
     /// is plausible.
     pub fn doubt_of_thrust(self, thrust: f64, pitch_speed: f64) -> Option<String> {
         let share = thrust / self.weight();
@@ -139,7 +139,7 @@ fn outside(x: f64, [least, most]: [f64; 2]) -> bool {
     !(least..=most).contains(&x)
 }
 
-/// Text with three significant figures, without trailing zeros.
+/// The number as text with three significant figures, without trailing zeros.
 fn short(x: f64) -> String {
     let places = (2 - x.abs().log10().floor() as i32).clamp(0, 9) as usize;
     let text = format!("{x:.places$}");
@@ -187,8 +187,8 @@ mod tests {
         let size = Size { mass: 2.1, span: 1.6, area: 0.32 };
         assert_eq!(size.doubt_of_thrust(10.0, 25.0), None);
         assert!(size.doubt_of_thrust(0.5, 25.0).unwrap().contains("9.81 N"));
-        // a pitch speed in km/h passes, because some propellers reach that figure in m/s; ten times that figure does
-        // not
+        // a pitch speed in km/h is accepted, because some propellers reach the same number in m/s. Ten times this number is
+        // rejected.
         assert!(size.doubt_of_thrust(10.0, 900.0).unwrap().contains("--pitch-speed-mps"));
     }
 }

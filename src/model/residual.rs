@@ -1,4 +1,4 @@
-//! Learned residual F_a(s, z; θ_a): a small network that adds what the physical effects lack, eq. (19) of \[GSFM26\].
+//! Learned residual F_a(s, z; θ_a), eq. (19) of \[GSFM26\]: a small network that adds to the rates of the physical effects.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,17 +16,17 @@ use greylag_physics::{Airframe, Controls, State};
 
 /// Inputs of the network: V, p, q, r, α, β, then δa, δe, δt.
 ///
-/// Roll and pitch are left out on purpose: attitude acts on the aircraft through gravity alone, which the physical
-/// part models exactly, so a residual learned in one attitude is valid in every other.
+/// Roll and pitch are not inputs. Attitude acts on the aircraft only through gravity, which the physical part models
+/// exactly. A residual learned in one attitude is therefore valid in every other.
 pub const INPUTS: usize = 9;
 
-/// Outputs of the network: the rates of the state, in units of x_c a second.
+/// Number of outputs of the network: the rates of the eight states, in units of x_c (eq. 21) per second.
 pub const OUTPUTS: usize = 8;
 
-/// Name of a file's tensor with the envelope of the training data.
+/// Name of the tensor with the envelope of the training data in a residual's file.
 const ENVELOPE: &str = "data_envelope";
 
-/// Learned contribution to the state's rates.
+/// Learned contribution to the rates of the state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residual {
     network: Arc<Dense>,
@@ -34,15 +34,15 @@ pub struct Residual {
     envelope: Option<Arc<DataEnvelope>>,
 }
 
-/// Fixed scales of the network's inputs and outputs, from the airframe rather than from data: inputs are of order one
-/// over the envelope, outputs in x_c of eq. (21).
+/// Fixed scales of the network's inputs and outputs. They come from the airframe, not from data. With them the inputs are of
+/// order one in the envelope, and the outputs are in units of x_c of eq. (21).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
-    /// Offset subtracted from each input.
+    /// Offset that is subtracted from each input, in the input's unit.
     pub offset: [f64; INPUTS],
-    /// Factor applied to each input after the offset.
+    /// Factor by which each input is multiplied after the offset, in the inverse of the input's unit.
     pub factor: [f64; INPUTS],
-    /// Factor applied to each output: x_c.
+    /// Factor by which each output is multiplied: x_c.
     pub output: [f64; OUTPUTS],
 }
 
@@ -52,17 +52,17 @@ pub struct Scales {
 pub struct Origin {
     /// Schema of the file: [`Origin::SCHEMA`].
     pub schema: String,
-    /// Hash of the airframe that it belongs to, see [`fingerprint`].
+    /// Fingerprint of the airframe to which the residual belongs, see [`fingerprint`].
     pub airframe: String,
     /// SHA-256 of the training data, hexadecimal.
     pub data: String,
     /// Seed of the training.
     pub seed: u64,
-    /// Name and version of the program that trained it.
+    /// Name and version of the program that trained the residual.
     pub program: String,
 }
 
-/// Error of loading a residual.
+/// Reason why a residual cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ResidualError {
     /// The file cannot be read.
@@ -70,7 +70,7 @@ pub enum ResidualError {
     Read {
         /// Path of the file.
         path: PathBuf,
-        /// The system's error.
+        /// The operating system's error.
         why: std::io::Error,
     },
     /// The file does not contain a residual.
@@ -86,13 +86,13 @@ pub enum ResidualError {
     Airframe {
         /// Path of the file.
         path: PathBuf,
-        /// Name of the given airframe.
+        /// Name of the airframe to be flown.
         airframe: String,
     },
-    /// The network has another number of inputs or outputs.
+    /// The network has a wrong number of inputs or outputs.
     #[error("a residual takes a network of {INPUTS} inputs and {OUTPUTS} outputs, not {0:?}")]
     Shape(Vec<usize>),
-    /// A layer is too wide.
+    /// A layer has too many units.
     #[error("a residual's layers have up to {ON_STACK} units, not {0:?}; choose fewer")]
     Wide(Vec<usize>),
     /// The parameters do not form a network.
@@ -105,13 +105,13 @@ impl Origin {
     pub const SCHEMA: &'static str = "greylag.residual/1";
 }
 
-/// SHA-256 of the properties of an airframe that a residual depends on: name, geometry and actuators.
+/// SHA-256 of the airframe's properties on which a residual depends: name, geometry, actuators and reference airspeed.
 pub fn fingerprint(airframe: &Airframe) -> String {
     hash(fingerprinted(airframe).as_bytes())
 }
 
-/// Text of schema 1 that is hashed, field by field, so that an additional field of an airframe does not invalidate
-/// earlier policies and residuals.
+/// The text that is hashed. Its form for schema 1 is fixed field by field, because an additional field of an airframe must
+/// not invalidate earlier policies and residuals.
 fn fingerprinted(airframe: &Airframe) -> String {
     let Geometry { area, span, chord } = airframe.geometry;
     let ActuatorFigures { aileron, elevator, throttle, step, .. } = airframe.actuators;
@@ -125,28 +125,29 @@ fn fingerprinted(airframe: &Airframe) -> String {
         let rudder = airframe.actuators.rudder;
         text += &format!(" aileron {aileron:?} elevator {elevator:?} rudder {rudder:?}");
     }
-    // the reference airspeed scales a residual's inputs and outputs
+    // a residual's inputs and outputs are scaled by the reference airspeed
     if airframe.reference != Reference::OF_SCHEMA_1 {
         text += &format!(" reference airspeed {:?}", airframe.reference.airspeed);
     }
     text
 }
 
-/// Whether schema 1 can represent `figures`: surfaces alike, symmetric travel, no rate limit, no rudder.
+/// Whether schema 1 can represent `figures`: identical surfaces, symmetric travel, no rate limit and no rudder.
 fn fits_schema_1(figures: &ActuatorFigures) -> bool {
     let ActuatorFigures { aileron, elevator, rudder, .. } = figures;
     let plain = aileron.travel.is_symmetric() && aileron.rate_max.is_none();
     plain && elevator == aileron && rudder.is_none()
 }
 
-/// SHA-256 in hexadecimal digits.
+/// SHA-256 of `bytes` in hexadecimal digits.
 pub fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
 impl Scales {
-    /// Scales of an aircraft: airspeed about V0 by a quarter of it, rates by the share of x_c reached in brisk
-    /// flight, angles by 0.2 rad (about the stall), deflections by their stops.
+    /// Scales of an aircraft. Airspeed is relative to V0 in units of V0/4, rates are in units of their fraction of x_c in brisk
+    /// flight, angles in units of 0.2 rad (about the stall), deflections in units of the largest travel. Throttle is
+    /// relative to 0.5 in units of 0.5.
     pub fn new(airframe: &Airframe, x_c: [f64; OUTPUTS]) -> Scales {
         let [_, _, v0, p, q, r, _, _] = x_c;
         let unit = [0.25 * v0, 0.1 * p, 0.02 * q, 0.05 * r, 0.2, 0.2];
@@ -160,12 +161,12 @@ impl Scales {
         Scales { offset, factor, output: x_c }
     }
 
-    /// Inputs of the network for a state and controls.
+    /// Scaled inputs of the network for a state and controls.
     #[inline(always)]
     pub fn inputs<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> [R; INPUTS] {
         let State { airspeed, p, q, r, alpha, beta, .. } = *state;
         let Controls { aileron, elevator, throttle, .. } = *controls;
-        // plain loops here and in kernels: a closure that is not inlined leaves the vector instructions
+        // a plain loop here and in kernels, because a closure that is not inlined leaves the vector instructions
         let mut x = [airspeed, p, q, r, alpha, beta, aileron, elevator, throttle];
         for (i, x) in x.iter_mut().enumerate() {
             *x = (*x - R::from_f64(self.offset[i])).scale(self.factor[i]);
@@ -173,7 +174,7 @@ impl Scales {
         x
     }
 
-    /// State rates from the network's outputs.
+    /// Rates of the state, in units of [`State`] per second, from the network's outputs.
     #[inline(always)]
     pub fn rate<R: Real>(&self, mut outputs: [R; OUTPUTS]) -> State<R> {
         for (x, scale) in outputs.iter_mut().zip(&self.output) {
@@ -184,10 +185,10 @@ impl Scales {
 }
 
 impl Residual {
-    /// A residual of `network` on an aircraft whose reference scale is `x_c`.
+    /// A residual with `network` on an aircraft whose reference scale is `x_c`, eq. (21).
     ///
     /// # Errors
-    /// If the network has other inputs or outputs.
+    /// If the network does not have `INPUTS` inputs and `OUTPUTS` outputs, or a layer is too wide.
     pub fn new(
         network: Dense,
         airframe: &Airframe,
@@ -204,7 +205,7 @@ impl Residual {
         Ok(Residual { network: Arc::new(network), scales, envelope: None })
     }
 
-    /// The residual with the envelope of these training samples.
+    /// The residual with the envelope of `samples`, its training data.
     pub fn trained_on<'a>(
         mut self,
         samples: impl Iterator<Item = (&'a State, &'a Controls)>,
@@ -214,27 +215,28 @@ impl Residual {
         self
     }
 
-    /// Distance of a point from the training data: 99.9 % of them lie within 1. Zero if the file has no envelope.
+    /// Distance of a point from the training data. Within 1 lie 99.9 % of the training samples. Zero if the file has no
+    /// envelope.
     pub fn distance(&self, state: &State, controls: &Controls) -> f64 {
         let inputs = self.scales.inputs(state, controls);
         self.envelope.as_ref().map_or(0.0, |e| e.distance(&self.network, &inputs))
     }
 
-    /// The network behind the residual.
+    /// The network that computes the residual.
     pub fn network(&self) -> &Dense {
         &self.network
     }
 
-    /// Contribution to the state's rates, units of [`State`] per second.
+    /// Contribution to the rates of the state, in units of [`State`] per second.
     #[inline(always)]
     pub fn rate<R: Real>(&self, state: &State<R>, controls: &Controls<R>) -> State<R> {
         self.scales.rate(self.network.evaluate(self.scales.inputs(state, controls)))
     }
 
-    /// Content of the residual's file.
+    /// Content of the residual's file in the format safetensors.
     ///
     /// # Errors
-    /// The error of the format's writer.
+    /// If safetensors cannot serialise the tensors.
     pub fn to_bytes(&self, origin: &Origin) -> Result<Vec<u8>, SafeTensorError> {
         let envelope = self.envelope.as_ref().map(|e| Square {
             name: ENVELOPE,
@@ -244,10 +246,10 @@ impl Residual {
         weights::to_bytes(&self.network, envelope, origin)
     }
 
-    /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`.
+    /// Reads the file of a residual for `airframe`, whose reference scale is `x_c`, eq. (21).
     ///
     /// # Errors
-    /// The file cannot be read, is not a residual, or is a residual of another airframe.
+    /// If the file cannot be read, is not a residual, or is a residual of another airframe.
     pub fn load(
         path: &Path,
         airframe: &Airframe,
@@ -263,7 +265,7 @@ impl Residual {
             return Err(ResidualError::Airframe { path: path.into(), airframe });
         }
         let whitening = weights::matrix(&bytes, ENVELOPE).map_err(content)?;
-        // a network of another shape is rejected before its features are computed
+        // a network of another shape must be rejected before its features are computed
         let residual = Residual::new(network, airframe, x_c)?;
         let envelope = whitening.map(|w| DataEnvelope::new(w, &residual.network)).transpose();
         let envelope = envelope.map_err(content)?.map(Arc::new);
@@ -271,7 +273,7 @@ impl Residual {
     }
 }
 
-/// Origin in the metadata of a file.
+/// The origin in the metadata of a file.
 fn origin(bytes: &[u8]) -> Result<Origin, String> {
     let origin: Origin = weights::origin(bytes)?;
     match origin.schema.as_str() {
@@ -295,10 +297,10 @@ mod tests {
     #[test]
     fn the_fingerprint_of_schema_1_stays_what_it_was() {
         let airframe = model().airframe;
-        // That of the policy in params/x8/policy, trained before the fields were written out.
+        // the fingerprint of the policy in params/x8/policy, which was trained before the form of the text was fixed
         let shipped = "b6f028741a1b461a25f87aa5eb0301411d7b376dcf4090784acced3ed87224c6";
         assert_eq!(fingerprint(&airframe), shipped);
-        // An aircraft that schema 1 cannot describe has another.
+        // an aircraft that schema 1 cannot describe has another fingerprint
         let mut other = airframe.clone();
         other.actuators.elevator.travel.least *= 0.9;
         assert_ne!(fingerprint(&other), shipped);

@@ -1,8 +1,8 @@
-//! Model of an aircraft from a few of its measures, by textbook formulas, with realistic standard deviations.
+//! Textbook model of an aircraft from a few of its measures, with realistic standard deviations.
 //!
-//! B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985
-//! (radii of gyration); \[BM12\]. The ratios for roll are those of the published X8 and Aerosonde; the
-//! elevons of a flying wing those of the X8.
+//! Sources are B. Etkin, L. D. Reid, "Dynamics of Flight", 3rd ed., 1996; J. Roskam, "Airplane Design" part V, 1985 (radii
+//! of gyration); \[BM12\]. The ratios for roll are those of the published X8 and Aerosonde, those for the elevons of a
+//! flying wing are the X8's.
 
 mod derivatives;
 
@@ -12,7 +12,7 @@ use crate::derivatives::widths::{self, Tool};
 use derivatives::{induced, rudder};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Arrangement of an aircraft's control surfaces.
+/// Arrangement of an aircraft's tail and control surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tail {
     /// Conventional tail: a tailplane and a fin.
@@ -32,11 +32,11 @@ pub struct Measures {
     pub span: f64,
     /// Area of the wing, m².
     pub area: f64,
-    /// Arrangement of the control surfaces.
+    /// Arrangement of the tail and control surfaces.
     pub tail: Tail,
-    /// Rudder travel to either side, rad; `None` without a rudder.
+    /// Rudder travel to each side, rad. `None` if the aircraft has no rudder.
     pub rudder: Option<f64>,
-    /// Travel of aileron and elevator to either side, rad.
+    /// Travel of aileron and elevator to each side, rad.
     pub travel: f64,
     /// Static thrust at full throttle, N.
     pub static_thrust: f64,
@@ -44,21 +44,21 @@ pub struct Measures {
     pub pitch_speed: f64,
 }
 
-/// Servos and motor of an aircraft.
+/// Dynamics of the servos and the motor of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drives {
     /// Natural frequency of the servos, rad/s.
     pub frequency: f64,
     /// Damping ratio of the servos.
     pub damping: f64,
-    /// Lag of the thrust, s.
+    /// Time constant of the thrust's lag, s.
     pub lag: f64,
     /// Source of these values.
     pub source: &'static str,
 }
 
 impl Drives {
-    /// Hobby servos and an electric motor.
+    /// Values for hobby servos and an electric motor.
     pub const HOBBY: Drives = Drives {
         frequency: 40.0,
         damping: 0.7,
@@ -67,16 +67,16 @@ impl Drives {
     };
 }
 
-/// An estimated number: name, value, relative standard deviation, source.
+/// An estimated number: name, value (in the unit of its name), relative standard deviation, source.
 pub type Estimate = (&'static str, f64, f64, &'static str);
 
-/// An effect of a model file with its estimates.
+/// An effect of a model file, as its id, with the estimates of its coefficients.
 pub(crate) type Section = (&'static str, Vec<Estimate>);
 
 /// Largest lift coefficient of a small wing.
 const LIFT_MAX: f64 = 1.2;
 
-/// Derived quantities that several coefficients share.
+/// Derived quantities that several coefficients use.
 struct Figures {
     aspect: f64,
     chord: f64,
@@ -88,7 +88,7 @@ struct Figures {
     lift: f64,
 }
 
-/// Table `[incidence]` of an airframe file from the angles of attack (rad) of cruise and stall.
+/// Table `[incidence]` of an airframe file, from the angles of attack (rad) at cruise and at the stall.
 pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     let up_to = |share: f64| (cruise + share * (stall - cruise)).max(0.01);
     format!(
@@ -101,7 +101,7 @@ pub fn incidence_limits(cruise: f64, stall: f64) -> String {
     )
 }
 
-/// Lift slope (1/rad) of a straight wing of aspect ratio `aspect`, by Helmbold.
+/// Lift slope (1/rad) of a straight wing with aspect ratio `aspect`, by Helmbold's formula.
 fn helmbold(aspect: f64) -> f64 {
     std::f64::consts::TAU * aspect / (2.0 + (4.0 + aspect * aspect).sqrt())
 }
@@ -117,26 +117,26 @@ impl Measures {
         Figures { aspect, chord, stall, cruise, wing, lift: loading / (cruise * cruise) }
     }
 
-    /// Text of the airframe file.
+    /// Text of the airframe file for these measures.
     pub fn airframe(&self) -> String {
         let f = self.figures();
         self.airframe_with_chord(f.chord, [self.slope(&f), self.zero_lift()])
     }
 
-    /// The airframe file with these servos and this motor.
+    /// Text of the airframe file with the servos and motor of `drives`.
     pub(crate) fn airframe_with_drives(&self, drives: &Drives) -> String {
         let f = self.figures();
         self.airframe_of(f.chord, [self.slope(&f), self.zero_lift()], drives)
     }
 
-    /// Cruise airspeed, m/s, and angle of attack at cruise, rad.
+    /// Cruise airspeed (m/s), and angle of attack at cruise (rad).
     pub(crate) fn cruise(&self) -> [f64; 2] {
         let f = self.figures();
         [f.cruise, (f.lift - self.zero_lift()) / self.slope(&f)]
     }
 
-    /// The airframe file with the mean chord (m), the lift slope (1/rad) and the lift coefficient at α = 0 from
-    /// another source.
+    /// Text of the airframe file with values from another source: the mean chord (m), the lift slope (1/rad) and the lift
+    /// coefficient at α = 0.
     pub(crate) fn airframe_with_chord(&self, chord: f64, lift: [f64; 2]) -> String {
         self.airframe_of(chord, lift, &Drives::HOBBY)
     }
@@ -183,17 +183,17 @@ impl Measures {
         out
     }
 
-    /// Text of the model file, to be stored beside the airframe file `airframe.toml`.
+    /// Text of the model file, which belongs in the folder of the airframe file `airframe.toml`.
     pub fn model(&self) -> String {
         self.model_of(&self.sections(), "Textbook estimates from mass, span, area and tail.")
     }
 
-    /// Text of a model file with the effects `sections`, and mass and inertia of these measures.
+    /// Text of a model file with the effects `sections`, and with mass and inertia from these measures.
     pub(crate) fn model_of(&self, sections: &[Section], description: &str) -> String {
         self.model_with(&self.inertia(), sections, description)
     }
 
-    /// As `model_of`, with other moments of inertia.
+    /// The same as `model_of`, with other moments of inertia.
     pub(crate) fn model_with(
         &self,
         inertia: &[Estimate; 4],
@@ -220,13 +220,13 @@ impl Measures {
         out
     }
 
-    /// Induced drag coefficients of α and α², for a wing with this lift slope and this lift coefficient at α = 0.
+    /// Coefficients of α and α² of the induced drag, for a wing with this lift slope (1/rad) and lift coefficient at α = 0.
     pub(crate) fn induced_by(&self, slope: f64, zero_lift: f64) -> [f64; 2] {
         let k = 1.0 / induced(&self.figures());
         [2.0 * k * zero_lift * slope, k * slope * slope]
     }
 
-    /// Effects of the model with their estimates.
+    /// The effects of the model with their estimates.
     pub(crate) fn sections(&self) -> Vec<Section> {
         let f = self.figures();
         let mut effects = vec![
@@ -242,14 +242,14 @@ impl Measures {
         if self.rudder.is_some() {
             effects.push(("rudder_linear", rudder()));
         }
-        // measured errors of these formulas; without them the stated standard deviations are kept
+        // measured errors of these formulas replace the stated standard deviations, where there are measured ones
         for (name, _, width, _) in effects.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
             *width = widths::of(Tool::Textbook, name).unwrap_or(*width);
         }
         effects
     }
 
-    /// Moments of inertia, from radii of gyration relative to half the span, half the length and half their mean.
+    /// Moments of inertia, kg m². The radii of gyration are relative to half the span, half the length and half their mean.
     pub(crate) fn inertia(&self) -> [Estimate; 4] {
         let length =
             if self.tail == Tail::Conventional { 0.7 * self.span } else { 0.35 * self.span };
@@ -264,12 +264,12 @@ impl Measures {
     }
 }
 
-/// Appends estimates as lines of a model file; a standard deviation of zero is omitted.
+/// Appends estimates as lines of a model file. A standard deviation of zero is omitted.
 pub fn numbers(out: &mut String, estimates: &[Estimate]) {
     for (name, value, width, source) in estimates {
         let _ = write!(out, "{name} = {{ value = {value:.5}, source = \"{source}\"");
         let sd = width * value.abs();
-        // a value that is written as zero is held
+        // a value that is written as zero is fixed in a fit
         if sd > 0.0 && value.abs() >= 5e-6 {
             let _ = write!(out, ", sd = {sd:.3e}");
         }
@@ -315,14 +315,14 @@ mod tests {
         ];
         for (name, value) in published {
             let ours = model.coefficients().iter().find(|c| c.name == name).unwrap();
-            // within two standard deviations: as a realistic standard deviation requires
+            // a realistic standard deviation implies an error below two standard deviations
             assert!((ours.value - value).abs() < 2.0 * ours.width(), "{ours:?} for {value}");
         }
     }
 
     #[test]
     fn level_flight_takes_a_throttle_within_its_stops() {
-        // at little throttle the propeller brakes, so the thrust of level flight has a second, negative solution
+        // the propeller brakes at low throttle, and the throttle of level flight has a second, negative solution
         let model = made(Tail::Conventional, Some(0.4363));
         let speed = model.airframe.reference.airspeed;
         let trim = crate::Trim::level(&model, speed, 0.0).unwrap();

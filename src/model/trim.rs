@@ -1,4 +1,4 @@
-//! Trim: deflections that hold a steady flight condition.
+//! Trim: the controls that hold a steady flight condition.
 
 use super::GreyBox;
 use super::jacobian::Four;
@@ -6,24 +6,24 @@ use super::newton;
 use greylag_num::Real;
 use greylag_physics::{Controls, State};
 
-/// The descent at full throttle counts as powered flight only if its path is shallower than that at idle by this
-/// angle, rad.
+/// Angle by which a descent at full throttle must be shallower than the glide at idle, rad. Otherwise the glide at idle is
+/// used.
 const SHALLOWER: f64 = 1e-6;
-/// Bisections of the throttle, enough for full precision.
+/// Number of bisections of the throttle, which gives double precision.
 const HALVINGS: usize = 52;
 
-/// A steady flight condition with the controls that hold it.
+/// A steady flight condition and the controls that hold it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
-    /// The state, whose rates vanish (see [`Trim::attitude`] for airspeed).
+    /// The state. Its rates are zero, except the airspeed's in the case described at [`Trim::attitude`].
     pub state: State,
     /// Controls that hold the condition.
     pub controls: Controls,
-    /// Remaining V̇ if the throttle is at its stop, m/s²; otherwise zero.
+    /// Remaining rate of the airspeed V̇ if the throttle is at a limit, m/s². Otherwise zero.
     pub acceleration: f64,
 }
 
-/// Error of a condition without trim.
+/// Reason why a condition has no trim.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "model {model} has no trim at roll {roll_deg:.1}°, pitch {pitch_deg:.1}°, {airspeed_mps:.1} m/s: \
@@ -32,21 +32,21 @@ pub struct Trim {
 pub struct TrimError {
     /// Name of the model.
     pub model: String,
-    /// Requested roll angle, °.
+    /// Requested roll angle, degrees.
     pub roll_deg: f64,
-    /// Requested pitch angle, °.
+    /// Requested pitch angle, degrees.
     pub pitch_deg: f64,
     /// Requested airspeed, m/s.
     pub airspeed_mps: f64,
 }
 
 impl Trim {
-    /// Straight and level at `airspeed` (m/s) and `altitude` (m): γ = 0, so θ = α.
+    /// Straight and level flight at `airspeed` (m/s) and `altitude` (m): γ = 0, and thus θ = α.
     ///
-    /// The controls may lie beyond their stops; the caller must check whether the aircraft has that much thrust.
+    /// The controls may lie outside their ranges. The caller must check whether the aircraft has this throttle and travel.
     ///
     /// # Errors
-    /// If no controls hold level flight at that airspeed.
+    /// If no controls hold level flight at this airspeed.
     pub fn level(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
         if airspeed.is_nan() || airspeed <= 0.0 {
             return Err(failure(model, 0.0, 0.0, airspeed));
@@ -66,31 +66,32 @@ impl Trim {
             .ok_or_else(|| failure(model, 0.0, 0.0, airspeed))
     }
 
-    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m): level; if no throttle holds level
-    /// flight, the descent at full throttle if that is shallower, else the glide at idle.
+    /// Straight flight with level wings at `airspeed` (m/s) and `altitude` (m). It is level if a throttle within 0..1 holds
+    /// level flight. Otherwise it is the descent at full throttle if it is shallower than the glide at idle, or else the
+    /// glide. If neither has a trim, the result is that of `Trim::level`.
     ///
     /// # Errors
-    /// If no elevator deflection holds either.
+    /// If neither level flight nor a descent has a trim.
     pub fn straight(model: &GreyBox, airspeed: f64, altitude: f64) -> Result<Trim, TrimError> {
         match Trim::level(model, airspeed, altitude) {
             Ok(level) if (0.0..=1.0).contains(&level.controls.throttle) => Ok(level),
-            // a propeller that brakes at little throttle has a second, negative solution
+            // a propeller that brakes at low throttle has a second, negative solution
             level => descent(model, airspeed, altitude).map_or(level, Ok),
         }
     }
 
-    /// Flight path angle with level wings and no sideslip, positive upwards, rad.
+    /// Flight-path angle with level wings and zero sideslip, rad, positive upwards.
     pub fn path(&self) -> f64 {
         self.state.pitch - self.state.alpha
     }
 
     /// A steady turn that holds roll and pitch (rad) at `airspeed` (m/s) and `altitude` (m).
     ///
-    /// If the throttle that holds the airspeed lies beyond its stops, it is set to the stop, and the airspeed drifts
-    /// with [`acceleration`](Trim::acceleration).
+    /// If the throttle that holds the airspeed is outside 0..1, it is set to the limit. The airspeed then changes with
+    /// [`acceleration`](Trim::acceleration).
     ///
     /// # Errors
-    /// If no deflection holds that attitude.
+    /// If no deflections hold this attitude.
     pub fn attitude(
         model: &GreyBox,
         roll: f64,
@@ -108,7 +109,7 @@ impl Trim {
         match within_stops(|start| solve(Thrust::From(start)), 0.3) {
             Some(free) if (0.0..=1.0).contains(&free.controls.throttle) => Ok(free),
             Some(free) => held(free.controls.throttle.clamp(0.0, 1.0)).ok_or_else(fail),
-            // a thrust that is nonlinear in throttle may not reach the required one at any throttle
+            // a thrust that is nonlinear in throttle may not give the required thrust at any throttle
             None => held(0.0)
                 .filter(|idle| idle.acceleration >= 0.0)
                 .or_else(|| held(1.0).filter(|full| full.acceleration <= 0.0))
@@ -118,9 +119,9 @@ impl Trim {
     }
 }
 
-/// The trim found from the initial throttle `start`; from full throttle if the first one is beyond the stops and the
-/// second one within. Thrust that falls before it rises with throttle, such as a windmilling propeller's, has two
-/// trims.
+/// The trim found from the initial throttle `start`. If its throttle is outside 0..1, the search is repeated from full
+/// throttle. The second trim is used if its throttle is within 0..1. A thrust that falls before it rises with throttle, as for
+/// a windmilling propeller, has two trims.
 fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> {
     let holds = |trim: &Trim| (0.0..=1.0).contains(&trim.controls.throttle);
     let first = from(start);
@@ -130,8 +131,8 @@ fn within_stops(from: impl Fn(f64) -> Option<Trim>, start: f64) -> Option<Trim> 
     from(1.0).filter(holds).or(first)
 }
 
-/// The trim at the throttle where `left` rises through zero, by bisection: Newton's method may oscillate about a kink
-/// of a thrust table. `None` if there is none between idle and full throttle.
+/// The trim at the throttle where `left` rises through zero, by bisection. Newton's method may oscillate about a kink of a
+/// thrust table. `None` if `left` does not rise through zero between idle and full throttle.
 fn halved(held: impl Fn(f64) -> Option<Trim>, left: impl Fn(&Trim) -> f64) -> Option<Trim> {
     let [idle, full] = [held(0.0)?, held(1.0)?];
     if !(left(&idle) < 0.0 && left(&full) > 0.0) {
@@ -145,7 +146,7 @@ fn halved(held: impl Fn(f64) -> Option<Trim>, left: impl Fn(&Trim) -> f64) -> Op
     held(high)
 }
 
-/// The descent at `airspeed` (m/s) and full throttle if it is shallower than that at idle.
+/// The descent at `airspeed` (m/s) and full throttle if it is shallower than the glide at idle, else the glide.
 fn descent(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
     let [idle, full] = [0.0, 1.0].map(|throttle| straight_at(model, airspeed, altitude, throttle));
     let powered = |full: &Trim| {
@@ -154,7 +155,7 @@ fn descent(model: &GreyBox, airspeed: f64, altitude: f64) -> Option<Trim> {
     full.filter(powered).or(idle)
 }
 
-/// Straight flight at `airspeed` (m/s) and the given throttle. Unknowns: α, δe, θ.
+/// Straight flight at `airspeed` (m/s), `altitude` (m) and the given throttle. The unknowns are α, δe and θ.
 fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> Option<Trim> {
     let condition = |[alpha, elevator, pitch]: [Four; 3]| {
         let held = Four::from_f64(throttle);
@@ -172,12 +173,12 @@ fn straight_at(model: &GreyBox, airspeed: f64, altitude: f64, throttle: f64) -> 
     Some(Trim { state, controls, acceleration: 0.0 })
 }
 
-/// Treatment of the throttle in an attitude's trim.
+/// Treatment of the throttle in the trim of an attitude.
 #[derive(Clone, Copy)]
 enum Thrust {
-    /// The throttle is an unknown that holds the airspeed, with this initial value.
+    /// The throttle is an unknown that holds the airspeed. Its initial value is given.
     From(f64),
-    /// The throttle is held at this value.
+    /// The throttle is fixed at this value.
     Held(f64),
 }
 
@@ -199,8 +200,8 @@ fn level_condition<R: Real>(
     (state, Controls { aileron: zero, elevator, throttle, rudder: zero, lagged: None })
 }
 
-/// Solves for α, the lateral unknown, p, q, r, δa, δe, δt. The lateral unknown is δr at β = 0 where the model has a
-/// rudder that yaws (a coordinated turn), else β at δr = 0. If the throttle is held, δt = throttle replaces V̇ = 0.
+/// Solves for α, the lateral unknown, p, q, r, δa, δe and δt. If the model has a rudder that yaws, the lateral unknown is δr
+/// at β = 0 (a coordinated turn), else β at δr = 0. With a fixed throttle, δt = throttle replaces V̇ = 0.
 fn solve_attitude(
     model: &GreyBox,
     roll: f64,
@@ -209,7 +210,7 @@ fn solve_attitude(
     thrust: Thrust,
 ) -> Option<Trim> {
     let sideways = Sideways::of(model);
-    // the coordinated turn of a point mass starts the search close by
+    // the initial rates are those of a point mass in a coordinated turn, close to the solution
     let turn = model.atmosphere.gravity / airspeed * roll.tan();
     let start = [
         0.05,

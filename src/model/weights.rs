@@ -1,4 +1,4 @@
-//! Weights of a dense network as a safetensors file, with one metadata entry.
+//! Weights of a dense network as a safetensors file with one metadata entry.
 
 use std::collections::HashMap;
 
@@ -9,24 +9,24 @@ use serde::de::DeserializeOwned;
 
 use greylag_num::Dense;
 
-/// Metadata entry with the file's origin, as JSON.
+/// Key of the metadata entry with the file's origin, as JSON.
 const METADATA: &str = "greylag";
 
-/// A square matrix stored beside a network's layers, row-major.
+/// A square matrix that is stored in addition to a network's layers.
 #[derive(Clone, Copy, Debug)]
 pub struct Square<'a> {
     /// Name of the tensor.
     pub name: &'static str,
-    /// Number of rows, equal to that of columns.
+    /// Number of rows, which equals the number of columns.
     pub size: usize,
     /// Matrix entries, row by row.
     pub entries: &'a [f32],
 }
 
-/// Content of a file: the layers of `network`, an optional matrix, and its `origin`.
+/// Content of a file with the layers of `network`, an optional matrix, and the file's `origin`.
 ///
 /// # Errors
-/// The error of the format's writer.
+/// If safetensors cannot serialise the tensors, or the origin cannot be written as JSON.
 pub fn to_bytes(
     network: &Dense,
     matrix: Option<Square>,
@@ -48,15 +48,15 @@ pub fn to_bytes(
             Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
         })
         .collect::<Result<Vec<_>, SafeTensorError>>()?;
-    // a single entry, because the format writes several in no fixed order, and equal networks must give equal files
+    // only one entry, because the format writes several in no fixed order, and equal networks must give equal files
     let origin = serde_json::to_string(origin)?;
     safetensors::serialize(views, Some(HashMap::from([(METADATA.to_owned(), origin)])))
 }
 
-/// Origin of a file, from its metadata.
+/// The origin of a file, from its metadata.
 ///
 /// # Errors
-/// The reason why it cannot be read, in words.
+/// If the bytes are not a safetensors file, or the metadata have no such entry. The error is in words.
 pub fn origin<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
     let origin = metadata.metadata().as_ref().and_then(|m| m.get(METADATA));
@@ -64,10 +64,10 @@ pub fn origin<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     serde_json::from_str(origin).map_err(|e| format!("its metadata: {e}"))
 }
 
-/// Network of a file: tensors `layers.0.weight`, `layers.0.bias` and so on.
+/// The network of a file, from the tensors `layers.0.weight`, `layers.0.bias` and so on.
 ///
 /// # Errors
-/// The reason why it cannot be read, in words.
+/// If a tensor is missing or has a wrong shape or type, or a parameter is not finite. The error is in words.
 pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let (mut sizes, mut parameters) = (Vec::new(), Vec::new());
@@ -98,10 +98,10 @@ pub fn network(bytes: &[u8]) -> Result<Dense, String> {
     Dense::new(&sizes, parameters).map_err(|e| e.to_string())
 }
 
-/// Entries of the matrix `name` of a file, row-major, if there is one.
+/// Entries of the matrix `name` of a file, row by row. `None` if the file has no such matrix.
 ///
 /// # Errors
-/// The reason why it cannot be read, in words.
+/// If the bytes are not a safetensors file, or the matrix is not in single precision. The error is in words.
 pub fn matrix(bytes: &[u8], name: &str) -> Result<Option<Vec<f32>>, String> {
     let tensors = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let Ok(tensor) = tensors.tensor(name) else { return Ok(None) };

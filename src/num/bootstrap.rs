@@ -1,4 +1,4 @@
-//! Bootstrap intervals of statistics.
+//! Bootstrap confidence intervals of statistics.
 
 use rand::RngExt;
 
@@ -8,13 +8,13 @@ use super::stream;
 /// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
 
-/// The 95 % percentile interval of `statistic` over `samples`, resampled with replacement from `seed`
-/// (Efron 1979; section VI of \[GSFM26\]); NaN for no samples.
+/// The 95 % percentile interval of `statistic` over `samples`, which are resampled with replacement (Efron 1979; section VI
+/// of \[GSFM26\]). The random numbers come from `seed`. NaN if there are no samples.
 pub fn interval(samples: &[f64], seed: u64, statistic: impl Fn(&[f64]) -> f64) -> [f64; 2] {
     stratified_interval(std::slice::from_ref(&samples), seed, statistic)
 }
 
-/// As [`interval`], of the samples of all `strata` in order, each of which is resampled separately and keeps its size
+/// The same interval for the samples of all `strata` in order. Each stratum is resampled separately and keeps its size
 /// (rliable, Agarwal et al. 2021).
 pub fn stratified_interval<S: AsRef<[f64]>>(
     strata: &[S],
@@ -46,7 +46,7 @@ mod tests {
     use crate::statistics::mean;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// The coverage of the interval of a mean is close to nominal.
+    /// The coverage of the interval of a mean is close to its nominal value.
     #[test]
     fn intervals_cover_the_mean() {
         let mut random = stream::stream(5, &[]);
@@ -58,7 +58,7 @@ mod tests {
                 low <= 0.0 && 0.0 <= high
             })
             .count();
-        // 95 % less the bootstrap's own 1–2 % at 50 samples; a binomial deviation is 1.5 %
+        // nominal 95 %, reduced by 1–2 % by the bootstrap at 50 samples, with a binomial standard deviation of 1.5 %
         assert!((178..=199).contains(&covered), "{covered} of 200");
         let all = interval(&[2.0; 7], 1, mean);
         assert_eq!(all, [2.0, 2.0]);

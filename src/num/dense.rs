@@ -1,22 +1,22 @@
-//! Dense networks with rectified linear units, evaluated over any [`Real`].
+//! Dense networks with rectified linear units, evaluated with any [`Real`].
 
 use rand::Rng;
 use rand::RngExt;
 
 use super::Real;
 
-/// Widest layer that a network may have. [`Units`] holds it on the heap, allocated once: [`Dense::evaluate_in`] and
-/// [`Dense::evaluate_one`] accept any network and allocate nothing.
+/// Largest number of units that a layer may have. [`Units`] has heap buffers for this number, which are allocated once.
+/// [`Dense::evaluate_in`] and [`Dense::evaluate_one`] therefore accept any network and allocate no memory.
 pub const WIDEST: usize = 512;
 
-/// Widest layer that [`Dense::evaluate`] and [`Dense::last_hidden`] hold on the stack: they need no [`Units`] and
-/// allocate nothing, but panic for a wider network. A residual with a wider layer is refused.
+/// Largest number of units in a layer for [`Dense::evaluate`] and [`Dense::last_hidden`], which use the stack. They need no
+/// [`Units`] and allocate no memory, but panic for a wider network. A residual with a wider layer is refused.
 pub const ON_STACK: usize = 128;
 
-/// A dense network: affine layers with max(0, ·) between them, none after the last.
+/// A dense network: affine layers with max(0, ·) between them, and none after the last layer.
 ///
-/// All parameters lie in one list, layer after layer: the weights, `[in, out]` as the crate burn
-/// stores them, then the biases.
+/// All parameters are in one list, layer after layer. Each layer has its weights, `[in, out]` as the crate burn stores
+/// them, then its biases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dense {
     sizes: Vec<usize>,
@@ -26,13 +26,13 @@ pub struct Dense {
 /// One affine layer, y = x W + b.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a> {
-    /// Weights W, `[in, out]`: those of one input are contiguous.
+    /// Weights W, `[in, out]`: the weights of one input are contiguous.
     pub weights: &'a [f32],
     /// Bias vector b.
     pub bias: &'a [f32],
 }
 
-/// Buffers on the heap for the units of two layers of up to [`WIDEST`], so that evaluation allocates nothing.
+/// Heap buffers for the units of two layers of up to [`WIDEST`] units. With them an evaluation allocates no memory.
 #[derive(Clone, Debug)]
 pub struct Units<R> {
     from: Vec<R>,
@@ -46,7 +46,7 @@ impl<R: Copy> Units<R> {
     }
 }
 
-/// Iterator over a network's layers; a named type so that it is inlined into kernels.
+/// Iterator over a network's layers. It is a named type because it must be inlined into kernels.
 #[derive(Clone, Debug)]
 pub struct Layers<'a> {
     sizes: &'a [usize],
@@ -66,7 +66,7 @@ impl<'a> Iterator for Layers<'a> {
     }
 }
 
-/// Error of a network's definition.
+/// Error in the definition of a network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DenseError {
     /// The layer sizes are not supported.
@@ -89,16 +89,16 @@ pub enum DenseError {
     NotFinite(usize),
 }
 
-/// Number of parameters of a network of layers `sizes`.
+/// Number of parameters of a network with layers of these `sizes`.
 fn count(sizes: &[usize]) -> usize {
     sizes.windows(2).map(|s| (s[0] + 1) * s[1]).sum()
 }
 
 impl Dense {
-    /// A network of layers `sizes` (inputs first) with these parameters.
+    /// A network with layers of these `sizes` (inputs first) and these parameters.
     ///
     /// # Errors
-    /// If their number is wrong, or one is not finite.
+    /// If a size is not supported, the number of parameters is wrong, or a parameter is not finite.
     pub fn new(sizes: &[usize], parameters: Vec<f32>) -> Result<Self, DenseError> {
         let fits = |n: &usize| (1..=WIDEST).contains(n);
         if sizes.len() < 2 || !sizes.iter().all(fits) {
@@ -114,11 +114,11 @@ impl Dense {
         }
     }
 
-    /// A network whose output is zero for any input: hidden layers uniform in ±1/√in, as burn and PyTorch initialise
-    /// them, the last layer zero.
+    /// A network whose output is zero for any input. The parameters of hidden layers are uniform in ±1/√in, as burn and PyTorch
+    /// initialise them. Those of the last layer are zero.
     ///
     /// # Errors
-    /// If `sizes` cannot be evaluated.
+    /// If `sizes` has fewer than two layers or a layer outside 1..=`WIDEST` units.
     pub fn silent(sizes: &[usize], rng: &mut impl Rng) -> Result<Self, DenseError> {
         let mut parameters = Vec::new();
         for (k, s) in sizes.windows(2).enumerate() {
@@ -139,7 +139,7 @@ impl Dense {
         &self.parameters
     }
 
-    /// All parameters, mutable. The caller must keep them finite.
+    /// All parameters, mutable. The caller must keep the values finite.
     pub fn parameters_mut(&mut self) -> &mut [f32] {
         &mut self.parameters
     }
@@ -150,10 +150,10 @@ impl Dense {
         Layers { sizes: &self.sizes, rest: &self.parameters }
     }
 
-    /// A network initialised as in PyTorch and burn: all parameters of a layer uniform in ±1/√in.
+    /// A network initialised as in PyTorch and burn, with all parameters of a layer uniform in ±1/√in.
     ///
     /// # Errors
-    /// If `sizes` cannot be evaluated.
+    /// If `sizes` has fewer than two layers or a layer outside 1..=`WIDEST` units.
     pub fn uniform(sizes: &[usize], rng: &mut impl Rng) -> Result<Self, DenseError> {
         let mut parameters = Vec::new();
         for s in sizes.windows(2) {
@@ -164,13 +164,13 @@ impl Dense {
         Dense::new(sizes, parameters)
     }
 
-    /// Output of the network.
+    /// Output of the network for `input`.
     ///
     /// # Panics
     /// If the network does not have `IN` inputs and `OUT` outputs, or has a layer wider than [`ON_STACK`].
     #[inline(always)]
     pub fn evaluate<R: Real, const IN: usize, const OUT: usize>(&self, input: [R; IN]) -> [R; OUT] {
-        // initialising unused buffer space costs time
+        // the smaller buffer is used where possible, because the initialisation of unused buffer space costs time
         if self.sizes.iter().all(|units| *units <= ON_STACK / 2) {
             self.on_stack::<R, IN, OUT, { ON_STACK / 2 }>(input)
         } else {
@@ -202,10 +202,10 @@ impl Dense {
         answer
     }
 
-    /// Writes the units of the last hidden layer to `units` and returns their number, zero for a single affine layer.
+    /// Writes the last hidden layer to `units` and returns its number of units. Zero for a network with a single layer.
     ///
     /// # Panics
-    /// If `input` has another length than the network's first layer, or a layer is wider than [`ON_STACK`].
+    /// If the length of `input` differs from the network's inputs, or a layer is wider than [`ON_STACK`].
     pub fn last_hidden(&self, input: &[f64], units: &mut [f64; ON_STACK]) -> usize {
         let hidden = self.sizes.len() - 2;
         let mut from = [0.0; ON_STACK];
@@ -219,10 +219,10 @@ impl Dense {
         if hidden == 0 { 0 } else { self.sizes[hidden] }
     }
 
-    /// Output of a network of any width, using `units` as buffers.
+    /// Output of a network of any width for `input`, with `units` as buffers.
     ///
     /// # Panics
-    /// If `input` has another length than the network's first layer.
+    /// If the length of `input` differs from the network's inputs.
     #[inline(always)]
     pub fn evaluate_in<'a, R: Real>(&self, units: &'a mut Units<R>, input: &[R]) -> &'a [R] {
         let Units { from, to } = units;
@@ -241,11 +241,11 @@ impl Dense {
         &from[..self.sizes[last + 1]]
     }
 
-    /// Output for one input in single precision, vectorised over the outputs of a layer, for a network evaluated once
-    /// a tick. Units at zero are skipped.
+    /// Output for one input in single precision, vectorised over the outputs of a layer. It serves networks that are evaluated
+    /// once per tick. Units at zero are skipped.
     ///
     /// # Panics
-    /// As [`evaluate_in`](Dense::evaluate_in).
+    /// If the length of `input` differs from the network's inputs.
     #[inline(always)]
     pub fn evaluate_one<'a>(&self, units: &'a mut Units<f32>, input: &[f32]) -> &'a [f32] {
         let Units { from, to: next } = units;
@@ -281,7 +281,7 @@ impl Layer<'_> {
         }
     }
 
-    /// Computes `B` outputs at a time, the rest by twos and ones.
+    /// Computes `B` outputs at a time, then the remaining outputs two at a time or singly.
     #[inline(always)]
     fn blocks<R: Real, const B: usize>(&self, input: &[R], output: &mut [R]) {
         let mut first = 0;
@@ -299,7 +299,7 @@ impl Layer<'_> {
         }
     }
 
-    /// Computes `B` outputs from `first` on.
+    /// Computes the `B` outputs from index `first` on.
     #[inline(always)]
     fn columns<R: Real, const B: usize>(&self, first: usize, input: &[R], output: &mut [R]) {
         let outputs = output.len();

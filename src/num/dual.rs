@@ -1,4 +1,4 @@
-//! Dual numbers: exact first derivatives by forward mode.
+//! Dual numbers: exact first derivatives by forward-mode differentiation.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -6,8 +6,8 @@ use super::{Real, each};
 
 /// A value with its gradient with respect to `N` inputs.
 ///
-/// Generic over the scalar type `T`, so that SIMD lanes ([`Lanes`](super::Lanes)) can carry gradients too. The crate
-/// `num-dual` is not used, because its scalar must be a float with comparisons.
+/// The scalar type `T` is generic because SIMD lanes ([`Lanes`](super::Lanes)) can have gradients too. The crate `num-dual`
+/// is not used, because its scalar must be a float with comparisons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dual<const N: usize, T = f64> {
     /// Value of the function.
@@ -17,14 +17,14 @@ pub struct Dual<const N: usize, T = f64> {
 }
 
 impl<const N: usize, T: Real> Dual<N, T> {
-    /// The input with number `index` (from 0): its derivative with respect to itself is one.
+    /// The input with number `index` (from 0). Its derivative with respect to itself is one.
     pub fn variable(value: T, index: usize) -> Self {
         let mut gradient = [T::zero(); N];
         gradient[index] = T::from_f64(1.0);
         Dual { value, gradient }
     }
 
-    /// A function's value with the chain rule applied: `slope` is its derivative at `self`.
+    /// A function's value with its gradient by the chain rule. `slope` is the function's derivative at `self`.
     #[inline(always)]
     fn chain(self, value: T, slope: T) -> Self {
         Dual { value, gradient: each(self.gradient, |g| g * slope) }
@@ -118,7 +118,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
-        // at zero the slope is infinite; it is set to zero, since a zero gradient times ∞ would be NaN
+        // the infinite slope at zero is replaced by zero, because a zero gradient times ∞ would be NaN
         let slope = T::where_less(T::zero(), root, T::from_f64(0.5) / root, T::zero());
         self.chain(root, slope)
     }
@@ -135,7 +135,7 @@ impl<const N: usize, T: Real> Real for Dual<N, T> {
         }
         Dual { value: T::where_less(a.value, b.value, then.value, otherwise.value), gradient }
     }
-    // a constant's own derivative is zero and need not be multiplied
+    // a constant has no derivative that would have to be multiplied
     #[inline(always)]
     fn scale(self, factor: f64) -> Self {
         Dual { value: self.value.scale(factor), gradient: each(self.gradient, |g| g.scale(factor)) }
@@ -169,7 +169,7 @@ mod tests {
         let dx = (everything(x + h, y) - everything(x - h, y)) / (2.0 * h);
         let dy = (everything(x, y + h) - everything(x, y - h)) / (2.0 * h);
         assert_eq!(dual.value, everything(x, y));
-        // central differences at h = 1e-6 are good to about 1e-9
+        // central differences with h = 1e-6 have errors of about 1e-9
         assert!((dual.gradient[0] - dx).abs() < 1e-8, "{} {dx}", dual.gradient[0]);
         assert!((dual.gradient[1] - dy).abs() < 1e-8, "{} {dy}", dual.gradient[1]);
     }

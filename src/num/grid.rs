@@ -1,9 +1,9 @@
-//! A function of two variables given on a grid: bilinear between the points, constant beyond.
+//! A function of two variables given on a grid, bilinear between the points and constant beyond them.
 
 use super::Real;
 use super::table::TableError;
 
-/// Largest number of points along the second variable, limited because their ramps are held in registers or on the
+/// Largest number of points along the second variable. The limit exists because their ramps are held in registers or on the
 /// stack.
 const MOST_COLUMNS: usize = 16;
 /// Largest number of points along the first variable.
@@ -14,13 +14,13 @@ const MOST_ROWS: usize = 100;
 pub struct Grid {
     x: Vec<f64>,
     y: Vec<f64>,
-    /// The function along `y` at the first `x`: its value at the first `y`, then a slope for each step in `y`.
+    /// The function along `y` at the first `x`: the value at the first `y`, then a slope for each interval of `y`.
     first: Vec<f64>,
-    /// For each step in `x` the slope over `x`, likewise along `y`.
+    /// The slope over `x` in each interval of `x`, in the same form along `y`.
     slopes: Vec<Vec<f64>>,
 }
 
-/// Error of a grid's definition.
+/// Error in the definition of a grid.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum GridError {
     /// The points of one variable are invalid.
@@ -28,10 +28,10 @@ pub enum GridError {
     Axis {
         /// Name of the variable.
         variable: &'static str,
-        /// The error of its points.
+        /// The error in its points.
         why: TableError,
     },
-    /// The values do not fill the grid.
+    /// The number of values does not match the grid.
     #[error("a grid of {0} by {1} points needs {0} rows of {1} values")]
     Uneven(usize, usize),
     /// A value is not finite.
@@ -69,10 +69,11 @@ fn ramp<R: Real>(x: R, from: f64, to: f64) -> R {
 }
 
 impl Grid {
-    /// The function with the value `values[i][j]` at (`x[i]`, `y[j]`), both increasing.
+    /// The function with the value `values[i][j]` at (`x[i]`, `y[j]`). Both `x` and `y` must increase.
     ///
     /// # Errors
-    /// If the points do not form a grid, or are more than 100 by 16.
+    /// If `x` or `y` does not increase, the values do not match the grid, a number is not finite, or there are fewer than 2 by 2
+    /// or more than 100 by 16 points.
     pub fn new(x: &[f64], y: &[f64], values: &[Vec<f64>]) -> Result<Grid, GridError> {
         let of = |variable| move |why| GridError::Axis { variable, why };
         increasing(x, MOST_ROWS).map_err(of("the first variable"))?;
@@ -94,13 +95,13 @@ impl Grid {
         })
     }
 
-    /// Points along the first and the second variable.
+    /// The points along the first and along the second variable.
     pub fn axes(&self) -> [&[f64]; 2] {
         [&self.x, &self.y]
     }
 
-    /// Value at (`x`, `y`), NaN if one of them is. Computed as sums of clipped ramps as in
-    /// [`Table::at`](super::Table::at): no search, hence no branch per lane.
+    /// Value at (`x`, `y`). NaN if `x` or `y` is NaN. It is a sum of clipped ramps as in [`Table::at`](super::Table::at), which
+    /// needs no search and hence no branch per lane.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R, y: R) -> R {
         let mut ramps = [R::zero(); MOST_COLUMNS];
@@ -108,7 +109,7 @@ impl Grid {
         for (j, ramped) in ramps.iter_mut().enumerate().take(steps) {
             *ramped = ramp(y, self.y[j], self.y[j + 1]);
         }
-        // zero, or NaN
+        // the first term is zero, or NaN if `x` or `y` is NaN
         let mut sum = (x + y).scale(0.0) + line(&self.first, &ramps);
         for (i, slopes) in self.slopes.iter().enumerate() {
             sum += ramp(x, self.x[i], self.x[i + 1]) * line(slopes, &ramps);
@@ -117,7 +118,7 @@ impl Grid {
     }
 }
 
-/// Value at the first point plus the ramps times their slopes.
+/// The value at the first point plus the sum of the ramps times their slopes.
 #[inline(always)]
 fn line<R: Real>(slopes: &[f64], ramps: &[R; MOST_COLUMNS]) -> R {
     let mut sum = R::from_f64(slopes[0]);

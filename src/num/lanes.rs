@@ -1,4 +1,4 @@
-//! Lanes: single-precision numbers that are evaluated together.
+//! Vector lanes: single-precision numbers that are evaluated together.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -11,12 +11,12 @@ use std::arch::x86_64::{__m128, __m256, __m512};
 
 /// `N` lanes in a register `V`, one for each candidate of a batch.
 ///
-/// With an array (`V = [f32; N]`) the compiler must vectorise by itself, which is slow and poor for AVX-512. With the
-/// registers of an instruction set, each operation is an intrinsic.
+/// With an array (`V = [f32; N]`) the compiler vectorises the operations, which is slow for AVX-512. With the registers of an
+/// instruction set, each operation is an intrinsic.
 ///
-/// With `FUSED`, [`Real::mul_add`] rounds once, so that the last bits of results differ. It doubles the speed where
-/// the processor has the instruction and the kernel is compiled for it; elsewhere it is very slow. Without `FUSED`,
-/// all kinds of lanes give bit-identical results.
+/// With `FUSED`, [`Real::mul_add`] rounds only once, which changes the last bits of results. It doubles the speed if the
+/// processor has the instruction and the kernel is compiled for it. Otherwise it is very slow. Without `FUSED`, all kinds
+/// of lanes give bit-identical results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes<const N: usize, const FUSED: bool = false, V = [f32; N]>(pub V);
@@ -27,14 +27,14 @@ pub type Avx512<const FUSED: bool> = Lanes<16, FUSED, __m512>;
 /// Sixteen lanes in AVX2 registers.
 #[cfg(target_arch = "x86_64")]
 pub type Avx2<const FUSED: bool> = Lanes<16, FUSED, Pair<__m256>>;
-/// Sixteen lanes in registers that every processor of the target has.
+/// Sixteen lanes in registers of the target's baseline, which every x86-64 processor has.
 #[cfg(target_arch = "x86_64")]
 pub type Base<const FUSED: bool> = Lanes<16, FUSED, Pair<Pair<__m128>>>;
-/// Sixteen lanes in registers that every processor of the target has.
+/// Sixteen lanes in registers of the target's baseline.
 #[cfg(not(target_arch = "x86_64"))]
 pub type Base<const FUSED: bool> = Lanes<16, FUSED>;
 
-/// Whether a multiply-add is fused on every processor of the target.
+/// Whether the target's baseline has a fused multiply-add.
 pub const BASE_FUSED: bool = cfg!(target_arch = "aarch64");
 
 impl<const N: usize, const FUSED: bool> Lanes<N, FUSED> {
@@ -132,8 +132,8 @@ impl<const N: usize, const FUSED: bool, V: Register> Real for Lanes<N, FUSED, V>
 }
 
 impl<const N: usize, const FUSED: bool, V: Register> Lanes<N, FUSED, V> {
-    /// Sum over the lanes, N being a power of two, by repeatedly adding the upper half to the lower one, so that
-    /// every kind of register gives a bit-identical result.
+    /// Sum over the lanes, where N must be a power of two. The upper half is repeatedly added to the lower half. All kinds of
+    /// registers therefore give a bit-identical result.
     #[inline(always)]
     pub fn sum(self) -> f32 {
         self.0.sum()
@@ -142,11 +142,11 @@ impl<const N: usize, const FUSED: bool, V: Register> Lanes<N, FUSED, V> {
 
 /// Lanes that can be accessed in rows of [`ROW`].
 pub trait Packed: Real {
-    /// Number of rows.
+    /// Number of rows in the lanes.
     const ROWS: usize;
     /// Packs the rows `row(0)`, `row(1)`, …
     fn pack(row: impl FnMut(usize) -> [f32; ROW]) -> Self;
-    /// Extracts one of the rows.
+    /// Extracts the row with number `row`.
     fn unpack(self, row: usize) -> [f32; ROW];
 }
 
@@ -176,13 +176,13 @@ impl<const N: usize, const FUSED: bool, V: Register> Packed for Lanes<N, FUSED, 
     }
 }
 
-/// Sine and cosine to 1e-7 absolute for |x| < 8192, without branches (Cephes `sinf`, `cosf`).
+/// Sine and cosine with an absolute error of 1e-7 for |x| < 8192, without branches (Cephes `sinf`, `cosf`).
 #[inline(always)]
 fn sin_cos<V: Register>(x: V) -> (V, V) {
     let c = V::splat;
     let shifted = x.mul(c(std::f32::consts::FRAC_2_PI)).add(c(ROUND));
     let turns = shifted.sub(c(ROUND));
-    // π/2 in three parts, so that the reduced argument keeps its last bits
+    // π/2 is split into three parts, which preserves the last bits of the reduced argument
     let y = x.sub(turns.mul(c(1.570_312_5))).sub(turns.mul(c(4.837_513e-4)));
     let y = y.sub(turns.mul(c(7.549_79e-8)));
     let z = y.mul(y);
@@ -194,7 +194,7 @@ fn sin_cos<V: Register>(x: V) -> (V, V) {
     V::quarters(shifted, sine, cosine)
 }
 
-/// Angle of the point (x, y) to 3 ulp, without branches (Cephes `atanf`).
+/// Angle of the point (x, y) with an error of 3 ulp, without branches (Cephes `atanf`).
 #[inline(always)]
 fn atan2<V: Register>(y: V, x: V) -> V {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -203,7 +203,7 @@ fn atan2<V: Register>(y: V, x: V) -> V {
     let big = V::where_less(ay, ax, ax, ay);
     let small = V::where_less(ay, ax, ay, ax);
     let ratio = small.div(big.greater(c(1e-37)));
-    // tan(π/8): above it, atan(t) = π/4 + atan((t − 1)/(t + 1))
+    // above tan(π/8), atan(t) = π/4 + atan((t − 1)/(t + 1))
     let high = c(0.414_213_57);
     let folded = ratio.sub(c(1.0)).div(ratio.add(c(1.0)));
     let t = V::where_less(high, ratio, folded, ratio);
@@ -217,7 +217,7 @@ fn atan2<V: Register>(y: V, x: V) -> V {
     V::where_less(y, c(0.0), angle.neg(), angle)
 }
 
-/// Exponential to 2 ulp, saturating at the ends of the range (Cephes `expf`).
+/// Exponential with an error of 2 ulp, saturated at the ends of the range (Cephes `expf`).
 #[inline(always)]
 fn exp<V: Register>(x: V) -> V {
     let c = V::splat;
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn functions_agree_with_the_standard_library() {
-        // 1e-6 is eight units in the last place at one: three times the routines' stated error
+        // 1e-6 is eight units in the last place at one, three times the documented error of the routines
         for i in -40_000..=40_000_i32 {
             let x = i as f32 * 2.5e-4;
             let ([s], [c]) = sin_cos([x]);
@@ -257,7 +257,7 @@ mod tests {
         assert_eq!(atan2([0.0_f32], [0.0]), [0.0]);
     }
 
-    /// Values of every function of lanes at many arguments, lane by lane.
+    /// Results of every function of lanes at many arguments, as rows of lanes.
     #[inline(always)]
     fn tried<const N: usize, const FUSED: bool, V: Register>() -> Vec<[f32; ROW]> {
         let mut all = Vec::new();

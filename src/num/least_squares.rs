@@ -1,9 +1,9 @@
-//! Least squares with a few unknowns.
+//! Linear least squares with a few unknowns.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Least-squares solution of `rows` · x = `values`; the one of minimum norm if it is not unique. `None` if a number
-/// is not finite.
+/// Least-squares solution of `rows` · x = `values`. If it is not unique, the solution of minimum norm. `None` if an
+/// input is not finite.
 pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> Option<[f64; N]> {
     if !rows.iter().flatten().chain(values).all(|x| x.is_finite()) {
         return None;

@@ -1,13 +1,12 @@
-//! `Real`: the operations that an equation of motion may use.
+//! The trait `Real`: the operations that an equation of motion may use.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// The scalar that the physics is generic over: `f64`, [`Lanes`](super::Lanes) of `f32`, or [`Dual`](super::Dual)
-/// numbers.
+/// The scalar type of the physics: `f64`, [`Lanes`](super::Lanes) of `f32`, or [`Dual`](super::Dual) numbers.
 ///
-/// There is no `<`: lanes cannot branch, so equations use [`where_less`](Real::where_less),
-/// [`min`](Real::min), [`max`](Real::max), [`abs`](Real::abs) and [`Table`](super::Table).
+/// There is no `<`, because lanes cannot branch. Equations use [`where_less`](Real::where_less), [`min`](Real::min),
+/// [`max`](Real::max), [`abs`](Real::abs) and [`Table`](super::Table) instead.
 pub trait Real:
     Copy
     + Debug
@@ -22,22 +21,22 @@ pub trait Real:
     + AddAssign
     + SubAssign
 {
-    /// Number of outputs of a layer that are summed at once, in registers.
+    /// Number of outputs of a network layer that are summed at the same time, in registers.
     const ABREAST: usize = 6;
     /// Whether a call that is not inlined would leave the caller's vector instruction set.
     const IN_REGISTERS: bool = false;
 
-    /// The constant `x`, with no derivative, in every lane.
+    /// The constant `x` in every lane, with zero derivatives.
     fn from_f64(x: f64) -> Self;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
-    /// The angle of the point (x, y) = (`x`, `self`), in −π..π.
+    /// The angle of the point (`x`, `self`), −π..π rad.
     fn atan2(self, x: Self) -> Self;
     /// Square root of the number.
     fn sqrt(self) -> Self;
     /// The exponential function e^x.
     fn exp(self) -> Self;
-    /// `then` where `a < b`, else `otherwise`; both are computed.
+    /// `then` if `a < b`, else `otherwise`. Both are computed.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
 
     /// Magnitude (absolute value) of the number.
@@ -45,22 +44,22 @@ pub trait Real:
     fn abs(self) -> Self {
         Self::where_less(self, Self::zero(), -self, self)
     }
-    /// The smaller of two numbers; NaN if `self` is, so that limits do not hide a NaN.
+    /// The smaller of two numbers. NaN if `self` is NaN, because a limit must not hide a NaN.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self::where_less(other, self, other, self)
     }
-    /// The larger of two numbers; NaN if `self` is.
+    /// The larger of two numbers. NaN if `self` is NaN.
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         Self::where_less(self, other, other, self)
     }
-    /// Multiply-add `self · factor + addend`, with one or two roundings depending on the type.
+    /// Multiply-add `self · factor + addend`, with one or two roundings that depend on the type.
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         self * factor + addend
     }
-    /// Multiply-add with a constant factor, `self · factor + addend`, rounded as [`mul_add`](Real::mul_add).
+    /// Multiply-add with a constant factor, `self · factor + addend`, rounded like [`mul_add`](Real::mul_add).
     #[inline(always)]
     fn mul_add_constant(self, factor: f64, addend: Self) -> Self {
         self.mul_add(Self::from_f64(factor), addend)
@@ -80,11 +79,11 @@ pub trait Real:
     fn clamp(self, low: f64, high: f64) -> Self {
         self.max(Self::from_f64(low)).min(Self::from_f64(high))
     }
-    /// The hyperbolic tangent, to 1e-7 absolute in single precision.
+    /// The hyperbolic tangent, with an absolute error of 1e-7 in single precision.
     #[inline(always)]
     fn tanh(self) -> Self {
         let one = Self::from_f64(1.0);
-        // past ±20 it is ±1 in double precision too, and the exponential stays finite
+        // beyond ±20 the tangent is ±1 in double precision too, and the limit keeps the exponential finite
         let e = self.clamp(-20.0, 20.0).scale(2.0).exp();
         (e - one) / (e + one)
     }
@@ -96,8 +95,8 @@ pub trait Real:
     }
 }
 
-/// Applies `f` to every element. Guaranteed to be inlined, unlike an array's own `map`: a call would leave the vector
-/// instructions of the caller.
+/// Applies `f` to every element. The function is always inlined, unlike the `map` of an array, because a call would leave the
+/// vector instructions of the caller.
 #[inline(always)]
 pub fn each<const N: usize, T: Copy, S: Copy>(all: [T; N], mut f: impl FnMut(T) -> S) -> [S; N] {
     let mut out = [f(all[0]); N];

@@ -1,34 +1,34 @@
-//! Registers that hold lanes, with the processor's operations on them.
+//! Processor registers that hold lanes, and the operations on them.
 
 use std::fmt::Debug;
 
-/// Adding and subtracting 1.5 · 2²³ rounds to the nearest integer without a call, and leaves the
-/// integer's last bits in those of the sum.
+/// The constant 1.5 · 2²³. Its addition and subtraction round a number to the nearest integer without a call. The last bits
+/// of the sum are those of the integer.
 pub(super) const ROUND: f32 = 12_582_912.0;
 
-/// Single-precision numbers that one instruction processes. Each operation rounds once as in IEEE 754, so that all
-/// kinds of register give bit-identical results.
+/// Single-precision numbers that one instruction processes together. Each operation rounds once as in IEEE 754. All kinds
+/// of registers therefore give bit-identical results.
 ///
-/// The registers of an instruction set may only be used in functions that are compiled for it.
+/// The registers of an instruction set may be used only in functions that are compiled for this set.
 pub trait Register: Copy + Debug + Send + Sync + 'static {
     /// Number of lanes.
     const LANES: usize;
-    /// Number of registers for simultaneous sums, enough to hide the latency of a multiply-add and few enough to
-    /// leave registers for its operands.
+    /// Number of sums that are computed at the same time. They hide the latency of a multiply-add and leave registers for its
+    /// operands.
     const SUMS: usize;
     /// The same number in every lane.
     fn splat(x: f32) -> Self;
-    /// Loads the first numbers of a list.
+    /// Loads the first numbers of `from`, one per lane.
     fn read(from: &[f32]) -> Self;
-    /// Stores the numbers at the start of a list.
+    /// Stores the lanes at the start of `to`.
     fn write(self, to: &mut [f32]);
-    /// Sum of the lanes, pairwise.
+    /// Sum of the numbers in each lane.
     fn add(self, other: Self) -> Self;
-    /// Difference of the lanes, pairwise.
+    /// Difference of the numbers in each lane.
     fn sub(self, other: Self) -> Self;
-    /// Product of the lanes, pairwise.
+    /// Product of the numbers in each lane.
     fn mul(self, other: Self) -> Self;
-    /// Quotient of the lanes, pairwise.
+    /// Quotient of the numbers in each lane.
     fn div(self, other: Self) -> Self;
     /// Negates `self` in every lane.
     fn neg(self) -> Self;
@@ -38,23 +38,22 @@ pub trait Register: Copy + Debug + Send + Sync + 'static {
     fn sqrt(self) -> Self;
     /// `self · factor + addend`, rounded once.
     fn fused(self, factor: Self, addend: Self) -> Self;
-    /// The smaller number of each lane: `self < other ? self : other`.
+    /// The smaller number in each lane: `self < other ? self : other`.
     fn lesser(self, other: Self) -> Self;
-    /// The larger number of each lane: `self > other ? self : other`.
+    /// The larger number in each lane: `self > other ? self : other`.
     fn greater(self, other: Self) -> Self;
     /// Selection in each lane: `a < b ? then : otherwise`.
     fn where_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
-    /// Sine and cosine of an angle increased by n quarter turns, n being the integer that was rounded into `shifted`
-    /// by adding 1.5 · 2²³.
+    /// Sine and cosine of an angle plus n quarter turns. The addition of 1.5 · 2²³ has rounded n into `shifted`.
     fn quarters(shifted: Self, sine: Self, cosine: Self) -> (Self, Self);
-    /// Power 2ⁿ of an integer in −126..=127.
+    /// The power 2ⁿ of an integer n in −126..=127.
     fn power(n: Self) -> Self;
-    /// Sum over the lanes, by repeatedly adding the upper half to the lower one.
+    /// Sum over the lanes. The upper half is repeatedly added to the lower half.
     fn sum(self) -> f32;
 }
 
-/// `N` results of an expression in `i`. A loop rather than `std::array::from_fn`: a function that is not inlined
-/// leaves the vector instructions of its caller.
+/// The values of an expression for `i` from 0 to `N` − 1. It is a loop because `std::array::from_fn` might not be inlined and
+/// then leaves the vector instructions of its caller.
 macro_rules! entries {
     ($i:ident => $value:expr) => {{
         let mut all = [0.0; N];
@@ -67,10 +66,10 @@ macro_rules! entries {
     }};
 }
 
-/// An array of numbers, to be vectorised by the compiler.
+/// An array of numbers, which the compiler vectorises.
 impl<const N: usize> Register for [f32; N] {
     const LANES: usize = N;
-    // six sums of 16 lanes take 24 of NEON's 32 registers
+    // six sums of 16 lanes use 24 of NEON's 32 registers
     const SUMS: usize = 6;
     #[inline(always)]
     fn splat(x: f32) -> Self {
@@ -160,11 +159,11 @@ impl<const N: usize> Register for [f32; N] {
     }
 }
 
-/// Two registers: the lanes of the first come before those of the second.
+/// Two registers. The lanes of the first precede those of the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair<V>(V, V);
 
-/// Operations on each half.
+/// Implements operations on each half separately.
 macro_rules! halves {
     ($($method:ident($($other:ident),*)),*) => {$(
         #[inline(always)]
@@ -224,7 +223,7 @@ impl<V: Register> Register for Pair<V> {
     }
 }
 
-/// Implements [`Register`] by intrinsics that differ in their prefix alone.
+/// Implements [`Register`] with intrinsics that differ only in their prefix.
 #[cfg(target_arch = "x86_64")]
 macro_rules! intrinsics {
     ($register:ty, $lanes:literal, $sums:literal, $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident
@@ -234,31 +233,31 @@ macro_rules! intrinsics {
         intrinsics!(two $register, add $add, sub $sub, mul $mul, div $div, lesser $min, greater $max);
         #[inline(always)]
         fn splat(x: f32) -> Self {
-            // SAFETY: as the trait demands, the processor has the instruction
+            // SAFETY: as the trait requires, the processor has the instruction
             unsafe { $splat(x) }
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
-            // SAFETY: as above
+            // SAFETY: as the trait requires, the processor has the instruction
             unsafe { $sqrt(self) }
         }
         #[inline(always)]
         fn read(from: &[f32]) -> Self {
             let from = &from[..$lanes];
-            // SAFETY: as above, and there are as many numbers as are read
+            // SAFETY: the processor has the instruction, and `from` has as many numbers as are read
             unsafe { $load(from.as_ptr()) }
         }
         #[inline(always)]
         fn write(self, to: &mut [f32]) {
             let to = &mut to[..$lanes];
-            // SAFETY: as above, and there is room for as many numbers as are written
+            // SAFETY: the processor has the instruction, and `to` has room for as many numbers as are written
             unsafe { $store(to.as_mut_ptr(), self) }
         }
     };
     (two $register:ty, $($method:ident $intrinsic:ident),*) => {$(
         #[inline(always)]
         fn $method(self, other: Self) -> Self {
-            // SAFETY: as the trait demands, the processor has the instruction
+            // SAFETY: as the trait requires, the processor has the instruction
             unsafe { $intrinsic(self, other) }
         }
     )*};

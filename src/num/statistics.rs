@@ -1,11 +1,11 @@
-//! Statistics of samples: mean, quantiles and the interquartile mean.
+//! Statistics of samples: mean, quantiles, interquartile mean and correlation length.
 
-/// The arithmetic mean; NaN for no samples.
+/// The arithmetic mean. NaN if there are no samples.
 pub fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
 }
 
-/// The quantile `q` in 0..=1, linear between order statistics; NaN for no samples.
+/// The quantile `q` (0..=1), linear between order statistics. NaN if there are no samples.
 pub fn quantile(samples: &[f64], q: f64) -> f64 {
     if samples.is_empty() {
         return f64::NAN;
@@ -18,8 +18,8 @@ pub fn quantile(samples: &[f64], q: f64) -> f64 {
     sorted[low] * (1.0 - part) + sorted[high] * part
 }
 
-/// The mean of the middle half of the samples (Agarwal et al. 2021), as `scipy.stats.trim_mean`
-/// with a quarter cut from each end; NaN for no samples.
+/// The mean of the middle half of the samples (Agarwal et al. 2021), like `scipy.stats.trim_mean` with a quarter cut from
+/// each end. NaN if there are no samples.
 pub fn interquartile_mean(samples: &[f64]) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -27,8 +27,9 @@ pub fn interquartile_mean(samples: &[f64]) -> f64 {
     mean(&sorted[cut..sorted.len() - cut])
 }
 
-/// Integral correlation length, in samples, of `parts`, series of zero mean with gaps between them (the mean is not
-/// removed): the autocorrelation summed both ways up to where it first falls below 0.05. 1 for white noise.
+/// Integral correlation length of the series in `parts`, in samples. It is 1 for white noise. The series have zero mean (the
+/// mean is not removed) and gaps between them. The length is the sum of the autocorrelation over positive and negative
+/// lags, up to the lag at which it first falls to 0.05.
 pub fn correlation_length(parts: &[Vec<f64>]) -> f64 {
     let mean_product = |lag: usize| {
         let pairs = parts.iter().flat_map(|part| part.iter().zip(part.iter().skip(lag)));
@@ -38,7 +39,7 @@ pub fn correlation_length(parts: &[Vec<f64>]) -> f64 {
     let own = mean_product(0);
     let longest = parts.iter().map(Vec::len).max().unwrap_or(0);
     let correlations = (1..longest).map(|lag| mean_product(lag) / own);
-    // a comparison with NaN is false
+    // a NaN ends the sum, because its comparison is false
     correlations.take_while(|c| *c > 0.05).fold(1.0, |sum, c| sum + 2.0 * c)
 }
 

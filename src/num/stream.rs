@@ -1,16 +1,16 @@
-//! Seeded random streams, identical on every machine and independent by path.
+//! Seeded random streams, identical on every machine and independent for different paths.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// A reproducible random stream. ChaCha8 is specified bit for bit, so that a seed gives the same flight in every
-/// version of the program on every machine.
+/// A reproducible random stream. ChaCha8 is specified to the bit. A seed therefore gives the same flight with every version
+/// of the program on every machine.
 pub type Stream = ChaCha8Rng;
 
-/// Random stream of `seed` for one purpose, for example `stream(seed, &[episode, tick])`: streams with different
-/// paths are independent, whatever order they are drawn in.
+/// Random stream of `seed` for one purpose, for example `stream(seed, &[episode, tick])`. Streams with different paths are
+/// independent and may be drawn in any order.
 pub fn stream(seed: u64, path: &[u64]) -> Stream {
-    // FNV-1a over the path picks one of ChaCha's 2^64 streams of the key
+    // the FNV-1a hash of the path selects one of ChaCha's 2^64 streams for the key
     let number =
         path.iter().flat_map(|p| p.to_le_bytes()).fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

@@ -1,4 +1,4 @@
-//! A function of one variable given by points: linear between them, constant outside.
+//! A function of one variable given by points, linear between them and constant beyond them.
 
 use super::Real;
 
@@ -6,11 +6,11 @@ use super::Real;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     floor: f64,
-    /// Segments: x at the start, length, slope.
+    /// Segments, each as x at its start, length in x, and slope.
     segments: Vec<(f64, f64, f64)>,
 }
 
-/// Error of a table's definition.
+/// Error in the definition of a table.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum TableError {
     /// There are too few points.
@@ -21,7 +21,7 @@ pub enum TableError {
     TooLong {
         /// Number of points given.
         points: usize,
-        /// Largest number possible.
+        /// Largest number of points allowed.
         most: usize,
     },
     /// The two lists differ in length.
@@ -35,11 +35,11 @@ pub enum TableError {
     NotFinite(usize),
 }
 
-/// Largest number of points, a limit on the cost of evaluating a model.
+/// Largest number of points. It limits the time to evaluate a model.
 const MAX_POINTS: usize = 1000;
 
 impl Table {
-    /// The table through the points (`x[i]`, `y[i]`), `x` increasing.
+    /// The table with the points (`x[i]`, `y[i]`), where `x` increases.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Table, TableError> {
         if x.len() != y.len() {
             return Err(TableError::Uneven(x.len(), y.len()));
@@ -65,7 +65,7 @@ impl Table {
         Ok(Table { floor: y[0], segments })
     }
 
-    /// Points of the table.
+    /// The points (x, y) of the table.
     pub fn points(&self) -> Vec<(f64, f64)> {
         let mut y = self.floor;
         let mut points = Vec::with_capacity(self.segments.len() + 1);
@@ -79,11 +79,11 @@ impl Table {
         points
     }
 
-    /// Value at `x`, NaN if `x` is. Computed as a sum of clipped ramps without a search, hence without a branch per
-    /// lane. At an abscissa the derivative is that of the right segment.
+    /// Value at `x`. NaN if `x` is NaN. It is a sum of clipped ramps, which needs no search and hence no branch per lane. At a
+    /// point of the table the derivative is the slope of the segment to the right.
     #[inline(always)]
     pub fn at<R: Real>(&self, x: R) -> R {
-        // zero, or NaN
+        // the second term is zero, or NaN if `x` is NaN
         let mut y = R::from_f64(self.floor) + x.scale(0.0);
         for &(start, length, slope) in &self.segments {
             let part = (x - R::from_f64(start)).max(R::zero());

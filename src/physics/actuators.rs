@@ -1,12 +1,12 @@
 //! Actuators: filters from commands to the deflections that act on the airframe, exact at a time step of 0.01 s.
 //!
-//! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step, so a
-//! recurrence with the same coefficients reproduces it to rounding.
+//! JSBSim discretises each filter with the bilinear (Tustin) rule at the simulation step. A recurrence with the same
+//! coefficients therefore reproduces its filters to rounding.
 
 use crate::servos::{ActuatorFigures, Surface};
 use greylag_num::{Real, each};
 
-/// A command, the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
+/// A command. It is the action of eq. (29) of \[GSFM26\] with throttle = (a_thr + 1)/2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Command<R = f64> {
     /// Aileron, −1..1; positive rolls right.
@@ -15,12 +15,12 @@ pub struct Command<R = f64> {
     pub elevator: R,
     /// Throttle command, 0..1.
     pub throttle: R,
-    /// Rudder, −1..1; positive yaws left. Zero on an aircraft without one.
+    /// Rudder, −1..1; positive yaws left. Zero on an aircraft without a rudder.
     pub rudder: R,
 }
 
 impl Command {
-    /// Surfaces centred, motor off.
+    /// The command with neutral surfaces and the motor off.
     pub const IDLE: Command = Command { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
 
     /// Whether every component is a finite number.
@@ -39,7 +39,7 @@ impl Command {
     }
 }
 
-/// Largest number of lags and delays, `lag(…)` and `delay(…)` of effect files, in the formulas of one model.
+/// Largest total number of `lag(…)` and `delay(…)` terms of effect files in the formulas of one model.
 pub const LAGS: usize = 2;
 
 /// Deflections and throttle position that act on the airframe at one instant.
@@ -51,10 +51,10 @@ pub struct Controls<R = f64> {
     pub elevator: R,
     /// Throttle position δt, 0..1.
     pub throttle: R,
-    /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without one.
+    /// Rudder deflection δr, rad; positive trailing edge left. Zero on an aircraft without a rudder.
     pub rudder: R,
-    /// Values of the lags and delays of the model's formulas at this instant; `None` if the past of the controls is
-    /// unknown, in which case they are taken as settled.
+    /// Values of the lags and delays of the model's formulas at this instant. `None` if the past controls are unknown. The
+    /// lags and delays then count as settled.
     pub lagged: Option<[R; LAGS]>,
 }
 
@@ -80,7 +80,7 @@ impl<R: Copy> Controls<R> {
 }
 
 impl Controls {
-    /// Linear interpolation to `next`, at the share `part` of the way.
+    /// Linear interpolation to `next`, at the fraction `part` of the way.
     pub fn towards(&self, next: &Controls, part: f64) -> Controls {
         let mix = |a: f64, b: f64| a + part * (b - a);
         Controls {
@@ -109,14 +109,14 @@ pub struct ActuatorState<R = f64> {
     pub elevator_rate: R,
     /// Position of the throttle, 0..1.
     pub throttle: R,
-    /// Rudder position, rad; positive trailing edge left. Zero on an aircraft without one.
+    /// Rudder position, rad; positive trailing edge left. Zero on an aircraft without a rudder.
     pub rudder: R,
     /// Rate of the rudder, rad/s.
     pub rudder_rate: R,
 }
 
 impl<R: Copy> ActuatorState<R> {
-    /// The positions, as controls.
+    /// The positions as controls, with unknown lags and delays.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -129,20 +129,20 @@ impl<R: Copy> ActuatorState<R> {
     }
 }
 
-/// A second-order surface filter with its memory, limited after the filter.
+/// A second-order filter of a surface, with its memory. Travel and rate limits follow the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceFilter<R = f64> {
-    /// The two last commanded deflections, rad, newest first.
+    /// The last two commanded deflections, rad, newest first.
     input: [R; 2],
-    /// The two last filtered deflections before clipping, rad, newest first.
+    /// The last two filtered deflections before the limits, rad, newest first.
     output: [R; 2],
-    /// The two last clipped deflections, rad, newest first.
+    /// The last two deflections after the limits, rad, newest first.
     clipped: [R; 2],
 }
 
-/// The filters of all actuators; an aircraft without a rudder has no filter for it.
+/// The filters of all actuators. An aircraft without a rudder has no rudder filter.
 ///
-/// Complete (Markov) state of the actuators; the observation [`ActuatorState`] is not complete.
+/// They are the complete (Markov) state of the actuators. The observation [`ActuatorState`] is not complete.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuators<R = f64> {
     aileron: SurfaceFilter<R>,
@@ -157,7 +157,7 @@ impl<R: Real> SurfaceFilter<R> {
         SurfaceFilter { input: [position; 2], output: [position; 2], clipped: [position; 2] }
     }
 
-    /// The filter memory consistent with a `position` (rad) and `rate` (rad/s) after the two last commands.
+    /// The filter memory consistent with a `position` (rad) and `rate` (rad/s) after the last two commands.
     #[inline(always)]
     fn observed(
         [position, rate]: [R; 2],
@@ -210,7 +210,7 @@ impl<R: Real> SurfaceFilter<R> {
 }
 
 impl<R: Real> Actuators<R> {
-    /// Actuators at rest at `controls`, with commands that hold them there. A rudder without figures keeps its position.
+    /// Actuators at rest at `controls`, with commands that hold them there. Without rudder data the rudder keeps its position.
     pub fn at_rest(controls: &Controls<R>) -> Self {
         Actuators {
             aileron: SurfaceFilter::at(controls.aileron),
@@ -228,9 +228,8 @@ impl<R: Real> Actuators<R> {
 
     /// The filter memories consistent with an observed `state` after the commands `previous` (newest first).
     ///
-    /// Exact unless a surface is at its stop, where the filter's own output is not observed: the first step after
-    /// leaving it may then be off by up to 8 % of the travel. The same applies to a surface that moves at its rate
-    /// limit.
+    /// The memories are exact unless a surface is at a travel limit or moves at its rate limit, where the output of the filter
+    /// is not observed. The first step after the limit may then be wrong by up to 8 % of the travel.
     #[inline(always)]
     pub fn from_observed(
         state: &ActuatorState<R>,
@@ -265,7 +264,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// Selects the filters of `then` where `chosen` is above zero, else these.
+    /// Selects the filters of `then` where `chosen` is above zero, else those of `self`.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
@@ -294,7 +293,7 @@ impl<R: Real> Actuators<R> {
         self.throttle_input = command.throttle;
     }
 
-    /// Present deflections and throttle position.
+    /// Present deflections and throttle position, with unknown lags and delays.
     #[inline(always)]
     pub fn controls(&self) -> Controls<R> {
         Controls {
@@ -309,7 +308,7 @@ impl<R: Real> Actuators<R> {
         }
     }
 
-    /// Present observation: positions, with rates as differences over the last step.
+    /// Present observation. The rates are differences over the last step.
     #[inline(always)]
     pub fn observed(&self, figures: &ActuatorFigures) -> ActuatorState<R> {
         let (rudder, rudder_rate) = match &self.rudder {
@@ -340,7 +339,7 @@ mod tests {
     #[test]
     fn recurrences_are_those_measured_in_the_simulator() {
         let f = figures();
-        // printed with five decimals
+        // the printed values have five decimals
         for (ours, printed) in [
             (f.aileron.filter[0], 0.12774),
             (-f.aileron.filter[1], 0.76644),

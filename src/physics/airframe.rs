@@ -1,4 +1,4 @@
-//! The airframe: geometry, actuators and flight envelope, from a TOML file.
+//! The airframe: geometry, actuators, flight envelope and sensors, read from a TOML file.
 
 mod controls;
 mod effectors;
@@ -17,7 +17,7 @@ use effectors::{MotorFile, SurfaceFile};
 
 pub use crate::servos::ActuatorFigures;
 
-/// Wing area in m², span and mean chord in m.
+/// Reference dimensions of the wing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     /// Reference wing area S, m².
@@ -28,7 +28,7 @@ pub struct Geometry {
     pub chord: f64,
 }
 
-/// Flight envelope: limits that the companion enforces.
+/// Flight envelope: the limits that the companion enforces.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Envelope {
@@ -40,45 +40,45 @@ pub struct Envelope {
     pub pitch_min_deg: f64,
     /// Largest normal load factor.
     pub load_factor_max: f64,
-    /// Smallest load factor, if the file states one: see [`load_factor_least`](Envelope::load_factor_least).
+    /// Smallest normal load factor. If `None`, see [`load_factor_least`](Envelope::load_factor_least).
     #[serde(default)]
     pub load_factor_min: Option<f64>,
-    /// Largest sideslip, degrees, if the file states one: see [`sideslip_most_deg`](Envelope::sideslip_most_deg).
+    /// Largest sideslip, degrees. If `None`, see [`sideslip_most_deg`](Envelope::sideslip_most_deg).
     #[serde(default)]
     pub sideslip_max_deg: Option<f64>,
     /// Smallest true airspeed, m/s.
     pub airspeed_min_mps: f64,
     /// Largest true airspeed, m/s.
     pub airspeed_max_mps: f64,
-    /// Cruise airspeed (true), the default where none is commanded, m/s.
+    /// Cruise airspeed (true), which is used if no airspeed is commanded, m/s.
     pub airspeed_cruise_mps: f64,
     /// Largest rate of a surface command, in units of the command (−1..1) per second.
     pub surface_slew_per_s: f64,
 }
 
-/// Smallest load factor relative to the largest, if a file states none: FAR 23.337 (b) (1), normal and utility
+/// Ratio of the smallest load factor to the largest if a file states no smallest: FAR 23.337 (b) (1), normal and utility
 /// category.
 const LEAST_LOAD: f64 = -0.4;
-/// Largest sideslip if a file states none, degrees: linear lateral derivatives are not valid beyond it.
+/// Largest sideslip if a file states none, degrees. Linear lateral derivatives are not valid beyond it.
 const SIDESLIP_DEG: f64 = 25.0;
 /// Ratio of the stall angle to the angle from which the nose is pushed down, if a file states none.
 const STALL: f64 = 4.0 / 3.0;
-/// Share of the stall angle that limits the angle of attack in flight.
+/// Fraction of the stall angle that limits the angle of attack in flight.
 const BEFORE_STALL: f64 = 0.95;
 
 impl Envelope {
-    /// Smallest load factor: the file's, else −0.4 of the largest (FAR 23.337).
+    /// Smallest normal load factor: the file's, or −0.4 of the largest if the file states none (FAR 23.337).
     pub fn load_factor_least(&self) -> f64 {
         self.load_factor_min.unwrap_or(LEAST_LOAD * self.load_factor_max)
     }
 
-    /// The largest sideslip, degrees: the file's, else 25.
+    /// Largest sideslip, degrees: the file's, or 25° if the file states none.
     pub fn sideslip_most_deg(&self) -> f64 {
         self.sideslip_max_deg.unwrap_or(SIDESLIP_DEG)
     }
 
-    /// Airspeed from which a log's rows count as flight, m/s: half the smallest one, so that a stall counts as flight
-    /// and taxiing does not.
+    /// Airspeed from which the rows of a log count as flight, m/s. It is half the smallest airspeed: a stall counts as flight,
+    /// taxiing does not.
     pub fn flying_from_mps(&self) -> f64 {
         0.5 * self.airspeed_min_mps
     }
@@ -105,16 +105,16 @@ pub struct Incidence {
     /// Largest angle of attack of steady flight, rad.
     #[serde(rename = "comfortable_rad")]
     pub comfortable: f64,
-    /// Largest angle of attack that a commanded attitude may require, rad; larger ones occur in transients only.
+    /// Largest angle of attack that a commanded attitude may require, rad. Larger ones occur only in transients.
     #[serde(rename = "tolerable_rad")]
     pub tolerable: f64,
-    /// Angle of attack beyond which the nose is pushed down, rad.
+    /// Angle of attack above which the controller pushes the nose down, rad.
     #[serde(rename = "push_from_rad")]
     pub push_from: f64,
-    /// Angle of attack at stall, rad, if the file states one: see [`before_stall`](Incidence::before_stall).
+    /// Angle of attack at stall, rad. If `None`, see [`before_stall`](Incidence::before_stall).
     #[serde(default, rename = "stall_rad")]
     pub stall: Option<f64>,
-    /// Elevator deflection, nose down, added per rad of angle of attack beyond `push_from`, rad/rad.
+    /// Nose-down elevator deflection per angle of attack above `push_from`, rad/rad.
     pub push_gain: f64,
 }
 
@@ -128,8 +128,8 @@ impl Incidence {
         stall: None,
     };
 
-    /// Largest angle of attack of a transient, rad: 95 % of the stall angle, which is 4/3 of `push_from` if the file
-    /// states none.
+    /// Largest angle of attack in a transient, rad: 95 % of the stall angle. If the file states no stall angle, it is 4/3 of
+    /// `push_from`.
     pub fn before_stall(&self) -> f64 {
         BEFORE_STALL * self.stall.unwrap_or(STALL * self.push_from)
     }
@@ -164,11 +164,11 @@ pub struct Airframe {
     pub geometry: Geometry,
     /// Actuator filters at a time step of 0.01 s.
     pub actuators: ActuatorFigures,
-    /// Whether the file describes the rudder.
+    /// Whether the file's schema can describe a rudder.
     pub yaw: Yaw,
-    /// Surfaces and motors that the controls move, if the file names them.
+    /// Surfaces and motors moved by the controls. `None` if the file names none.
     pub mixer: Option<Mixer>,
-    /// JSBSim properties that are held in flight, for example flaps.
+    /// JSBSim properties that are constant in flight, for example flaps.
     pub conditions: BTreeMap<String, f64>,
     /// Reference condition for scaling.
     pub reference: Reference,
@@ -176,11 +176,11 @@ pub struct Airframe {
     pub incidence: Incidence,
     /// Limits of the flight envelope.
     pub envelope: Envelope,
-    /// Stated errors and noise of its sensors.
+    /// Errors and noise of the aircraft's sensors, as stated in the file.
     pub sensors: Sensors,
 }
 
-/// A number of a parameter file with its source.
+/// A number in a parameter file with its source.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a number with its source: { value = …, source = \"…\" }")]
 pub struct Sourced {
@@ -188,13 +188,13 @@ pub struct Sourced {
     pub value: f64,
     /// Source of the value, in words.
     pub source: String,
-    /// Prior standard deviation, in the same unit, if it is known.
+    /// Prior standard deviation, in the same unit. `None` if it is unknown.
     pub sd: Option<f64>,
-    /// Bounds in the same unit, if the file states them.
+    /// Lower and upper bound, in the same unit. `None` if the file states none.
     pub bounds: Option<[f64; 2]>,
 }
 
-/// Error of reading an airframe or model file.
+/// Reason why an airframe or model file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The file cannot be read.
@@ -216,7 +216,7 @@ pub enum FileError {
         what: &'static str,
         /// Path of the file.
         path: PathBuf,
-        /// Description of the error, with its remedy.
+        /// Description of the error and its remedy.
         why: String,
     },
 }
@@ -258,7 +258,7 @@ struct GeometryFile {
 }
 
 impl File {
-    /// Actuator filters, and whether the file describes the rudder.
+    /// Actuator filters, and whether the file's schema can describe a rudder.
     fn controls(&self) -> Result<(ActuatorFigures, Yaw), String> {
         match (self.schema, &self.actuators, &self.controls) {
             (1, Some(alike), None) => alike.figures(),
@@ -306,15 +306,15 @@ impl File {
 }
 
 impl Airframe {
-    /// Straight flight with level wings at the reference airspeed, the initial state of imagined flights.
+    /// Straight and level flight at the reference airspeed, the initial state of simulated flights.
     pub fn start(&self) -> State {
         State { airspeed: self.reference.airspeed, ..State::NEUTRAL }
     }
 
-    /// Reads an airframe file (`schema = 2`, or 1 of earlier programs).
+    /// Reads an airframe file of schema 2, or of schema 1 from earlier programs.
     ///
     /// # Errors
-    /// If the file cannot be read, has a syntax error or another schema, or holds a number outside the range of
+    /// If the file cannot be read, has a syntax error or another schema, or has a number outside the range of
     /// aircraft.
     pub fn load(path: &Path) -> Result<Airframe, FileError> {
         let what = "airframe file";
@@ -327,7 +327,7 @@ impl Airframe {
         Self::parse(&text).map_err(|why| FileError::Content { what, path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error describes the fault.
+    /// Reads the text of an airframe file, as [`load`](Self::load) does. The error describes the fault.
     pub fn parse(text: &str) -> Result<Airframe, String> {
         let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(file.schema, 2)?;
@@ -402,13 +402,13 @@ impl Envelope {
     }
 }
 
-/// Checks that a name is usable in tables and file names.
+/// Checks that a name is usable in tables and file names: one line of 1 to 64 bytes.
 pub fn named(name: String) -> Result<String, String> {
     let fits = !name.trim().is_empty() && name.len() <= 64 && !name.chars().any(char::is_control);
     if fits { Ok(name) } else { Err("name must be one line of 1 to 64 bytes; give it one".into()) }
 }
 
-/// Rejects a file whose schema is not one of 1 to `newest`.
+/// Checks that the schema of a file is one of 1 to `newest`.
 pub fn check_schema(schema: u32, newest: u32) -> Result<(), String> {
     if (1..=newest).contains(&schema) {
         return Ok(());
@@ -424,7 +424,7 @@ pub fn positive(field: &str, number: &Sourced, most: f64) -> Result<f64, String>
     within(field, number, [most * 1e-9, most])
 }
 
-/// Checks that a number lies between `least` and `most`, which are positive.
+/// Checks that a number lies between `least` and `most`, which are positive, and that its standard deviation is positive.
 pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<f64, String> {
     if number.sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
         return Err(format!("{field}.sd must be a positive number"));
@@ -438,7 +438,7 @@ pub fn within(field: &str, number: &Sourced, [least, most]: [f64; 2]) -> Result<
     ))
 }
 
-/// A TOML error on one line: location, then description.
+/// A TOML error as one line of text: the line number, then the description.
 pub fn toml_error(text: &str, error: &toml::de::Error) -> String {
     let line =
         error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);

@@ -1,28 +1,28 @@
-//! Air density and gravity.
+//! Air density and gravity, constant or of the standard atmosphere.
 
 /// Sea-level density of the standard atmosphere (ISO 2533), the reference of equivalent airspeed, kg/m³.
 pub const SEA_LEVEL_DENSITY: f64 = 1.225;
-/// Standard gravity (ISO 80000-3), the unit g of accelerations, m/s².
+/// Standard gravity (ISO 80000-3), the unit g of load factors, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Effective gravity at middle latitudes, m/s², for use without a model of the aircraft. It is JSBSim's at 46.8°
-/// latitude and 600 m; near sea level, gravity at any latitude is within 0.03 m/s² of it.
+/// Effective gravity at middle latitudes, m/s², for use without a model of the aircraft. It is JSBSim's value at 46.8°
+/// latitude and 600 m. Near sea level, gravity at any latitude is within 0.03 m/s² of this value.
 pub const MIDDLE_GRAVITY: f64 = 9.806;
 
-/// Density law of the air.
+/// Law of the air density over altitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Density {
     /// Constant density, kg/m³.
     Constant(f64),
-    /// The troposphere of the standard atmosphere (ISO 2533), by altitude.
+    /// The density of the troposphere of the standard atmosphere (ISO 2533) at the altitude.
     Standard,
 }
 
 /// Density law and gravity of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Atmosphere {
-    /// Density law as a function of altitude.
+    /// Law of the air density over altitude.
     pub density: Density,
-    /// Effective gravity (gravitation less the Earth's rotation), m/s².
+    /// Effective gravity (gravitation minus the centrifugal acceleration of the Earth's rotation), m/s².
     pub gravity: f64,
 }
 
@@ -39,7 +39,7 @@ impl Atmosphere {
 
 /// Density of the standard atmosphere below 11 km, kg/m³, at geometric `altitude` (m).
 ///
-/// Sea-level pressure is JSBSim's, 2116.228 lbf/ft², 5 parts in a million above ISO 2533.
+/// The sea-level pressure is JSBSim's, 2116.228 lbf/ft², which exceeds that of ISO 2533 by 5 parts in a million.
 pub fn standard_density(altitude: f64) -> f64 {
     const RADIUS: f64 = 6_356_766.0;
     const LAPSE: f64 = 0.0065;
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn standard_atmosphere_at_tabulated_altitudes() {
-        // ISO 2533 tables give five figures
+        // the tables of ISO 2533 have five significant figures
         for (altitude, density) in
             [(0.0, 1.2250), (600.0, 1.1560), (2000.0, 1.0066), (5000.0, 0.73643)]
         {

@@ -1,23 +1,23 @@
-//! The complete catalogue: effects on the air and input effects.
+//! The complete catalogue of effects: effects on forces, moments and the body, and input effects.
 
 use super::effects::{self, Description};
 use super::{formula, inputs};
 
-/// All effects that a model may have: compiled ones, then those of the shipped effect files.
+/// All effects that a model may have: compiled effects, shipped effect files, then input effects.
 pub fn all() -> impl Iterator<Item = Description> {
     on_air().chain(inputs::Kind::ALL.iter().map(|kind| kind.describe()))
 }
 
-/// The effects on forces and moments or on the body.
+/// The effects on forces, moments or the body: compiled effects, then those of the shipped effect files.
 pub fn on_air() -> impl Iterator<Item = Description> {
     let compiled = effects::Kind::ALL.iter().map(|kind| kind.describe());
-    // a user's own file of the same id takes the shipped one's place
+    // a user's file replaces a shipped file with the same id
     let of_files =
         formula::register::shipped().iter().filter_map(|effect| describe(effect.about.id));
     compiled.chain(of_files)
 }
 
-/// Description of the effect `id`, of the catalogue or of an effect file that was read.
+/// Description of the effect `id` of the catalogue, or of an effect file that was read. `None` if there is no such effect.
 pub fn describe(id: &str) -> Option<Description> {
     let on_air = effects::Kind::from_id(id).map(|kind| kind.describe());
     on_air.or_else(|| inputs::Kind::from_id(id).map(|kind| kind.describe()))

@@ -1,6 +1,6 @@
-//! Basic quantities of flight: state, controls, air, wrench, airframe, actuators and the rigid body.
+//! Flight physics: state, controls, air, forces and moments, airframe, actuators, sensors and the rigid body.
 //!
-//! Units are SI and radians; body axes are forward-right-down (FRD), earth axes north-east-down.
+//! Units are SI and radians. Body axes are forward-right-down (FRD), earth axes north-east-down (NED).
 
 pub mod actuators;
 pub mod airframe;

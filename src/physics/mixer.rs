@@ -1,26 +1,26 @@
-//! The mixer: maps the four virtual controls to named surfaces and motors, and their positions back to the controls.
+//! The mixer: it maps the four virtual controls to named surfaces and motors, and their positions back to the controls.
 //!
-//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have others: two
-//! elevons, a V-tail, several motors. Effector i receives the command u_i = Σ_j g_ij c_j, where c_j are the commands
-//! of the controls. A surface moves to its deflection at u_i, limited to −1..1. The inverse is c = g⁺ u, by least
-//! squares, where u_i is the deflection over half the travel. Forces that are linear in the surfaces' deflections are
-//! then linear in those of the controls.
+//! Model, planner and logs have four controls: aileron, elevator, rudder, throttle. An aircraft may have other surfaces: two
+//! elevons, a V-tail, several motors. Effector i receives the command u_i = Σ_j g_ij c_j, where c_j are the commands of the
+//! controls. A surface moves to its deflection at u_i, limited to −1..1. The inverse is c = g⁺ u by least squares, where u_i
+//! is the deflection divided by half the travel. Forces that are linear in the surfaces' deflections are therefore linear
+//! in the deflections of the controls.
 
 use crate::Command;
 use crate::servos::{Travel, Travels};
 
 /// Names of the controls, in the order of an effector's gains.
 pub const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
-/// A column of gains is dependent if, after the preceding columns are projected out, its length is below this share
-/// of its own.
+/// Relative tolerance for linear dependence. A column of gains is dependent if its part orthogonal to the preceding columns
+/// is shorter than this fraction of its length.
 const DEPENDENT: f64 = 1e-6;
-/// Relative tolerance between a control's stated travel and the one that its surfaces give.
+/// Relative tolerance between a control's travel in the file and the travel that its surfaces give.
 const TRAVEL: f64 = 1e-3;
 
 /// Kind of an effector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Does {
-    /// A surface with its deflections at the commands −1 and 1, rad.
+    /// A surface, with its travel: the deflections at the commands −1 and 1, rad.
     Deflects(Travel),
     /// A motor, tractor or pusher, with a command of 0..1.
     Pulls,
@@ -29,17 +29,17 @@ pub enum Does {
 /// A named surface or motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effector {
-    /// Name, also of its columns in a log: `NAME_rad`, `NAME_cmd`.
+    /// Name of the effector. Its columns in a log are `NAME_rad` and `NAME_cmd`.
     pub name: String,
     /// Kind of the effector.
     pub does: Does,
-    /// Gains: its command for a command of one on each of [`CONTROLS`].
+    /// Gains: the effector's command for a command of one on each of [`CONTROLS`].
     pub gains: [f64; 4],
-    /// Servo output of the flight controller that moves it, from 1.
+    /// Servo output of the flight controller that moves the effector, from 1. `None` if unknown.
     pub channel: Option<u8>,
-    /// JSBSim property of its command, −1..1 or 0..1.
+    /// JSBSim property of the effector's command, −1..1 for a surface or 0..1 for a motor.
     pub command: Option<String>,
-    /// JSBSim property of its deflection, rad, or of the motor's throttle.
+    /// JSBSim property of the surface's deflection, rad, or of the motor's throttle, 0..1.
     pub position: Option<String>,
 }
 
@@ -52,7 +52,7 @@ impl Effector {
         }
     }
 
-    /// Position at a command: rad, or 0..1 for a motor.
+    /// Position at a command: the deflection (rad) of a surface, or 0..1 for a motor.
     pub fn position(&self, command: f64) -> f64 {
         match self.does {
             Does::Deflects(travel) => travel.deflection(command),
@@ -60,7 +60,7 @@ impl Effector {
         }
     }
 
-    /// Position at a command of one: half the travel, rad; one for a motor.
+    /// Position per command: half the travel (rad) of a surface, or one for a motor.
     fn unit(&self) -> f64 {
         match self.does {
             Does::Deflects(travel) => 0.5 * (travel.most - travel.least),
@@ -69,7 +69,7 @@ impl Effector {
     }
 }
 
-/// Error of a mixer's definition.
+/// Error in the definition of a mixer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MixerError {
     /// No effector moves a control.
@@ -98,12 +98,12 @@ pub enum MixerError {
     Singular {
         /// Name of the dependent control.
         control: &'static str,
-        /// Names of the controls before it.
+        /// Names of the preceding controls on which it depends.
         others: String,
-        /// Names of its effectors.
+        /// Names of the effectors that the control moves.
         effectors: String,
     },
-    /// A control's travel differs from that of its surfaces.
+    /// A control's travel in the file differs from the travel that its surfaces give.
     #[error(
         "controls.{control} goes from {given_least:.4} to {given_most:.4} rad, its surfaces give {least:.4} to {most:.4}: \
          write these"
@@ -126,17 +126,17 @@ pub enum MixerError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixer {
     effectors: Vec<Effector>,
-    /// Pseudo-inverse g⁺: command of each control for a command of each effector.
+    /// Pseudo-inverse g⁺: command of each control per command of each effector, one row per effector.
     back: Vec<[f64; 4]>,
-    /// Deflection of each control at a command of one, rad: mean over its surfaces; 1 for the throttle.
+    /// Deflection of each control at a command of one, rad: the mean over its surfaces. It is 1 for the throttle.
     unit: [f64; 4],
 }
 
 impl Mixer {
-    /// Builds the mixer of `effectors` on an aircraft with or without a `rudder`.
+    /// Builds the mixer of `effectors` for an aircraft with or without a `rudder`.
     ///
     /// # Errors
-    /// If a control moves no surface or motor, does not exist, or two are linearly dependent.
+    /// If a control moves no effector, an effector has a gain for a missing rudder, or two controls are linearly dependent.
     pub fn new(effectors: Vec<Effector>, rudder: bool) -> Result<Mixer, MixerError> {
         let has = [true, true, rudder, true];
         for (j, control) in CONTROLS.into_iter().enumerate() {
@@ -159,14 +159,14 @@ impl Mixer {
         &self.effectors
     }
 
-    /// Commands of the effectors for `command`, limited to their ranges.
+    /// Commands of the effectors for `command`, clamped to their ranges.
     pub fn mix(&self, command: &Command) -> Vec<f64> {
         let asked = [command.aileron, command.elevator, command.rudder, command.throttle];
         let sum = |e: &Effector| e.gains.iter().zip(asked).map(|(g, c)| g * c).sum::<f64>();
         self.effectors.iter().map(|e| e.limited(sum(e))).collect()
     }
 
-    /// Deflections of the controls, by [`Self::shares`] of the effectors' positions.
+    /// Deflections of the controls (rad; 0..1 for the throttle) at the effectors' `positions`, by [`Self::shares`].
     pub fn deflections(&self, positions: &[f64]) -> [f64; 4] {
         let mut out = [0.0; 4];
         for (shares, position) in self.shares().zip(positions) {
@@ -175,23 +175,23 @@ impl Mixer {
         out
     }
 
-    /// Share of each effector's position (rad; 0..1 for a motor) in the deflection of each control (rad; 0..1 for the
-    /// throttle).
+    /// Contribution of each effector's position (rad; 0..1 for a motor) to the deflection of each control (rad; 0..1 for
+    /// the throttle).
     pub fn shares(&self) -> impl Iterator<Item = [f64; 4]> {
         let both = self.back.iter().zip(&self.effectors);
         both.map(|(row, e)| std::array::from_fn(|j| row[j] * self.unit[j] / e.unit()))
     }
 
-    /// Share of each effector's command in the command of each control.
+    /// Contribution of each effector's command to the command of each control.
     pub fn command_shares(&self) -> &[[f64; 4]] {
         &self.back
     }
 
-    /// Travels of the controls, at full command of each alone.
+    /// Travels of the controls (rad), with full command of one control at a time.
     pub fn travels(&self) -> Travels {
         let travel = |j: usize| {
             let at = |value: f64| {
-                // at half throttle, differential thrust can yaw the aircraft either way
+                // at half throttle, differential thrust can yaw the aircraft to both sides
                 let given = |e: &Effector| e.limited(e.gains[j] * value + 0.5 * e.gains[3]);
                 let positions: Vec<f64> =
                     self.effectors.iter().map(|e| e.position(given(e))).collect();
@@ -203,16 +203,16 @@ impl Mixer {
         Travels { aileron: travel(0), elevator: travel(1), rudder: moved.then(|| travel(2)) }
     }
 
-    /// Rejects `travels` of an airframe file that differ from those of the surfaces.
+    /// Rejects `travels` of an airframe file that differ from the travels that the surfaces give.
     ///
     /// # Errors
-    /// The first one that differs by more than 0.1 %.
+    /// If a travel differs by more than 0.1 %. The error names the first control with such a difference.
     pub fn checked(self, travels: &Travels) -> Result<Mixer, MixerError> {
         let own = self.travels();
         let pairs = [
             (Some(own.aileron), Some(travels.aileron)),
             (Some(own.elevator), Some(travels.elevator)),
-            // a motor's share of the throttle is not an angle
+            // the travel of a rudder that only motors produce is not an angle
             (own.rudder.filter(|_| self.rudder_deflects()), travels.rudder),
         ];
         for (control, (own, given)) in CONTROLS.into_iter().zip(pairs) {
@@ -236,8 +236,8 @@ impl Mixer {
     }
 }
 
-/// Deflection of control `j` at a command of one: the mean over the surfaces that it moves, or over the motors if it
-/// moves motors only.
+/// Deflection of control `j` at a command of one: the mean over the surfaces that it moves. If it moves only motors, the
+/// mean over the motors.
 fn unit(effectors: &[Effector], j: usize) -> f64 {
     if j == 3 {
         return 1.0;
@@ -253,7 +253,7 @@ fn unit(effectors: &[Effector], j: usize) -> f64 {
     sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
 }
 
-/// g⁺ by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ; one row for each effector. A control without gains has zeros.
+/// g⁺ by modified Gram–Schmidt: g = Q R, g⁺ = R⁻¹ Qᵀ, with one row per effector. A control without gains has zeros.
 fn pseudo_inverse(effectors: &[Effector]) -> Result<Vec<[f64; 4]>, MixerError> {
     let column = |j: usize| -> Vec<f64> { effectors.iter().map(|e| e.gains[j]).collect() };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
@@ -278,7 +278,7 @@ fn pseudo_inverse(effectors: &[Effector]) -> Result<Vec<[f64; 4]>, MixerError> {
     }
     let mut rows = vec![[0.0; 4]; effectors.len()];
     for (i, row) in rows.iter_mut().enumerate() {
-        // R x = Qᵀ e_i from the last unknown back
+        // solves R x = Qᵀ e_i by back substitution
         for (place, (j, q)) in orthogonal.iter().enumerate().rev() {
             let later: f64 = orthogonal[place + 1..].iter().map(|(k, _)| r[*j][*k] * row[*k]).sum();
             row[*j] = (q[i] - later) / r[*j][*j];

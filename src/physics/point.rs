@@ -1,11 +1,11 @@
-//! The point of evaluation of forces and moments.
+//! The point at which forces and moments are evaluated: state, controls and airflow.
 
 use crate::airframe::Geometry;
 use crate::rigid_body::{ForceAxes, Vector};
 use crate::{Controls, State, Wrench};
 use greylag_num::Real;
 
-/// Airflow quantities, computed once for all effects.
+/// Airflow quantities, which are computed once for all effects.
 #[derive(Clone, Copy, Debug)]
 pub struct AirData<R = f64> {
     /// Dynamic pressure times wing area, ½ρV²S, N.
@@ -58,7 +58,7 @@ impl<R: Real> AirData<R> {
 pub struct Point<'a, R = f64> {
     /// State of the aircraft.
     pub state: &'a State<R>,
-    /// Deflections and throttle position that act now.
+    /// Deflections and throttle position that act at this instant.
     pub controls: &'a Controls<R>,
     /// Airflow at the state.
     pub air: &'a AirData<R>,
@@ -66,11 +66,11 @@ pub struct Point<'a, R = f64> {
     pub geometry: &'a Geometry,
     /// Axes in which drag, side force and lift act.
     pub axes: ForceAxes,
-    /// Sums of the effects of the first pass, for the effects that depend on them; zero during the first pass.
+    /// Sums over the effects of the first pass, for the effects that depend on them. Zero during the first pass.
     pub base: &'a Base<R>,
 }
 
-/// Sums over the effects of the first pass: those that depend on state, controls and airflow only.
+/// Sums over the effects of the first pass, which depend only on state, controls and airflow.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<R = f64> {
     /// Forces and moments of these effects.
@@ -81,12 +81,12 @@ pub struct Base<R = f64> {
     pub deflected: Wrench<R>,
     /// The part of `wrench` without deflections and body rates.
     pub still: Wrench<R>,
-    /// Rate of the model's state with all its effects, in each state's unit per second.
+    /// Rate of the model's state with all its effects, in units of the state per second.
     pub rate: State<R>,
 }
 
 impl<R: Real> Base<R> {
-    /// Sums before any effect is added.
+    /// The sums before the first pass: zero.
     #[inline(always)]
     pub fn zero() -> Self {
         let wrench = Wrench::zero();

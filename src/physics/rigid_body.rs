@@ -1,12 +1,12 @@
-//! Rigid-body dynamics: from forces to the rates of the state, eqs. (7)–(12) and (35) of \[GSFM26\].
+//! Rigid-body dynamics: the rates of the state for given forces and moments, eqs. (7)–(12) and (35) of \[GSFM26\].
 
 use crate::wrench::Channel;
 use crate::{AirData, State, Wrench};
 use greylag_num::{Real, each};
 
-/// Mass in kg, moments of inertia in kg m², axes FRD through the centre of gravity.
+/// Mass and moments of inertia, in FRD axes through the centre of gravity.
 ///
-/// `jxz` follows \[BM12\]: the product of inertia enters the inertia matrix as −Jxz.
+/// The product of inertia `jxz` enters the inertia matrix as −Jxz, as in \[BM12\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidBody<R = f64> {
     /// Mass of the aircraft, kg.
@@ -22,14 +22,14 @@ pub struct RigidBody<R = f64> {
 }
 
 impl RigidBody {
-    /// Whether the values are physical: a positive mass, and a positive definite inertia.
+    /// Whether the values are physical: a positive mass and a positive definite inertia matrix.
     pub fn is_physical(&self) -> bool {
         let RigidBody { mass, jx, jy, jz, jxz } = *self;
         mass > 0.0 && jx > 0.0 && jy > 0.0 && jz > 0.0 && jx * jz > jxz * jxz
     }
 
-    /// Whether an iteration may step from this body to `next`: `next` must be physical and keep a third of the mass
-    /// and a third of 1 − Jxz²/(Jx Jz), which is zero for a singular inertia matrix. A longer step from a wrong
+    /// Whether an iteration may step from this body to `next`. The body `next` must be physical and keep at least a third of
+    /// the mass and a third of 1 − Jxz²/(Jx Jz), which is zero for a singular inertia matrix. A longer step from a wrong
     /// inertia leads to nearly infinite accelerations.
     pub fn may_become(&self, next: &RigidBody) -> bool {
         let room = |b: &RigidBody| 1.0 - b.jxz * b.jxz / (b.jx * b.jz);
@@ -38,7 +38,7 @@ impl RigidBody {
 }
 
 impl<R: Copy> RigidBody<R> {
-    /// Applies `f` to every value.
+    /// Converts every value with `f`.
     #[inline(always)]
     pub fn map<S>(&self, f: impl Fn(R) -> S) -> RigidBody<S> {
         RigidBody {
@@ -51,7 +51,7 @@ impl<R: Copy> RigidBody<R> {
     }
 }
 
-/// Axes of a model's aerodynamic forces.
+/// Axes in which a model's aerodynamic forces are expressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ForceAxes {
@@ -61,10 +61,10 @@ pub enum ForceAxes {
     Wind,
 }
 
-/// A vector in body axes, FRD.
+/// A vector in FRD body axes, unless stated otherwise.
 pub type Vector<R> = [R; 3];
 
-/// Forces other than gravity in body axes, N (eq. 36 less eq. 37).
+/// Forces without gravity in body axes, N (eq. 36 without eq. 37).
 #[inline(always)]
 pub fn body_force<R: Real>(wrench: &Wrench<R>, air: &AirData<R>, axes: ForceAxes) -> Vector<R> {
     let (drag, side, lift) =
@@ -81,7 +81,7 @@ pub fn body_force<R: Real>(wrench: &Wrench<R>, air: &AirData<R>, axes: ForceAxes
     ]
 }
 
-/// Drag, side force and lift (N) whose sum is `force` (N, body axes): the inverse of [`body_force`] without thrust.
+/// Drag, side force and lift (N) that give `force` (N, body axes): the inverse of [`body_force`] without thrust.
 #[inline(always)]
 pub fn aerodynamic_force<R: Real>(
     force: Vector<R>,
@@ -121,7 +121,7 @@ pub fn angular_acceleration<R: Real>(
     let RigidBody { jx, jy, jz, jxz, .. } = *body;
     let (p, q, r) = (state.p, state.q, state.r);
     let gamma = jx * jz - jxz * jxz;
-    // moments left after the gyroscopic terms, then the inverse of the inertia matrix
+    // moments without the gyroscopic terms, then multiplied by the inverse of the inertia matrix
     let roll = moment[0] + jxz * p * q - (jz - jy) * q * r;
     let pitch = moment[1] + (jz - jx) * p * r - jxz * (p * p - r * r);
     let yaw = moment[2] - jxz * q * r + (jx - jy) * p * q;
@@ -144,8 +144,8 @@ pub fn air_velocity<R: Real>(state: &State<R>, air: &AirData<R>) -> Vector<R> {
     [forward * air.cos_alpha, state.airspeed * air.sin_beta, forward * air.sin_alpha]
 }
 
-/// The state's rate of change from `acceleration` (specific force plus gravity, body axes, m/s²)
-/// and angular acceleration (rad/s²): eqs. (7)–(12).
+/// The rate of the state for an `acceleration` (specific force plus gravity, body axes, m/s²) and an angular acceleration
+/// `spin` (body axes, rad/s²): eqs. (7)–(12).
 #[inline(always)]
 pub fn state_rate<R: Real>(
     state: &State<R>,
@@ -157,7 +157,7 @@ pub fn state_rate<R: Real>(
     let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
     let (p, q, r, v) = (state.p, state.q, state.r, state.airspeed);
     let [roll, pitch, _] = attitude_rate(state);
-    // eqs. (9), (11), (12) with u, v, w written out and the Coriolis terms collected
+    // eqs. (9), (11), (12) with u, v, w inserted and the Coriolis terms collected
     let forward = gx * cos_alpha + gz * sin_alpha;
     let downward = gz * cos_alpha - gx * sin_alpha;
     let airspeed = forward * cos_beta + gy * sin_beta;
@@ -167,8 +167,8 @@ pub fn state_rate<R: Real>(
     State { roll, pitch, airspeed, p: spin[0], q: spin[1], r: spin[2], alpha, beta }
 }
 
-/// Acceleration in body axes (m/s²) that gives airspeed, α and β the rates of `rate`: the inverse of [`state_rate`]
-/// in the acceleration.
+/// Acceleration in body axes (m/s²) at which airspeed, α and β have the rates in `rate`: the inverse of [`state_rate`] with
+/// respect to the acceleration.
 #[inline(always)]
 pub fn acceleration_of<R: Real>(state: &State<R>, air: &AirData<R>, rate: &State<R>) -> Vector<R> {
     let AirData { sin_alpha, cos_alpha, sin_beta, cos_beta, .. } = *air;
@@ -182,8 +182,8 @@ pub fn acceleration_of<R: Real>(state: &State<R>, air: &AirData<R>, rate: &State
     ]
 }
 
-/// Transpose of [`state_rate`] in acceleration and spin: converts a gradient `slope` with respect to the rates to one
-/// with respect to acceleration (body axes) and angular acceleration.
+/// Transpose of [`state_rate`] in acceleration and spin. It converts the gradient `slope` with respect to the rates to the
+/// gradients with respect to acceleration and angular acceleration (body axes).
 #[inline(always)]
 pub fn state_rate_transposed<R: Real>(
     state: &State<R>,
@@ -202,8 +202,8 @@ pub fn state_rate_transposed<R: Real>(
     (acceleration, [slope.p, slope.q, slope.r])
 }
 
-/// Transpose of [`body_force`] and [`angular_acceleration`] in the wrench: converts gradients with respect to
-/// acceleration (body axes) and angular acceleration to one with respect to each channel.
+/// Transpose of [`body_force`] and [`angular_acceleration`] in the wrench. It converts gradients with respect to acceleration
+/// and angular acceleration (body axes) to the gradient with respect to each channel.
 #[inline(always)]
 pub fn accelerations_transposed<R: Real>(
     body: &RigidBody<R>,
@@ -231,7 +231,7 @@ pub fn accelerations_transposed<R: Real>(
     wrench
 }
 
-/// Rotates a vector from body axes to the local horizon frame with the aircraft's heading (ψ = 0).
+/// Rotates a vector from body axes to the local horizon frame (north-east-down axes turned to the aircraft's heading).
 #[inline(always)]
 pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();
@@ -245,7 +245,7 @@ pub fn body_to_horizon<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     ]
 }
 
-/// Inverse of [`body_to_horizon`].
+/// Rotates a vector from the local horizon frame to body axes: the inverse of [`body_to_horizon`].
 #[inline(always)]
 pub fn horizon_to_body<R: Real>(state: &State<R>, v: Vector<R>) -> Vector<R> {
     let (sin_roll, cos_roll) = state.roll.sin_cos();
@@ -276,7 +276,7 @@ mod tests {
     };
     const GEOMETRY: Geometry = Geometry { area: 0.75, span: 2.1, chord: 0.3571 };
 
-    /// Eqs. (9), (11), (12) as printed, from the body velocities.
+    /// The reference is eqs. (9), (11), (12) as printed, from the body velocities.
     #[test]
     fn collected_rates_equal_the_printed_equations() {
         let air = AirData::new(&STATE, 1.156, 600.0, &GEOMETRY);
@@ -289,7 +289,7 @@ mod tests {
         let va = STATE.airspeed;
         let dva = (u * du + v * dv + w * dw) / va;
         let rate = state_rate(&STATE, &air, acceleration, [0.0; 3]);
-        // the two forms differ by rounding only
+        // the two forms differ only by rounding
         assert!((rate.airspeed - dva).abs() < 1e-12);
         assert!((rate.alpha - (u * dw - w * du) / (u * u + w * w)).abs() < 1e-12);
         assert!((rate.beta - (va * dv - v * dva) / (va * (va * va - v * v).sqrt())).abs() < 1e-12);
@@ -306,7 +306,7 @@ mod tests {
         }
     }
 
-    /// Euler's equations J ω̇ + ω × Jω = M with the inertia matrix written out.
+    /// Euler's equations are J ω̇ + ω × Jω = M, with the inertia matrix written out.
     #[test]
     fn angular_acceleration_satisfies_eulers_equations() {
         let body = RigidBody { mass: 3.364, jx: 1.2290, jy: 0.1702, jz: 0.8808, jxz: -0.9343 };
@@ -331,7 +331,7 @@ mod tests {
         for i in 0..3 {
             assert!((back[i] - v[i]).abs() < 1e-14);
         }
-        // gravity points straight down in the horizon frame
+        // in the horizon frame gravity points vertically down
         let down = body_to_horizon(&STATE, gravity_in_body(&STATE, 9.806));
         assert!(down[0].abs() < 1e-14 && down[1].abs() < 1e-14 && (down[2] - 9.806).abs() < 1e-14);
     }

@@ -1,10 +1,10 @@
-//! Prior knowledge of an aircraft's sensors and of the wind, from the section `[sensors]`.
+//! Prior information on an aircraft's sensors and on the wind, from the section `[sensors]` of a file.
 //!
 //! ```toml
 //! [sensors]
-//! wind = "still"                                # the air stands still: the three wind_… are 0, held
-//! clocks = "one"                                # all sensors sample together: the skew_… are 0, held
-//! airspeed_scale = { value = 1.0, sd = 0.02 }   # measured by true airspeed; sd = 0 holds it
+//! wind = "still"                                # no wind: the three wind_… are fixed at 0
+//! clocks = "one"                                # all sensors sample at the same time: the skew_… are fixed at 0
+//! airspeed_scale = { value = 1.0, sd = 0.02 }   # ratio of measured to true airspeed; sd = 0 fixes it
 //! alpha_bias_rad = { value = 0.01, sd = 0.005 }
 //! vanes_sd_rad = 0.005                          # noise of the vanes
 //! vanes_at_m = [0.6, 0.0, -0.02]                # from the centre of gravity: forward, right, down
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-/// The constants of sensors and wind that a flight-path reconstruction estimates, with their units.
+/// The constants of sensors and wind that the flight-path reconstruction estimates, each with its unit.
 pub const CONSTANTS: [(&str, &str); 30] = [
     ("alpha_bias", "rad"),
     ("beta_bias", "rad"),
@@ -49,23 +49,23 @@ pub const CONSTANTS: [(&str, &str); 30] = [
     ("accelerometer_gain_z", ""),
 ];
 
-/// Keys of the sensors' noise, standard deviations.
+/// Keys of the sensors' noise, which is stated as standard deviations.
 const NOISE: [&str; 4] = ["attitude_sd_rad", "airspeed_sd_mps", "vanes_sd_rad", "velocity_sd_mps"];
 
-/// Longest lever arm, m.
+/// Largest accepted distance of a sensor from the centre of gravity along each axis, m.
 const FARTHEST: f64 = 100.0;
 
-/// Prior of a constant.
+/// Prior of a constant of the sensors or the wind.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Known {
-    /// Mean, in the unit of [`CONSTANTS`]; an airspeed scale is measured airspeed divided by true airspeed.
+    /// Mean, in the unit of [`CONSTANTS`]. An airspeed scale is measured airspeed divided by true airspeed.
     pub value: f64,
-    /// Standard deviation; 0 holds the constant.
+    /// Standard deviation, in the same unit. With 0 the constant is fixed.
     pub sd: f64,
 }
 
-/// Prior knowledge of sensors and wind: the content of a section `[sensors]`.
+/// Prior information on sensors and wind: the content of a section `[sensors]`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(try_from = "BTreeMap<String, Written>")]
 pub struct Sensors {
@@ -75,7 +75,7 @@ pub struct Sensors {
     accelerometer_at: Option<[f64; 3]>,
 }
 
-/// A sensor whose noise may be stated.
+/// A sensor whose noise may be stated, with the unit of the standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Noisy {
     /// Attitude: roll, pitch, yaw, rad.
@@ -97,7 +97,7 @@ enum Written {
     Known(Known),
 }
 
-/// Key of a constant in a file: its name with its unit.
+/// Key of a constant in a file: its name followed by its unit.
 fn key((name, unit): (&str, &str)) -> String {
     let suffix = match unit {
         "rad" => "_rad",
@@ -116,7 +116,7 @@ impl TryFrom<BTreeMap<String, Written>> for Sensors {
 
     fn try_from(written: BTreeMap<String, Written>) -> Result<Self, String> {
         let mut sensors = Sensors::default();
-        // words first: the prior of a single constant takes precedence over a word for all
+        // words come first, because the prior of a single constant takes precedence over a word for all of them
         for (name, value) in &written {
             if let Written::Word(word) = value {
                 sensors.take_word(name, word)?;
@@ -178,14 +178,14 @@ impl Sensors {
                     _ => return Err(format!("sensors.{name} takes no place; {}", known_keys())),
                 }
             }
-            // a row of two numbers reads as a value with its sd
+            // a list of two numbers is parsed as a value with its standard deviation
             Written::Known(_) if ["vanes_at_m", "accelerometer_at_m"].contains(&name) => {
                 return Err(format!("sensors.{name} is a place: [forward, right, down] in m"));
             }
             Written::Known(known) => {
                 let found = CONSTANTS.into_iter().find(|c| key(*c) == name);
                 let (constant, _) = found.ok_or_else(|| {
-                    format!("sensors.{name} is no constant of a sensor; {}", known_keys())
+                    format!("sensors.{name} is not a constant of a sensor; {}", known_keys())
                 })?;
                 if !(known.value.is_finite() && known.sd.is_finite() && known.sd >= 0.0) {
                     return Err(format!(
@@ -204,7 +204,7 @@ impl Sensors {
         Ok(())
     }
 
-    /// These priors, with those that `other` states in place of them.
+    /// These priors, replaced by those of `other` where it states them.
     pub fn overridden_by(&self, other: &Sensors) -> Sensors {
         let mut all = self.clone();
         all.constants.extend(other.constants.iter().map(|(name, known)| (*name, *known)));
@@ -216,34 +216,34 @@ impl Sensors {
         all
     }
 
-    /// Prior of a constant of [`CONSTANTS`], if it is stated.
+    /// Prior of a constant of [`CONSTANTS`]. `None` if it is not stated.
     pub fn known(&self, name: &str) -> Option<Known> {
         self.constants.get(name).copied()
     }
 
-    /// Holds a constant of [`CONSTANTS`] at `value`, unless a prior is stated.
+    /// Fixes a constant of [`CONSTANTS`] at `value` (in its unit), unless a prior is stated.
     pub fn hold(&mut self, name: &'static str, value: f64) {
         self.constants.entry(name).or_insert(Known { value, sd: 0.0 });
     }
 
-    /// Wind north, east, down (m/s), if its horizontal part is stated.
+    /// Wind velocity north, east, down (m/s). `None` if its horizontal part is not stated. An unstated vertical part is zero.
     pub fn wind(&self) -> Option<[f64; 3]> {
         let [north, east, down] =
             ["wind_north", "wind_east", "wind_down"].map(|name| self.known(name).map(|k| k.value));
         Some([north?, east?, down.unwrap_or(0.0)])
     }
 
-    /// Stated noise of a sensor, a standard deviation.
+    /// Standard deviation of a sensor's noise, in its unit. `None` if it is not stated.
     pub fn noise(&self, of: Noisy) -> Option<f64> {
         self.noise[of as usize]
     }
 
-    /// Position of the vanes, m from the centre of gravity, body axes.
+    /// Position of the vanes from the centre of gravity in body axes, m. `None` if it is not stated.
     pub fn vanes_at(&self) -> Option<[f64; 3]> {
         self.vanes_at
     }
 
-    /// Position of the accelerometer, m from the centre of gravity, body axes.
+    /// Position of the accelerometer from the centre of gravity in body axes, m. `None` if it is not stated.
     pub fn accelerometer_at(&self) -> Option<[f64; 3]> {
         self.accelerometer_at
     }
@@ -252,7 +252,7 @@ impl Sensors {
 fn known_keys() -> String {
     let constants: Vec<String> = CONSTANTS.into_iter().map(key).collect();
     format!(
-        "[sensors] knows wind, clocks, {}, vanes_at_m, accelerometer_at_m, and as {{ value = …, sd = … }} {}",
+        "[sensors] accepts wind, clocks, {}, vanes_at_m, accelerometer_at_m, and as {{ value = …, sd = … }} {}",
         NOISE.join(", "),
         constants.join(", ")
     )

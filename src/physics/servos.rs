@@ -1,19 +1,19 @@
-//! Servos: travel, rate limit and filter of each control.
+//! Servos: travel, rate limit and discrete filter of each actuator.
 
 use crate::{Command, Controls};
 use greylag_num::Real;
 
-/// Travel of a surface, rad: its deflections at the commands −1 and 1.
+/// Travel of a surface: its deflections at the commands −1 and 1, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travel {
-    /// Deflection at the command −1, negative.
+    /// Deflection at the command −1, rad, negative.
     pub least: f64,
-    /// Deflection at the command 1, positive.
+    /// Deflection at the command 1, rad, positive.
     pub most: f64,
 }
 
 impl Travel {
-    /// A symmetric travel, rad.
+    /// The symmetric travel ±`most`, rad.
     pub const fn symmetric(most: f64) -> Travel {
         Travel { least: -most, most }
     }
@@ -24,32 +24,32 @@ impl Travel {
         self.least == -self.most
     }
 
-    /// Larger deflection of both sides, rad.
+    /// The larger magnitude of the two limits, rad.
     pub fn largest(&self) -> f64 {
         self.most.max(-self.least)
     }
 
-    /// Smaller deflection of both sides, rad, which is reachable either way.
+    /// The smaller magnitude of the two limits, rad, which the surface reaches on both sides.
     pub fn smallest(&self) -> f64 {
         self.most.min(-self.least)
     }
 
-    /// Whether `deflection` (rad) lies within the stops.
+    /// Whether `deflection` (rad) lies inside the travel, without its limits.
     pub fn reaches(&self, deflection: f64) -> bool {
         self.least < deflection && deflection < self.most
     }
 
-    /// Deflection (rad) per unit of command on the side of `deflection`.
+    /// Deflection per unit of command on the side of `deflection`, rad.
     pub fn slope(&self, deflection: f64) -> f64 {
         if deflection < 0.0 { -self.least } else { self.most }
     }
 
-    /// Ratio of `deflection` (rad) to the travel on its side.
+    /// Ratio of `deflection` (rad) to the travel on its side: the command for this deflection.
     pub fn part(&self, deflection: f64) -> f64 {
         deflection / self.slope(deflection)
     }
 
-    /// Deflection (rad) for `command`.
+    /// Deflection (rad) for `command` (−1..1), without limits.
     #[inline(always)]
     pub fn deflection<R: Real>(&self, command: R) -> R {
         if self.is_symmetric() {
@@ -59,7 +59,7 @@ impl Travel {
         R::where_less(command, R::zero(), down, up)
     }
 
-    /// Command for `deflection` (rad).
+    /// Command for `deflection` (rad), without limits.
     #[inline(always)]
     pub fn command<R: Real>(&self, deflection: R) -> R {
         if self.is_symmetric() {
@@ -77,31 +77,31 @@ pub struct Travels {
     pub aileron: Travel,
     /// Travel of the elevator.
     pub elevator: Travel,
-    /// Travel of the rudder, if there is one.
+    /// Travel of the rudder. `None` if the aircraft has no rudder.
     pub rudder: Option<Travel>,
 }
 
 impl Travels {
-    /// Ailerons and elevator with the same symmetric travel of ±`most` (rad), no rudder.
+    /// Ailerons and elevator with the same symmetric travel ±`most` (rad), without a rudder.
     pub const fn alike(most: f64) -> Travels {
         let travel = Travel::symmetric(most);
         Travels { aileron: travel, elevator: travel, rudder: None }
     }
 }
 
-/// A surface: its filter at one time step, its travel, its rate limit.
+/// Actuator of a surface: its filter at one time step, its travel and its rate limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Coefficients b0, a1, a2 of y = b0 (u + 2u₋₁ + u₋₂) − a1 y₋₁ − a2 y₋₂.
     pub filter: [f64; 3],
-    /// Deflections at full command, which are also the stops.
+    /// Deflections at full command, which are also the travel limits.
     pub travel: Travel,
-    /// Rate limit, rad/s; `None` if only the filter limits the rate.
+    /// Rate limit, rad/s. `None` if only the filter limits the rate.
     pub rate_max: Option<f64>,
 }
 
 impl Surface {
-    /// The bilinear transform of ω²/(s² + 2ζωs + ω²), `frequency` in rad/s, at `step` (s).
+    /// The bilinear transform of ω²/(s² + 2ζωs + ω²) with `frequency` ω (rad/s) and `damping` ζ at the time step `step` (s).
     pub fn tustin(frequency: f64, damping: f64, travel: Travel, step: f64) -> Surface {
         let w = frequency * step;
         let d = 4.0 + 4.0 * damping * w + w * w;
@@ -113,21 +113,21 @@ impl Surface {
 /// The actuators' discrete filters at one time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuatorFigures {
-    /// Figures of the ailerons.
+    /// Actuator of the ailerons.
     pub aileron: Surface,
-    /// Figures of the elevator.
+    /// Actuator of the elevator.
     pub elevator: Surface,
-    /// Figures of the rudder, if there is one.
+    /// Actuator of the rudder. `None` if the aircraft has no rudder.
     pub rudder: Option<Surface>,
-    /// Coefficients b, a of the throttle's lag y = b (u + u₋₁) + a y₋₁.
+    /// Coefficients b, a of the throttle's first-order lag y = b (u + u₋₁) + a y₋₁.
     pub throttle: [f64; 2],
     /// Time step of the filters, s.
     pub step: f64,
 }
 
 impl ActuatorFigures {
-    /// Identical ailerons and elevator with `frequency` (rad/s), `damping` and `deflection_max` (rad), no rudder, and a
-    /// throttle with `lag` (s), at time step `step` (s).
+    /// Identical actuators of ailerons and elevator with `frequency` (rad/s), `damping` and travel ±`deflection_max` (rad),
+    /// without a rudder. The throttle has the time constant `lag` (s). The time step is `step` (s).
     pub fn tustin(frequency: f64, damping: f64, deflection_max: f64, lag: f64, step: f64) -> Self {
         let travel = Travel::symmetric(deflection_max);
         let surface = Surface::tustin(frequency, damping, travel, step);
@@ -135,7 +135,7 @@ impl ActuatorFigures {
         ActuatorFigures { aileron: surface, elevator: surface, rudder: None, throttle, step }
     }
 
-    /// The bilinear transform of 1/(τs + 1), `lag` and `step` in s.
+    /// The bilinear transform of 1/(τs + 1) with time constant `lag` (s) at the time step `step` (s).
     pub fn lag(lag: f64, step: f64) -> [f64; 2] {
         let k = step / lag;
         [k / (2.0 + k), (2.0 - k) / (2.0 + k)]
@@ -150,7 +150,7 @@ impl ActuatorFigures {
         }
     }
 
-    /// Command for these deflections and this throttle, limited to its ranges.
+    /// Command for the deflections and the throttle of `controls`, clamped to its ranges.
     pub fn command(&self, controls: &Controls) -> Command {
         Command {
             aileron: self.aileron.travel.part(controls.aileron),
@@ -161,7 +161,7 @@ impl ActuatorFigures {
         .clamped()
     }
 
-    /// Steady-state controls for `command`.
+    /// Deflections and throttle in steady state with `command`.
     pub fn controls(&self, command: &Command) -> Controls {
         Controls {
             aileron: self.aileron.travel.deflection(command.aileron),

@@ -1,4 +1,4 @@
-//! Growth of the coefficients' physical bounds with the size of an aircraft.
+//! Size of an aircraft, with which the physical bounds of coefficients grow.
 
 use super::airframe::Geometry;
 use super::effects::Coefficient;
@@ -7,16 +7,16 @@ use super::rigid_body::RigidBody;
 /// Mass (kg) and span (m) up to which the catalogue's bounds apply unchanged.
 const WRITTEN_FOR: [f64; 2] = [25.0, 5.0];
 
-/// Coefficient that carries the weight of an aircraft in slow flight.
+/// Name of the coefficient whose bounds grow with the lift coefficient of slow flight.
 const LIFT: &str = "CL0";
-/// Load factor of a gentle pull-up in slow flight.
+/// Load factor of a gentle pull-up in slow flight, for which the bounds of `CL0` leave room.
 const PULL: f64 = 1.5;
 /// Density of the standard atmosphere at sea level, kg/m³ (ISO 2533).
 const SEA_LEVEL: f64 = 1.225;
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY: f64 = 9.80665;
 
-/// Size relative to an aircraft of 25 kg and 5 m: ratios of mass and span, at least 1.
+/// Size of an aircraft relative to 25 kg and 5 m span: ratios of mass and span, each at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     mass: f64,
@@ -25,25 +25,24 @@ pub struct Size {
 }
 
 impl Size {
-    /// Size of an aircraft of `body` and `geometry`.
+    /// Size of an aircraft with `body` and `geometry`.
     pub fn new(body: &RigidBody, geometry: &Geometry) -> Size {
         let [mass, span] = WRITTEN_FOR;
         let length = (geometry.span / span).max(1.0);
         Size { mass: (body.mass / mass).max(1.0), length, lift: 1.0 }
     }
 
-    /// The size with the lift coefficient that an aircraft of `body` and `geometry` needs at its smallest `airspeed`
-    /// (m/s): the lift coefficient of level flight at sea level times `PULL`, at least 1.
+    /// The size with the lift coefficient that the aircraft needs at its smallest `airspeed` (m/s). It is the lift coefficient
+    /// of level flight at sea level times `PULL`, and at least 1.
     pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
         let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
         let level = body.mass * GRAVITY / (pressure * geometry.area);
         Size { lift: (PULL * level).max(1.0), ..self }
     }
 
-    /// Physical bounds of `coefficient`. Bounds that are dimensionless or per angle are those of the catalogue,
-    /// except for `CL0`, whose bounds grow with the required lift coefficient. Bounds in units of force, length,
-    /// moment, angular momentum or inertia grow with the aircraft. A coefficient without `grows`, the default in
-    /// effect files, keeps its bounds.
+    /// Physical bounds of `coefficient`. Bounds in units of force, length, moment, angular momentum or inertia grow with the
+    /// aircraft. The bounds of `CL0` grow with the lift coefficient of slow flight. Other bounds, and those of a coefficient
+    /// without `grows` (the default in effect files), are unchanged.
     pub fn bounds(&self, coefficient: &Coefficient) -> (f64, f64) {
         if !coefficient.grows {
             return coefficient.bounds;
@@ -82,11 +81,11 @@ mod tests {
         let torque = coefficient("k_nm", "", "N m", (-50.0, 50.0));
         let small = Size::new(&body(3.4), &geometry(2.1));
         assert_eq!(small.bounds(&torque), (-50.0, 50.0));
-        // ten times heavier, twice as wide
+        // ten times the mass, twice the span
         let large = Size::new(&body(250.0), &geometry(10.0));
         assert_eq!(large.bounds(&torque), (-1000.0, 1000.0));
         assert_eq!(large.bounds(&coefficient("k", "", "", (-1.0, 1.0))), (-1.0, 1.0));
-        // 100 N/m² at 6 m/s: CL = 4.5 in level flight, so that a CL0 of 2 must be allowed
+        // 100 N/m² at 6 m/s gives CL = 4.5 in level flight, where a CL0 of 2 must be allowed
         let slow = Geometry { area: 0.1, span: 1.0, chord: 0.1 };
         let lift = coefficient("CL0", "", "", (-1.0, 1.0));
         let at = |airspeed| Size::new(&body(1.0), &slow).lifted_at(airspeed, &body(1.0), &slow);

@@ -1,4 +1,4 @@
-//! The eight flight states that the model predicts.
+//! The state vector of the model: eight flight states.
 
 use greylag_num::{Real, each};
 
@@ -36,7 +36,7 @@ impl State {
         "beta_rad",
     ];
 
-    /// The start of an episode: wings level, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
+    /// The initial state of an episode: level wings, α = β = 0, 16.67 m/s (section V-A of \[GSFM26\]).
     pub const NEUTRAL: State = State {
         roll: 0.0,
         pitch: 0.0,
@@ -67,7 +67,7 @@ impl<R: Copy> State<R> {
         State { roll, pitch, airspeed, p, q, r, alpha, beta }
     }
 
-    /// Applies `f` to every component.
+    /// Converts every component with `f`.
     #[inline(always)]
     pub fn map<S: Copy>(&self, f: impl FnMut(R) -> S) -> State<S> {
         State::from_array(each(self.to_array(), f))
@@ -75,7 +75,7 @@ impl<R: Copy> State<R> {
 }
 
 impl<R: Real> State<R> {
-    /// Euler step: `self + step · rate`, by component.
+    /// Euler step: `self + step · rate` for each component.
     #[inline(always)]
     pub fn advance(&self, rate: &State<R>, step: f64) -> Self {
         State {
@@ -90,7 +90,7 @@ impl<R: Real> State<R> {
         }
     }
 
-    /// Selects `then` where `chosen` is above zero, else `self`, by component.
+    /// Selects `then` where `chosen` is above zero, else `self`, for each component.
     #[inline(always)]
     pub fn replaced(&self, chosen: R, then: &State<R>) -> Self {
         let (mut all, then) = (self.to_array(), then.to_array());

@@ -1,17 +1,17 @@
-//! Reading of text files written by persons, with a limit on their length.
+//! Reader of text files written by users, with a limit on their length.
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Longest file that is read, bytes: a hundred times the longest one shipped. A parser uses up to eighty times the
-/// text's length in memory.
+/// Longest file that is read, bytes. It is a hundred times the longest shipped file. The limit bounds the memory of a
+/// parser, which is up to eighty times the length of the text.
 pub const LONGEST: u64 = 1 << 20;
 
 /// Reads the text of the file at `path`.
 ///
 /// # Errors
-/// If it cannot be read, is not UTF-8, or is longer than [`LONGEST`].
+/// If the file cannot be read, is not UTF-8, or is longer than [`LONGEST`].
 pub fn read(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;

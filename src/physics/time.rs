@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
-/// A moment on the vehicle's monotonic clock, in whole microseconds.
+/// A time on the vehicle's monotonic clock, in whole microseconds.
 ///
-/// A type of its own because a companion meets three clocks (vehicle, host, wall) and must never
-/// subtract one from another by accident; only vehicle time drives decisions.
+/// It is a separate type because a companion has three clocks (vehicle, host, wall) whose times must not be mixed. All
+/// decisions use vehicle time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Time(u64);
 
 impl Time {
-    /// A moment `us` microseconds after the vehicle's start.
+    /// The time `us` microseconds after the vehicle's start.
     pub const fn from_micros(us: u64) -> Self {
         Time(us)
     }
@@ -22,11 +22,11 @@ impl Time {
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 * 1e-6
     }
-    /// The time passed since `earlier`; zero if `earlier` lies in the future.
+    /// The time passed since `earlier`. Zero if `earlier` is later than this time.
     pub fn since(self, earlier: Time) -> Duration {
         Duration::from_micros(self.0.saturating_sub(earlier.0))
     }
-    /// The moment `later` after this one.
+    /// The time `later` after this one.
     pub fn plus(self, later: Duration) -> Self {
         Time(self.0.saturating_add(later.as_micros() as u64))
     }

@@ -1,24 +1,24 @@
-//! Forces and moments on the airframe, by channel.
+//! Forces and moments on the airframe, one value per channel.
 
 use greylag_num::Real;
 
-/// A direction in which an effect may act.
+/// A force or moment component in which an effect may act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Drag alone, N, along the airflow, positive backwards; thrust is in `BodyX`. `ChannelId::Drag` of the weak form
-    /// is drag less thrust.
+    /// Drag along the airflow, N, positive backwards, without thrust (see `BodyX`). In the weak form, `ChannelId::Drag` is
+    /// drag minus thrust.
     Drag,
-    /// Lift, N, upward across the airflow.
+    /// Lift across the airflow, N, positive upward.
     Lift,
-    /// Aerodynamic side force, N, to the right.
+    /// Aerodynamic side force, N, positive to the right.
     Side,
-    /// Force along body x that does not turn with the airflow (thrust), N.
+    /// Force along body x that does not turn with the airflow (thrust), N, positive forward.
     BodyX,
-    /// Rolling moment l, N m.
+    /// Rolling moment l about body x, N m.
     Roll,
-    /// Pitching moment m, N m.
+    /// Pitching moment m about body y, N m.
     Pitch,
-    /// Yawing moment n, N m.
+    /// Yawing moment n about body z, N m.
     Yaw,
 }
 
@@ -35,27 +35,27 @@ impl Channel {
     ];
 }
 
-/// Forces in N, moments in N m about the centre of gravity, one per [`Channel`].
+/// Forces (N) and moments about the centre of gravity (N m), one value per [`Channel`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wrench<R = f64>([R; 7]);
 
 impl<R: Real> Wrench<R> {
-    /// No force, no moment.
+    /// The wrench without forces and moments.
     #[inline(always)]
     pub fn zero() -> Self {
         Wrench([R::zero(); 7])
     }
-    /// Adds `amount` to one channel.
+    /// Adds `amount` (N or N m) to a channel.
     #[inline(always)]
     pub fn add(&mut self, channel: Channel, amount: R) {
         self.0[channel as usize] += amount;
     }
-    /// The amount in one channel.
+    /// The value (N or N m) in a channel.
     #[inline(always)]
     pub fn get(&self, channel: Channel) -> R {
         self.0[channel as usize]
     }
-    /// The difference `self` − `other`, by channel.
+    /// The difference `self` − `other` in each channel.
     #[inline(always)]
     pub fn minus(&self, other: &Self) -> Self {
         let mut difference = *self;

@@ -1,4 +1,4 @@
-//! The page of an aircraft from its model: three views, trim, modes, stick response.
+//! Page on an aircraft from its model: three views, trim, modes, loops and control responses.
 
 use std::fmt::Write;
 
@@ -11,18 +11,18 @@ use greylag_control::aircraft_check::AircraftCheck;
 use greylag_control::stick_response::{STEPPED, StickResponse};
 use greylag_model::GreyBox;
 
-/// Input of the page about one aircraft's model.
+/// Input of the page on an aircraft's model.
 #[derive(Clone, Debug)]
 pub struct AircraftReport<'a> {
-    /// The model that the page is about.
+    /// The model of the aircraft.
     pub model: &'a GreyBox,
     /// Results of the checks of the model.
     pub check: &'a AircraftCheck,
-    /// Responses to a step of a quarter of full aileron, then of full elevator.
+    /// Responses to a step of a quarter of full aileron and to a step of a quarter of full elevator.
     pub responses: &'a [StickResponse; 2],
     /// Path of the model's file.
     pub model_file: String,
-    /// The command line that made the page.
+    /// The command line that generated the page.
     pub command_line: String,
 }
 
@@ -38,7 +38,7 @@ impl AircraftReport<'_> {
                 "Over the envelope; angles up positive.",
                 vec![Figure::Table(self.trim())],
             ),
-            Section::new("What the stick does", &stick_note(), vec![Figure::Time(self.stick())]),
+            Section::new("Control response", &stick_note(), vec![Figure::Time(self.stick())]),
             Section::new(
                 "Modes",
                 "Of straight flight at the cruise airspeed.",
@@ -46,7 +46,7 @@ impl AircraftReport<'_> {
             ),
             Section::new(
                 "Loops of the LQI",
-                "Change of the loop's gain, phase lag and delay that it bears.",
+                "Change of the loop's gain, phase lag and delay that it tolerates.",
                 vec![Figure::Table(self.loops())],
             ),
             Section::new("Provenance", "", vec![Figure::Table(self.provenance())]).folded(),
@@ -67,7 +67,7 @@ impl AircraftReport<'_> {
         let AircraftCheck { findings, level_up_to, controller, .. } = self.check;
         let envelope = self.model.airframe.envelope;
         let mut details = vec![format!(
-            "Controller to begin with: {}; its loops bear {:.0} ms of delay.",
+            "Controller to begin with: {}; its loops tolerate {:.0} ms of delay.",
             controller.name,
             1e3 * controller.delay_s
         )];
@@ -90,14 +90,14 @@ impl AircraftReport<'_> {
             None => Verdict {
                 outcome: Outcome::Reached,
                 reason: String::new(),
-                sentence: format!("It {flies}; nothing is to be mended."),
+                sentence: format!("It {flies}; nothing needs correction."),
                 details,
                 next: String::new(),
             },
             Some((first, rest)) => Verdict {
                 outcome: Outcome::Missed,
                 reason: String::new(),
-                sentence: format!("To be mended before a flight: {first}."),
+                sentence: format!("To correct before a flight: {first}."),
                 details: rest.iter().cloned().chain(details).collect(),
                 next: String::new(),
             },
@@ -117,7 +117,7 @@ impl AircraftReport<'_> {
             let [alpha, path] = [l.alpha, l.path].map(f64::to_degrees);
             let row = [l.airspeed, alpha, 100.0 * l.elevator, 100.0 * l.throttle];
             let row = row.map(|x| format!("{x:.1}").replace('-', "−"));
-            // a path that is level but for rounding
+            // a path within 0.05° of level counts as level
             let path = if path.abs() < 0.05 {
                 "level".into()
             } else {
@@ -223,8 +223,8 @@ impl AircraftReport<'_> {
     }
 }
 
-const SKETCH_NOTE: &str = "Span and mean chord to scale; the body and the tail are drawn as usual ones, for the model \
-                           knows them by their coefficients only.";
+const SKETCH_NOTE: &str = "Span and mean chord to scale; the shapes of the body and the tail are typical ones, because \
+                           the model has only their coefficients.";
 
 fn stick_note() -> String {
     format!(
@@ -248,7 +248,7 @@ fn sketch(model: &GreyBox) -> Drawing {
             "<rect class=\"{class}\" x=\"{x:.4}\" y=\"{y:.4}\" width=\"{w:.4}\" height=\"{h:.4}\"/>"
         );
     };
-    // from above, nose up
+    // top view, nose up
     let nose = 0.5 * span - 0.5 * body;
     rectangle(nose, 0.0, body, length, "body");
     rectangle(0.0, 0.22 * length, span, chord, "wing");
@@ -259,14 +259,14 @@ fn sketch(model: &GreyBox) -> Drawing {
         rectangle(0.34 * span, length - 0.45 * chord, 0.32 * span, 0.45 * chord, "wing");
         rectangle(0.34 * span, length - 0.15 * chord, 0.32 * span, 0.15 * chord, "surface");
     }
-    // from ahead
+    // front view
     let ahead = length + gap;
     rectangle(nose, ahead + 0.5 * high - 0.5 * body, body, body, "body");
     rectangle(0.0, ahead + 0.5 * high - 0.06 * chord, span, 0.12 * chord, "wing");
     if tailed {
         rectangle(0.5 * span - 0.02 * chord, ahead, 0.04 * chord, 0.5 * high, "wing");
     }
-    // from the left
+    // side view from the left
     let left = span + gap;
     let mid = 0.5 * high;
     rectangle(left, mid - 0.5 * body, length, body, "body");

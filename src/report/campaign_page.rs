@@ -1,4 +1,4 @@
-//! The page of a campaign: findings, tables with the paper's values, and the cell of each number.
+//! Page of a campaign: findings, tables with the paper's values, and the cell of each number.
 
 use std::collections::BTreeMap;
 
@@ -15,20 +15,20 @@ use greylag_campaign::{CampaignFile, Record};
 /// Names of the three statistics.
 const STATISTICS: [&str; 3] = ["median", "interquartile mean", "mean"];
 
-/// Results of a campaign, finished or not.
+/// Results of a finished or unfinished campaign.
 #[derive(Clone, Debug)]
 pub struct CampaignReport<'a> {
     /// Definition of the campaign.
     pub file: &'a CampaignFile,
     /// Number of cells in the campaign.
     pub cells: usize,
-    /// Results of the cells that are done.
+    /// Results of the finished cells.
     pub records: &'a [Record],
     /// Summary tables over the cells.
     pub summaries: &'a [Summary],
     /// Verdict on each of the campaign's claims.
     pub findings: &'a [tables::Finding],
-    /// The command that wrote the page.
+    /// The command that generated the page.
     pub command: String,
 }
 
@@ -44,7 +44,7 @@ impl CampaignReport<'_> {
         Page { title: format!("Campaign {}", self.file.name), subtitle, sections }
     }
 
-    /// The claims, and where the tables depart from the paper's.
+    /// Section with the claims and with the differences between the tables and those of the paper.
     fn said(&self) -> Section {
         let sentence = |sentence: String| Finding { sentence, link: None };
         let claims = self
@@ -59,7 +59,7 @@ impl CampaignReport<'_> {
         Section::new("Findings", note, vec![Figure::Findings(findings)])
     }
 
-    /// A figure for each stage that has learning curves.
+    /// Section with the learning curves of each stage; `None` if no stage has any.
     fn curves(&self) -> Option<Section> {
         let mut stages: Vec<&str> =
             self.records.iter().filter(|r| !r.curve.is_empty()).map(|r| r.stage.as_str()).collect();
@@ -115,7 +115,7 @@ impl CampaignReport<'_> {
         figure
     }
 
-    /// The numbers behind the tables, each with its seed and a link to its cell.
+    /// Section with the numbers behind the tables, each with its seed and a link to its cell.
     fn runs(&self) -> Section {
         let columns =
             [("Cell", Left), ("Seed", Right), ("Row", Left), ("Quantity", Left), ("Value", Right)];
@@ -141,7 +141,7 @@ impl CampaignReport<'_> {
         Section::new("Numbers", note, vec![Figure::Table(table)])
     }
 
-    /// The cells with their commands.
+    /// Section with the cells and their commands.
     fn done(&self) -> Section {
         let columns = [
             ("Cell", Left),
@@ -183,7 +183,7 @@ impl CampaignReport<'_> {
     }
 }
 
-/// The interquartile mean of a column over the seeds at `steps`; `None` unless every seed has a point there.
+/// The interquartile mean of a column over the seeds at `steps`; `None` unless every seed has a value there.
 fn middle(records: &[&Record], column: &str, steps: f64) -> Option<Estimate> {
     let value = |record: &&Record| {
         let at = record.curve["steps"].iter().position(|s| *s == steps)?;
@@ -213,12 +213,12 @@ fn summary(index: usize, summary: &Summary) -> Section {
     };
     let note = format!(
         "Median, interquartile mean and mean over the runs, with 95 % percentile bootstrap intervals over seeds, \
-         each stratum resampled by itself. A row's name leads to its numbers.{beside}"
+         each stratum resampled separately. A row's name leads to its numbers.{beside}"
     );
     Section::new(&summary.title, &note, figures)
 }
 
-/// The three statistics of each row in a quantity, the paper's under them.
+/// The three statistics of each row for the quantity `metric`, each followed by the paper's value.
 fn intervals(summary: &Summary, metric: &str) -> Whiskers {
     let mut rows = Vec::new();
     for row in summary.rows.iter().filter(|r| r.metric == metric) {

@@ -1,23 +1,23 @@
-//! The page of one effect: its entry in the catalogue and its signature as figures.
+//! Page of one effect: its catalogue entry and plots of its signature.
 
 use super::{Align, Figure, Page, Section, Style, Table, XyFigure, XyMark, XySeries};
 use greylag_physics::effects::Description;
 use greylag_sysid::signature::{MANOEUVRE, Pair, Signature};
 
-/// Input of the page about one effect.
+/// Input of the page on one effect.
 #[derive(Clone, Debug)]
 pub struct EffectReport<'a> {
-    /// Description of the effect.
+    /// Catalogue description of the effect.
     pub about: Description,
     /// Channels on which the effect acts, in words.
     pub channels: String,
-    /// Where it acts: on the air and the body, on the deflections, on the measurement.
+    /// What the effect acts on: aerodynamics and body, deflections, or measurements.
     pub place: &'static str,
-    /// Signature of the effect; `None` for an error of the measurement.
+    /// Signature of the effect; `None` for a measurement error.
     pub signature: Option<&'a Signature>,
-    /// Name of the model on which the signature is drawn.
+    /// Name of the model for which the signature was computed.
     pub model: String,
-    /// Values of the coefficients in the drawing.
+    /// Values of the coefficients for the signature, in the order and the units of the effect's coefficients.
     pub values: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ impl EffectReport<'_> {
 
     fn facts(&self) -> Table {
         let mut table = Table::new(
-            "what the catalogue knows",
+            "entry of the catalogue",
             &[("", Align::Left), (self.about.id, Align::Left)],
         );
         for [name, text] in facts(&self.about, self.place, &self.channels) {
@@ -84,7 +84,7 @@ impl EffectReport<'_> {
     }
 }
 
-/// Properties of an effect in the catalogue besides its parameters, as names and texts.
+/// Catalogue properties of an effect except its parameters, as pairs of name and text.
 pub fn facts(about: &Description, place: &str, channels: &str) -> Vec<[String; 2]> {
     let mut rows = vec![
         ["what it is".into(), about.description.into()],

@@ -1,4 +1,4 @@
-//! The page of an evaluation: scores beside the paper's, step responses, and the planners' candidates.
+//! Page of an evaluation: scores next to those of the paper, step responses, and the planners' candidates.
 
 pub(crate) mod answer;
 mod way;
@@ -19,20 +19,20 @@ use greylag_sim::tracking::{Tracking, seconds};
 /// Results of an evaluation with their provenance.
 #[derive(Clone, Debug)]
 pub struct EvaluationReport<'a> {
-    /// A line under the title.
+    /// Subtitle of the page.
     pub subtitle: String,
-    /// Results of each controller.
+    /// Results, one element per controller.
     pub evaluations: &'a [Evaluation],
-    /// Single flights: a target, and for it one flight of each evaluation.
+    /// Single flights: each target with one flight per evaluation, in the order of `evaluations`.
     pub flights: &'a [(Target, Vec<Tracking>)],
-    /// The next command, ready to be copied; empty if none is known.
+    /// The next command for the user to run; empty if there is none.
     pub next: String,
-    /// Inputs of the evaluation, such as files and options, as names and values.
+    /// Inputs of the evaluation, such as files and options, as pairs of name and value.
     pub provenance: Vec<(String, String)>,
 }
 
 impl EvaluationReport<'_> {
-    /// The page of the evaluation.
+    /// Builds the page of the evaluation.
     pub fn page(&self) -> Page {
         let mut sections = vec![self.verdict(), self.intervals()];
         if !self.flights.is_empty() {
@@ -46,12 +46,12 @@ impl EvaluationReport<'_> {
         Page { title: "Controllers".into(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// The answer, before the figures.
+    /// Section with the answer.
     fn verdict(&self) -> Section {
         let plain = |sentence: String| Finding { sentence, link: None };
         let mut lead: Vec<Finding> =
             answer::sentences(self.evaluations).into_iter().map(plain).collect();
-        // the first two sentences, on tracking and on the envelope, lead together
+        // the first two sentences, on tracking and on the envelope, are prominent
         let rest = lead.split_off(lead.len().min(2));
         let next = self.next.clone();
         match lead.is_empty() {
@@ -65,7 +65,7 @@ impl EvaluationReport<'_> {
         first.groups.iter().map(|score| score.targets.as_str()).collect()
     }
 
-    /// Each evaluation's score of a group, with its name.
+    /// The score of each evaluation for a group, with the name of the controller.
     fn scores_of<'a>(&'a self, group: &'a str) -> impl Iterator<Item = (String, &'a Score)> {
         self.evaluations.iter().filter_map(move |e| Some((label(e), e.score(group)?)))
     }
@@ -172,7 +172,7 @@ impl EvaluationReport<'_> {
         Section::new("Single flights", note, vec![Figure::Choice(choice)])
     }
 
-    /// Section on the planners' rollouts on the way to the targets; `None` if no planner flew.
+    /// Section on the planners' rollouts during the flights to the targets; `None` if no planner flew.
     fn sight(&self) -> Option<Section> {
         let mut options = Vec::new();
         for (target, flights) in self.flights {
@@ -211,7 +211,7 @@ impl EvaluationReport<'_> {
     }
 }
 
-/// Name of a controller with its model or policy.
+/// Name of a controller with the name of its model or policy.
 fn label(e: &Evaluation) -> String {
     if e.model == "-" { e.controller.clone() } else { format!("{} ({})", e.controller, e.model) }
 }
@@ -302,13 +302,12 @@ mod tests {
             said[0].ends_with("leaving the envelope more often: lqi (exact <model>) 0.00200°."),
             "{said:?}"
         );
-        // a flight in twenty does not rank a controller behind
+        // a controller that leaves the envelope in up to one flight in twenty keeps its rank
         all[0].groups.iter_mut().for_each(|s| s.kept_rate = 0.96);
         assert_eq!(answer::best(&all).unwrap().controller, "lqi");
     }
 
-    /// Every controller is drawn with its interval and the paper's result. The page of a flight that ends early holds no
-    /// NaN.
+    /// The page shows every controller with its interval and the paper's result. It contains no NaN for a flight that ends early.
     #[test]
     fn the_page_has_ours_and_the_papers() {
         let evaluations = [evaluated("hybrid", 0.25), evaluated("lqi", 1e-7)];

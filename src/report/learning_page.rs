@@ -1,4 +1,4 @@
-//! The page of learning curves: results of policy trainings over steps and over time.
+//! Page of learning curves: evaluations of policy trainings over steps and over time.
 
 use super::Align::{Left, Right};
 use super::{
@@ -8,29 +8,29 @@ use crate::kit::curves::Range;
 use crate::kit::numbers::{number, percent};
 use greylag_learn::policy::learning_curve::{CurvePoint, best, knee, spread};
 
-/// A training of one or several seeds.
+/// A training with one or several seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
-    /// Name that distinguishes it from the other trainings.
+    /// Name that distinguishes this training from the others.
     pub name: String,
-    /// Each seed's name and evaluations, in order; every seed has at least one evaluation.
+    /// Name and evaluations of each seed, in time order; every seed has at least one evaluation.
     pub seeds: Vec<(String, Vec<CurvePoint>)>,
 }
 
-/// Trainings side by side, like Figure 2 of the paper.
+/// Trainings for comparison, like Figure 2 of the paper.
 #[derive(Clone, Debug)]
 pub struct LearningReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// A line under it.
+    /// Subtitle of the page.
     pub subtitle: String,
-    /// Trainings to be drawn side by side.
+    /// The trainings on the page.
     pub trainings: &'a [Training],
-    /// Pairs of name and value, such as commands and files.
+    /// Inputs such as commands and files, as pairs of name and value.
     pub provenance: Vec<(String, String)>,
 }
 
-/// A quantity of an evaluation with the title of its figure and the name of its axis.
+/// A quantity of an evaluation, with the title and the axis label of its figure.
 struct Quantity {
     title: &'static str,
     label: &'static str,
@@ -66,7 +66,7 @@ const QUANTITIES: [Quantity; 4] = [
 ];
 
 impl LearningReport<'_> {
-    /// The page of the trainings.
+    /// Builds the page of the trainings.
     pub fn page(&self) -> Page {
         let over = [
             ("Steps", self.figures("Thousand steps", |p| p.steps as f64 / 1000.0)),
@@ -94,7 +94,7 @@ impl LearningReport<'_> {
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// The best evaluation of each seed of each training, in a sentence; the first in large type.
+    /// Section with one sentence on the best evaluation of each seed; the first sentence is prominent.
     fn answer(&self) -> Section {
         let all = self.trainings.iter().flat_map(|t| t.seeds.iter().map(move |s| (t, s)));
         let said = all.filter_map(|(training, (seed, points))| {

@@ -1,14 +1,15 @@
-//! The report: figures and tables of a flight as one HTML file that needs no network.
+//! The report: figures and tables as one HTML file that needs no network.
 //!
-//! A [`Page`] is a title over [`Section`]s, a section holds [`Figure`]s in order, and
-//! [`Page::render`] turns them into one string with style, script and data inside.
-//! There is a page for each kind of result: an aircraft's model (`AircraftReport`), an effect of the catalogue
-//! (`EffectReport`), a flight ([`FlightReport`]), models compared with flights ([`ComparisonReport`]), a missing effect
-//! ([`DiagnosisReport`]), the amended model ([`AmendmentReport`]), a trained model (`TrainingReport`), the training of
-//! policies (`LearningReport`), controllers (`EvaluationReport`), and a campaign (`CampaignReport`). The plots
-//! are drawn in the reader's browser by uPlot 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`), which is embedded.
+//! A [`Page`] contains [`Section`]s under a title, and a section contains [`Figure`]s in order. [`Page::render`] converts a page
+//! to one string that includes styles, scripts and data.
 //!
-//! All [`TimeFigure`]s of a page share one clock: their zoom and their cursor are linked.
+//! There is a page for each kind of result: an aircraft's model (`AircraftReport`), an effect of the catalogue (`EffectReport`),
+//! a flight ([`FlightReport`]), a comparison of models with flights ([`ComparisonReport`]), a diagnosis of missing effects
+//! ([`DiagnosisReport`]), an amended model ([`AmendmentReport`]), a trained model (`TrainingReport`), trainings of policies
+//! (`LearningReport`), an evaluation of controllers (`EvaluationReport`), and a campaign (`CampaignReport`). The embedded library
+//! uPlot 1.6.32 (MIT, `kit/assets/uPlot.LICENSE`) draws the plots in the browser.
+//!
+//! All [`TimeFigure`]s of a page have the same time axis: their zoom and their cursor are linked.
 
 mod aircraft_page;
 #[cfg(feature = "study")]

@@ -1,4 +1,4 @@
-//! Rollouts of a planner: candidates, plan, and computation time by part of a tick.
+//! Rollouts of a planner: candidates, plan, and computation time of each part of a control step.
 
 use super::Align::Right;
 use super::{Figure, Style, Table, XyFigure, XyMark, XySeries};
@@ -6,19 +6,19 @@ use crate::kit::numbers::number;
 use greylag_control::insight::{Insight, Path};
 use greylag_model::STEP;
 
-/// Internal state of a planner at one displayed tick.
+/// Internal state of a planner at one control step.
 #[derive(Clone, Debug)]
 pub struct Sight {
-    /// When, s, on the clock of the page.
+    /// Time of the step, s, on the page's time axis.
     pub time_s: f64,
     /// Commanded roll and pitch, rad.
     pub target: [f64; 2],
-    /// Rollouts and plan of that tick.
+    /// Rollouts and plan of the step.
     pub insight: Insight,
 }
 
 impl Sight {
-    /// Roll and pitch of the candidates and of the plan.
+    /// Figures of roll and pitch with the candidates and the plan.
     pub(super) fn fans(&self) -> [Figure; 2] {
         [self.fan(0, "Roll"), self.fan(1, "Pitch")]
     }
@@ -27,7 +27,7 @@ impl Sight {
         let line = |path: &Path| -> [Vec<f64>; 2] {
             let x = (0..path.len()).map(|k| self.time_s + k as f64 * STEP);
             let y = path.iter().map(|angles| angles[axis].to_degrees());
-            // a number that is not finite ends the line
+            // a NaN separates the curves
             [x.chain([f64::NAN]).collect(), y.chain([f64::NAN]).collect()]
         };
         let mut all = [Vec::new(), Vec::new()];
@@ -62,7 +62,7 @@ impl Sight {
     }
 }
 
-/// Computation time of each part of the displayed ticks, ms.
+/// Table of the computation times of each part of the steps, ms.
 pub(super) fn phases<'a>(sights: impl IntoIterator<Item = &'a Sight>) -> Table {
     let mut sights = sights.into_iter().peekable();
     let mut columns = vec![("At (s)", Right)];

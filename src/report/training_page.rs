@@ -1,4 +1,4 @@
-//! The page of one training: the history of loss and coefficients, and what the residual contributes.
+//! Page of one training: error, history of loss and coefficients, and contribution of the residual.
 
 use super::Align::{Left, Right};
 use super::{
@@ -11,33 +11,33 @@ use greylag_learn::dynamics::score::Horizon;
 use greylag_learn::{Learned, Moment};
 use greylag_model::STEP;
 
-/// Results of a training, with the files and commands that they come from.
+/// Results of a training, with its inputs.
 #[derive(Clone, Debug)]
 pub struct TrainingReport<'a> {
     /// Title of the page.
     pub title: String,
-    /// A line under it.
+    /// Subtitle of the page.
     pub subtitle: String,
     /// History of the training, in order.
     pub history: &'a [Moment],
-    /// The coefficients that were trained.
+    /// The trained coefficients.
     pub coefficients: &'a [Learned],
-    /// Errors of the bare prior on the judging flights.
+    /// Errors of the prior without residual on the held-out flights.
     pub prior: &'a [Horizon],
-    /// Errors of the learned model on the same flights.
+    /// Errors of the learned model on the held-out flights.
     pub learned: &'a [Horizon],
     /// Map of the residual's contribution; `None` for a model without one.
     pub residual: Option<&'a ResidualMap>,
-    /// The next command, ready to be copied; empty if none is known.
+    /// The next command for the user to run; empty if there is none.
     pub next: String,
-    /// Notes for the reader of the page.
+    /// Notes for the user.
     pub notes: &'a [String],
-    /// Names and values of the training's inputs: files, hashes, options.
+    /// Inputs of the training (files, hashes, options), as pairs of name and value.
     pub provenance: Vec<(String, String)>,
 }
 
 impl TrainingReport<'_> {
-    /// The page of the training.
+    /// Builds the page of the training.
     pub fn page(&self) -> Page {
         let mut sections = vec![self.answer(), self.errors(), self.losses(), self.tracks()];
         if let Some(residual_map) = self.residual {
@@ -49,7 +49,7 @@ impl TrainingReport<'_> {
         Page { title: self.title.clone(), subtitle: self.subtitle.clone(), sections }
     }
 
-    /// By how much the error changes, at the longest horizon and at the one before it.
+    /// Section on the change of the error at the two longest horizons.
     fn answer(&self) -> Section {
         let change = |(p, l): (&Horizon, &Horizon)| {
             let by = 100.0 * (l.rms / p.rms - 1.0);
@@ -136,7 +136,7 @@ impl TrainingReport<'_> {
         if self.history.is_empty() {
             return Section::default();
         }
-        let note = "The prediction error over the bare prior's, how large the residual is beside the \
+        let note = "The prediction error over the bare prior's, the size of the residual relative to the \
                     prior, and λ, whose inverse weighs it.";
         let figures = vec![
             line("Prediction error, eq. (23)", "L / L_prior", &|m| m.normalised),

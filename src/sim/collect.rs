@@ -11,14 +11,14 @@ use greylag_logs::{Flight, Sample};
 use greylag_num::stream::{self, Stream};
 use greylag_physics::{Command, State};
 
-/// Number of bins of roll and of pitch; each cell is visited once before any is visited again.
+/// Number of bins of roll and of pitch. Every cell is used once before any cell is used again.
 const BINS: usize = 5;
 /// Range of the target attitudes, rad: Table II.
 const ENVELOPE: [f64; 2] = [60.0 * DEGREE, 30.0 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Steps for which a random action is held: white noise never leaves the trim region.
+/// Steps of 10 ms for which a random action is held. White noise at every step never leaves the trim region.
 const HELD: usize = 25;
-/// Correlation from step to step of Ornstein–Uhlenbeck actions: a time constant of 0.33 s.
+/// Correlation from step to step of Ornstein–Uhlenbeck actions, which gives a time constant of 0.33 s.
 const MEMORY: f64 = 0.97;
 
 /// Ids of the random streams.
@@ -31,7 +31,7 @@ const CHOICES: u64 = 12;
 pub struct Place {
     /// Seed of the collection.
     pub seed: u64,
-    /// Round, 0 being the one with random actions only.
+    /// Round, from 0. Round 0 has random actions only.
     pub round: u32,
     /// Episode within the round, from 0.
     pub episode: u32,
@@ -56,13 +56,14 @@ impl Place {
         Target { roll, pitch: within(bin / BINS, ENVELOPE[1]), airspeed }
     }
 
-    /// Fraction of random actions: one in the first round, then a half, a quarter, …
+    /// Fraction of random actions: 1 in round 0, halved in each further round.
     pub fn random_part(&self) -> f64 {
         0.5_f64.powi(self.round.min(100) as i32)
     }
 }
 
-/// Random actions: held in even episodes, Ornstein–Uhlenbeck in odd ones; their amplitude is drawn for each episode.
+/// Random actions: held in even episodes, Ornstein–Uhlenbeck noise in odd ones. Their amplitude is drawn for each
+/// episode.
 struct Wander {
     held: bool,
     size: f64,
@@ -93,8 +94,8 @@ impl Wander {
     }
 }
 
-/// Flies an episode of [`STEPS`] steps: `planner` acts, except for a fraction of random actions (all without a
-/// planner). The episode ends when a state is not finite.
+/// Flies an episode of [`STEPS`] steps. `planner` acts, except during random intervals with random actions. Without a
+/// planner all actions are random. The episode ends early if a state is not finite.
 ///
 /// # Errors
 ///
@@ -136,7 +137,8 @@ pub fn explore(
     Ok(Flight::from(samples))
 }
 
-/// A row of the log: state, effective controls and the command given then.
+/// A log sample: state, actuator positions and command at the same time. Without `command` the sample has the previous
+/// command.
 pub fn sample(seen: &Observation, command: Option<&Command>, target: &Target) -> Sample {
     let State { roll, pitch, airspeed, p, q, r, alpha, beta } = seen.state;
     let command = command.unwrap_or(&seen.previous[0]);
@@ -190,7 +192,7 @@ mod tests {
         let most = |get: &dyn Fn(&Sample) -> f64| {
             flights.iter().flatten().map(|s| get(s).abs()).fold(0.0, f64::max)
         };
-        // the stall is at 12.3 degrees, hard targets reach 60 of bank
+        // The stall is at 12.3°. Hard targets reach 60° of bank.
         assert!(most(&|s| s.alpha_rad).to_degrees() > 13.0);
         assert!(most(&|s| s.attitude_rad[0]).to_degrees() > 60.0);
         let again = fly(2);

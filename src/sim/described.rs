@@ -5,12 +5,12 @@ use greylag_sitl::plant::{Mixing, Moved, PlantOptions};
 use greylag_physics::Airframe;
 use greylag_physics::mixer::{Does, Effector};
 
-/// Applies the surfaces, motors and conditions of `airframe` to `plant`. Surfaces without JSBSim properties use the
-/// aircraft's own channels; properties set on the command line are kept.
+/// Applies the surfaces, motors and conditions of `airframe` to `plant`. If no surface has a JSBSim property, the
+/// channels of JSBSim's aircraft are used. Properties that `plant` already sets are kept.
 ///
 /// # Errors
 ///
-/// If some of the surfaces have a position and some have none, by name.
+/// If some surfaces have a position property and others have none. The message names a surface without one.
 pub fn describe(plant: &mut PlantOptions, airframe: &Airframe) -> Result<(), String> {
     for (name, value) in &airframe.conditions {
         if plant.held.iter().all(|(held, _)| held != name) {

@@ -1,5 +1,5 @@
-//! Experiment design: the manoeuvre that best discriminates two effects, from simulations of models with one or the
-//! other.
+//! Experiment design: finds the manoeuvre that best discriminates two effects, from simulations of models with either
+//! effect.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -22,9 +22,9 @@ use greylag_sysid::progress::{Cancelled, Progress, report};
 use greylag_sysid::separation::{Separation, separation};
 use greylag_sysid::weak_form::prepared::{ClockError, Prepared};
 
-/// Evidence that discriminates the two effects.
+/// Smallest `apart` of a `Separation` at which two effects count as discriminated.
 pub const ENOUGH: f64 = 10.0;
-/// Longest schedule, s.
+/// Longest accepted duration of a plan, s.
 pub const LONGEST_S: f64 = 600.0;
 /// Smallest number of repetitions: one on each of two opposite headings.
 const LEAST: f64 = 2.0;
@@ -62,7 +62,7 @@ pub enum DesignError {
 pub struct Suspect {
     /// Id of the effect.
     pub id: String,
-    /// Values of its coefficients, in its own order; empty for clearly visible ones.
+    /// Values of the effect's coefficients, in the effect's order. An empty list selects clearly visible values.
     pub values: Vec<f64>,
 }
 
@@ -73,19 +73,19 @@ pub struct Prospect {
     pub name: &'static str,
     /// Length of the manoeuvre, s.
     pub duration_s: f64,
-    /// The separation when the first effect is true, and when the second is; `None` if the aircraft with it would
-    /// leave its bounds.
+    /// Separation if the first effect is true, and if the second effect is true. `None` if the aircraft with the true
+    /// effect would leave its bounds.
     pub separations: [Option<Separation>; 2],
 }
 
 impl Prospect {
-    /// The smaller of the two separations.
+    /// The smaller of the two separations; `None` if one is missing.
     pub fn apart(&self) -> Option<f64> {
         let [a, b] = self.separations;
         Some(a?.apart.min(b?.apart))
     }
 
-    /// Duration of this manoeuvre for an evidence of [`ENOUGH`], s.
+    /// Flight time with this manoeuvre for an evidence of [`ENOUGH`], s; `None` if a separation is missing.
     pub fn seconds(&self) -> Option<f64> {
         self.apart().map(|apart| self.duration_s * ENOUGH / apart)
     }
@@ -93,11 +93,13 @@ impl Prospect {
 
 /// Expected discrimination of `suspects`, both missing from `model`, by the menu's manoeuvres, the fastest first.
 ///
-/// `controller` flies; the noise is that of a small autopilot. `progress` reports the number of manoeuvres simulated.
+/// `controller` flies the manoeuvres, with the sensor noise of a small autopilot. `progress` reports the fraction of
+/// manoeuvres simulated.
 ///
 /// # Errors
 ///
-/// If an effect is unknown, present already, or its amplitude is unknown, or `progress` cancelled the task.
+/// If both effects are the same, if an effect is unknown or already in the model, if its amplitude is unknown, or if
+/// `progress` cancels the task.
 pub fn prospects(
     model: &GreyBox,
     controller: &dyn Controller,
@@ -134,7 +136,7 @@ pub fn prospects(
 pub struct Plan {
     /// The chosen manoeuvre.
     pub manoeuvre: &'static Manoeuvre,
-    /// Duration for an evidence of [`ENOUGH`], s.
+    /// Flight time for an evidence of [`ENOUGH`], s.
     pub seconds: f64,
     /// Number of repetitions, on alternating headings.
     pub times: usize,
@@ -142,7 +144,8 @@ pub struct Plan {
     pub schedule: Schedule,
 }
 
-/// The fastest of `prospects`, sorted as by [`prospects`]; `None` if none suffices within [`LONGEST_S`].
+/// Plans the fastest of `prospects`, which must be sorted as by [`prospects`], at the cruise airspeed `cruise_mps`
+/// (m/s). `None` if no manoeuvre reaches [`ENOUGH`] within [`LONGEST_S`].
 pub fn plan(prospects: &[Prospect], cruise_mps: f64) -> Option<Plan> {
     let best = prospects.first()?;
     let seconds = best.seconds().filter(|seconds| *seconds < LONGEST_S)?;
@@ -152,8 +155,8 @@ pub fn plan(prospects: &[Prospect], cruise_mps: f64) -> Option<Plan> {
     Some(Plan { manoeuvre, seconds, times, schedule })
 }
 
-/// The repeated manoeuvre, each repetition on the opposite heading: on a single heading wind cannot be distinguished
-/// from an airspeed scale error.
+/// Repeats a manoeuvre on alternating opposite headings. On a single heading, wind cannot be distinguished from an
+/// airspeed scale error.
 fn repeated(manoeuvre: &Manoeuvre, times: usize) -> Schedule {
     let again = |all: Schedule, _| all.then(menu::TURN.schedule()).then(manoeuvre.schedule());
     (1..times).fold(manoeuvre.schedule(), again)
@@ -166,8 +169,8 @@ fn truth(model: &GreyBox, suspect: &Suspect) -> Result<GreyBox, DesignError> {
     Ok(with)
 }
 
-/// Values of its coefficients: those given, else clearly visible ones, else the centre of the search's starting
-/// values.
+/// Values of the effect's coefficients: the given values, else clearly visible ones, else the middle of the search's
+/// starting values.
 fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     if !suspect.values.is_empty() {
         return Ok(suspect.values.clone());
@@ -188,12 +191,13 @@ fn values(model: &GreyBox, suspect: &Suspect) -> Result<Vec<f64>, DesignError> {
     middle.ok_or_else(|| DesignError::Amplitude { id: id.into() })
 }
 
-/// Candidates for fitting the effect to data of `model`: for each set of shape constants, `model` with one unit of
-/// each linear coefficient, or with the whole effect where it has none.
+/// Candidate models for fitting the effect to data of `model`, one list for each set of starting values. A list has one
+/// copy of `model` for each linear coefficient that is not zero. An effect with fewer than two linear coefficients has
+/// one copy with the whole effect.
 ///
 /// # Errors
 ///
-/// The effect is unknown, present already, or its size is unknown.
+/// If the effect is unknown or already in the model, or if its size is unknown.
 pub fn alternatives(model: &GreyBox, suspect: &Suspect) -> Result<Vec<Vec<GreyBox>>, DesignError> {
     let own = values(model, suspect)?;
     let about = catalogue::describe(&suspect.id);
@@ -261,7 +265,7 @@ fn imagine(
         notes: Vec::new(),
     };
     let mut prepared = Prepared::new(&flight, 0.0)?;
-    // a simulated flight has no noise; the separation accounts for that of sensors
+    // The simulated flight has no noise. The separation accounts for sensor noise.
     (prepared.noise, prepared.force_noise) = (noise, force_noise);
     Ok((!prepared.windows.is_empty()).then_some(prepared))
 }

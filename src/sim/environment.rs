@@ -16,7 +16,7 @@ pub enum Trouble {
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// A state of the model is not finite.
-    #[error("the imagined aircraft of model {0} left the numbers; its model does not hold there")]
+    #[error("the simulated state of model {0} diverged; the model is not valid there")]
     Diverged(String),
     /// A copy of the simulator cannot be made.
     #[error("{0}")]

@@ -10,10 +10,10 @@ use greylag_physics::Command;
 
 pub use greylag_control::quality::{REACHED_DEG, attitude_error_deg};
 
-/// Number of steps of an episode (section V-E of \[GSFM26\]).
+/// Number of steps of an episode: 10 s in steps of 10 ms (section V-E of \[GSFM26\]).
 pub const STEPS: usize = 1000;
 
-/// Number of steps over which the settled error is taken: the last fifth.
+/// Number of steps over which the settled error is computed: the last fifth of an episode.
 pub const SETTLED: usize = 200;
 
 /// Settled error above which an episode counts as diverged, degrees (Table VIII).
@@ -24,12 +24,12 @@ pub const DIVERGED_DEG: f64 = 10.0;
 pub struct Outcome {
     /// Mean of roll and pitch RMSE over the last fifth, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,
-    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole duration if they never
-    /// do.
+    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s. It is the whole duration if they
+    /// do not stay, or if the aircraft was lost.
     pub settling_s: f64,
-    /// Computing time of the controller for each step.
+    /// Computing time of the controller for each scored step.
     pub cost: Vec<Duration>,
-    /// The track that was flown.
+    /// The track of the scored leg.
     pub track: Track,
 }
 
@@ -48,12 +48,12 @@ pub struct Episode<'a> {
 pub struct Leg {
     /// Attitude and airspeed target.
     pub target: Target,
-    /// Duration in steps.
+    /// Duration in steps of 10 ms.
     pub steps: usize,
 }
 
 impl Episode<'_> {
-    /// Flies towards `target` and scores it; `watch` is called at every step.
+    /// Flies towards `target` and scores the flight. `watch` is called at every step.
     ///
     /// # Errors
     ///
@@ -66,8 +66,8 @@ impl Episode<'_> {
         self.fly_leg(None, Leg { target: *target, steps: STEPS }, watch)
     }
 
-    /// Flies `leg` and scores it, starting from the reset state or from the end of `first`, which is flown and not
-    /// scored; `watch` is called at every step.
+    /// Flies `leg` and scores it. The leg starts at the end of `first`, which is not scored, or at the reset state if
+    /// `first` is `None`. `watch` is called at every step of both legs.
     ///
     /// # Errors
     ///
@@ -141,8 +141,8 @@ fn seconds(steps: usize) -> f64 {
     steps as f64 * STEP
 }
 
-/// The settled error of \[GSFM26\] section V-E: the mean of roll and pitch RMSE, degrees, of attitude errors (roll,
-/// pitch) in degrees; NaN without any.
+/// The settled error of \[GSFM26\] section V-E, degrees: the mean of the RMSE in roll and the RMSE in pitch. `errors`
+/// are pairs of roll and pitch error, degrees. The result is NaN if `errors` is empty.
 pub fn settled_error_deg(errors: &[[f64; 2]]) -> f64 {
     let rmse = |axis: usize| {
         let squares: f64 = errors.iter().map(|e| e[axis] * e[axis]).sum();
@@ -158,7 +158,8 @@ mod tests {
 
     const TARGET: Target = Target { roll: 0.0, pitch: 0.0, airspeed: 16.67 };
 
-    /// Off by a given attitude in the last fifth, or lost at a step.
+    /// An environment with the attitude `settled` (degrees) in the last fifth, which loses the aircraft at step
+    /// `lost_at`.
     struct Fake {
         step: usize,
         settled: [f64; 2],
@@ -233,7 +234,7 @@ mod tests {
         assert!((outcome.settling_s - seconds(STEPS - SETTLED)).abs() < 1e-9);
     }
 
-    /// A leg begins where the one before it ends: its track, its cost and its first change are its own.
+    /// A leg starts at the end of the first leg. Its track and computing time exclude the first leg.
     #[test]
     fn a_leg_is_scored_from_where_the_first_one_ends() {
         let mut environment = Fake { step: 0, settled: [0.5, -0.5], lost_at: usize::MAX };
@@ -244,7 +245,7 @@ mod tests {
         let outcome = episode.fly_leg(Some(first), leg, |_, _| steps += 1).unwrap();
         assert_eq!((steps, outcome.cost.len(), outcome.track.moments.len()), (900, 400, 401));
         assert_eq!((outcome.track.target, outcome.track.before), (TARGET, Some(Command::IDLE)));
-        // away up to step 800 of the episode, which is 300 of the leg
+        // off target up to step 800 of the episode, which is step 300 of the leg
         assert!(
             (outcome.settling_s - 3.0).abs() < 1e-9 && (outcome.settled_deg - 0.5).abs() < 1e-9
         );

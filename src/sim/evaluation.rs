@@ -28,13 +28,14 @@ const SEED: u64 = 95;
 pub struct Evaluation {
     /// Name of the controller.
     pub controller: String,
-    /// Name of the model that it was designed from or plans with.
+    /// Name of the model from which the controller was designed or with which it plans.
     pub model: String,
-    /// Scores by group; `all`, where both were flown, is easy with the hard corners: the 240 of the paper's Table II.
+    /// Scores by group. The group `all` joins easy targets and hard corners if both were flown: the 240 targets of the
+    /// paper's Table II.
     pub groups: Vec<Score>,
     /// Computing time per step.
     pub ms_per_step: Cost,
-    /// The limits that the flights are measured against; `None` without measurement.
+    /// The limits against which the flights are measured; `None` without measurement.
     pub limits: Option<Limits>,
     /// Every flight with its measures, in the order of the targets; empty without measurement.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -65,15 +66,15 @@ pub struct Score {
     pub count: usize,
     /// Mean settled error, degrees.
     pub mean_deg: f64,
-    /// Its 95 % bootstrap interval over the targets.
+    /// 95 % bootstrap interval of the mean over the targets, degrees.
     pub mean_ci95_deg: [f64; 2],
     /// Median settled error, degrees.
     pub median_deg: f64,
-    /// Its 95 % bootstrap interval, degrees.
+    /// 95 % bootstrap interval of the median, degrees.
     pub median_ci95_deg: [f64; 2],
     /// Interquartile mean of the settled error, degrees.
     pub iqm_deg: f64,
-    /// Its 95 % bootstrap interval, degrees.
+    /// 95 % bootstrap interval of the interquartile mean, degrees.
     pub iqm_ci95_deg: [f64; 2],
     /// Smallest settled error, degrees.
     pub min_deg: f64,
@@ -83,10 +84,10 @@ pub struct Score {
     pub settling_s: f64,
     /// Fraction of targets with more than 10° of settled error.
     pub divergence_rate: f64,
-    /// Its 95 % bootstrap interval.
+    /// 95 % bootstrap interval of the divergence rate.
     pub divergence_ci95: [f64; 2],
-    /// Fraction of the flights within the limits of load factor and angle of attack, transients allowed, see
-    /// [`TRANSIENT`](greylag_control::quality::TRANSIENT); NaN without measurement.
+    /// Fraction of the flights within the limits of load factor and angle of attack; NaN without measurement.
+    /// Transients are allowed, see [`TRANSIENT`](greylag_control::quality::TRANSIENT).
     pub kept_rate: f64,
     /// Fraction of the flights that overshoot roll and pitch by at most 1° or 3 % of the step, whichever is larger.
     pub little_overshoot_rate: f64,
@@ -108,8 +109,8 @@ pub struct Cost {
 /// Makes a controller for a thread.
 pub type Make<'a> = &'a (dyn Fn() -> Box<dyn Controller> + Sync);
 
-/// Flies `rows` in JSBSim with clones of a controller, on all cores; `done` is called after each. Every row has its
-/// own random numbers, independent of the core and of the other rows.
+/// Flies `rows` in JSBSim on all cores, with a controller of `make` on each thread. `done` is called after each flight.
+/// Every row has its own random stream, independent of the core and of the other rows.
 ///
 /// # Errors
 ///
@@ -149,7 +150,7 @@ pub fn evaluate_courses(
 ///
 /// # Errors
 ///
-/// None for a controller that can be built: losing the aircraft is a result.
+/// No error occurs at present. The loss of an aircraft is a result.
 pub fn imagine(
     model: &GreyBox,
     make: Make,
@@ -178,14 +179,14 @@ pub fn imagine_courses(
 pub struct Robustness {
     /// The score over all draws.
     pub all: Evaluation,
-    /// Of each draw: mean settled error, degrees, and the number of targets that diverged (settled error over
+    /// For each draw: mean settled error, degrees, and the number of targets that diverged (settled error over
     /// [`DIVERGED_DEG`]).
     pub draws: Vec<(f64, usize)>,
 }
 
 impl Robustness {
-    /// Monte Carlo over the uncertainty of `model`: flies `courses` in draws 0 to `draws` − 1 with the seed `seed`,
-    /// see [`GreyBox::drawn`]. `done` is called after each draw.
+    /// Monte Carlo simulation over the uncertainty of `model`: flies `courses` in draws 0 to `draws` − 1 of the seed
+    /// `seed`, see [`GreyBox::drawn`]. `done` is called after each draw.
     ///
     /// # Errors
     ///
@@ -217,7 +218,7 @@ impl Robustness {
 /// One flight of an evaluation: start, target, random stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
-    /// Its index in its set, from 0: it selects the random numbers.
+    /// Index of the course in its set, from 0. The index selects the random stream.
     pub number: u32,
     /// Group of the target; `None` for steps between attitudes.
     pub group: Option<Group>,
@@ -228,13 +229,13 @@ pub struct Course {
 }
 
 impl Course {
-    /// Name of its group in tables and JSON.
+    /// Name of the group in tables and JSON; `steps` without a group.
     pub fn targets(&self) -> &'static str {
         self.group.map_or("steps", Group::name)
     }
 }
 
-/// The targets of a file as in the paper, at an airspeed (m/s).
+/// Courses from the start of an episode to the targets `rows`, as in the paper, at `airspeed` (m/s).
 pub fn courses(rows: &[Row], airspeed: f64) -> Vec<Course> {
     let course = |row: &Row| {
         let [roll, pitch] = [row.roll_deg, row.pitch_deg].map(f64::to_radians);
@@ -310,7 +311,7 @@ impl Sums {
             .into_iter()
             .map(|group| Score::new(group.name(), &of(&|g| g == Some(group))))
             .collect();
-        // "all" means the targets of Table II; a subset of them is not "all"
+        // "all" means the targets of Table II, of which no group may be missing
         if groups[..2].iter().all(|score| score.count > 0) {
             let table = |g| matches!(g, Some(Group::Easy | Group::HardCorners));
             groups.push(Score::new("all", &of(&table)));

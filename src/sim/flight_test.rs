@@ -1,4 +1,4 @@
-//! A flight test in JSBSim: a controller flies a schedule, and the true state of every step is kept.
+//! A flight test in JSBSim: a controller flies a schedule, and the true state of every step is stored.
 
 use greylag_sitl::plant::{PlantOptions, Truth};
 
@@ -7,9 +7,9 @@ use greylag_control::{Controller, Target};
 use greylag_manoeuvres::{PITCH_MAX_DEG, ROLL_MAX_DEG, Schedule, Scheduled};
 use greylag_physics::Command;
 
-/// Factor on the excitation after the aircraft has left its bounds.
+/// Factor by which the excitation is reduced after the aircraft has left its bounds.
 const GENTLER: f64 = 0.75;
-/// Number of schedules tried before the aircraft counts as unflyable.
+/// Number of flights after which the aircraft counts as unflyable.
 const TRIES: usize = 7;
 
 /// A flight without sensor errors: truth and command of every step of 0.01 s.
@@ -41,7 +41,7 @@ pub enum FlightTestError {
     Departed {
         /// Name of the schedule.
         schedule: String,
-        /// Time of leaving, s.
+        /// Time at which the aircraft left the bounds, s.
         time_s: f64,
         /// Roll at that time, degrees.
         roll_deg: f64,
@@ -85,7 +85,8 @@ pub fn fly(
     Ok(flown)
 }
 
-/// [`fly`] with reduced excitation while the aircraft leaves its bounds.
+/// Flies as [`fly`]. While the aircraft leaves its bounds, the flight is repeated with less excitation, up to six
+/// times.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! JSBSim as a training environment of one aircraft: the paper's first regime.
+//! JSBSim as a training environment with one aircraft: the first training regime of \[GSFM26\].
 
 use greylag_sitl::plant::PlantOptions;
 
@@ -23,11 +23,11 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// An aircraft at the start, with the first of `targets`.
+    /// An aircraft in its initial state, with the next target of `targets`.
     ///
     /// # Errors
     ///
-    /// If JSBSim cannot be set up.
+    /// If JSBSim cannot load the aircraft or reset it.
     pub fn new(plant: &PlantOptions, targets: Stratified) -> Result<Flown, Trouble> {
         let mut simulator = Simulator::new(plant)?;
         let seen = simulator.reset()?;
@@ -59,7 +59,7 @@ impl World for Flown {
     }
 
     fn step(&mut self, _block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble> {
-        // a state that is not finite is a loss at the last finite one
+        // if a state is not finite, the aircraft is lost in its last finite state
         let left = match self.simulator.step(command(action.map(|x| x.0[0].into()))) {
             Ok(seen) => {
                 self.seen = seen;

@@ -1,6 +1,6 @@
 //! Translates an effect file's formulas to JSBSim functions.
 //!
-//! The expression tree is shared with the effect, its evaluation is not: JSBSim evaluates the functions itself.
+//! Only the expression tree is shared with the effect. JSBSim evaluates the functions with its own code.
 
 use greylag_sitl::hidden::{Filter, FilterKind, Hidden, Place};
 
@@ -10,16 +10,18 @@ use greylag_physics::formula::{Variable, Written};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Largest length of a function in characters: JSBSim reads it once, but deeper nesting multiplies the length.
+/// Largest length of a function, characters. Nested calls of smoothstep, tanh, sign and deadband repeat their arguments
+/// and multiply the length.
 const LONGEST: usize = 200_000;
 /// Metres in a foot.
 const FT: f64 = 0.3048;
 
-/// `effect` with `values` of its coefficients in JSBSim's syntax.
+/// The functions of `effect` in JSBSim's syntax, with `values` of its coefficients.
 ///
 /// # Errors
 ///
-/// If JSBSim cannot express a part of the formula.
+/// If the formula reads the lift, if the time of a lag or delay is no parameter, or if a function exceeds 200 000
+/// characters.
 pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     let mut writer = Writer { values, filters: Vec::new() };
     let mut functions = Vec::new();
@@ -31,7 +33,7 @@ pub fn hidden(effect: &Written, values: &[f64]) -> Result<Hidden, String> {
     Ok(Hidden::written(effect.about.id, functions, writer.filters))
 }
 
-/// A channel's JSBSim property, and the factor to its unit.
+/// JSBSim's place for a channel, and its unit (lbf or lbf ft) in N or N m.
 fn place(channel: Channel) -> (Place, f64) {
     match channel {
         Channel::Drag => (Place::Drag, LBF),
@@ -93,7 +95,7 @@ fn variable(of: Variable) -> Result<String, String> {
         V::BetaRate => property("aero/betadot-rad_sec"),
         V::Lift => {
             return Err(format!(
-                "{} is not known there while forces are worked out; write qbar*S and alpha",
+                "{} is not available while forces are computed; write qbar*S and alpha",
                 of.name()
             ));
         }
@@ -126,7 +128,7 @@ impl Writer<'_> {
                 match written.len() > LONGEST {
                     true => Err(format!(
                         "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what \
-                         stands inside smoothstep, tanh, sign and deadband; nest them less"
+                         is inside smoothstep, tanh, sign and deadband; nest them less"
                     )),
                     false => Ok(written),
                 }
@@ -138,11 +140,11 @@ impl Writer<'_> {
         self.values.get(parameter).copied().unwrap_or(0.0)
     }
 
-    /// Output property of a filter.
+    /// Output property of the filter for `function`. Equal filters are written once.
     fn filter(&mut self, function: Function, all: &[Expression]) -> Result<String, String> {
         let time_s = match all.get(1).map(|e| &e.node) {
             Some(Node::Parameter(k)) => self.value(*k),
-            _ => return Err(format!("the time of {} is no parameter", function.name())),
+            _ => return Err(format!("the time of {} is not a parameter", function.name())),
         };
         let input = self.xml(&all[0])?;
         let kind = if function == Function::Delay { FilterKind::Delay } else { FilterKind::Lag };
@@ -156,7 +158,7 @@ impl Writer<'_> {
     }
 }
 
-/// A sum of ramps: JSBSim's tables take no expression as input.
+/// A piecewise linear table as a sum of ramps, because JSBSim's tables accept no expression as input.
 fn table(x: &str, points: &[[f64; 2]]) -> String {
     let ramp = |pair: &[[f64; 2]]| {
         let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
@@ -199,12 +201,12 @@ fn call(function: Function, all: &[String]) -> String {
             let low = element("product", &[number(-1.0), width]);
             element("difference", &[all[0].clone(), element("max", &[held, low])])
         }
-        // lags and delays are separate filters, which settle at their argument
+        // Lags and delays are separate filters. In steady state their output equals their argument.
         Function::Lag | Function::Delay => all[0].clone(),
     }
 }
 
-/// Sign with value 0 at zero; JSBSim's own is 1 there.
+/// Sign function with value 0 at zero. JSBSim's sign function is 1 at zero.
 fn sign(x: &str) -> String {
     let above = element("gt", &[x.to_owned(), number(0.0)]);
     let below = element("lt", &[x.to_owned(), number(0.0)]);

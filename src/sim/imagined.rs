@@ -1,4 +1,4 @@
-//! Many simulated aircraft at once: a model evaluated in lanes, section IV-B of \[GSFM26\].
+//! Many aircraft simulated at once, with the model evaluated in SIMD lanes (section IV-B of \[GSFM26\]).
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use greylag_physics::{Controls, State};
 /// Aircraft per block of lanes.
 pub const WIDTH: usize = ROW;
 
-/// Steps of an episode, the same as in JSBSim.
+/// Steps of 10 ms of an episode, as many as in JSBSim.
 pub const STEPS: u32 = 1000;
 
 /// Validity limits of the model, at which the episode ends: angles θ, α, β (rad), rates p, q, r (rad/s), airspeed
@@ -32,12 +32,12 @@ struct Envelope {
     airspeed: [f64; 2],
 }
 
-/// End of an aircraft's step.
+/// State of an aircraft's episode after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// The episode continues.
     No,
-    /// Truncated by the time limit: not terminal, the value is bootstrapped.
+    /// The episode was truncated by the time limit. The step is not terminal, and its value is bootstrapped.
     Time,
     /// Terminated: a validity limit was exceeded.
     Lost,
@@ -48,17 +48,17 @@ pub enum Ended {
 pub struct Stepped {
     /// Observation after the step.
     pub observed: [Block; OBSERVATIONS],
-    /// Reward of eq. (30).
+    /// Reward of eq. (30) of \[GSFM26\].
     pub reward: Block,
-    /// End of the step for each aircraft.
+    /// State of each aircraft's episode.
     pub ended: [Ended; WIDTH],
 }
 
-/// Aircraft simulated by a model, each with its own target, filters and episode: many at once, for training. To fly a
-/// controller in one aircraft see [`Imagined`](crate::environment::Imagined).
+/// Many aircraft simulated by a model at once, for training. Each has its own target, actuator filters and episode. To
+/// fly a controller in one aircraft, use [`Imagined`](crate::environment::Imagined).
 ///
-/// The exact actuator filters are part of the state. The air density is constant: over an episode it would change by
-/// less than 1 %.
+/// The exact actuator filters are part of the state. The air density is constant, since it would change by less than 1
+/// % over an episode.
 #[derive(Clone, Debug)]
 pub struct Imagination {
     model: Arc<GreyBox>,
@@ -82,12 +82,12 @@ struct Batch {
 }
 
 impl Imagination {
-    /// `instances` aircraft of `model` at the neutral start; `targets` supplies the target of each episode.
+    /// `instances` aircraft of `model` at the neutral start. `targets` supplies the target of each episode.
     pub fn new(model: Arc<GreyBox>, instances: usize, targets: Stratified) -> Imagination {
         let lane = Block::from_f64;
         let (state, rest) = (model.airframe.start(), Controls::default());
         let mut memory = Memory::default();
-        // the scheme's memory at the start is the acceleration there
+        // the integration scheme starts with the acceleration of the initial state
         model.step(&state, &rest, model.airframe.reference.altitude, &mut memory);
         let zero = lane(0.0);
         let rest =
@@ -114,7 +114,7 @@ impl Imagination {
         imagination
     }
 
-    /// Starts new episodes, whose targets continue the random sequence after its first `targets`.
+    /// Starts new episodes. Their targets skip the first `targets` of the random sequence.
     pub fn restart(&mut self, targets: u64) {
         self.targets.go_on_after(targets);
         for k in 0..self.batches.len() {
@@ -140,12 +140,12 @@ impl Imagination {
         self.instances
     }
 
-    /// Number of blocks; lanes of the last one above the instances are unused.
+    /// Number of blocks. Lanes of the last block beyond the number of aircraft are unused.
     pub fn blocks(&self) -> usize {
         self.batches.len()
     }
 
-    /// Number of episodes started, one per target, and of those that ended outside the limits.
+    /// Number of episodes started, and number of episodes that ended outside the validity limits.
     pub fn episodes(&self) -> [u64; 2] {
         [self.targets.count(), self.lost]
     }
@@ -156,7 +156,7 @@ impl Imagination {
         observe(state, &actuators.observed(&self.model.airframe.actuators), target)
     }
 
-    /// One step of a block under `action`; ended episodes are reset afterwards.
+    /// Simulates one step of a block under `action`. Ended episodes are reset afterwards.
     pub fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Stepped {
         let batch = &mut self.batches[block];
         let (observed, reward, outside) = batch.advance(&self.model, &self.task, action);
@@ -187,7 +187,7 @@ impl Imagination {
 }
 
 impl Batch {
-    /// Resets the aircraft of `chosen` to the start.
+    /// Resets the aircraft in the lanes where `chosen` is 1.
     fn begin(&mut self, chosen: Block, neutral: &Batch) {
         self.state = self.state.replaced(chosen, &neutral.state);
         self.actuators = self.actuators.replaced(chosen, &neutral.actuators);
@@ -239,7 +239,7 @@ pub fn outside(state: &State<Block>) -> Block {
     ENVELOPE.left(state)
 }
 
-/// Smallest and largest value of each state in an episode.
+/// Smallest and largest value of each state in an episode: rad, rad/s, m/s.
 pub fn bounds() -> [State; 2] {
     let Envelope { pitch, incidence, rate, airspeed: [slow, fast] } = ENVELOPE;
     let roll = std::f64::consts::PI;

@@ -26,11 +26,11 @@ const ALPHA: f64 = 0.052;
 const ANGLE: f64 = 0.035;
 /// Larger sideslip for a second value of the drag, rad: 8°.
 const FAR: f64 = 4.0 * ANGLE;
-/// Half interval of dimensionless rates.
+/// Half interval of the dimensionless rates pb/2V, qc/2V and rb/2V.
 const RATE: f64 = 0.005;
 /// Pitch angle at which gravity curves the flight path differently from level flight, rad: 60°.
 const ATTITUDE: f64 = 1.05;
-/// Half interval of commands.
+/// Half interval of surface commands, −1..1 being the travel.
 const COMMAND: f64 = 0.2;
 /// Incidences of the tables, degrees.
 const TABLE_DEG: [f64; 24] = [
@@ -43,7 +43,7 @@ const TABLE_DEG: [f64; 24] = [
 pub struct Imported {
     /// Text of the airframe file.
     pub airframe: String,
-    /// Text of the model file, beside `airframe.toml`.
+    /// Text of the model file, which refers to `airframe.toml` in the same folder.
     pub model: String,
     /// Effects that airframe and model do not represent, one sentence each.
     pub left_out: Vec<String>,
@@ -64,7 +64,7 @@ impl Imported {
 /// An aircraft cannot be imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    /// The simulator cannot load or evaluate it.
+    /// The simulator cannot load or evaluate the aircraft.
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// A surface moves to one side only, or against its command.
@@ -81,7 +81,7 @@ pub enum ImportError {
         /// Deflection at the command 1, rad.
         most: f64,
     },
-    /// The wing has no lift slope.
+    /// The aircraft has no positive lift at any incidence of the tables.
     #[error(
         "the aircraft has no lift at {airspeed:.1} m/s: give the airspeed at which it flies with --cruise-mps"
     )]
@@ -99,18 +99,20 @@ struct Subject<'a> {
     span: f64,
     chord: f64,
     mass: MassProperties,
-    /// Coefficients' slopes over the rate of incidence, α̇c/2V, which are removed from every evaluation.
+    /// Slopes of the coefficients over the rate of incidence, α̇c/2V. Their contribution is removed from every
+    /// evaluation.
     alpha_rate: Coefficients,
 }
 
-/// Coefficients of D, Y, L and l, m, n.
+/// Coefficients of drag, side force and lift (wind axes), and of rolling, pitching and yawing moment (body axes).
 type Coefficients = [f64; 6];
 
-/// Imports the aircraft of `plant` about `cruise` (m/s) at `altitude` (m), under `name`.
+/// Imports the aircraft of `plant` as the aircraft `name`, from its loads about the airspeed `cruise` (m/s) and the
+/// altitude `altitude` (m).
 ///
 /// # Errors
 ///
-/// [`ImportError`], if it cannot be held in a state, or has a surface that an airframe file cannot represent.
+/// If the aircraft cannot be evaluated in JSBSim, has no lift, or has a surface that an airframe file cannot represent.
 pub fn import(
     plant: &mut Plant,
     name: &str,
@@ -175,7 +177,7 @@ struct Polar {
 }
 
 impl Polar {
-    /// The smallest incidence (rad) at which the lift coefficient reaches `lift`, interpolated.
+    /// The smallest incidence (rad) at which the interpolated lift coefficient reaches `lift`; 0 if it does not.
     fn incidence(&self, lift: f64) -> f64 {
         let reaches = self.lift.windows(2).position(|w| w[0] < lift && lift <= w[1]);
         reaches.map_or(0.0, |k| {
@@ -240,8 +242,8 @@ impl Subject<'_> {
         Ok(rate * self.chord / (2.0 * airspeed))
     }
 
-    /// Slopes of the coefficients over α̇c/2V: at one airflow, gravity curves the path faster in some attitudes than
-    /// in others.
+    /// Slopes of the coefficients over α̇c/2V, from two attitudes with the same airflow. Gravity curves the flight path
+    /// at a different rate in each attitude.
     fn alpha_rate(&mut self) -> Result<Coefficients, PlantError> {
         let mut sides = [([0.0; 6], 0.0); 2];
         for (side, pitch_rad) in sides.iter_mut().zip([0.0, ATTITUDE]) {

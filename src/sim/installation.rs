@@ -7,15 +7,15 @@ use rand::RngExt;
 use greylag_logs::{Flight, Sample};
 use greylag_num::stream::stream;
 
-/// Random stream of installations.
+/// Random stream from which the errors are drawn.
 const DRAW: u64 = 73;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Installation and calibration errors. [`Installation::TRUE`] has none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Installation {
-    /// Rotation vector from body axes to the board, rad, body axes: rates, specific force and attitude are measured
-    /// in the board's axes.
+    /// Rotation vector from body axes to the axes of the sensor board, rad, in body axes. Rates, specific force and
+    /// attitude are measured in board axes.
     pub tilt: [f64; 3],
     /// Relative gain errors of the gyros p, q, r.
     pub gyro_gain: [f64; 3],
@@ -52,9 +52,9 @@ impl Installation {
         velocity_late: 0.0,
     };
 
-    /// One error drawn from `seed`, with its name: a board rotated by 1° to 3° about one axis, a gain error of 3 % to
-    /// 10 %, an airspeed bias of 0.5 to 1.5 m/s or lag of 0.05 to 0.2 s, a heading error of 3° to 8°, a velocity
-    /// delay of 0.05 to 0.2 s.
+    /// Draws one error from `seed` and returns it with its name. The error is a board rotation of 1° to 3° about one
+    /// axis, a gain error of 3 % to 10 %, an airspeed bias of 0.5 to 1.5 m/s, an airspeed lag or a velocity delay of
+    /// 0.05 to 0.2 s, or a heading error of 3° to 8°.
     pub fn one(seed: u64) -> (&'static str, Installation) {
         let mut random = stream(seed, &[DRAW]);
         let kind = random.random_range(0..7_usize);
@@ -119,7 +119,7 @@ impl Installation {
         }
     }
 
-    /// Applies the delays: a first-order lag of the airspeed, a delay of the velocity.
+    /// Applies the first-order lag of the airspeed and the delay of the velocity.
     fn delay(&self, samples: &mut [Sample]) {
         let velocity: Vec<([f64; 3], f64)> =
             samples.iter().map(|s| (s.velocity_ned_mps, s.time_s)).collect();
@@ -173,12 +173,12 @@ fn from_euler([roll, pitch, yaw]: [f64; 3]) -> Matrix {
     product(&product(&about(2, yaw), &about(1, pitch)), &about(0, roll))
 }
 
-/// Roll, pitch, yaw (rad) of a rotation from body to earth axes, away from vertical flight.
+/// Roll, pitch, yaw (rad) of a rotation from body to earth axes. Roll and yaw are undefined in vertical flight.
 fn to_euler(m: &Matrix) -> [f64; 3] {
     [m[2][1].atan2(m[2][2]), (-m[2][0]).clamp(-1.0, 1.0).asin(), m[1][0].atan2(m[0][0])]
 }
 
-/// The velocity at `time`, interpolated; the first one before the first sample.
+/// The velocity at `time` (s), linearly interpolated. Outside the samples it is the velocity of the nearest sample.
 fn late(past: &[([f64; 3], f64)], time: f64) -> [f64; 3] {
     let after = past.iter().rposition(|(_, t)| *t <= time).map_or(0, |k| k + 1);
     let (Some(before), Some(next)) =

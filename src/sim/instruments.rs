@@ -1,4 +1,4 @@
-//! Sensor model: from a true flight to its log.
+//! Sensor model: makes the log of a simulated flight, with sensor errors.
 
 use std::f64::consts::TAU;
 
@@ -80,9 +80,9 @@ impl Instruments {
         ..Instruments::PERFECT
     };
 
-    /// A small autopilot's instruments drawn from `seed`: [`Self::NOISY`], biases of 0.005 rad/s, 0.1 m/s², 0.5° of
-    /// α, 0.4° of β and 2 % of airspeed (standard deviations, truncated at two), every group but the gyros delayed by
-    /// up to one sample.
+    /// A small autopilot's instruments drawn from `seed`, with the noise of [`Self::NOISY`]. The standard deviations of
+    /// the biases are 0.005 rad/s, 0.1 m/s², 0.5° of α, 0.4° of β and 2 % of airspeed. Biases are limited to two
+    /// standard deviations. Every group except the gyros is delayed by up to one sample (10 ms).
     pub fn drawn(seed: u64) -> Instruments {
         let mut random = stream(seed, &[DRAW]);
         let mut bias = |sd: f64| {
@@ -105,12 +105,12 @@ impl Instruments {
         }
     }
 
-    /// The log of `flown` by these instruments, with the noise of `seed`.
+    /// The log of `flown` with these instruments, named `name`. The noise is drawn from `seed`.
     pub fn log(&self, flown: &Flown, name: &str, seed: u64) -> Flight {
         let mut random = stream(seed, &[NOISE]);
         let mut samples: Vec<Sample> =
             (0..flown.truth.len()).map(|k| self.row(flown, k, &mut random)).collect();
-        // an aircraft without a rudder has no column of it
+        // the log has a rudder column only if the rudder is deflected
         if flown.truth.iter().any(|t| t.rudder_rad != 0.0) {
             samples.iter_mut().enumerate().for_each(|(k, sample)| self.rudder(flown, k, sample));
         }
@@ -130,7 +130,7 @@ impl Instruments {
         let late = |group: Group, get: &dyn Fn(&Truth) -> f64| {
             get(now) + self.late[group as usize] / DT_S * (get(before) - get(now))
         };
-        // an angle within half a turn of the present one, so that nothing is interpolated across ±π
+        // unwrapped to within half a turn of the present angle, to avoid interpolation across ±π
         let turn = |get: &dyn Fn(&Truth) -> f64| {
             late(Group::Attitude, &|t| get(t) - TAU * ((get(t) - get(now)) / TAU).round())
         };

@@ -11,7 +11,7 @@ use greylag_physics::formula::Written;
 /// Random stream of missing effects.
 const DRAW: u64 = 80;
 
-/// Sizes that scale the effects: those for which [`KINDS`] is written, and those of the aircraft.
+/// Scale factors from the aircraft for which [`KINDS`] is written to another aircraft.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Craft {
     /// Factors on amplitudes by unit: N, m, N m, N m s, kg m².
@@ -20,7 +20,7 @@ pub struct Craft {
     moment: f64,
     momentum: f64,
     inertia: f64,
-    /// Factors on the decay of thrust and of surface effectiveness with airspeed.
+    /// Factor on the decay of thrust with airspeed. Its square applies to surface effectiveness.
     airspeed: f64,
     /// Factor on the stiffness in pitch.
     stiffness: f64,
@@ -60,7 +60,7 @@ impl Craft {
         }
     }
 
-    /// Sizes of `model`, from which any effect may be missing: for simulated aircraft.
+    /// Sizes of a simulated aircraft `model`, from which any effect may be missing.
     pub fn lacking(model: &GreyBox) -> Craft {
         let own = ["lift_table", "drag_beta2", "drag_elevator_abs"].map(str::to_owned);
         let craft = Craft::of(model);
@@ -72,8 +72,8 @@ impl Craft {
         self.has.iter().any(|has| has == id)
     }
 
-    /// All effects that can be missing, at this aircraft's sizes. An effect that replaces one of the aircraft's own
-    /// requires that the model has that one.
+    /// All effects that can be missing, with this aircraft's amplitudes. An effect that replaces one of the aircraft's
+    /// effects is included only if the reference has the replaced effect.
     pub fn kinds(&self) -> Vec<MissingKind> {
         let own = |kind: &&MissingKind| match kind.id {
             "lift_stall" => self.has("lift_table"),
@@ -85,7 +85,7 @@ impl Craft {
         KINDS.iter().filter(own).chain(taken).map(|kind| self.sized(kind)).collect()
     }
 
-    /// The effect with that id at this aircraft's size.
+    /// The effect `id` with this aircraft's amplitudes; `None` if it cannot be missing.
     pub fn kind(&self, id: &str) -> Option<MissingKind> {
         self.kinds().into_iter().find(|kind| kind.id == id)
     }
@@ -131,11 +131,11 @@ const WRITTEN: Sizes = Sizes {
 /// An effect that can be missing.
 #[derive(Clone, Copy, Debug)]
 pub struct MissingKind {
-    /// Id in the catalogue.
+    /// Id of the effect in the catalogue.
     pub id: &'static str,
-    /// Unit of its amplitude; empty if dimensionless.
+    /// Unit of the amplitude; empty if dimensionless.
     pub unit: &'static str,
-    /// Amplitudes that are identifiable in a few minutes of flight, with the aircraft still flyable.
+    /// Range of amplitudes that are identifiable in a few minutes of flight while the aircraft remains flyable.
     pub clear: [f64; 2],
     /// Whether the amplitude may be negative.
     pub either_sign: bool,
@@ -149,7 +149,7 @@ const fn both(id: &'static str, unit: &'static str, clear: [f64; 2]) -> MissingK
     MissingKind { id, unit, clear, either_sign: true }
 }
 
-/// Effects of the aircraft itself that are removed from its model where it has them; the simulator is unchanged.
+/// Effects that are removed from the aircraft's model if the model has them. The simulator is unchanged.
 const OF_THE_MODEL: [MissingKind; 2] =
     [kind("rudder_linear", "", [1.0, 1.0]), kind("propeller", "", [1.0, 1.0])];
 
@@ -185,7 +185,7 @@ pub const KINDS: [MissingKind; 26] = [
 ];
 
 impl MissingKind {
-    /// The effect with that id, with amplitudes for an aircraft of the size of the X8.
+    /// The effect `id`, with amplitudes for an aircraft of the size of the X8.
     pub fn from_id(id: &str) -> Option<MissingKind> {
         KINDS.iter().chain(&OF_THE_MODEL).copied().find(|kind| kind.id == id)
     }
@@ -204,7 +204,7 @@ impl MissingKind {
         let largest = self.clear[0].abs().max(self.clear[1].abs());
         match self.id {
             "rate_limit" => self.clear[0],
-            // beyond it the inertia matrix is not positive definite
+            // beyond this value the inertia matrix is not positive definite
             "inertia_xz" => largest,
             // −29 N would cancel the whole thrust
             "thrust_scale" | "mass_error" => 2.0 * largest,
@@ -212,7 +212,7 @@ impl MissingKind {
         }
     }
 
-    /// The nearest representable amplitude: a delay is a whole number of steps.
+    /// The nearest representable amplitude: a delay is a whole number of 10 ms steps.
     pub fn allowed(&self, amplitude: f64) -> f64 {
         if self.id == "time_delay" {
             (100.0 * amplitude).round().max(1.0) / 100.0
@@ -230,13 +230,13 @@ pub(super) fn rounded(x: f64) -> f64 {
 /// An effect that is missing from a model, with its amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
-    /// Id in the catalogue.
+    /// Id of the effect in the catalogue.
     pub id: &'static str,
     /// Amplitude in the unit of [`MissingKind::unit`].
     pub amplitude: f64,
-    /// Addition to the JSBSim aircraft; empty where its file has the effect.
+    /// Addition to the JSBSim aircraft; `None` where its file has the effect.
     pub hidden: Option<Hidden>,
-    /// Id of the effect that is removed from the model.
+    /// Id of the effect that is removed from the model; `None` if no effect is removed.
     pub taken_out: Option<&'static str>,
     /// True values of the catalogue entry's coefficients; empty where the entry only approximates the effect.
     pub values: Vec<f64>,
@@ -253,12 +253,12 @@ pub enum MissingError {
         /// Ids that exist.
         known: String,
     },
-    /// The effect of a file uses a variable that the simulator lacks.
+    /// JSBSim cannot express the formula of an effect file.
     #[error("effect {id} cannot be hidden in JSBSim: {why}")]
     Formula {
         /// Name of the effect.
         id: &'static str,
-        /// The variable that is lacking.
+        /// The part of the formula that JSBSim cannot express.
         why: String,
     },
     /// The simulator refuses the effect.
@@ -267,11 +267,11 @@ pub enum MissingError {
 }
 
 impl Missing {
-    /// The effect `id` with `amplitude` as the aircraft `craft`'s total.
+    /// The effect `id`; `amplitude` includes the same effect of the aircraft `craft` itself.
     ///
     /// # Errors
     ///
-    /// If there is no such effect, or its amplitude cannot be represented.
+    /// If there is no such effect, or the simulator refuses its amplitude.
     pub fn new(craft: &Craft, id: &str, amplitude: f64) -> Result<Missing, MissingError> {
         let kind = craft.kind(id).ok_or_else(|| MissingError::Unknown {
             id: id.into(),
@@ -308,7 +308,7 @@ impl Missing {
     ///
     /// # Errors
     ///
-    /// If JSBSim lacks one of its variables.
+    /// If JSBSim cannot express the formula.
     pub fn written(effect: &'static Written, values: &[f64]) -> Result<Missing, MissingError> {
         let hidden = hidden_formula::hidden(effect, values)
             .map_err(|why| MissingError::Formula { id: effect.about.id, why })?;
@@ -321,7 +321,7 @@ impl Missing {
         })
     }
 
-    /// An effect of `craft` drawn from `seed`: any one, or `id`, with `amplitude` or a clearly identifiable one.
+    /// Draws an effect of `craft` from `seed`, unless `id` names one. `amplitude` replaces the drawn amplitude.
     ///
     /// # Errors
     ///
@@ -374,7 +374,7 @@ mod tests {
         assert!(Missing::new(&x8, "flutter", 1.0).unwrap_err().to_string().contains("dead_zone"));
     }
 
-    /// The amplitudes are written for the X8: there they are as written, to the bit.
+    /// For the X8 the amplitudes equal those of `KINDS`, to the bit.
     #[test]
     fn amplitudes_go_by_the_size_of_the_aircraft() {
         let x8 = craft("params/x8/jsbsim.toml").kinds();
@@ -385,7 +385,7 @@ mod tests {
         assert!((thrust / -10.0 - 11.0 / 3.364).abs() < 1e-9, "{thrust}");
         let robbed = Missing::new(&aerosonde, "rudder_linear", 1.0).unwrap();
         assert!(robbed.hidden.is_none() && robbed.taken_out == Some("rudder_linear"));
-        // its model has no side drag that could be taken out
+        // its model has no side drag that could be removed
         assert!(Missing::new(&aerosonde, "drag_beta2", 0.5).is_err());
     }
 

@@ -13,7 +13,7 @@ const WAVES: [f64; 4] = [0.11, 0.13, 0.05, 0.07];
 pub struct Flight {
     /// Length in steps of 0.01 s.
     pub steps: usize,
-    /// Steps with sines; the rest are without.
+    /// Number of steps with sines, from the start of the flight.
     pub moved: usize,
     /// Amplitude of the sine on each control, in units of its command.
     pub amplitude: Command,
@@ -22,8 +22,8 @@ pub struct Flight {
 /// One-step prediction errors of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Root mean square over the flight, as a fraction of the state's scale x_c per second, in the order of
-    /// `State::to_array`.
+    /// RMS error of the predicted state change over the flight, in multiples of the state's scale x_c per second, in
+    /// the order of `State::to_array`.
     pub rms: [f64; 8],
     /// Observation after the last step.
     pub last: Observation,
@@ -48,12 +48,12 @@ pub enum FlightError {
     Trouble(#[from] Trouble),
 }
 
-/// Flies `flight` in `environment` towards the `target` of each step; `model` predicts each step from the state and
-/// the deflections before it.
+/// Flies `flight` in `environment` towards the `target` of each step. `model` predicts each step from the state and the
+/// actuator positions before the step.
 ///
 /// # Errors
 ///
-/// [`FlightError`], if no LQI can be designed, or the aircraft cannot be flown.
+/// If no LQI can be designed from the model, or the environment cannot continue.
 pub fn errors(
     model: &GreyBox,
     environment: &mut impl Environment,
@@ -80,7 +80,7 @@ pub fn errors(
     Ok(Errors { rms: squares.map(|sum| (sum / flight.steps as f64).sqrt()), last: seen })
 }
 
-/// `own` plus the sines of that step.
+/// `own` plus the sines at `step`.
 fn moved(own: Command, amplitude: Command, step: usize) -> Command {
     let [aileron, elevator, throttle, rudder] =
         WAVES.map(|frequency| (frequency * step as f64).sin());

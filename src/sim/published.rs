@@ -1,21 +1,21 @@
-//! Published results of the paper's controllers, for comparison.
+//! Published results of the controllers of \[GSFM26\], for comparison with evaluations.
 
-/// A published value with its 95 % interval, degrees or percent.
+/// A published value with its 95 % confidence interval, in degrees or in percent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
     /// The published value.
     pub value: f64,
-    /// Bounds of its interval.
+    /// Lower and upper bound of the interval.
     pub ci95: [f64; 2],
 }
 
-/// Results of one controller on one group of targets: Tables XI (true frozen prior, ten policies), VIII (six models,
-/// sixty) and V of \[GSFM26\].
+/// Results of one controller on one group of targets, from three tables of \[GSFM26\]: XI (true frozen prior, ten
+/// policies), VIII (six models, sixty policies) and V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Published {
-    /// Name of the controller here.
+    /// Name of the controller in this program.
     pub controller: &'static str,
-    /// Name of the group of targets here; `all` are the paper's 240.
+    /// Name of the group of targets in this program; `all` means the paper's 240 targets.
     pub targets: &'static str,
     /// Median settled error, degrees.
     pub median_deg: Value,
@@ -23,7 +23,7 @@ pub struct Published {
     pub iqm_deg: Value,
     /// Mean settled error, degrees.
     pub mean_deg: Value,
-    /// Fraction of the targets that diverged (settled error over 10°), percent; over all six models.
+    /// Fraction of the targets with a settled error above 10° (diverged), percent. The fraction covers all six models.
     pub diverged_percent: Value,
     /// Computing time per step, ms.
     pub ms_per_step: f64,
@@ -91,7 +91,7 @@ mod tests {
                 assert!(v.ci95[0] <= v.value && v.value <= v.ci95[1], "{p:?}");
             }
         }
-        // the paper's all are 140 easy and 100 hard targets
+        // of the paper's 240 targets, 140 are easy and 100 are hard
         let mean = |targets| published("hybrid", targets).unwrap().mean_deg.value;
         let all = (140.0 * mean("easy") + 100.0 * mean("hard_corners")) / 240.0;
         assert!((all - mean("all")).abs() < 0.01);

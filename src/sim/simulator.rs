@@ -7,7 +7,7 @@ use greylag_control::Observation;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{ActuatorState, Command, State, Time};
 
-/// JSBSim with one aircraft.
+/// One aircraft in JSBSim, as an environment.
 pub struct Simulator {
     plant: Plant,
     start: Start,
@@ -19,13 +19,13 @@ impl Simulator {
     ///
     /// # Errors
     ///
-    /// If the aircraft does not exist.
+    /// If the aircraft cannot be loaded.
     pub fn new(options: &PlantOptions) -> Result<Simulator, Trouble> {
         let plant = Plant::new(options)?;
         Ok(Simulator { plant, start: options.start, previous: [Command::IDLE; 2] })
     }
 
-    /// Initial state of its episodes.
+    /// Initial state of the episodes.
     pub fn start(&self) -> Start {
         self.start
     }

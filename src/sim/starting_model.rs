@@ -1,4 +1,4 @@
-//! Initial model of a search for missing effects: with coefficient errors, and without some effects.
+//! Writes the initial model of a search for missing effects, with coefficient errors and without some effects.
 
 use std::fmt::Write;
 
@@ -9,19 +9,22 @@ use greylag_num::stream::stream;
 use greylag_physics::catalogue::describe;
 use greylag_physics::size::Size;
 
-/// Standard deviation of the coefficient errors as a fraction of the value, truncated at two.
+/// Standard deviation of the coefficient errors, as a fraction of the value. Errors are limited to two standard
+/// deviations.
 pub const WRONG: f64 = 0.15;
 /// Random stream of the errors.
 const DRAW: u64 = 81;
-/// Incidence range, rad, of the line that replaces the lift table: −4° and 7°, between the stalls.
+/// Range of angle of attack, rad, of the line that replaces the lift table: −4° to 7°, between negative and positive
+/// stall.
 const LINE: [f64; 2] = [-0.069_813_2, 0.122_173];
 
-/// Text of a model file made from `reference` (a model file's text): named `name`, every coefficient with an error of
-/// [`WRONG`] drawn from `seed`, without the `missing` effects.
+/// Writes the text of a model file named `name` from the text of the model file `reference`. The effects that `missing`
+/// takes out of the model are removed. Every coefficient has an error with the standard deviation [`WRONG`], drawn from
+/// `seed`.
 ///
 /// # Errors
 ///
-/// If the reference is not a model file.
+/// If the reference is no model file, or lacks an effect that is to be removed.
 pub fn starting_model(
     reference: &str,
     name: &str,
@@ -72,7 +75,7 @@ fn line(effect: &toml::Value) -> Option<[f64; 2]> {
     Some([rounded(at(low)? - slope * low), rounded(slope)])
 }
 
-/// Thrust (N) of an effect `propeller` at full throttle at rest.
+/// Thrust (N) of an effect `propeller` at full throttle and zero airspeed.
 fn most_thrust(effect: &toml::Value) -> Option<f64> {
     let value = |name: &str| effect.get(name)?.get("value")?.as_float();
     Some(value("T0_n")? + value("Tt_n")? + value("Ttt_n")?)
@@ -83,7 +86,7 @@ fn most_in_table(effect: &toml::Value) -> Option<f64> {
     effect.get("T_n")?.get("value")?.as_array()?.last()?.as_array()?.first()?.as_float()
 }
 
-/// The effect `thrust_linear` without airspeed dependence: half of the static thrust.
+/// The effect `thrust_linear` with half of the static thrust `most` (N), without airspeed dependence.
 fn linear_thrust(most: f64) -> toml::Value {
     let number =
         [("value", rounded(0.5 * most).into()), ("source", "half the thrust at rest".into())];
@@ -97,8 +100,8 @@ fn set(effect: &mut toml::Table, name: &str, value: f64) -> Option<()> {
     Some(())
 }
 
-/// Multiplies every coefficient by 1 + 0.15 times a normal draw; draws are keyed by the coefficients' names, so that
-/// removing one does not change the others.
+/// Multiplies every coefficient by 1 + 0.15 x, where x is normally distributed and limited to ±2. The draws are keyed
+/// by the coefficients' names. Therefore the removal of a coefficient does not change the other draws.
 fn make_wrong(effects: &mut toml::Table, seed: u64) {
     for (id, effect) in effects.iter_mut() {
         let Some(effect) = effect.as_table_mut() else { continue };
@@ -110,8 +113,8 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
             let mut random = stream(seed, &[[DRAW].as_slice(), &path].concat());
             let unit: f64 = StandardNormal.sample(&mut random);
             let wrong = possible(id, name, value * (1.0 + WRONG * unit.clamp(-2.0, 2.0)));
-            // a prior standard deviation below the error would hold the fit at the wrong value; an unstated one is 15
-            // %
+            // A prior standard deviation below the error would keep the fit at the wrong value. Without `sd` the prior
+            // standard deviation is 15 %.
             if number
                 .get("sd")
                 .and_then(toml::Value::as_float)
@@ -125,7 +128,7 @@ fn make_wrong(effects: &mut toml::Table, seed: u64) {
     }
 }
 
-/// The nearest plausible value of the coefficient for an aircraft of any size.
+/// `value` clamped to the bounds of the coefficient, unless the bounds scale with the aircraft's size.
 fn possible(effect: &str, name: &str, value: f64) -> f64 {
     let about = describe(effect);
     let own = about.and_then(|about| about.coefficients.iter().find(|c| c.name == name));
@@ -135,14 +138,14 @@ fn possible(effect: &str, name: &str, value: f64) -> f64 {
     }
 }
 
-/// A model file with the order and the one-line numbers of the shipped ones.
+/// Text of a model file with the order of the shipped files and one line for each number.
 fn text(file: &toml::Table) -> String {
     let mut out = String::new();
     let is_section = |value: &toml::Value| {
         value.as_table().is_some_and(|t| t.values().any(|v| v.is_table() || v.is_array()))
     };
     let mut sections = vec![(String::new(), file)];
-    // the stack is emptied from its end
+    // sections are taken from the end of the stack
     while let Some((path, table)) = sections.pop() {
         let (below, here): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
         if !path.is_empty() && !here.is_empty() {

@@ -1,4 +1,4 @@
-//! Steps between random attitudes in flight, in addition to targets from level flight.
+//! Evaluation courses: steps between random attitudes in flight.
 
 use rand::RngExt;
 
@@ -10,13 +10,14 @@ use greylag_physics::Airframe;
 
 /// Id of the random stream.
 const STREAM: u64 = 242;
-/// Steps for which the first attitude is held: five seconds, in which every controller here settles or is lost.
+/// Steps of 10 ms for which the first attitude is held: 5 s, within which every controller of this program settles or
+/// loses the aircraft.
 const HELD: usize = 500;
-/// Steps for which the second one is held and scored: eight seconds, as in the demonstration.
+/// Steps of 10 ms for which the second attitude is held and scored: 8 s, as in the demonstration.
 const SCORED: usize = 800;
 
-/// `count` steps of `seed`: from one attitude to another, both uniform over the envelope's bank and pitch, at the
-/// cruise airspeed.
+/// `count` steps from one attitude to another, drawn from `seed`. Both attitudes are uniformly distributed over the
+/// envelope's bank and pitch. The commanded airspeed is the cruise airspeed.
 pub fn steps(seed: u64, count: u32, airframe: &Airframe) -> Vec<Course> {
     let envelope = &airframe.envelope;
     let step = |number: u32| {
@@ -49,7 +50,7 @@ mod tests {
         let rolls: Vec<f64> =
             firsts.chain(all.iter().map(|c| c.leg.target)).map(|t| t.roll.to_degrees()).collect();
         let beyond = |deg: f64| rolls.iter().filter(|r| r.abs() > deg).count();
-        // half of an even draw from ±60° lies beyond 30°: 400 of 800, 14 the standard deviation
+        // half of a uniform draw from ±60° lies beyond 30°: 400 of 800, with a standard deviation of 14
         assert!(beyond(60.0) == 0 && (340..460).contains(&beyond(30.0)), "{}", beyond(30.0));
         assert!(all.iter().all(|c| c.leg.target.airspeed == airframe.envelope.airspeed_cruise_mps));
     }

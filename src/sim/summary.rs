@@ -16,16 +16,16 @@ const SEED: u64 = 96;
 pub struct Spread {
     /// Median over the flights.
     pub median: f64,
-    /// Its 95 % bootstrap interval over the flights.
+    /// 95 % bootstrap interval of the median over the flights.
     pub median_ci95: [f64; 2],
-    /// The worst value.
+    /// The worst value over the flights: smallest or largest, as the measure defines.
     pub worst: f64,
 }
 
 /// Summaries by the id of the measure.
 pub type Spreads = BTreeMap<&'static str, Spread>;
 
-/// Summary of every measure over these flights; measures unknown in all flights are left out.
+/// Summary of every measure over `flights`, from its finite values. Measures without a finite value are omitted.
 pub fn spreads(flights: &[&Quality]) -> Spreads {
     let of = |measure: &greylag_control::quality::Measure| {
         let values = flights.iter().map(|q| (measure.get)(q));

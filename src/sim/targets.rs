@@ -1,4 +1,4 @@
-//! Target attitudes for scoring controllers: a fixed, seeded file.
+//! Target attitudes: the seeded target file for scoring controllers, and the target sequence for training.
 
 use std::path::Path;
 
@@ -10,7 +10,8 @@ use greylag_control::Target;
 use greylag_num::stream;
 use greylag_physics::{Airframe, State};
 
-/// Difficulty of a target, Table II of \[GSFM26\] in both its readings.
+/// Difficulty of a target. The hard targets of Table II of \[GSFM26\] can be read in two ways, as corners or as outside
+/// of the easy box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
@@ -18,7 +19,7 @@ pub enum Group {
     Easy,
     /// |roll| in 45..60° with |pitch| in 25..30°: all four corners.
     HardCorners,
-    /// Within 60° and 30°, anywhere outside the easy box.
+    /// |roll| up to 60° and |pitch| up to 30°, anywhere outside the easy box.
     HardOutside,
 }
 
@@ -26,7 +27,7 @@ pub enum Group {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// Its index in the file, from 0: it selects the random numbers.
+    /// Index of the target in the file, from 0. The index selects the random stream.
     #[serde(skip)]
     pub number: u32,
     /// Group of the target.
@@ -37,7 +38,7 @@ pub struct Row {
     pub pitch_deg: f64,
 }
 
-/// Number of bins of roll and of pitch; each cell is visited once before any is visited again (section IV-A of
+/// Number of bins of roll and of pitch. Every cell is used once before any cell is used again (section IV-A of
 /// \[GSFM26\]).
 const BINS: usize = 5;
 /// Id of the random stream of [`Stratified`].
@@ -45,7 +46,7 @@ const STRATIFIED: u64 = 241;
 
 /// An infinite sequence of targets, stratified over 5 × 5 bins of the envelope of Table II.
 ///
-/// Its state is a seed and a count, so that it can be resumed from a checkpoint.
+/// Seed and number of targets define the state of the sequence. A checkpoint can therefore resume it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stratified {
     seed: u64,
@@ -56,32 +57,34 @@ pub struct Stratified {
     bins: Vec<usize>,
 }
 
-/// Fraction of targets at the reference airspeed, where others are allowed.
+/// Fraction of targets at the reference airspeed if other airspeeds are allowed.
 const SLOW: f64 = 0.5;
-/// Smallest commanded airspeed over the envelope's smallest, and largest over its cruise.
+/// Ratio of the smallest commanded airspeed to the envelope's smallest, and of the largest commanded airspeed to
+/// cruise.
 const WANTED: [f64; 2] = [1.15, 1.25];
 
 impl Stratified {
-    /// Targets of `seed` after the first `count`; a fraction `corners` (0..1) of them is in the hard corners, which
-    /// are 4 % of the envelope (0 as in the paper).
+    /// Targets of `seed` after the first `count`. A fraction `corners` (0..1) of them is drawn in the hard corners,
+    /// which cover 4 % of the envelope. The paper uses 0.
     pub fn new(seed: u64, count: u64, corners: f64) -> Stratified {
         let start = State::NEUTRAL.airspeed;
         Stratified { seed, count, corners, start, airspeeds: [start; 2], bins: Vec::new() }
     }
 
-    /// The same targets at the reference airspeed of `airframe`, half of them at other airspeeds of its envelope.
+    /// The same attitudes, half of them at the reference airspeed of `airframe` and half at other airspeeds of its
+    /// envelope.
     pub fn at_airspeeds_of(self, airframe: &Airframe) -> Stratified {
         let ([low, high], envelope) = (WANTED, &airframe.envelope);
         let airspeeds = [low * envelope.airspeed_min_mps, high * envelope.airspeed_cruise_mps];
         Stratified { start: airframe.reference.airspeed, airspeeds, ..self }
     }
 
-    /// Continues after `count` targets.
+    /// Continues the sequence after its first `count` targets.
     pub fn go_on_after(&mut self, count: u64) {
         (self.count, self.bins) = (count, Vec::new());
     }
 
-    /// Number of targets given.
+    /// Position in the sequence: number of targets drawn or skipped so far.
     pub fn count(&self) -> u64 {
         self.count
     }
@@ -119,7 +122,7 @@ impl Stratified {
     }
 }
 
-/// The target file: 140 easy, 100 hard in the corners, 100 hard outside the easy box.
+/// The target file: 140 easy targets, 100 in the hard corners, and 100 anywhere outside the easy box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFile {
     /// The targets in file order.
@@ -149,7 +152,7 @@ impl Group {
         }
     }
 
-    /// Bounds of its targets as text.
+    /// Bounds of the group's targets as text.
     const fn rule(self) -> &'static str {
         match self {
             Group::Easy => "easy is |roll| < 45 with |pitch| < 25",
@@ -158,7 +161,7 @@ impl Group {
         }
     }
 
-    /// Whether a target in degrees belongs to it.
+    /// Whether a target attitude (degrees) belongs to the group.
     pub fn contains(self, roll_deg: f64, pitch_deg: f64) -> bool {
         let (roll, pitch) = (roll_deg.abs(), pitch_deg.abs());
         let easy = roll < 45.0 && pitch < 25.0;
@@ -172,7 +175,7 @@ impl Group {
 }
 
 impl TargetFile {
-    /// The target set of `seed`: rounded to 0.01°, stratified in a 14 × 10 grid for the easy ones.
+    /// The target set of `seed`, rounded to 0.01°. The easy targets are stratified in a 14 × 10 grid of roll and pitch.
     pub fn generate(seed: u64) -> TargetFile {
         let mut rng = stream::stream(seed, &[240]);
         let mut rows = Vec::new();
@@ -210,8 +213,8 @@ impl TargetFile {
     ///
     /// # Errors
     ///
-    /// If it cannot be read, is not such a table, is empty, or has a row whose roll and pitch are outside its group's
-    /// bounds (see [`Group`]).
+    /// If the file cannot be read, has other columns, is empty, or has a row whose roll and pitch are outside its
+    /// group's bounds (see [`Group`]).
     pub fn load(path: &Path) -> Result<TargetFile, TargetError> {
         let fail = |why: String| TargetError { path: path.display().to_string(), why };
         let mut reader = csv::ReaderBuilder::new()
@@ -292,7 +295,7 @@ mod tests {
             others += usize::from(target.airspeed != same.airspeed);
             assert!((1.15 * 13.0..=25.0).contains(&target.airspeed));
         }
-        // 200 expected, 10 the standard deviation
+        // expected 200, with a standard deviation of 10
         assert!((160..240).contains(&others), "{others}");
     }
 

@@ -11,9 +11,9 @@ pub const ASKED: [usize; 3] = [10, 50, 150];
 /// A flight towards one target.
 #[derive(Clone, Debug)]
 pub struct Tracking {
-    /// Roll and pitch, rad, at every step; NaN once the aircraft is lost.
+    /// Roll and pitch, rad, at every step; NaN after the loss of the aircraft.
     pub attitude: Vec<[f64; 2]>,
-    /// The planner's candidates at [`ASKED`]: step and insight.
+    /// The planner's candidates at the steps [`ASKED`], each with its step.
     pub insights: Vec<(usize, Insight)>,
 }
 
@@ -48,7 +48,7 @@ pub fn track(
     Ok(flight)
 }
 
-/// Duration of a step, s.
+/// Time of a step after the start, s.
 pub fn seconds(step: usize) -> f64 {
     step as f64 * STEP
 }

@@ -20,7 +20,7 @@ use greylag_physics::airframe::Reference;
 
 /// Stream of the wind.
 const WIND: u64 = 82;
-/// Strongest steady wind at the cruise airspeed for which the flights are written, m/s: a third of the airspeed.
+/// Strongest steady wind at the cruise airspeed for which the flights are written, m/s. It is a third of that airspeed.
 const WIND_MAX_MPS: f64 = 6.0;
 /// Wind 20 ft above ground of light turbulence, m/s (MIL-F-8785C).
 const LIGHT_20FT_MPS: f64 = 7.6;
@@ -28,11 +28,11 @@ const LIGHT_20FT_MPS: f64 = 7.6;
 /// The aircraft of a trial.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The simulator's aircraft at its start, with its held properties; its air and hidden effects are the trial's.
+    /// The simulator's aircraft with its initial state and held properties. The trial sets air and hidden effects.
     pub plant: PlantOptions,
-    /// Airspeed at which it cruises, m/s.
+    /// Cruise airspeed, m/s.
     pub cruise: f64,
-    /// Whether its rudder is excited.
+    /// Whether the rudder is excited.
     pub rudder: bool,
 }
 
@@ -76,7 +76,7 @@ pub struct Trial {
     pub seed: u64,
     /// The effects that the aircraft has and its model lacks; empty for a null case.
     pub missing: Vec<Missing>,
-    /// Severity of the turbulence, 1 to 7; `None` for still air.
+    /// Severity of the turbulence, 1 to 7; `None` for no turbulence.
     pub turbulence: Option<u8>,
     /// Installation errors of the instruments, the same in all flights.
     pub installed: Installation,
@@ -92,8 +92,8 @@ pub struct Logs {
 }
 
 impl Trial {
-    /// Flies the training and the test flights of the seed under `controller`, with reduced excitation where the
-    /// aircraft would leave its bounds, and logs them with instruments drawn for each flight.
+    /// Flies the training and the test flights of the seed under `controller`. The excitation is reduced where the
+    /// aircraft would leave its bounds. Instruments are drawn for the log of each flight.
     ///
     /// # Errors
     ///
@@ -107,7 +107,7 @@ impl Trial {
         Ok(Logs { training, testing })
     }
 
-    /// The flights for estimation alone.
+    /// Flies and logs the training flights only.
     ///
     /// # Errors
     ///

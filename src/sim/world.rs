@@ -4,7 +4,7 @@ use crate::Trouble;
 use crate::imagined::{Block, Imagination, Stepped};
 use greylag_control::policy::{ACTIONS, OBSERVATIONS};
 
-/// One or several aircraft, each in its own episode. An episode that ends is followed by a new one.
+/// One or several aircraft, each in its own episode. A new episode follows one that ends.
 pub trait World {
     /// Number of aircraft.
     fn instances(&self) -> usize;
@@ -14,10 +14,10 @@ pub trait World {
     ///
     /// # Errors
     ///
-    /// If the environment cannot continue; losing an aircraft is not an error.
+    /// If the environment cannot continue. The loss of an aircraft is not an error.
     fn step(&mut self, block: usize, action: &[Block; ACTIONS]) -> Result<Stepped, Trouble>;
-    /// Starts new episodes. Their targets continue the random sequence after its first `targets`, as when training is
-    /// resumed.
+    /// Starts new episodes. Their targets skip the first `targets` of the random sequence, as resumed training
+    /// requires.
     ///
     /// # Errors
     ///

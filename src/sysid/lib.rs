@@ -1,5 +1,5 @@
-//! System identification from flight logs: reconstruct the flight path, compare models with it, rank the effects that
-//! a model lacks, amend it.
+//! System identification from flight logs: flight-path reconstruction, comparison of models with flights, ranking of
+//! missing effects, and amendment of a model.
 
 #[cfg(feature = "study")]
 pub mod amend;

@@ -1,15 +1,15 @@
-//! Progress of a long task, and its cancellation.
+//! Progress reports of a long task, and cancellation by their listener.
 
 use std::ops::ControlFlow;
 
 /// A stage of a long task.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
-    /// Current activity, in words.
+    /// Current activity, in words for the user.
     pub doing: &'a str,
-    /// Share of the whole task that is done, 0 to 1; never decreases.
+    /// Share of the whole task that is done, 0 to 1. It never decreases.
     pub fraction: f64,
-    /// Candidates of a diagnosis in the present ranking, the best first; empty before the ranking and in other tasks.
+    /// Candidates of a diagnosis in the current ranking, the best first. Empty before the ranking and in other tasks.
     pub ranking: &'a [FirstLook],
 }
 
@@ -25,9 +25,9 @@ impl<'a> Stage<'a> {
 pub struct FirstLook {
     /// Identifier of the effect.
     pub id: &'static str,
-    /// Evidence for it: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
+    /// Evidence for the effect: the smaller of the penalised gain in likelihood and the Wald statistic, dimensionless.
     pub evidence: f64,
-    /// Evidence that the best candidate reaches by chance if no effect is missing.
+    /// Evidence that the best candidate reaches by chance if no effect is missing, dimensionless.
     pub threshold: f64,
 }
 
@@ -60,7 +60,7 @@ pub fn not_cancelled(answer: ControlFlow<()>) -> Result<(), Cancelled> {
     }
 }
 
-/// Listener for a part of a task: maps its fractions 0 to 1 to the range `from` to `to` of the whole task.
+/// Listener for a part of a task: maps the fractions 0 to 1 of the part to the range `from` to `to` of the whole task.
 pub fn part<'a>(
     progress: &'a Progress<'a>,
     [from, to]: [f64; 2],

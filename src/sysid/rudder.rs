@@ -1,4 +1,4 @@
-//! A rudder that moves in the flights but is not part of the model.
+//! Detection of a rudder that moves in the flights but is not part of the model.
 
 use crate::compare::ChannelId;
 use crate::flight_path::reconstruction::Reconstruction;
@@ -6,15 +6,14 @@ use greylag_logs::rudder::RudderMotion;
 use greylag_model::{GreyBox, RUDDER};
 use greylag_physics::airframe::Yaw;
 
-/// Channels of a rudder's forces and moments: it yaws the aircraft, and its deflection with the resulting sideslip
-/// causes drag.
+/// Channels that contain a rudder's forces and moments. Its deflection and the resulting sideslip also cause drag.
 pub const CHANNELS: [ChannelId; 4] =
     [ChannelId::Drag, ChannelId::Side, ChannelId::Roll, ChannelId::Yaw];
 
-/// Largest motion of a rudder in `flights` for which `model` has no effect.
+/// Largest rudder motion in `flights`; `None` if no rudder moves or `model` has a rudder effect.
 ///
-/// A rudder command does not count if the airframe states that the aircraft has no rudder: firmware sends such commands all
-/// the same.
+/// A rudder command does not count if the airframe states that the aircraft has no rudder, because firmware sends rudder
+/// commands nevertheless.
 pub fn unmodelled(flights: &[Reconstruction], model: &GreyBox) -> Option<RudderMotion> {
     if model.has(RUDDER) {
         return None;
@@ -38,7 +37,7 @@ pub fn warning(motion: RudderMotion) -> String {
     )
 }
 
-/// Reason not to assert an effect while such a rudder moves.
+/// Reason why an effect in a channel of `CHANNELS` is not asserted while an unmodelled rudder moves.
 pub fn reason(motion: RudderMotion) -> String {
     let motion = motion.to_string();
     format!("t{}, and the model has no rudder effect for its channels", &motion[1..])

@@ -1,4 +1,4 @@
-//! Separation of two candidate effects by flights, after everything else has been refitted.
+//! Separation of two candidate effects by flights: how well the flights distinguish them after a refit of the model.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,26 +8,26 @@ use greylag_model::GreyBox;
 
 /// Number of channels used: D, L, Y, l, m, n.
 const CHANNELS: usize = 6;
-/// Ridge parameter of a free column relative to its squared norm, so that a system with equal columns remains solvable.
+/// Ridge parameter of a free column, relative to the column's squared norm. It keeps a system with equal columns solvable.
 const RIDGE: f64 = 1e-9;
 /// Prior width of a sensor's constant error in a channel, in standard deviations of a window's noise.
 const BIAS_WIDTH: f64 = 100.0;
 
-/// Squared difference in predictions due to an effect that remains after a refit, in noise variances, the unit of evidence.
+/// Squared difference in predictions due to an effect, in noise variances, after a refit. This is the unit of evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
-    /// Squared difference after the coefficients are refitted: whether the effect is detectable at all.
+    /// Squared difference that remains after the coefficients are refitted: a measure of the effect's detectability.
     pub visible: f64,
-    /// Squared difference after the other effect is fitted in its place as well.
+    /// Squared difference that remains after the other effect is also fitted.
     pub apart: f64,
 }
 
-/// Separation, by `flight`, of the effect that `truth` has from another effect; `base` lacks both.
+/// Separation, by `flight`, of an effect from another effect. `truth` has the effect; `base` has neither of them.
 ///
-/// `others` holds the ways in which the other effect may be fitted. Each is a set of models whose differences from `base`
-/// are scaled freely.
+/// `others` holds the alternatives for fitting the other effect. An alternative is a set of models whose differences from
+/// `base` are scaled freely.
 ///
-/// The coefficients of `base` are refitted within their prior widths, and so are constant errors in every channel.
+/// The coefficients of `base` and a constant error in every channel are refitted within their prior widths.
 pub fn separation(
     base: &GreyBox,
     truth: &GreyBox,
@@ -45,7 +45,7 @@ pub fn separation(
     Separation { visible, apart: apart.min(visible) }
 }
 
-/// Standard deviation of each channel's noise; infinite for one that is not measured.
+/// Standard deviation of each channel's noise, in the channel's unit; infinite for a channel that is not measured.
 fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     let mut scale = [f64::INFINITY; CHANNELS];
     for series in channels(model, flight) {
@@ -57,7 +57,7 @@ fn noise(model: &GreyBox, flight: &Prepared) -> [f64; CHANNELS] {
     scale
 }
 
-/// Measured less predicted in standard deviations of noise, channel after channel; 0 where not known.
+/// Measured less predicted in standard deviations of noise, in the order of channels, then windows; 0 if not measured.
 fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVector<f64> {
     let windows = flight.windows.len();
     let mut all = DVector::zeros(CHANNELS * windows);
@@ -74,7 +74,7 @@ fn residual(model: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> DVec
     all
 }
 
-/// Columns of all parameters that are refitted, each times its prior width.
+/// Regression columns of all refitted parameters, each multiplied by the prior width of its parameter.
 fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<DVector<f64>> {
     let windows = flight.windows.len();
     let found = columns(base, flight);
@@ -94,8 +94,8 @@ fn refitted(base: &GreyBox, flight: &Prepared, scale: &[f64; CHANNELS]) -> Vec<D
     all
 }
 
-/// Squared length of `gap` after projection onto `prior` (each with a unit pseudo-observation) and `free` has been
-/// subtracted.
+/// Squared norm of `gap` after a least-squares fit of the columns `prior` and `free` is subtracted. The coefficients of
+/// `prior` have a prior with unit variance.
 fn remaining(prior: &[DVector<f64>], free: Vec<DVector<f64>>, gap: &DVector<f64>) -> f64 {
     let free = free.into_iter().filter(|column| column.norm_squared() > 0.0);
     let columns: Vec<DVector<f64>> = prior.iter().cloned().chain(free).collect();
@@ -122,9 +122,9 @@ mod tests {
         let gap = DVector::from_vec(vec![3.0, 4.0, 12.0]);
         assert!((remaining(&[], Vec::new(), &gap) - 169.0).abs() < 1e-9);
         assert!((remaining(&[], vec![unit(2)], &gap) - 25.0).abs() < 1e-6);
-        // a column of length 3 and prior width 1: 3² − (3·3)²/(3² + 1) = 0.9 of the 9 is left
+        // a column of length 3 and prior width 1: 3² − (3·3)²/(3² + 1) = 0.9 remains of 9
         assert!((remaining(&[unit(0) * 3.0], vec![unit(2)], &gap) - 16.9).abs() < 1e-6);
-        // the same column twice does no harm
+        // the same column twice gives the same result
         assert!((remaining(&[], vec![unit(2), unit(2)], &gap) - 25.0).abs() < 1e-6);
     }
 }

@@ -1,24 +1,24 @@
-//! Signature of an effect: its changes of forces and moments in sweeps of flow variables and controls, and its changes
-//! of the response to a manoeuvre.
+//! Signature of an effect: the changes of forces and moments in sweeps of flow variables and controls, and the changes of the
+//! response to a manoeuvre.
 
 use greylag_model::{GreyBox, JoinError, STEP, Trim, TrimError, Twin};
 use greylag_physics::effects::Description;
 use greylag_physics::rigid_body;
 use greylag_physics::{Command, Controls, State};
 
-/// Altitude of the signatures, m: the start of an episode.
+/// Altitude at which signatures are computed, m: the initial altitude of an episode.
 const ALTITUDE: f64 = 600.0;
 
-/// Number of sweeps shown, those with the largest change.
+/// Number of sweeps shown. The sweeps with the largest changes are selected.
 const SWEEPS: usize = 4;
 
-/// Number of states shown in the manoeuvre, those with the largest change.
+/// Number of states shown in the manoeuvre. The states with the largest changes are selected.
 const STATES: usize = 4;
 
 /// Number of points of a sweep.
 const POINTS: usize = 121;
 
-/// A change below this share of the channel's own range is negligible.
+/// A change below this share of the quantity's range without the effect is negligible.
 const NOTHING: f64 = 1e-4;
 
 /// Error of computing a signature.
@@ -43,13 +43,13 @@ pub enum SignatureError {
 /// Changes caused by an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signature {
-    /// Changes along one variable at a time, the clearest first.
+    /// Changes along one variable at a time, in descending order of the change.
     pub sweeps: Vec<Pair>,
-    /// Changes over time in [`MANOEUVRE`], the clearest first.
+    /// Changes over time in [`MANOEUVRE`], in descending order of the change.
     pub manoeuvre: Vec<Pair>,
 }
 
-/// One quantity over another, without the effect and with it.
+/// One quantity against another, without and with the effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
     /// The horizontal quantity with its unit.
@@ -66,9 +66,9 @@ pub struct Pair {
 
 /// The manoeuvre of [`Signature::manoeuvre`], in words.
 pub const MANOEUVRE: &str = "From level flight: 3-2-1-1 on the elevator from 0.5 s, a doublet of the aileron from \
-     4 s, full throttle from 6 s to 8 s.";
+     4 s, full throttle from 6 s to 8 s, a doublet of the rudder from 8 s.";
 
-/// Quantities that an effect may change, with their units.
+/// Labels of the quantities that an effect may change, with their units.
 const CHANNELS: [&str; 6] = [
     "drag less thrust by mass, m/s²",
     "lift by mass, m/s²",
@@ -97,7 +97,7 @@ struct Condition {
     altitude: f64,
 }
 
-/// A variable to sweep: its label, its range in the label's unit, its setter.
+/// A variable to sweep: label, range in the label's unit, setter.
 type Variable = (&'static str, [f64; 2], fn(&mut Condition, f64));
 
 const VARIABLES: [Variable; 12] = [
@@ -147,7 +147,7 @@ fn set(model: &mut GreyBox, about: &Description, values: &[f64]) {
 }
 
 fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
-    // sideslip, rates and aileron are not zero, so that products of them show too
+    // sideslip (rad), rates (rad/s) and aileron (rad) are not zero: effects of their products also appear
     let state = State { beta: 0.07, p: 0.4, q: 0.3, r: 0.3, ..trim.state };
     let controls = Controls { aileron: 0.1, ..trim.controls };
     let from = Condition { state, controls, altitude: ALTITUDE };
@@ -173,7 +173,7 @@ fn sweeps(models: &[GreyBox; 2], trim: &Trim) -> Vec<Pair> {
     plainest(all, SWEEPS)
 }
 
-/// Values of [`CHANNELS`] at a condition.
+/// Values of [`CHANNELS`] at a flight condition.
 fn accelerations(model: &GreyBox, at: &Condition) -> [f64; 6] {
     let air = model.air(&at.state, at.altitude);
     let (acceleration, [l, m, n]) = model.accelerations(&at.state, &at.controls, &air);
@@ -220,7 +220,8 @@ fn command(model: &GreyBox, trim: &Trim, time: f64) -> Command {
     .clamped()
 }
 
-/// The `most` pairs with the largest change, relative to the largest range of the vertical quantity without the effect.
+/// The `most` pairs with the largest changes, in descending order. A change is relative to the largest range of the vertical
+/// quantity without the effect.
 fn plainest(all: Vec<Pair>, most: usize) -> Vec<Pair> {
     let extent = |values: &[f64]| {
         let fold = |f: fn(f64, f64) -> f64, start| values.iter().copied().fold(start, f);
@@ -250,8 +251,8 @@ mod tests {
     use greylag_physics::{effects, inputs};
     use std::path::Path;
 
-    /// Every effect of the catalogue changes a sweep and the manoeuvre at its example; an effect of the inputs, such as
-    /// an actuator lag, changes the manoeuvre only.
+    /// Every effect of the catalogue changes a sweep and the manoeuvre with its example values. An effect of the inputs, such as
+    /// an actuator lag, changes only the manoeuvre.
     #[test]
     fn every_effect_leaves_its_signature() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
@@ -261,7 +262,7 @@ mod tests {
             let found = signature(&model, &about, about.entry.unwrap().example).unwrap();
             let first = found.sweeps.first().map(|pair| (pair.x_label, pair.y_label));
             println!("{:25} {first:?}", about.id);
-            // the X8 has no rudder, so the manoeuvre's rudder doublet does nothing
+            // the X8 has no rudder: the manoeuvre's rudder doublet has no effect
             let moves = about.id == "rudder_linear" || !found.manoeuvre.is_empty();
             assert!(first.is_some() && moves, "{}", about.id);
         }

@@ -21,14 +21,14 @@ use greylag_sysid::amend::document::sha256;
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::weak_form::prepared::Prepared;
 
-/// The folder of the saved model, below the session's.
+/// Subfolder of the session's folder for the saved model.
 pub(super) const SAVED: &str = "model";
 
-/// A request, made by a page that saw the session at a revision.
+/// A request, with the revision of the session on which it is based.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Request {
-    /// Revision of the session that the requester saw.
+    /// Revision of the session on the page that made the request.
     pub revision: u64,
     /// The request itself.
     pub act: Act,
@@ -45,12 +45,12 @@ pub enum Act {
         /// New role of the flight.
         role: Role,
     },
-    /// Remove a flight from the session; its file stays.
+    /// Remove a flight from the session; its log file is kept.
     Remove {
         /// Index of the flight in the session.
         flight: usize,
     },
-    /// Multiply a column of all logs by a factor, as a finding advises.
+    /// Multiply a column of all logs by a factor, as recommended by a finding.
     Map {
         /// Index of the flight with the finding.
         flight: usize,
@@ -61,68 +61,69 @@ pub enum Act {
     },
     /// Start a diagnosis of the model.
     Diagnose,
-    /// Accept an effect, and fit the model with it.
+    /// Accept an effect and fit the model with it.
     Tick {
         /// Id of the effect in the catalogue.
         effect: String,
     },
-    /// Keep the effect accepted last although the data refuse it.
+    /// Keep the last accepted effect although the data refuse it.
     Keep,
-    /// Take back the effect accepted last.
+    /// Remove the last accepted effect.
     Undo,
-    /// Accept again the effect that was removed last.
+    /// Accept again the last removed effect.
     Redo,
-    /// Compute the fits that are missing, for example after a flight has changed its role.
+    /// Compute missing fits, for example after the role of a flight has changed.
     Fit,
-    /// Judge the models by the test flights.
+    /// Compare the models with the test flights, which opens them.
     Judge,
-    /// Write the amended model into the folder `model` of the session's.
+    /// Write the amended model to the subfolder `model` of the session's folder.
     Save,
-    /// Read the model file again.
+    /// Read the model file again after a change.
     ReloadModel,
     /// Cancel a running job.
     Cancel {
         /// Id of the job.
         job: u64,
     },
-    /// Keep an effect that was written as text.
+    /// Add an effect that is written as text to the session.
     Write {
-        /// The text of its file.
+        /// Text of the effect file.
         text: String,
     },
-    /// Take an effect that was written as text out of the session.
+    /// Remove an effect that was written as text from the session.
     Forget {
         /// Id of the effect.
         effect: String,
     },
-    /// Search a formula for what no effect explains.
+    /// Search for a formula for the residual that no effect explains.
     Propose,
-    /// Make a flight schedule that distinguishes two effects.
+    /// Design a flight schedule that distinguishes two effects.
     Design {
         /// Ids of the two effects.
         between: [String; 2],
     },
-    /// Fly the model in the simulator.
+    /// Fly the model in the simulator as ordered.
     Fly(Order),
-    /// Watch a recording that another program is writing.
+    /// Display a recording while another program writes it.
     Watch {
-        /// Folder of the recording, or the recorded log itself.
+        /// Folder of the recording, or path of the recorded log.
         folder: PathBuf,
     },
-    /// Stop the flight or the watching of a recording.
+    /// Stop the flight or the display of a recording.
     StopFlight,
-    /// Take a recording as a log.
+    /// Add a recording to the session as a log.
     TakeFlight {
-        /// The flight, by its place in the session.
+        /// Index of the recording in the session.
         flown: usize,
     },
 }
 
 impl Bench {
-    /// Carries out the request.
+    /// Executes the request.
     ///
     /// # Errors
-    /// The session has changed since the requester's view of it, or the request cannot be carried out.
+    /// `WorkbenchError::Conflict` if the session has changed since the page read it; another error if the request cannot be
+    /// executed.
     pub fn act(self: &Arc<Self>, request: Request) -> Result<(), WorkbenchError> {
         let seen = request.revision;
         match request.act {
@@ -170,7 +171,7 @@ impl Bench {
         }
     }
 
-    /// Takes a log out of the session.
+    /// Removes a log from the session.
     fn remove(&self, seen: u64, flight: usize) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             if flight >= inner.session.logs.len() {
@@ -182,7 +183,7 @@ impl Bench {
         })
     }
 
-    /// Keeps the effect accepted last although the data refuse it.
+    /// Keeps the last accepted effect although the data refuse it.
     fn keep(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.effects.last_mut();
@@ -193,7 +194,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Takes back the effect accepted last.
+    /// Removes the last accepted effect.
     fn undo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.effects.pop();
@@ -201,12 +202,12 @@ impl Bench {
             inner.supersede(Work::Fit);
             Ok(())
         })?;
-        // the remaining effects may have no fit: it was interrupted, or a flight has another role
+        // the fit of the remaining effects may be missing: it was interrupted, or a flight has changed its role
         self.start(Work::Fit);
         Ok(())
     }
 
-    /// Accepts again the effect that was removed last.
+    /// Accepts again the last removed effect.
     fn redo(self: &Arc<Self>, seen: u64) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             let last = inner.session.undone.pop();
@@ -217,15 +218,16 @@ impl Bench {
         Ok(())
     }
 
-    /// Takes a log that a page has sent, called `name`.
+    /// Adds a log with the name `name` and the content `bytes`, which a page has sent.
     ///
     /// # Errors
-    /// The file is not a log or cannot be used, is in the session already, or cannot be stored.
+    /// If `name` is invalid, `bytes` are not a usable log, the session already contains the log, the session is not at revision
+    /// `seen`, or the file cannot be written.
     pub fn take(&self, seen: u64, name: &str, bytes: &[u8]) -> Result<(), WorkbenchError> {
         self.take_as(seen, name, bytes, None)
     }
 
-    /// Takes a log with a role, or with the usual one.
+    /// Adds a log with the role `role`; `None` selects the default role.
     pub(super) fn take_as(
         &self,
         seen: u64,
@@ -241,7 +243,7 @@ impl Bench {
         let _one_at_a_time = self.taking.lock().unwrap_or_else(PoisonError::into_inner);
         let place = PathBuf::from("logs").join(name);
         let file = self.folder.join(&place);
-        // if another log has that name, the new one gets a name with its hash
+        // if another log has this name, the new file name begins with a hash of its content
         let place = match fs::read(&file) {
             Ok(there) if there != bytes => {
                 PathBuf::from("logs").join(format!("{}-{name}", &sha256(bytes)[..8]))
@@ -287,8 +289,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Judges the model as given and as amended by free runs over the test flights. The opening is recorded before
-    /// the results are shown.
+    /// Scores the given and the amended model by free runs over the test flights. The opening of the test flights is recorded
+    /// before the results are displayed.
     fn judge(&self, seen: u64) -> Result<(), WorkbenchError> {
         self.same_model()?;
         let (given, amended, effects, places, flights) = {
@@ -321,14 +323,14 @@ impl Bench {
         })
     }
 
-    /// Reads the model's files and the logs again, and discards the results from the old files.
+    /// Reads the model files and the logs again, and discards results of the old files.
     fn reload(&self, seen: u64) -> Result<(), WorkbenchError> {
         let path = self.lock().session.model.clone();
         let read = load(&path)?;
         self.change(seen, |inner| {
             inner.session.model_sha256 = read.fingerprint;
             (inner.model, inner.original) = (read.model, read.original);
-            // the logs are read again, because gravity, actuators and the least airspeed come from the model
+            // the logs are read again because gravity, actuators and the lowest airspeed of flight are those of the model
             inner.reread();
             Ok(())
         })
@@ -336,7 +338,7 @@ impl Bench {
 }
 
 impl Inner {
-    /// The model as amended, with the accepted effects that are in it.
+    /// The amended model, and the accepted effects that joined it.
     fn amended(&self) -> Result<(GreyBox, Vec<String>), WorkbenchError> {
         if self.session.effects.is_empty() {
             return Ok((self.model.clone(), Vec::new()));
@@ -347,8 +349,8 @@ impl Inner {
     }
 }
 
-/// The longest horizon that runs reach, at most that of the judgement, s, with the error there; NaN if no run reaches
-/// one.
+/// The longest horizon, s, that runs reach and that is at most `Options::JUDGED_AT_S`, and the error at this horizon. NaN if no
+/// run reaches a horizon.
 fn judged(scores: &[HorizonScore]) -> (f64, f64) {
     let mut reached = scores.iter().filter(|s| s.runs > 0 && s.horizon_s <= Options::JUDGED_AT_S);
     reached.next_back().map_or((f64::NAN, f64::NAN), |s| (s.horizon_s, s.rmse_scaled))

@@ -24,45 +24,42 @@ use greylag_sysid::amend::{Estimate, Fit};
 use greylag_sysid::compare::{self, Comparison, compare};
 use greylag_sysid::progress::ignore_progress;
 
-/// Options with which a workbench is opened.
+/// Options for opening a workbench.
 pub struct Given {
     /// Folder of the session; created if it does not exist.
     pub folder: PathBuf,
     /// Path of the model file; required for a new session.
     pub model: Option<PathBuf>,
-    /// Logs to add; those that the session has already are skipped.
+    /// Logs to add; a log that the session already contains is skipped.
     pub logs: Vec<PathBuf>,
     /// Options for reading logs.
     pub reading: Reading,
-    /// Flies the failsafe scenarios of the page `failsafes`.
+    /// Simulates the failsafe scenarios of the page `failsafes`.
     #[cfg(feature = "sitl")]
     pub failsafes: super::failsafe::Failsafes,
 }
 
 /// A session with the results computed from it: logs and their roles, the model, accepted effects, jobs, flights.
 ///
-/// It is shared as an `Arc`, may be called from any thread and knows no network. Its methods are of four kinds:
+/// It is shared as an `Arc`, may be called from any thread and has no network access. Its methods are of four kinds:
 ///
 /// - [`Bench::open`] reads or creates the session of a folder and claims the folder until the value is dropped.
-/// - Requests: [`Bench::act`] and [`Bench::take`] (a log). Each carries the revision that the requester saw. One that
-///   edits the session fails with [`WorkbenchError::Conflict`] and changes nothing if the revision is no longer the
-///   present one; otherwise the edit is on disk when the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`,
-///   `Cancel` and `StopFlight` edit nothing that a requester sees and work at any revision.
-/// - Views, which change nothing in the session: [`Bench::state`], [`Bench::diagnosis`], [`Bench::failing`],
-///   [`Bench::flight`], [`Bench::free_run`] and others. `failing` and `flight` block while they compute a comparison
-///   that is not cached. `flight` and `free_run` refuse test flights that have not been opened.
-/// - Events go to the callback of [`Bench::open`], on the thread that causes them and without the lock held, so that
-///   the callback may call the bench. They carry progress; for anything else, look at the views again.
+/// - Requests are [`Bench::act`] and [`Bench::take`] (a log). Each contains the revision on which it is based. If this revision
+///   is outdated, a request that edits the session fails with [`WorkbenchError::Conflict`]. Otherwise the edit is on disk when
+///   the call returns. `Diagnose`, `Fit`, `Propose`, `Design`, `Save`, `Cancel` and `StopFlight` are accepted at any revision.
+/// - Views do not change the session: [`Bench::state`], [`Bench::diagnosis`], [`Bench::failing`], [`Bench::flight`],
+///   [`Bench::free_run`] and others. `failing` and `flight` block while they compute a comparison that is not cached. `flight`
+///   and `free_run` refuse test flights that have not been opened.
+/// - Events go to the callback of [`Bench::open`], on the thread that causes them. The callback may call the bench.
 ///
-/// Order of calls: open, then requests and views in any order. Jobs run on threads of their own, and `state` lists a job
-/// until it ends. A new job replaces the running one of its kind, which ends at its next stage, as a cancelled one does.
-/// Time: nothing has to be called periodically. A result is valid for a key of its inputs, so undoing an edit restores it.
-/// The system's clock only stamps records of the session.
+/// After `open`, requests and views may be called in any order. Each job runs on a separate thread. A new job replaces a running
+/// job of the same kind, which ends at its next stage like a cancelled job. Each result is stored under a key of its inputs, so
+/// an undone edit restores it. The system clock is used only for time stamps of records in the session.
 pub struct Bench {
     pub(super) folder: PathBuf,
     pub(super) on_event: Box<dyn Fn(Event) + Send + Sync>,
     inner: Mutex<Inner>,
-    /// Held while a log is added, so that two at once cannot take the same file name.
+    /// Held while a log is added, because two concurrent calls must not select the same file name.
     pub(super) taking: Mutex<()>,
     #[cfg(feature = "sitl")]
     pub(super) failsafes: super::failsafe::Failsafes,
@@ -75,18 +72,18 @@ pub(super) struct Inner {
     pub session: Session,
     pub model: GreyBox,
     pub original: Original,
-    /// The session's logs, in its order, or why one cannot be used.
+    /// The session's logs, in order; `Err` with the reason for a log that cannot be used.
     pub flights: Vec<Result<Arc<Loaded>, String>>,
     pub comparison: Option<(String, Arc<Comparison>)>,
     pub tuned: Option<(String, Fit)>,
     pub diagnosis: Option<(String, Arc<Value>)>,
-    /// Result of the search for a formula.
+    /// Key and result of the search for a formula.
     pub proposal: Option<(String, Arc<Value>)>,
-    /// The two effects that the next schedule shall distinguish.
+    /// The two effects that the next schedule has to distinguish.
     pub between: Option<[String; 2]>,
-    /// Schedules made in this session.
+    /// Schedules that were designed in this session.
     pub designed: Vec<Designed>,
-    /// The present flight, or the last one.
+    /// The present flight, or else the last flight.
     pub flying: Option<Flying>,
     pub estimate: Option<(String, Estimate)>,
     pub fits: BTreeMap<String, Arc<Fitted>>,
@@ -94,16 +91,18 @@ pub(super) struct Inner {
     pub failures: BTreeMap<String, String>,
     pub jobs: Vec<Job>,
     pub next_job: u64,
-    /// Options of the command line for reading logs.
+    /// Command-line options for reading logs.
     pub given: Reading,
-    /// The same options as [`greylag_logs`] takes them.
+    /// The same options in the form of [`greylag_logs`].
     pub options: logs::Options,
     pub mapping: InUse,
 }
 
 impl Bench {
-    /// Opens the session of a folder, or creates one. `on_event` is called for every event, on the
-    /// thread that causes it.
+    /// Opens the session of a folder, or creates one. `on_event` is called for every event, on the thread that causes the event.
+    ///
+    /// # Errors
+    /// If the folder is locked, a file is invalid or cannot be read or written, or a new session has no model.
     pub fn open(
         given: Given,
         on_event: impl Fn(Event) + Send + Sync + 'static,
@@ -136,7 +135,7 @@ impl Bench {
         inner.take_mapping()?;
         inner.read_own()?;
         inner.read_designed();
-        // flights that an earlier run left unfinished
+        // marks flights that an earlier process did not finish
         let cut = inner.session.flown.iter_mut().filter(|f| f.outcome == Outcome::Flying);
         cut.for_each(|flown| flown.outcome = Outcome::CutOff);
         inner.reread();
@@ -158,16 +157,16 @@ impl Bench {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Inner> {
-        // the state is consistent even after a panic of a job, which changes it in single steps
+        // the state is consistent even after a job's panic, because each job changes it in single steps
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Present revision of the session; each change increments it.
+    /// Present revision of the session, which every change increments.
     pub fn revision(&self) -> u64 {
         self.lock().session.revision
     }
 
-    /// Applies `edit` if `seen` is the session's revision and writes the session; restores the state if either fails.
+    /// Applies `edit` if the session is at revision `seen`, and writes the session. If either fails, the state is restored.
     pub(super) fn change<T>(
         &self,
         seen: u64,
@@ -196,7 +195,7 @@ impl Bench {
         }
     }
 
-    /// Applies `edit` at any revision, for changes that no requester makes, and writes the session.
+    /// Applies `edit` at any revision, for changes that no page requests, and writes the session.
     pub(super) fn amend_session(
         &self,
         edit: impl FnOnce(&mut Inner),
@@ -211,7 +210,7 @@ impl Bench {
         written
     }
 
-    /// Adds the log at `path`, unless the session has it already.
+    /// Adds the log at `path`; does nothing if the session already contains it.
     fn add_file(&self, path: &Path) -> Result<(), WorkbenchError> {
         let path = fs::canonicalize(path).map_err(|e| io(path, e))?;
         let bytes = fs::read(&path).map_err(|e| io(&path, e))?;
@@ -221,7 +220,7 @@ impl Bench {
         }
     }
 
-    /// Adds the log at `path` with the content `bytes`. Without a `role` it gets that of [`Session::usual_role`].
+    /// Adds the log at `path` with the content `bytes`. Without a `role`, its role is that of [`Session::usual_role`].
     pub(super) fn add(
         &self,
         seen: u64,
@@ -247,12 +246,12 @@ impl Bench {
         })
     }
 
-    /// Comparison of the models (given, tuned, amended) with the flights to fit to and held out; cached by key.
+    /// Comparison of the models (given, tuned, amended) with the fit and hold-out flights; cached by key.
     pub(super) fn comparison(&self) -> Result<(Vec<Way>, Arc<Comparison>), WorkbenchError> {
         let (key, ways, models, flights) = {
             let inner = self.lock();
             let (shown, (ways, models)) = (inner.shown(), inner.ways());
-            // an effect without a fitted model changes nothing
+            // an effect without a fitted or estimated model does not change the comparison
             let effects = if shown == "given" { &[] } else { &inner.session.effects[..] };
             let key = format!("{}{shown}{ways:?}", inner.key("comparison", effects));
             if let Some((_, known)) = inner.comparison.as_ref().filter(|(k, _)| *k == key) {
@@ -274,7 +273,7 @@ impl Bench {
         self.folder.join("fits").join(key)
     }
 
-    /// [`WorkbenchError::ModelChanged`] if the model file has changed since it was read.
+    /// Fails with [`WorkbenchError::ModelChanged`] if the model file has changed since it was read.
     pub(super) fn same_model(&self) -> Result<(), WorkbenchError> {
         let inner = self.lock();
         match inner.model_changed() {
@@ -313,7 +312,7 @@ impl Before {
     }
 }
 
-/// The session with its model. A model edited since the last run is read again.
+/// Reads or creates the session and reads its model, which may have changed since the last run.
 fn begin(
     folder: &Path,
     model: Option<&Path>,
@@ -335,7 +334,7 @@ fn begin(
     Ok((session, read.model, read.original))
 }
 
-/// A model with the contents of its files.
+/// A model, the contents of its files, and their fingerprint.
 pub(super) struct Read {
     pub model: GreyBox,
     pub original: Original,
@@ -344,7 +343,7 @@ pub(super) struct Read {
 
 /// Reads the model at `path`.
 pub(super) fn load(path: &Path) -> Result<Read, WorkbenchError> {
-    // computed first, so that an edit of the file in the meantime is noticed later
+    // computed before the model is read, so an edit in the meantime is detected later
     let fingerprint = fingerprint(path).map_err(|e| io(path, e))?;
     Ok(Read { model: GreyBox::load(path)?, original: Original::read(path)?, fingerprint })
 }
@@ -355,7 +354,7 @@ fn result_file(folder: &Path, key: &str) -> PathBuf {
 }
 
 impl Inner {
-    /// Loads the stored results that match the present keys: of earlier runs, or of the same roles at an earlier time.
+    /// Loads stored results for the present keys, from an earlier run or from an earlier state of the session.
     pub fn recall(&mut self) {
         let stored = |key: &str, known: &Option<(String, Arc<Value>)>| {
             if known.as_ref().is_some_and(|(of, _)| of == key) {
@@ -380,7 +379,7 @@ impl Inner {
         }
     }
 
-    /// Which model is displayed as the amended one: `fitted`, `estimated` or `given`.
+    /// Origin of the displayed amended model: `fitted`, `estimated`, or `given` if there is neither a fit nor an estimate.
     pub fn shown(&self) -> String {
         let key = self.key("fit", &self.session.effects);
         match (self.fits.contains_key(&key), &self.estimate) {
@@ -390,7 +389,8 @@ impl Inner {
         }
     }
 
-    /// The model as given, then as amended: estimated by equation error until the fit is done.
+    /// The given model, then the amended model if there is one. Until its fit is complete, the amended model is an equation-error
+    /// estimate.
     pub fn models(&self) -> Vec<GreyBox> {
         let key = self.key("fit", &self.session.effects);
         let estimate = self.estimate.as_ref().filter(|(of, _)| *of == key).map(|(_, e)| &e.model);

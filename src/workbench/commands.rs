@@ -1,4 +1,4 @@
-//! The commands of `greylag` that do the same as the page.
+//! The `greylag` commands that correspond to the functions of the workbench page.
 
 use serde::Serialize;
 
@@ -9,16 +9,16 @@ use greylag_logs::csv::Tolerance;
 use greylag_logs::quoted;
 use greylag_sysid::amend::document::MODEL;
 
-/// The commands for the session as it is.
+/// The commands that correspond to the present session.
 #[derive(Clone, Debug, Serialize)]
 pub struct Commands {
-    /// Command that summarises the logs.
+    /// Command that summarises the logs; empty without logs.
     pub flights: String,
-    /// Command that compares the models with the flights to fit to and held out.
+    /// Command that compares the models with the fit and hold-out flights; empty without such flights.
     pub compare: String,
-    /// Command that finds the effects that the model lacks.
+    /// Command that finds missing effects of the model; empty without fit flights.
     pub diagnose: String,
-    /// The command that searches a formula for the residual; empty without a flight to test it on.
+    /// Command that searches for a formula for the residual; empty without a flight to test the formula.
     pub propose: String,
     /// Command that amends the model; empty without accepted effects.
     pub amend: String,
@@ -27,7 +27,7 @@ pub struct Commands {
 }
 
 impl Bench {
-    /// The commands for the session as it is.
+    /// The commands that correspond to the present session.
     pub(super) fn commands(&self, inner: &Inner) -> Commands {
         let model = quoted(&inner.session.model);
         let logs = |roles: &[Role]| -> String {
@@ -55,7 +55,7 @@ impl Bench {
             true => String::new(),
             false => command,
         };
-        // the workbench leaves the deflections on the log's clock everywhere
+        // the workbench always keeps the deflections on the clock of the log
         let compare = |logs: &str, roles: &[Role]| {
             let words = inner.reading_words(roles);
             format!("greylag compare --model {model}{amended} --log{logs} --recorded-clock{words}")
@@ -83,8 +83,8 @@ impl Bench {
 }
 
 impl Inner {
-    /// The command that searches a formula, with the options that name the `own` effects; empty if no flight is left to
-    /// test it on.
+    /// The command that searches for a formula, with the option `own` for the session's written effects; empty if no flight is
+    /// left to test the formula.
     fn propose_command(&self, own: &str) -> String {
         let Ok(places) = self.searched_places() else { return String::new() };
         let named = |places: Vec<usize>| -> String {
@@ -96,14 +96,14 @@ impl Inner {
         format!("greylag propose --model {model} --log{search} --hold-out{test}{own}{both}")
     }
 
-    /// Options of a command for reading the session's logs.
+    /// Options for a command that reads the session's logs.
     fn mapping_words(&self) -> String {
         let mapping = self.mapping.file.iter().map(|file| format!(" --mapping {}", quoted(file)));
         let lenient = (self.given.tolerance == Tolerance::Lenient).then(|| " --lenient".to_owned());
         mapping.chain(lenient).collect()
     }
 
-    /// Options of a command for reading the logs of these roles; logs with problems need one more.
+    /// Options for a command that reads the logs of `roles`, including the option for logs with problems if it is needed.
     fn reading_words(&self, roles: &[Role]) -> String {
         let doubtful = |k: &usize| self.flights[*k].as_ref().is_ok_and(|f| f.in_doubt());
         let despite = self.given.despite_problems || self.usable(roles).iter().any(doubtful);

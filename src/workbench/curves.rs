@@ -1,4 +1,4 @@
-//! A flight over time as a page draws it.
+//! Data of one flight over time, for the plots of a page.
 
 use std::collections::BTreeMap;
 
@@ -9,34 +9,34 @@ use super::tuned::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::weak_form::prepared::Prepared;
 
-/// Rows of a flight that are drawn at most.
+/// Largest number of rows per flight in the plots.
 const ROWS: usize = 2500;
 
-/// A flight over time, drawn.
+/// Data of one flight over time.
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightData {
     /// Name of the flight.
     pub name: String,
-    /// Time on the log's clock, s.
+    /// Time on the log's clock, s; `None` at a gap.
     pub time_s: Vec<Option<f64>>,
-    /// The states by name, in °, °/s and m/s.
+    /// The states by name, in °, °/s and m/s; `None` at a gap.
     pub states: BTreeMap<&'static str, Vec<Option<f32>>>,
-    /// The deflections in °, the throttle as a share.
+    /// Aileron and elevator deflection in °, throttle 0..1; `None` at a gap.
     pub controls: BTreeMap<&'static str, Vec<Option<f32>>>,
-    /// Middles of the windows, s.
+    /// Middle of each window, s; `None` between segments.
     pub window_s: Vec<Option<f64>>,
-    /// Value of each regime variable in each window.
+    /// Value of each regime variable in each window; `None` between segments.
     pub regimes: BTreeMap<String, Vec<Option<f32>>>,
-    /// Origin of each of the models.
+    /// Origin of each model.
     pub ways: Vec<Way>,
-    /// Channels by symbol: measured, then each model.
+    /// Channels by symbol: the measured values, then the values of each model.
     pub channels: BTreeMap<&'static str, Vec<Vec<Option<f32>>>>,
 }
 
-/// Short names of the states, in their order.
+/// Short names of the states, in the order of the traces.
 const STATES: [&str; 8] = ["phi", "theta", "V", "p", "q", "r", "alpha", "beta"];
 
-/// A flight over time, number `k` of the comparison.
+/// Data of the flight with index `k` in the comparison.
 pub(super) fn data(
     flight: &Prepared,
     comparison: &Comparison,
@@ -83,7 +83,7 @@ pub(super) fn data(
     }
 }
 
-/// Windows as rows of a channel's trace, which has an extra row between segments.
+/// Index of the window for each row of a channel's trace; `None` for the extra row between segments.
 pub(super) fn rows(flight: &Prepared) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(flight.windows.len());
     for (k, window) in flight.windows.iter().enumerate() {
@@ -95,7 +95,7 @@ pub(super) fn rows(flight: &Prepared) -> Vec<Option<usize>> {
     rows
 }
 
-/// The states by name, in °, °/s and m/s, at `kept` rows.
+/// The states by name, in °, °/s and m/s, at the rows `kept`.
 pub(super) fn named(
     states: &[Vec<f64>; 8],
     kept: &[usize],
@@ -107,7 +107,7 @@ pub(super) fn named(
     STATES.iter().zip(states).map(of).collect()
 }
 
-/// Name of a variable in JSON.
+/// Name of a regime variable in JSON.
 fn word(variable: RegimeVariable) -> String {
     match serde_json::to_value(variable) {
         Ok(Value::String(word)) => word,
@@ -115,7 +115,7 @@ fn word(variable: RegimeVariable) -> String {
     }
 }
 
-/// A number with five significant digits, enough for a screen; `None` if it is not finite.
+/// A value rounded to five significant digits, which exceeds the resolution of a screen; `None` if it is not finite.
 fn some(x: f64) -> Option<f32> {
     if x == 0.0 {
         return Some(0.0);

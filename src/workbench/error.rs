@@ -1,4 +1,4 @@
-//! Errors of the workbench's requests.
+//! Errors of the workbench.
 
 use std::io;
 use std::path::PathBuf;
@@ -17,25 +17,25 @@ use greylag_sysid::flight_path::ReconstructError;
 use greylag_sysid::progress::Cancelled;
 use greylag_sysid::weak_form::prepared::ClockError;
 
-/// Kind of a failure, which sets the status of the HTTP answer.
+/// Kind of an error, which determines the HTTP status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The request does not fit the session, for example a file that is not a log.
+    /// The request is invalid in this session, for example because a file is not a log.
     Bad,
-    /// The session has moved on since the requester looked.
+    /// The session or a file has changed since the page read it.
     Conflict,
-    /// The data are locked until the test flights are opened.
+    /// The data belong to test flights that have not been opened.
     Locked,
     /// The requested object does not exist.
     Missing,
-    /// The disk or the program failed.
+    /// The file system or the program failed.
     Failed,
 }
 
 /// Reason why the workbench cannot carry out a request.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkbenchError {
-    /// Someone else changed the session first.
+    /// Another request changed the session first.
     #[error(
         "the session was changed in another window: it is at revision {now}, this page was at {seen}; the page \
          shows it as it is now, so do it again if you still mean it"
@@ -43,10 +43,10 @@ pub enum WorkbenchError {
     Conflict {
         /// Present revision of the session.
         now: u64,
-        /// Revision that the requester saw.
+        /// Revision on which the request is based.
         seen: u64,
     },
-    /// The model file has changed since it was read.
+    /// The model file has changed since the session read it.
     #[error(
         "{} changed on disk since it was read, so what is shown is not about it; reload the model", path.display()
     )]
@@ -54,34 +54,34 @@ pub enum WorkbenchError {
         /// Path of the model file.
         path: PathBuf,
     },
-    /// A log has changed since it was read.
+    /// A log has changed since the session read it.
     #[error(
-        "{} is not the log that the session knows: its content changed; take it out of the session and add it again", path.display()
+        "{} has changed since it was added to the session; take it out of the session and add it again", path.display()
     )]
     LogChanged {
         /// Path of the log.
         path: PathBuf,
     },
-    /// The session has the log already.
+    /// The session already contains the log, under this name.
     #[error("this log is in the session already, as {0}")]
     Twice(String),
-    /// A name that no file may have.
+    /// The name is not allowed for a file.
     #[error("{0:?} is no name for a log; give it a name of letters, digits, dots and dashes")]
     Name(String),
-    /// No flight of that number.
+    /// The session has no flight with this index.
     #[error(
         "there is no flight number {0} in the session; it may have been taken out in another window"
     )]
     NoFlight(usize),
-    /// The test is not open.
+    /// The flight is a test flight that has not been opened.
     #[error(
         "{0} is a test flight, which stays unseen until the models are judged by it; press Judge, or give it another role"
     )]
     Locked(String),
-    /// A role has no flight.
+    /// No usable flight has this role.
     #[error("no flight that can be used has the role {}; give one that role", .0.word())]
     NoRole(Role),
-    /// The session is about another model.
+    /// The session belongs to another model.
     #[error(
         "the session in {} is about the model {}; leave --model out, or give --dir another folder",
         folder.display(),
@@ -93,15 +93,15 @@ pub enum WorkbenchError {
         /// Path of the session's model.
         model: PathBuf,
     },
-    /// The amended model would replace the model from which it was made.
+    /// The amended model would overwrite the model from which it was made.
     #[error("{} is the model to start from, which stays as it is; move it out of the session's folder", .0.display())]
     OverModel(PathBuf),
-    /// No effect joined the model.
+    /// None of the accepted effects joined the model.
     #[error(
         "no effect was accepted by the data, so there is nothing to save: keep a refused one anyway, or take it back"
     )]
     AllRefused,
-    /// A written fit is another one.
+    /// A written fit differs from the computed fit when it is read back.
     #[error("the fit written to {} read back with another {what}; report this", folder.display())]
     Lost {
         /// Folder of the written fit.
@@ -109,13 +109,13 @@ pub enum WorkbenchError {
         /// Part of the fit that differs.
         what: String,
     },
-    /// A failure inside the program, such as a panic of a job.
+    /// An internal error of the program, such as a panic of a job.
     #[error("a fault of the program, please report it: {0}")]
     Fault(String),
     /// The user cancelled the task.
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
-    /// A new session was given no model.
+    /// A new session has no model.
     #[error(
         "a new session needs a model: name one, as in `greylag workbench --model params/x8/prior.toml`"
     )]
@@ -123,68 +123,68 @@ pub enum WorkbenchError {
     /// There is nothing to undo or redo.
     #[error("there is nothing to {0}")]
     Nothing(&'static str),
-    /// The session has the effect already.
+    /// The model or the session already contains the effect.
     #[error("{0} is in the model already")]
     Present(String),
-    /// The mapping is the user's own.
+    /// The user's mapping is in use, and the workbench does not change it.
     #[error(
         "the logs are read by a mapping of your own; add this line to its [columns] and start again: {0}"
     )]
     MappingGiven(String),
-    /// The session's mapping is broken.
-    #[error("cannot add to the mapping {}: it is no mapping; mend or remove it", .0.display())]
+    /// The session's mapping is invalid.
+    #[error("cannot add to the mapping {}: it is not a mapping; correct or remove it", .0.display())]
     NoMapping(PathBuf),
-    /// The moment is not flown.
+    /// The flight has no data at this time, s, from which a free run can start.
     #[error(
         "no free run can start at {0:.1} s: the aircraft is not in the air there, or the log has a gap"
     )]
     NotFlown(f64),
-    /// The fit is not done.
+    /// The accepted effects have not been fitted.
     #[error("the fit of the accepted effects is not done; wait for it, or take the effect back")]
     Unfitted,
-    /// A text is not an effect file.
+    /// A text is not a valid effect file.
     #[error("{0}")]
     EffectText(String),
-    /// The effect is accepted.
+    /// The effect is accepted and therefore cannot be removed.
     #[error("{0} is accepted; take it back first")]
     Accepted(String),
-    /// No manoeuvre of the menu distinguishes the two effects.
-    #[error("no manoeuvre of the menu tells {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
+    /// No manoeuvre in the list distinguishes the two effects.
+    #[error("no manoeuvre of the menu distinguishes {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
     NotApart([String; 2]),
-    /// A flight is on.
+    /// A flight is in progress.
     #[error("a flight is on; stop it, or wait for its end")]
     Flying,
-    /// The order of a flight cannot be carried out.
+    /// The ordered flight is not possible, for this reason.
     #[error("cannot fly: {0}")]
     Order(String),
-    /// The program has no simulator.
+    /// The program was built without the simulator.
     #[error("this program was built without the simulator; build it with the feature sitl")]
     NoSimulator,
     /// The recording does not exist.
     #[error("there is no recording in {}: name the folder that `greylag fly` printed, which holds flight.csv", .0.display())]
     NoRecording(PathBuf),
-    /// The session is open elsewhere.
+    /// Another workbench has the session open.
     #[error(
         "another workbench has the session in {} open; use its window, or give --dir another folder", .0.display()
     )]
     Open(PathBuf),
-    /// The session file is broken.
-    #[error("cannot read the session {}: {why}; mend the file, or give --dir another folder", path.display())]
+    /// The session file is invalid.
+    #[error("cannot read the session {}: {why}; correct the file, or give --dir another folder", path.display())]
     Session {
         /// Path of the session file.
         path: PathBuf,
         /// Error of the file's content.
         why: String,
     },
-    /// A file could not be read or a folder not be made.
+    /// A file could not be read, or a folder could not be created.
     #[error("cannot use {}: {source}; check that it exists and may be read and written", path.display())]
     Io {
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
         /// Error of the operating system.
         source: io::Error,
     },
-    /// A result has no place in JSON.
+    /// A result cannot be represented in JSON.
     #[error("cannot write a result as JSON: {0}")]
     Json(#[from] serde_json::Error),
     /// The log cannot be read.
@@ -196,22 +196,22 @@ pub enum WorkbenchError {
     /// The mapping cannot be read.
     #[error(transparent)]
     Mapping(#[from] MappingError),
-    /// The log cannot be used.
+    /// The flight path cannot be reconstructed from the log.
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),
     /// The model cannot be read.
     #[error(transparent)]
     Model(#[from] FileError),
-    /// The files of an amended model cannot be made.
+    /// The files of the amended model cannot be made.
     #[error(transparent)]
     Document(#[from] DocumentError),
-    /// A file was not written.
+    /// A file could not be written.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// The comparison of the models failed.
     #[error(transparent)]
     Compare(#[from] CompareError),
-    /// A flight without a clock.
+    /// The clock of a flight cannot be used.
     #[error(transparent)]
     Clock(#[from] ClockError),
     /// The diagnosis of the model failed.
@@ -220,7 +220,7 @@ pub enum WorkbenchError {
     /// The fit of the model failed.
     #[error(transparent)]
     Amend(#[from] AmendError),
-    /// No controller for the model.
+    /// A controller cannot be designed for the model.
     #[error(transparent)]
     Control(#[from] greylag_control::SetupError),
     /// The design of a schedule failed.
@@ -244,7 +244,7 @@ impl WorkbenchError {
     }
 }
 
-/// A failure of the system at `path`.
+/// An error of the operating system at `path`.
 pub(super) fn io(path: &std::path::Path, source: io::Error) -> WorkbenchError {
     WorkbenchError::Io { path: path.into(), source }
 }

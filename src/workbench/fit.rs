@@ -1,4 +1,4 @@
-//! The model with the accepted effects: fitted, stored in the session's folder, saved.
+//! Fits the model with the accepted effects, stores the fits in the session's folder, and saves the amended model.
 
 use std::fs;
 use std::path::Path;
@@ -18,18 +18,18 @@ use greylag_sysid::compare::{HorizonScore, free_run};
 use greylag_sysid::progress::{Progress, part, report};
 use greylag_sysid::weak_form::prepared::Prepared;
 
-/// The file of a fit's errors over the flights that it saw.
+/// File with the free-run errors over the fit flights.
 const ON_FIT: &str = "on_fit.json";
-/// Share of a first fit's time that tuning the prior takes.
+/// Share of the progress of a first fit that the tuning of the prior takes.
 const TUNING: f64 = 0.4;
 
-/// A model fitted with accepted effects, as stored in the session's folder.
+/// A model that was fitted with accepted effects, as stored in the session's folder.
 pub struct Fitted {
     /// The model with the fitted coefficients.
     pub model: GreyBox,
     /// Content of the file `amend.json` of the command `amend`.
     pub story: Value,
-    /// Free-run errors over the flights that the fit saw, `given` and `amended`.
+    /// Free-run errors over the fit flights, of the `given` and of the `amended` model.
     pub on_fit: Value,
 }
 
@@ -69,7 +69,7 @@ struct Task {
 }
 
 impl Bench {
-    /// Computes the missing fits of all accepted effects.
+    /// Computes the missing fits of the accepted effects, in the order of acceptance.
     pub(super) fn fit(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let count = self.lock().session.effects.len();
         for k in 1..=count {
@@ -83,8 +83,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Inputs of the fit of the first `count` effects; `None` if it exists, or fewer effects are
-    /// accepted now.
+    /// Inputs of the fit of the first `count` effects; `None` if the fit exists, or fewer effects are accepted now.
     fn task(&self, count: usize) -> Result<Option<Task>, WorkbenchError> {
         let mut inner = self.lock();
         let Some(effects) = inner.session.effects.get(..count) else { return Ok(None) };
@@ -92,7 +91,7 @@ impl Bench {
         if inner.fits.contains_key(&key) {
             return Ok(None);
         }
-        // an earlier run may have left it there
+        // the fit may be stored from an earlier run
         if let Some(fitted) = Fitted::read(&self.fit_folder(&key)) {
             inner.fits.insert(key, Arc::new(fitted));
             return Ok(None);
@@ -147,7 +146,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Writes the model as amended to `folder`: the same files as `greylag amend`.
+    /// Writes the amended model to `folder`, in the same files as `greylag amend`.
     pub(super) fn save(&self, folder: &Path) -> Result<(), WorkbenchError> {
         let from = {
             let inner = self.lock();
@@ -193,7 +192,7 @@ fn hashed(inner: &Inner, role: Role) -> Vec<Hashed> {
     inner.usable(&[role]).iter().map(of).collect()
 }
 
-/// Writes a fit to `folder` atomically.
+/// Writes a fit to `folder`: first to a temporary folder, which then replaces `folder`.
 fn write(task: &Task, amended: &Amended, folder: &Path) -> Result<(), WorkbenchError> {
     let [logs, hold_out] = &task.logs;
     let slowest = task.model.airframe.envelope.flying_from_mps();

@@ -1,4 +1,4 @@
-//! The session's logs in memory: read, reconstructed, ready to be compared.
+//! The session's logs in memory: read, reconstructed and ready for comparison.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,18 +17,18 @@ use greylag_sysid::flight_path::reconstruction::Reconstruction;
 use greylag_sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag_sysid::weak_form::prepared::Prepared;
 
-/// Number of points of the small plot of a flight.
+/// Largest number of points in the small plot of a flight.
 const STRIP: usize = 160;
 
 /// A log in memory.
 pub struct Loaded {
-    /// Summary of the log by its reader.
+    /// Summary of the log from its reader.
     pub info: Info,
-    /// Findings about the file, without those that [`Info`] adds.
+    /// Findings in the file, without those that [`Info`] adds.
     pub findings: Vec<Finding>,
-    /// The flight, deflections as recorded.
+    /// The flight with the deflections as recorded.
     pub flight: Reconstruction,
-    /// The flight on the models' clock.
+    /// The flight in the form for free runs and comparisons.
     pub prepared: Prepared,
 }
 
@@ -48,7 +48,10 @@ pub struct Strip {
 }
 
 impl Loaded {
-    /// Reads the log `name` from `bytes`, with the envelope and the mixer of `model`.
+    /// Reads the log `name` with the content `bytes`, with the envelope and the mixer of `model`.
+    ///
+    /// # Errors
+    /// If the content is not a log, its flight path cannot be reconstructed, or its clock cannot be used.
     pub fn parse(
         bytes: &[u8],
         name: &str,
@@ -78,7 +81,10 @@ impl Loaded {
         }))
     }
 
-    /// Reads the log of `entry`, whose relative path is below `folder`.
+    /// Reads the log of `entry`; a relative path is relative to `folder`.
+    ///
+    /// # Errors
+    /// `WorkbenchError::LogChanged` if the content has changed, and the errors of reading and of `parse`.
     pub fn read(
         entry: &LogEntry,
         folder: &Path,
@@ -93,7 +99,7 @@ impl Loaded {
         Loaded::parse(&bytes, &entry.name(), reading, model)
     }
 
-    /// Whether the log has defects that falsify the figures computed from it.
+    /// Whether the log has defects that make results computed from it wrong.
     pub fn in_doubt(&self) -> bool {
         self.info.severity() == Severity::Problem
     }

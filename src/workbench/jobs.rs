@@ -1,4 +1,4 @@
-//! Long tasks in the background: their progress and their cancellation.
+//! Long computations in the background, with progress and cancellation.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,7 +16,7 @@ use greylag_sysid::amend::tune;
 use greylag_sysid::diagnose::{Options, diagnose};
 use greylag_sysid::progress::{FirstLook, Progress, Stage, part};
 
-/// Field of a stored diagnosis that lists the effects from files which the diagnosis has tried.
+/// Field of a stored diagnosis with the effect files that the diagnosis included.
 pub(super) const TRIED: &str = "tried";
 
 /// Kind of a job.
@@ -40,20 +40,20 @@ pub struct Job {
     pub id: u64,
     /// Kind of result that the job computes.
     pub work: Work,
-    /// Key of the job's inputs: a second job with the same key is not started.
+    /// Key of the job's inputs; no second job with the same key is started.
     #[serde(skip)]
     pub key: String,
     /// Current stage of the job.
     pub doing: String,
-    /// Share done, 0 to 1.
+    /// Fraction of the work done, 0 to 1.
     pub fraction: f64,
-    /// Candidates as ranked so far.
+    /// Present ranking of the candidates.
     pub ranking: Vec<FirstLook>,
     #[serde(skip)]
     pub(super) stop: Stop,
 }
 
-/// Cancels a job at its next stage.
+/// Cancels a job or a flight; the computation stops at its next stage.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -63,7 +63,7 @@ impl Stop {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// `Break` once the job has been cancelled.
+    /// `Break` after the cancellation, otherwise `Continue`.
     pub fn answer(&self) -> ControlFlow<()> {
         match self.0.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
@@ -72,7 +72,7 @@ impl Stop {
     }
 }
 
-/// Events for the pages that are connected.
+/// Events for the connected pages.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
@@ -81,12 +81,12 @@ pub enum Event {
         /// The job in its present state.
         job: Job,
     },
-    /// A flight has new samples.
+    /// A flight has new points.
     Flight {
-        /// New part of the flight.
+        /// The new part of the flight.
         part: Part,
     },
-    /// The session or its results have changed: read the state again.
+    /// The session or its results have changed; a page has to read the state again.
     Changed {
         /// Present revision of the session.
         revision: u64,
@@ -94,7 +94,7 @@ pub enum Event {
 }
 
 impl Inner {
-    /// Removes the jobs of a kind from the list; each stops computing at its next stage.
+    /// Removes the jobs of a kind from the list; each of them stops at its next stage.
     pub(super) fn supersede(&mut self, work: Work) {
         self.jobs.iter().filter(|job| job.work == work).for_each(|job| job.stop.stop());
         self.jobs.retain(|job| job.work != work);
@@ -107,7 +107,7 @@ impl Inner {
     }
 }
 
-/// Outcome of a job; a panic becomes an error, so that the job does not appear to run for ever.
+/// Outcome of a job. A panic becomes an error, because otherwise the job would appear to run forever.
 fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), WorkbenchError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let said = panic.downcast_ref::<&str>().map(ToString::to_string);
@@ -117,12 +117,12 @@ fn outcome(work: impl FnOnce() -> Result<(), WorkbenchError>) -> Result<(), Work
 }
 
 impl Bench {
-    /// Announces that results have changed; the session has not.
+    /// Announces a change of results without a change of the session.
     pub(super) fn changed(&self) {
         (self.on_event)(Event::Changed { revision: self.revision() });
     }
 
-    /// Starts a job, unless a job with the same key is running or all its fits exist.
+    /// Starts a job, unless a job with the same key runs or, for a fit, all fits exist.
     pub(super) fn start(self: &Arc<Self>, work: Work) {
         let (id, stop) = {
             let mut inner = self.lock();
@@ -156,7 +156,7 @@ impl Bench {
         std::thread::spawn(move || bench.work(id, work, &stop));
     }
 
-    /// Removes the job `id` from the list; it stops computing at its next stage.
+    /// Removes the job `id` from the list; the job stops at its next stage.
     pub(super) fn cancel(&self, id: u64) {
         let mut inner = self.lock();
         inner.jobs.iter().filter(|job| job.id == id).for_each(|job| job.stop.stop());
@@ -201,7 +201,7 @@ impl Bench {
         (self.on_event)(Event::Progress { job });
     }
 
-    /// Diagnoses the given model over the flights to fit to, then tunes the prior for later fits.
+    /// Diagnoses the given model over the fit flights, then tunes its coefficients for later fits.
     fn diagnose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let ([key, tuned_key], model, flights, divided, with, tried) = {
             let inner = self.lock();
@@ -223,7 +223,7 @@ impl Bench {
         self.lock().diagnosis = Some((key, Arc::new(value)));
         self.changed();
         let there = self.lock().tuned.as_ref().is_some_and(|(of, _)| *of == tuned_key);
-        // errors of dividing and tuning are reported when an effect is accepted
+        // errors of the division of flights and of the tuning are reported when the user accepts an effect
         if let (false, Ok(Divided { fit, .. })) = (there, divided)
             && let Ok(tuned) = tune(&model, &fit, &part(progress, [0.95, 1.0]))
         {
@@ -234,7 +234,7 @@ impl Bench {
 }
 
 impl Work {
-    /// Prefix of the keys of its results.
+    /// Prefix of the keys of this kind of result.
     pub(super) fn word(self) -> &'static str {
         match self {
             Work::Diagnosis => "diagnosis",

@@ -1,5 +1,4 @@
-//! Keys of results. A key holds a hash over all inputs of a result, so that the result is valid while they are
-//! unchanged.
+//! Keys of results. A key contains a hash of all inputs of a result, so a stored result is valid as long as its key is unchanged.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -10,9 +9,9 @@ use greylag_physics::formula::register;
 use greylag_sysid::amend::document::sha256;
 
 impl Inner {
-    /// Key of a result's inputs: model, options for reading logs, flights by role, effects.
+    /// Key of a result `what` from its inputs: model, options for reading logs, flights by role, effects.
     pub fn key(&self, what: &str, effects: &[Accepted]) -> String {
-        // a result contains the names of its flights and uses only flights that can be read
+        // flight names are included because results contain them; logs that cannot be read are not used
         let logs = |role: Role| -> String {
             let places = self.usable(&[role]);
             let named = places.iter().zip(self.names(&places));
@@ -27,20 +26,20 @@ impl Inner {
             &self.mapping.text,
             &format!("{:?}", self.given.tolerance),
             &logs(Role::Fit),
-            // a diagnosis does not look at flights held out
+            // a diagnosis does not use hold-out flights
             &if what == "diagnosis" { String::new() } else { logs(Role::HoldOut) },
             &effects.join("+"),
         ];
         format!("{what}-{}", &sha256(all.join("|").as_bytes())[..16])
     }
 
-    /// Whether a file of the model has changed since it was read.
+    /// Whether a file of the model has changed, or cannot be read, since the session read it.
     pub fn model_changed(&self) -> bool {
         fingerprint(&self.session.model).map_or(true, |now| now != self.session.model_sha256)
     }
 }
 
-/// SHA-256 over all files that make the model at `path`: itself, its airframe, its residual, its own effects.
+/// SHA-256 of all files of the model at `path`: the model file, its airframe, its residual and its effect files.
 pub fn fingerprint(path: &Path) -> io::Result<String> {
     let text = fs::read_to_string(path)?;
     let table: toml::Table = toml::from_str(&text).unwrap_or_default();
@@ -56,7 +55,7 @@ pub fn fingerprint(path: &Path) -> io::Result<String> {
     Ok(sha256(all.as_bytes()))
 }
 
-/// The file, or every `.toml` of the folder, at `path`.
+/// The file at `path`, or all `.toml` files if `path` is a folder.
 fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.into()]);

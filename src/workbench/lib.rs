@@ -1,8 +1,7 @@
-//! The workbench: flights, a model's errors, its missing effects and the amended model, in one session.
+//! The workbench: flights, errors of a model, its missing effects and the amended model, in one session.
 //!
-//! [`Bench`] is the session with its results; it does not use the network. [`server`] serves it to a browser on this
-//! machine. The computations are those of the commands `compare --recorded-clock`, `diagnose` and `amend`, by the same
-//! functions.
+//! [`Bench`] contains the session and its results, and has no network access. [`server`] serves it to a browser on the same
+//! computer. The computations use the functions of the commands `compare --recorded-clock`, `diagnose` and `amend`.
 
 mod act;
 mod bench;

@@ -1,4 +1,4 @@
-//! Effects that are written as text in the session: checked, kept, tried like those of the catalogue.
+//! Effects that the user writes as text: they are checked, stored, and tried like effects of the catalogue.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,12 +23,12 @@ use greylag_sysid::diagnose::{Curve, over_the_best};
 use greylag_sysid::progress::ignore_progress;
 use greylag_sysid::weak_form::prepared::Prepared;
 
-/// The folder of the effect files, below the session's.
+/// Subfolder of the session's folder for effect files.
 pub(super) const EFFECTS: &str = "effects";
 /// An example of an effect file.
 const EXAMPLE: &str = include_str!("../../params/effects/yaw_by_throttle.toml");
 
-/// An effect that was written as text.
+/// An effect that the user has written as text.
 #[derive(Clone, Debug, Serialize)]
 pub struct OwnView {
     id: String,
@@ -38,7 +38,7 @@ pub struct OwnView {
     text: String,
 }
 
-/// Content of an effect file that was checked.
+/// Description of a valid effect file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
     /// Id of the effect.
@@ -47,11 +47,11 @@ pub struct Checked {
     pub description: &'static str,
     /// Formula of the effect.
     pub formula: &'static str,
-    /// Whether a model with it may be flown by a controller.
+    /// Whether a controller may fly a model with this effect.
     pub status: Status,
 }
 
-/// Names that an effect file may use, with a template to start from.
+/// Names that an effect file may contain, and an example.
 pub fn grammar() -> Value {
     let variable = |v: &Variable| json!([v.name(), v.alias(), v.meaning()]);
     let functions = Function::ALL.iter().filter(|f| !f.is_operator());
@@ -60,10 +60,10 @@ pub fn grammar() -> Value {
     json!({ "example": EXAMPLE, "variables": variables, "functions": functions })
 }
 
-/// Parses a text as an effect file, without storing it.
+/// Parses `text` as an effect file, without storing it.
 ///
 /// # Errors
-/// Describes the error, its line and the remedy.
+/// `WorkbenchError::EffectText` with the error, its line and a remedy.
 pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
     let written = file::parse(text).map_err(WorkbenchError::EffectText)?;
     let Description { id, description, formula, .. } = written.about;
@@ -71,7 +71,7 @@ pub fn check(text: &str) -> Result<Checked, WorkbenchError> {
 }
 
 impl Bench {
-    /// Adds an effect that was written as text to the session; it replaces one of the same id.
+    /// Adds an effect that is written as text to the session; it replaces an effect with the same id.
     pub(super) fn write_effect(
         self: &std::sync::Arc<Self>,
         seen: u64,
@@ -81,7 +81,7 @@ impl Bench {
         let path = effect_file(&self.folder, id);
         let mut before = None;
         let kept = self.change(seen, |inner| {
-            // an effect that is in the model keeps the formula with which it was fitted
+            // an effect of the model must keep the formula with which it was fitted
             if inner.model.has(id) {
                 return Err(WorkbenchError::Present(id.into()));
             }
@@ -109,7 +109,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Takes an effect that was written as text out of the session; its file stays.
+    /// Removes an effect that was written as text from the session; its file is kept.
     pub(super) fn forget(&self, seen: u64, id: &str) -> Result<(), WorkbenchError> {
         self.change(seen, |inner| {
             if inner.session.effects.iter().any(|e| e.id == id) {
@@ -121,12 +121,12 @@ impl Bench {
         })
     }
 
-    /// The contribution of the accepted effect `id` in the channel where it is largest, over the variable that shows
-    /// it best, with the residual of the model without the effect. It comes from the fit if that is done, else from
-    /// the estimate. `None` without either, and for an effect that cannot be set to zero.
+    /// Contribution of the accepted effect `id` in the channel in which it is largest, over the variable that shows it best. The
+    /// result also contains the residual of the model without the effect. It is computed from the fit if the fit is complete,
+    /// otherwise from the estimate. `None` if there is neither, or if the effect has no linear coefficients.
     ///
     /// # Errors
-    /// The flights cannot be compared.
+    /// If the flights cannot be compared.
     pub fn curve(&self, id: &str) -> Result<Option<Curve>, WorkbenchError> {
         let (with, flights, relative) = {
             let inner = self.lock();
@@ -147,7 +147,7 @@ impl Bench {
     }
 }
 
-/// Contribution of an effect to a channel, window by window.
+/// Contribution of an effect to a channel in each window, with the residual of the model without the effect.
 struct Made {
     id: ChannelId,
     made: Vec<f64>,
@@ -156,14 +156,14 @@ struct Made {
 }
 
 impl Made {
-    /// Energy of the contribution divided by that of the residual without the effect.
+    /// Energy of the contribution divided by the energy of the residual without the effect.
     fn weight(&self) -> f64 {
         let power = |list: &[f64]| list.iter().map(|x| x * x).sum::<f64>();
         power(&self.made) / power(&self.left).max(f64::MIN_POSITIVE)
     }
 }
 
-/// Contribution of the second model to a channel beyond the first model's; `None` where the channel is not measured.
+/// The second model's prediction minus the first model's in a channel; `None` if the channel is not measured.
 fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -> Option<Made> {
     let mut all = Made { id, made: Vec::new(), left: Vec::new(), regimes: Vec::new() };
     let [without, with] = &comparison.models[..] else { return None };
@@ -186,7 +186,7 @@ fn made(comparison: &compare::Comparison, flights: &[Prepared], id: ChannelId) -
     (!all.made.is_empty()).then_some(all)
 }
 
-/// The model with the effect's linear coefficients set to zero; `None` if it has none.
+/// The model with the linear coefficients of the effect set to zero; `None` if there are none.
 fn zeroed(model: &GreyBox, id: &str) -> Option<GreyBox> {
     let about = catalogue::describe(id)?;
     let linear = about.coefficients.len().checked_sub(about.shape)?;
@@ -199,7 +199,7 @@ fn zeroed(model: &GreyBox, id: &str) -> Option<GreyBox> {
 }
 
 impl Inner {
-    /// Reads the session's effect files, so that their ids are known.
+    /// Loads the session's effect files, which makes their ids available.
     pub(super) fn read_own(&self) -> Result<(), WorkbenchError> {
         for id in &self.session.own {
             register::load(&effect_file(&self.folder, id))?;
@@ -207,13 +207,13 @@ impl Inner {
         Ok(())
     }
 
-    /// Ids and hashes of the session's effect files, which a diagnosis tries now.
+    /// Ids and hashes of the session's effect files, which a new diagnosis would include.
     pub(super) fn tried(&self) -> Value {
         let text = |id: &String| register::find(id).map_or("", |effect| effect.text.as_str());
         self.session.own.iter().map(|id| json!([id, sha256(text(id).as_bytes())])).collect()
     }
 
-    /// The effects that were written as text.
+    /// The effects that the user has written as text.
     pub(super) fn own_views(&self) -> Vec<OwnView> {
         let view = |id: &String| {
             let read = register::find(id);
@@ -228,7 +228,7 @@ impl Inner {
         self.session.own.iter().map(view).collect()
     }
 
-    /// Name of the effect in a command: its file if it belongs to the session, else its id.
+    /// Argument for the effect in a command: the path of its file if the session has one, otherwise its id.
     pub(super) fn effect_word(&self, id: &str) -> PathBuf {
         match self.session.own.iter().any(|own| own == id) {
             true => effect_file(&self.folder, id),
@@ -236,8 +236,7 @@ impl Inner {
         }
     }
 
-    /// Standard deviation of an effect's clearest linear coefficient relative to its value; 0 as long as it is not
-    /// fitted.
+    /// Smallest ratio of standard deviation to value among the coefficients of an effect; 0 before the fit.
     fn relative_sd(&self, id: &str) -> f64 {
         let key = self.key("fit", &self.session.effects);
         let Some(fitted) = self.fits.get(&key) else { return 0.0 };
@@ -248,7 +247,7 @@ impl Inner {
     }
 }
 
-/// The file of the effect `id` of the session in `folder`.
+/// Path of the file for the effect `id`, in the session's folder `folder`.
 fn effect_file(folder: &Path, id: &str) -> PathBuf {
     folder.join(EFFECTS).join(format!("{id}.toml"))
 }

@@ -1,4 +1,4 @@
-//! A formula for what no effect of the catalogue explains, and a schedule that distinguishes two
+//! Search for a formula for the residual that no effect of the catalogue explains, and design of schedules that distinguish two
 //! effects.
 
 use std::fs;
@@ -18,7 +18,7 @@ use greylag_sysid::diagnose::{Options, propose};
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 use greylag_sysid::progress::Progress;
 
-/// A schedule that was made to distinguish two effects.
+/// A schedule that was designed to distinguish two effects.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Designed {
     /// Name of the schedule and of its file.
@@ -29,18 +29,18 @@ pub struct Designed {
     pub manoeuvre: String,
     /// Purpose of the manoeuvre.
     pub description: String,
-    /// Duration of the manoeuvre that suffices, s.
+    /// Sufficient duration of the manoeuvre, s.
     pub seconds: f64,
     /// Number of times that the manoeuvre is flown.
     pub times: usize,
     /// Path of the schedule's file.
     pub file: PathBuf,
-    /// The command that does the same.
+    /// The equivalent command.
     pub command: String,
 }
 
 impl Bench {
-    /// Searches a formula for the unexplained residual of the given model, and stores the result.
+    /// Searches for a formula for the unexplained residual of the given model, and stores the result.
     pub(super) fn propose(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         let (key, model, [search, test], with) = {
             let inner = self.lock();
@@ -64,7 +64,7 @@ impl Bench {
         known.map_or(Value::Null, |(_, value)| value.as_ref().clone())
     }
 
-    /// Starts making a schedule that distinguishes two effects.
+    /// Starts the design of a schedule that distinguishes two effects.
     pub(super) fn start_design(
         self: &Arc<Self>,
         between: [String; 2],
@@ -78,7 +78,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Makes the schedule for the two effects of [`Bench::start_design`].
+    /// Designs the schedule for the two effects of [`Bench::start_design`].
     #[cfg(feature = "sitl")]
     pub(super) fn design(&self, progress: &Progress) -> Result<(), WorkbenchError> {
         use super::error::io;
@@ -127,7 +127,7 @@ impl Bench {
         Ok(())
     }
 
-    /// No schedule without the simulator's instruments.
+    /// Without the simulator, no schedule can be designed.
     #[cfg(not(feature = "sitl"))]
     pub(super) fn design(&self, _: &Progress) -> Result<(), WorkbenchError> {
         Err(WorkbenchError::NoSimulator)
@@ -135,14 +135,14 @@ impl Bench {
 }
 
 impl Inner {
-    /// The flights that a formula is searched in, and those that it is tested on, as in `greylag propose`. If none is
-    /// held out, the last flight to fit to is tested on.
+    /// The flights for the search for a formula, then the flights for its test, as in `greylag propose`. Without a hold-out
+    /// flight, the last fit flight is the test flight.
     pub(super) fn searched(&self) -> Result<[Vec<Reconstruction>; 2], WorkbenchError> {
         let [fit, held] = self.searched_places()?;
         Ok([self.reconstructions(&fit), self.reconstructions(&held)])
     }
 
-    /// Indices of the flights that a formula is searched in, and of those that it is tested on.
+    /// Indices of the flights for the search for a formula, then of the flights for its test.
     pub(super) fn searched_places(&self) -> Result<[Vec<usize>; 2], WorkbenchError> {
         let (mut fit, held) = (self.usable(&[Role::Fit]), self.usable(&[Role::HoldOut]));
         match (&fit[..], &held[..]) {
@@ -156,7 +156,7 @@ impl Inner {
         }
     }
 
-    /// Reads the schedules that were made in this session.
+    /// Reads the schedules that were designed in this session.
     pub(super) fn read_designed(&mut self) {
         let files = fs::read_dir(self.folder.join(SCHEDULES)).into_iter().flatten().flatten();
         let mut paths: Vec<PathBuf> = files.map(|e| e.path()).collect();

@@ -1,5 +1,4 @@
-//! Options for reading the session's logs: those of the command line, with the session's own
-//! mapping if it names none.
+//! Options for reading the session's logs: those of the command line, and the session's mapping if the command line names none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,20 +12,20 @@ use greylag_logs::csv::Tolerance;
 use greylag_logs::mapping::Mapping;
 use greylag_logs::sources::Asked;
 
-/// Options of a command line for reading logs.
+/// Command-line options for reading logs.
 #[derive(Clone, Debug, Default)]
 pub struct Reading {
-    /// Path of the mapping file, if one is named.
+    /// Path of the mapping file; `None` if none is named.
     pub mapping: Option<PathBuf>,
-    /// How many unusable rows a log may have.
+    /// Tolerance for unusable rows in a log.
     pub tolerance: Tolerance,
-    /// Whether logs are used in which wrong units, signs or axes were found.
+    /// Whether logs with wrong units, signs or axes are used nevertheless.
     pub despite_problems: bool,
-    /// Instances to read instead of those that the reader would choose.
+    /// Message instances to read in place of the reader's choice.
     pub sources: Vec<Asked>,
 }
 
-/// The mapping that logs are read by.
+/// The mapping for reading logs.
 #[derive(Clone, Debug, Default)]
 pub struct InUse {
     /// Path of the mapping file; `None` without a mapping.
@@ -44,7 +43,7 @@ impl Reading {
 }
 
 impl Inner {
-    /// Loads the mapping that was named, or else the session's if it has one.
+    /// Loads the mapping of the command line or, without one, the session's mapping if it exists.
     pub fn take_mapping(&mut self) -> Result<(), WorkbenchError> {
         let own = Some(self.folder.join(FILE)).filter(|path| path.exists());
         let Some(file) = self.given.mapping.clone().or(own) else { return Ok(()) };
@@ -52,14 +51,14 @@ impl Inner {
         self.read_by(&file, text)
     }
 
-    /// Reads the logs by the mapping `text`, the present or future content of `file`.
+    /// Uses the mapping `text`, which is or will be the content of `file`, for reading logs.
     pub fn read_by(&mut self, file: &Path, text: String) -> Result<(), WorkbenchError> {
         self.options.mapping = Mapping::parse(&text, file)?;
         self.mapping = InUse { file: Some(file.into()), text };
         Ok(())
     }
 
-    /// The settings of the readers of logs.
+    /// The options in the form of the log readers, without a mapping.
     pub fn options_of(given: &Reading) -> logs::Options {
         let sources = given.sources.clone();
         logs::Options { tolerance: given.tolerance, sources, ..Default::default() }

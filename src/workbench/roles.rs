@@ -1,6 +1,6 @@
-//! Roles of the session's logs, and their names in the commands of this program.
+//! Roles of the session's logs, and the names of flights in commands.
 //!
-//! `Session::usual_role` in `session.rs` chooses the role of a new log.
+//! `Session::usual_role` in `session.rs` selects the role of a new log.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,18 +14,18 @@ use greylag_logs::names;
 use greylag_sysid::amend::split;
 use greylag_sysid::flight_path::reconstruction::Reconstruction;
 
-/// The flights of a fit and those for its validation, with notes on findings in their logs.
+/// The flights for a fit and for its validation, with notes on their logs.
 pub struct Divided {
-    /// Flights that the fit sees.
+    /// Flights to which the model is fitted.
     pub fit: Vec<Reconstruction>,
-    /// Flights that judge it.
+    /// Flights for the validation of the fit.
     pub held_out: Vec<Reconstruction>,
     /// Notes on findings in the logs.
     pub notes: Vec<String>,
 }
 
 impl Inner {
-    /// Adds a log to the session with `role`, or with the default role. It replaces a log with the same path.
+    /// Adds a log to the session with `role`; `None` selects the default role. The log replaces a log with the same path.
     pub fn take_in(&mut self, entry: LogEntry, role: Option<Role>, loaded: Arc<Loaded>) {
         let file = self.folder.join(&entry.path);
         let before = self.session.logs.iter().position(|l| self.folder.join(&l.path) == file);
@@ -34,7 +34,7 @@ impl Inner {
             (None, Some(place)) => self.session.logs[place].role,
             (None, None) => self.session.usual_role(&entry.name()),
         };
-        // a log in doubt gets no role until the user has looked at it
+        // a log in doubt stays unused until the user gives it a role
         let role = if loaded.in_doubt() { Role::Unused } else { usual };
         let entry = LogEntry { role, ..entry };
         match before {
@@ -50,7 +50,7 @@ impl Inner {
         }
     }
 
-    /// Gives a log another role. This opens a test flight that was locked, and the opening is recorded.
+    /// Changes the role of a log. If this opens a locked test flight, the opening is recorded.
     pub fn give_role(&mut self, place: usize, role: Role) -> Result<(), WorkbenchError> {
         let log = self.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
         if role != Role::Test && self.locked(log) && self.flights[place].is_ok() {
@@ -80,7 +80,7 @@ impl Inner {
         log.role == Role::Test && !opened
     }
 
-    /// The file of a log.
+    /// Path of a log.
     pub fn file(&self, place: usize) -> PathBuf {
         self.folder.join(&self.session.logs[place].path)
     }
@@ -90,19 +90,19 @@ impl Inner {
         names(&places.iter().map(|k| self.file(*k)).collect::<Vec<_>>())
     }
 
-    /// The logs of some roles that can be used, in their order.
+    /// Indices of the usable logs with one of `roles`, in order.
     pub fn usable(&self, roles: &[Role]) -> Vec<usize> {
         let logs = self.session.logs.iter().zip(&self.flights).enumerate();
         let usable = logs.filter(|(_, (log, flight))| roles.contains(&log.role) && flight.is_ok());
         usable.map(|(k, _)| k).collect()
     }
 
-    /// The flights that models are compared with.
+    /// Indices of the flights with which the models are compared.
     pub fn seen(&self) -> Vec<usize> {
         self.usable(&[Role::Fit, Role::HoldOut])
     }
 
-    /// The flights at `places` that can be used.
+    /// The usable flights at the indices `places`.
     pub fn reconstructions(&self, places: &[usize]) -> Vec<Reconstruction> {
         let of = |(k, name): (&usize, String)| {
             let flight = self.flights[*k].as_ref().ok()?.flight.clone();
@@ -111,7 +111,7 @@ impl Inner {
         places.iter().zip(self.names(places)).filter_map(of).collect()
     }
 
-    /// The complete flights with the role Fit.
+    /// The flights with the role Fit, each in full length.
     pub fn to_fit(&self) -> Result<Vec<Reconstruction>, WorkbenchError> {
         match self.usable(&[Role::Fit])[..] {
             [] => Err(WorkbenchError::NoRole(Role::Fit)),
@@ -119,7 +119,7 @@ impl Inner {
         }
     }
 
-    /// The flights to fit to and those to judge by, as `greylag amend` divides them, with its notes.
+    /// The flights for a fit and for its validation, divided as in `greylag amend`, with the notes of that command.
     pub fn divided(&self) -> Result<Divided, WorkbenchError> {
         let fit = self.to_fit()?;
         let held = self.usable(&[Role::HoldOut]);
@@ -139,7 +139,7 @@ impl Inner {
         }
     }
 
-    /// Findings in the logs at `places`, as a command prints them.
+    /// Findings in the logs at the indices `places`, as a command prints them.
     fn findings(&self, places: &[usize]) -> Vec<String> {
         let of = |(k, name): (&usize, String)| {
             let all = self.flights[*k].iter().flat_map(|flight| flight.findings.clone());
@@ -149,7 +149,7 @@ impl Inner {
     }
 }
 
-/// Seconds since 1970 (UTC).
+/// Present time, s since 1970 (UTC).
 pub fn now_s() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs())
 }

@@ -1,4 +1,4 @@
-//! Content of a session's file `session.toml`.
+//! Content of the session file `session.toml`.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::error::{WorkbenchError, io};
 use greylag_report as report;
 
-/// The file in the session's folder.
+/// Name of the session file in the session's folder.
 pub const FILE: &str = "session.toml";
 /// Version of the file's schema.
 const SCHEMA: u32 = 1;
@@ -17,13 +17,13 @@ const SCHEMA: u32 = 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// The model is fitted to it.
+    /// The model is fitted to the flight.
     Fit,
-    /// Effects are judged by it; the fit does not see it.
+    /// The flight validates the fit, which does not use it.
     HoldOut,
-    /// Locked until the models are judged by it.
+    /// The flight is locked until the models are scored with it.
     Test,
-    /// Not used by any computation.
+    /// No computation uses the flight.
     Unused,
 }
 
@@ -43,7 +43,7 @@ impl Role {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogEntry {
-    /// Path of the log; a relative one is below the session's folder.
+    /// Path of the log; a relative path is relative to the session's folder.
     pub path: PathBuf,
     /// SHA-256 of its content.
     pub sha256: String,
@@ -52,31 +52,31 @@ pub struct LogEntry {
 }
 
 impl LogEntry {
-    /// Name of the flight: that of its file.
+    /// Name of the flight, which is the name of its file.
     pub fn name(&self) -> String {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 }
 
-/// An effect that was accepted.
+/// An accepted effect.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accepted {
     /// Id of the effect.
     pub id: String,
-    /// Whether it stays though the data refuse it.
+    /// Whether the effect is kept although the data refuse it.
     #[serde(default)]
     pub anyway: bool,
 }
 
-/// Reason why the test flights have been revealed.
+/// Reason why test flights were opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Occasion {
-    /// Models were judged by them.
+    /// The models were scored with them.
     #[default]
     Judged,
-    /// One was given another role.
+    /// A test flight got another role.
     OtherRole,
 }
 
@@ -84,20 +84,20 @@ pub enum Occasion {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Opening {
-    /// When, seconds since 1970 (UTC).
+    /// Time of the opening, s since 1970 (UTC).
     pub unix_s: u64,
-    /// Occasion on which the test flights were opened.
+    /// Reason for the opening.
     #[serde(default)]
     pub occasion: Occasion,
-    /// The effects that were in the model.
+    /// Ids of the effects in the amended model.
     pub effects: Vec<String>,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// SHA-256 of the logs, which identifies them.
+    /// SHA-256 of the logs, by which they are identified.
     #[serde(default)]
     pub sha256: Vec<String>,
-    /// Normalised root mean square error of the model as given at `horizon_s`; NaN if no run gets there, or no model
-    /// was judged.
+    /// Normalised root mean square error of the given model at `horizon_s`; NaN if no run reaches the horizon, or no model was
+    /// scored.
     pub given: f64,
     /// The same error of the amended model.
     pub amended: f64,
@@ -117,51 +117,51 @@ pub enum Outcome {
     Stopped,
     /// The flight could not start, or ended early.
     Failed,
-    /// The workbench ended before it.
+    /// The workbench ended before the flight did.
     CutOff,
 }
 
-/// A flight with the model of the session, or another program's that was watched.
+/// A flight with the session's model, or a recording of another program.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flown {
-    /// When it began, seconds since 1970 (UTC).
+    /// Start of the flight, s since 1970 (UTC).
     pub unix_s: u64,
-    /// The folder of its recording; a relative path is below the session's folder.
+    /// Folder of the recording; a relative path is relative to the session's folder.
     pub folder: PathBuf,
-    /// The model that flew, or that a watched flight was compared with.
+    /// Name of the model of the flight, or of the model with which a recording was compared.
     pub model: String,
-    /// The effects that were accepted.
+    /// Ids of the effects that were accepted at that time.
     pub effects: Vec<String>,
-    /// Schedule that was flown; empty for a watched flight.
+    /// Name of the schedule; empty for a recording of another program.
     #[serde(default)]
     pub schedule: String,
-    /// The command that flies the same; empty for a watched flight.
+    /// The command that repeats the flight; empty for a recording of another program.
     #[serde(default)]
     pub command: String,
     /// Outcome of the flight.
     pub outcome: Outcome,
-    /// Time in the recording, s.
+    /// Duration of the recording, s.
     pub seconds: f64,
     /// Warnings of the models' monitors, each with its time and model.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// Last line of the flying program.
+    /// Last line of output of the flight's program.
     #[serde(default)]
     pub said: String,
 }
 
-/// A session, as its file `session.toml` holds it.
+/// A session, in the form of its file `session.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
-    /// Version of the file's layout: 1.
+    /// Version of the file's schema: 1.
     pub schema: u32,
-    /// Revision number: increases by one with each change.
+    /// Revision, which every change increments by one.
     pub revision: u64,
-    /// The model to start from.
+    /// Path of the given model.
     pub model: PathBuf,
-    /// SHA-256 over its files: with airframe, residual and effects of files.
+    /// SHA-256 of the model's files, including airframe, residual and effect files.
     pub model_sha256: String,
     /// Logs of the session with their roles.
     #[serde(default)]
@@ -169,22 +169,22 @@ pub struct Session {
     /// The accepted effects, in order.
     #[serde(default)]
     pub effects: Vec<Accepted>,
-    /// Effects that were taken back. The last of them is the first to be accepted again.
+    /// Removed effects, of which the last is the first to be accepted again.
     #[serde(default)]
     pub undone: Vec<Accepted>,
     /// Openings of the test flights, in order.
     #[serde(default)]
     pub openings: Vec<Opening>,
-    /// Ids of effects that were written as text, in the folder `effects`.
+    /// Ids of effects that the user has written as text; their files are in the folder `effects`.
     #[serde(default)]
     pub own: Vec<String>,
-    /// Flights of the session, in the order flown.
+    /// Flights of the session, in time order.
     #[serde(default)]
     pub flown: Vec<Flown>,
 }
 
 impl Session {
-    /// A session that begins with the file `model`.
+    /// A new session with the model file `model`.
     pub fn new(model: PathBuf, model_sha256: String) -> Session {
         Session {
             schema: SCHEMA,
@@ -215,14 +215,14 @@ impl Session {
         let session: Session = toml::from_str(&text).map_err(|e| broken(e.to_string()))?;
         match session.schema {
             SCHEMA => Ok(Some(session)),
-            other => Err(broken(format!("its schema is {other}, this program knows {SCHEMA}"))),
+            other => Err(broken(format!("its schema is {other}, this program reads {SCHEMA}"))),
         }
     }
 
     /// Writes the session to `folder` atomically.
     ///
     /// # Errors
-    /// The folder or the disk refuses.
+    /// If the session cannot be represented in TOML, or the file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WorkbenchError> {
         let path = folder.join(FILE);
         let text = toml::to_string(self)
@@ -230,13 +230,13 @@ impl Session {
         Ok(report::write_over(&path, &text)?)
     }
 
-    /// Places of the logs with a role, in order.
+    /// Indices of the logs with a role, in order.
     pub fn with(&self, role: Role) -> impl Iterator<Item = usize> {
         self.logs.iter().enumerate().filter(move |(_, log)| log.role == role).map(|(k, _)| k)
     }
 
-    /// The default role of a new log. A log whose name begins with `test` is a test flight. Of the others the first is
-    /// fitted to, and the one added last is held out, as in `greylag amend`.
+    /// The default role of a new log. A log whose name begins with `test` is a test flight. As in `greylag amend`, the first
+    /// other log is a fit flight, and the last one added is held out.
     pub fn usual_role(&self, name: &str) -> Role {
         let has = |role| self.with(role).next().is_some();
         match name.to_lowercase().starts_with("test") {
@@ -248,16 +248,15 @@ impl Session {
         }
     }
 
-    /// Gives the role Fit to the log that is held out because it was added last, if a log with the role `next`
-    /// replaces it.
+    /// Changes the log that is held out as the last one added to the role Fit, if a log with the role `next` replaces it.
     pub fn make_room(&mut self, next: Role) {
         if let (Role::HoldOut, Some(place)) = (next, self.held_out_last()) {
             self.logs[place].role = Role::Fit;
         }
     }
 
-    /// Index of the log that is held out because it was added last, so that the next log replaces it: the only one
-    /// held out, the last of those to fit to and held out, with no effect accepted.
+    /// Index of the log that is held out as the last one added, which the next log replaces. It is the only hold-out flight and
+    /// the last of the fit and hold-out flights, and no effect is accepted. `None` otherwise.
     pub fn held_out_last(&self) -> Option<usize> {
         let seen = |log: &LogEntry| matches!(log.role, Role::Fit | Role::HoldOut);
         let last = self.logs.iter().rposition(seen)?;
@@ -266,17 +265,17 @@ impl Session {
     }
 }
 
-/// Lock on a session's folder: no other workbench may open it while this value lives.
+/// Lock on a session's folder: no other workbench can open the folder while this value exists.
 pub struct Claim {
-    /// The lock is given up when this is closed.
+    /// Closing the file releases the lock.
     _lock: File,
 }
 
 impl Claim {
-    /// Locks `folder`, which is created if it does not exist.
+    /// Locks `folder`, and creates it if it does not exist.
     ///
     /// # Errors
-    /// If another workbench holds it, or it cannot be created.
+    /// `WorkbenchError::Open` if another workbench has locked the folder, and `WorkbenchError::Io` if it cannot be created.
     pub fn of(folder: &Path) -> Result<Claim, WorkbenchError> {
         fs::create_dir_all(folder.join("logs")).map_err(|e| io(folder, e))?;
         let path = folder.join(".lock");

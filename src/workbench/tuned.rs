@@ -1,4 +1,4 @@
-//! The model with its own coefficients tuned and no effect added: only a missing effect can explain its remaining error.
+//! The tuned model: its coefficients are fitted and no effect is added, so only missing effects can explain its remaining error.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,27 +15,27 @@ use greylag_sysid::amend::Fit;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// The model as in its file.
+    /// The model of the model file.
     Given,
-    /// Its own coefficients fitted, no effect added.
+    /// The model with fitted coefficients and no added effect.
     Tuned,
-    /// With the accepted effects.
+    /// The model with the accepted effects.
     Amended,
 }
 
 impl Bench {
-    /// Keeps a fit of the model's own coefficients, and its values in a file for a later run.
+    /// Stores a fit of the model's coefficients, in memory and in a file for a later run.
     pub(super) fn keep_tuned(&self, key: String, fit: Fit) {
         let values: BTreeMap<&str, f64> =
             fit.parameters.iter().map(|p| (p.name.as_str(), p.value)).collect();
-        // without the file a later run tunes again
+        // if the file cannot be written, a later run tunes again
         let _ = write_over(&self.result_file(&key), json!(values).to_string());
         self.lock().tuned = Some((key, fit));
     }
 }
 
 impl Inner {
-    /// The tuned model of the present flights, if it is known.
+    /// The model tuned to the present flights; `None` before the tuning.
     fn tuned_model(&self) -> Option<GreyBox> {
         let key = self.key("tuned", &[]);
         let mut model = match self.tuned.as_ref().filter(|(of, _)| *of == key) {
@@ -52,7 +52,7 @@ impl Inner {
         Some(model)
     }
 
-    /// The model as given, tuned, and amended; those that are not fitted yet are left out.
+    /// The given, the tuned and the amended model; models that are not fitted yet are left out.
     pub(super) fn ways(&self) -> (Vec<Way>, Vec<GreyBox>) {
         let mut models = self.models();
         let amended = (models.len() > 1).then(|| models.remove(1));

@@ -1,4 +1,4 @@
-//! The session as a page sees it.
+//! Views of the session as JSON for a page.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -24,16 +24,16 @@ use greylag_logs::phases::Phase;
 use greylag_sysid::compare::{self, FlightResult, ModelResult, compare, free_run};
 use greylag_sysid::progress::ignore_progress;
 
-/// Longest free run, s.
+/// Longest duration of a free run, s.
 const LONGEST_S: f64 = 60.0;
 
-/// A flight in the list.
+/// A flight in the list of flights.
 #[derive(Serialize)]
 struct FlightView<'a> {
     name: String,
     path: String,
     role: Role,
-    /// Whether the flight's data are still hidden.
+    /// Whether the flight is a test flight that has not been opened.
     locked: bool,
     error: Option<&'a str>,
     #[serde(flatten)]
@@ -63,16 +63,16 @@ struct StepView {
     id: String,
     description: &'static str,
     anyway: bool,
-    /// `fitted`, `fitting`, `failed` or `unfitted`.
+    /// One of `fitted`, `fitting`, `failed`, `unfitted`.
     status: &'static str,
     error: Option<String>,
-    /// Errors on the flights held out, by equation error alone until the fit is done.
+    /// Errors of the equation-error estimate on the hold-out flights; `None` once the fit is complete.
     estimated: Option<Value>,
     story: Option<Value>,
     on_fit: Option<Value>,
 }
 
-/// Everything but the curves.
+/// The state of the session without curves.
 #[derive(Serialize)]
 struct StateView<'a> {
     schema: &'static str,
@@ -99,28 +99,28 @@ struct StateView<'a> {
 #[derive(Serialize)]
 struct FailingView<'a> {
     flights: Vec<usize>,
-    /// Origin of each of the models.
+    /// Origin of each model.
     ways: Vec<Way>,
     models: &'a [ModelResult],
     notes: &'a [String],
 }
 
-/// Request for a free run.
+/// Request for free runs.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
     /// Index of the flight in the session.
     pub flight: usize,
-    /// Where it starts, s on the log's clock.
+    /// Start of the run, s, on the log's clock.
     pub time_s: f64,
-    /// How long it is, s.
+    /// Duration of the run, s; limited to 0.1 to 60 s.
     pub seconds: f64,
 }
 
-/// A free run of each model.
+/// Free runs of all models from the same state.
 #[derive(Clone, Debug, Serialize)]
 pub struct FreeRun {
-    /// The runs of the models as given, tuned and amended; those that are not fitted yet are left out.
+    /// The runs of the given, the tuned and the amended model; models that are not fitted yet are left out.
     pub runs: Vec<OneRun>,
 }
 
@@ -138,10 +138,10 @@ pub struct OneRun {
 }
 
 impl Bench {
-    /// Everything but the curves, as JSON.
+    /// The state of the session as JSON, without curves.
     ///
     /// # Errors
-    /// A number has no place in JSON.
+    /// If a number cannot be represented in JSON.
     pub fn state(&self) -> Result<Value, WorkbenchError> {
         let inner = self.lock();
         let session = &inner.session;
@@ -181,10 +181,10 @@ impl Bench {
         known.map_or(Value::Null, |(_, value)| value.as_ref().clone())
     }
 
-    /// Errors of the models by channel and regime, on the flights to fit to and held out.
+    /// Errors of the models by channel and regime, over the fit and hold-out flights.
     ///
     /// # Errors
-    /// No flight can be compared.
+    /// If no flight can be compared, or a number cannot be represented in JSON.
     pub fn failing(&self) -> Result<Value, WorkbenchError> {
         let (ways, comparison) = self.comparison()?;
         let inner = self.lock();
@@ -200,10 +200,10 @@ impl Bench {
         Ok(serde_json::to_value(&view)?)
     }
 
-    /// The flight over time, as measured and as predicted by the models.
+    /// One flight over time, as measured and as predicted by the models.
     ///
     /// # Errors
-    /// The flight does not exist, or is still hidden.
+    /// `WorkbenchError::NoFlight` if the flight does not exist, and `WorkbenchError::Locked` if it has not been opened.
     pub fn flight(&self, place: usize) -> Result<FlightData, WorkbenchError> {
         let flight = self.may_be_seen(place)?;
         let missing = WorkbenchError::NoFlight(place);
@@ -226,10 +226,11 @@ impl Bench {
         Ok(data(&flight.prepared, &comparison, k, ways))
     }
 
-    /// Free runs of the models from a moment of a flight.
+    /// Free runs of the models from one time of a flight.
     ///
     /// # Errors
-    /// The flight is still hidden, or the aircraft is not in flight at that time.
+    /// `WorkbenchError::Locked` if the flight has not been opened, and `WorkbenchError::NotFlown` if the aircraft is not in
+    /// flight at that time.
     pub fn free_run(&self, request: RunRequest) -> Result<FreeRun, WorkbenchError> {
         let flight = self.may_be_seen(request.flight)?;
         let (ways, models) = self.lock().ways();
@@ -247,7 +248,7 @@ impl Bench {
         Ok(FreeRun { runs: runs.ok_or(WorkbenchError::NotFlown(request.time_s))? })
     }
 
-    /// A flight whose data are not hidden.
+    /// A flight, unless it is a locked test flight.
     fn may_be_seen(&self, place: usize) -> Result<Arc<Loaded>, WorkbenchError> {
         let inner = self.lock();
         let log = inner.session.logs.get(place).ok_or(WorkbenchError::NoFlight(place))?;
@@ -259,21 +260,21 @@ impl Bench {
     }
 }
 
-/// Whether a result exists, with the error of its job.
+/// Whether a result exists, its key, and the error of its job.
 fn result(inner: &Inner, known: &Option<(String, Arc<Value>)>, work: Work) -> Value {
     let key = inner.key(work.word(), &[]);
     let known = known.as_ref().filter(|(of, _)| *of == key);
     let tried = known.map_or(&Value::Null, |(_, value)| &value[TRIED]);
     json!({
         "there": known.is_some(),
-        // a diagnosis made before the last effect was written does not rank that effect
+        // a diagnosis from before the last effect was written does not rank that effect
         "behind": tried.is_array() && *tried != inner.tried(),
         "error": inner.failures.get(&key),
         "key": key,
     })
 }
 
-/// Why no schedule was made for the last pair of effects.
+/// Error of the schedule design for the last pair of effects; `None` without an error.
 fn design_failure(inner: &Inner) -> Option<&String> {
     let pair = inner.between.as_ref()?.join("-");
     inner.failures.get(&(inner.key(Work::Schedule.word(), &[]) + &pair))
@@ -327,7 +328,7 @@ fn about(flight: &Loaded, locked: bool) -> About<'_> {
     }
 }
 
-/// The accepted effect number `count`, counted from one.
+/// The accepted effect with the number `count`, from 1.
 fn step(inner: &Inner, count: usize) -> StepView {
     let effects = &inner.session.effects[..count];
     let effect = &effects[count - 1];

@@ -49,7 +49,7 @@ fn what_new_makes_needs_no_mending_and_check_says_the_same() {
         assert_eq!(made.status.code(), checked.status.code(), "{name}: {said}");
         // its own defaults are no fault
         assert_eq!(made.status.code(), Some(0), "{name}: {said}{}", text(&made.stderr));
-        assert!(!said.contains("mend:"), "{name}: {said}");
+        assert!(!said.contains("correct:"), "{name}: {said}");
         let found = json(&found);
         let levels = found["levels"].as_array().unwrap();
         assert!(levels.len() > 3);
@@ -60,7 +60,7 @@ fn what_new_makes_needs_no_mending_and_check_says_the_same() {
             assert!(level["path"].as_f64().unwrap().abs() < 0.01, "{name}: {level}");
         }
         let html = fs::read_to_string(&page).unwrap();
-        for part in ["<svg role=\"img\"", "Straight flight", "Modes", "What the stick does"] {
+        for part in ["<svg role=\"img\"", "Straight flight", "Modes", "Control response"] {
             assert!(html.contains(part), "{name}: the page lacks {part}");
         }
     }

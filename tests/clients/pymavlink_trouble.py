@@ -254,7 +254,7 @@ def killed_and_started(client, flown):
     client.run(1.0)
     client.mark()
     flown.start_shim()
-    client.until_text("vehicle clock went back", 10.0)
+    client.until_text("vehicle clock jumped back", 10.0)
     check_active(client)
     client.engage(*TARGET)
     client.until_attitude(*TARGET, hold=0.5)

@@ -77,7 +77,7 @@ fn a_mystery_is_made_kept_and_opened() {
         assert!(told.contains(words), "{told}");
     }
     fs::write(out.join("diagnosis.json"), "{").unwrap();
-    refuses(&["mystery", "--open", dir], &["diagnosis.json", "no diagnosis"]);
+    refuses(&["mystery", "--open", dir], &["diagnosis.json", "not a diagnosis"]);
     fs::write(out.join("answer.sealed"), "00ff").unwrap();
     refuses(&["mystery", "--open", dir], &["answer.sealed", "holds no answer"]);
 }

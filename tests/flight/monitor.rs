@@ -69,7 +69,7 @@ impl Flight {
                 })
                 .unwrap();
         }
-        said.retain(|(_, words)| words.contains("the model's"));
+        said.retain(|(_, words)| words.contains("deviates from the model"));
         said
     }
 }

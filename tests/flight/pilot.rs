@@ -598,7 +598,7 @@ fn a_vehicle_that_starts_again_is_flown_in_hold() {
     flight.now = Time::from_micros(0);
     let decision = flight.tick();
     assert_eq!((decision.mode, decision.armed), (Mode::Hold, true));
-    assert!(flight.texts().contains("clock went back"));
+    assert!(flight.texts().contains("clock jumped back"));
 }
 
 /// A 64-bit congruential generator, so that the storm is the same on every machine.
@@ -939,7 +939,7 @@ fn a_planner_is_shown_the_last_two_commands_in_force() {
 
 #[test]
 fn a_clock_that_falls_back_by_more_than_a_second_is_a_new_start() {
-    let said = "clock went back";
+    let said = "clock jumped back";
     for (back_us, restarted) in [(20_000, false), (1_000_000, false), (1_000_001, true)] {
         // The clock of the frames alone.
         let mut flight = Flight::armed();

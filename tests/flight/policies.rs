@@ -137,7 +137,9 @@ fn parameters_of_the_flight_controller_are_set_and_looked_at() {
     let rules = policies(&factory.envelope());
     let refused = |scenario| distances(&factory, &rules, &scenario).unwrap_err().to_string();
     assert!(refused(with(Counterpart::Px4, "NONE", 1.0)).contains("has no parameter NONE"));
-    assert!(refused(with(Counterpart::Sitl, "X", 1.0)).contains("no flight controller is played"));
+    assert!(
+        refused(with(Counterpart::Sitl, "X", 1.0)).contains("no flight controller is simulated")
+    );
 }
 
 #[test]
@@ -157,7 +159,7 @@ fn rules_go_with_the_parameters_and_a_parameter_that_is_refused_is_named() {
         "{said}"
     );
     assert!(refused(with("GL_NONE", 1.0)).contains("no such parameter"));
-    assert!(refused(with("SYSID_THISMAV", 2.0)).contains("no real number"));
+    assert!(refused(with("SYSID_THISMAV", 2.0)).contains("not a real number"));
 }
 
 /// Rolls as far as it goes, and swings its elevator.

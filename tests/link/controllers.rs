@@ -746,8 +746,8 @@ fn each_fault_is_said_with_the_remedy_of_its_stack() {
             Stack::Px4,
             "pitches up when the elevator is commanded down",
         ),
-        (Fault::Unanswered(Axis::Roll), Stack::Px4, "does not answer to the aileron"),
-        (Fault::Unanswered(Axis::Pitch), Stack::Px4, "does not answer to the elevator"),
+        (Fault::Unanswered(Axis::Roll), Stack::Px4, "no response to the aileron"),
+        (Fault::Unanswered(Axis::Pitch), Stack::Px4, "no response to the elevator"),
         (Fault::Oscillation(Axis::Roll), Stack::Px4, "oscillates in roll, the aileron"),
         (Fault::Oscillation(Axis::Pitch), Stack::Px4, "oscillates in pitch, the elevator"),
         (Fault::Oscillation(Axis::Pitch), Stack::Ardupilot, "raise SCHED_LOOP_RATE"),
@@ -855,7 +855,7 @@ fn what_the_gyros_filter_and_the_loop_leave_of_the_delay_is_judged_by_surfaces()
         played.parameter("SCHED_LOOP_RATE", rate);
         let words = played.real.delay_words().unwrap();
         assert!(words.contains(&format!("INS_GYRO_FILTER {filter}")), "{words}");
-        assert!(words.contains("of the 46 ms at which its loop swings by itself"), "{words}");
+        assert!(words.contains("of the 46 ms at which the loop oscillates"), "{words}");
         let obstacle = played.real.delay_obstacle();
         assert_eq!(obstacle.is_some(), refused, "{filter} Hz, {rate} Hz: {obstacle:?}");
         if refused {
@@ -864,7 +864,7 @@ fn what_the_gyros_filter_and_the_loop_leave_of_the_delay_is_judged_by_surfaces()
         }
         played.engage();
         let said = played.notices.iter().any(|notice| {
-            matches!(notice, Notice::Text(_, words) if words.starts_with("little delay is left"))
+            matches!(notice, Notice::Text(_, words) if words.starts_with("small delay margin"))
         });
         assert_eq!(said, warned, "{filter} Hz, {rate} Hz: {:?}", played.notices);
     }
@@ -898,7 +898,7 @@ fn a_stall_of_this_computer_is_no_silence_of_the_controller() {
             .collect();
         match kept {
             true => assert_eq!(released, [""; 0], "{ms} ms"),
-            false => assert_eq!(released, ["this computer was late by 0.6 s"], "{ms} ms"),
+            false => assert_eq!(released, ["this computer stalled for 0.6 s"], "{ms} ms"),
         }
     }
 }

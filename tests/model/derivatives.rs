@@ -134,8 +134,8 @@ fn at_no_incidence_the_derivatives_are_the_coefficients() {
     }
     assert!(read.warnings.is_empty(), "{:?}", read.warnings);
     let said = read.notes.join("\n");
-    assert!(said.contains("aileron of the file is turned round"), "{said}");
-    assert!(said.contains("rudder of the file is turned round"), "{said}");
+    assert!(said.contains("aileron of the file is reversed in sign"), "{said}");
+    assert!(said.contains("rudder of the file is reversed in sign"), "{said}");
     assert!(
         said.contains("the control flap is left out") && !said.contains("elevator of"),
         "{said}"
@@ -230,7 +230,7 @@ fn aerosandboxs_buildup_is_read_with_its_controls() {
         assert!((0.4..4.0).contains(&ratio), "{name}: {ratio}");
     }
     // an aileron of AeroSandbox rolls left, its rudder yaws right
-    assert!(read.notes.iter().any(|n| n.contains("aileron of the file is turned round")));
+    assert!(read.notes.iter().any(|n| n.contains("aileron of the file is reversed in sign")));
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn what_a_method_does_not_compute_is_named_and_not_taken() {
     assert!(value(&textbook, "pitch_linear.Cmde") < -0.3, "the textbook's elevator stands in");
     let line = read(&computed("trainer-liftingline"), &beside()).unwrap();
     let said = line.warnings.join("\n");
-    for part in ["Clp = -0.00", "beside CLalpha", "Cmq = ", "does not see rotation"] {
+    for part in ["Clp = -0.00", "with CLalpha", "Cmq = ", "does not model rotation"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     assert!(value(&model(&line), "roll_linear.Clp") < -0.2);

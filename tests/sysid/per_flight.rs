@@ -88,7 +88,7 @@ fn a_board_that_stands_askew_in_one_flight_is_found_there_and_not_in_the_other()
     for (m, asked) in unasked.iter().zip(&angles) {
         assert!((m.value - asked.value).abs() < asked.sd, "{} {}", m.flight, m.name);
     }
-    assert!(without.sentences[0].contains("axes stand askew, roll"), "{:?}", without.sentences);
+    assert!(without.sentences[0].contains("axes are misaligned, roll"), "{:?}", without.sentences);
     for (k, m) in angles.iter().enumerate() {
         println!("{} {} {:.3} ± {:.3}", m.flight, m.name, m.value.to_degrees(), m.sd.to_degrees());
         let truth = if k < 3 { turned[k].to_radians() } else { 0.0 };
@@ -96,7 +96,7 @@ fn a_board_that_stands_askew_in_one_flight_is_found_there_and_not_in_the_other()
     }
     let clear: Vec<bool> = angles.iter().map(|m| m.asserted).collect();
     assert_eq!(clear, [true, false, true, false, false, false]);
-    assert!(found.sentences.iter().any(|s| s.contains("axes stand askew, roll")));
+    assert!(found.sentences.iter().any(|s| s.contains("axes are misaligned, roll")));
 }
 
 #[test]

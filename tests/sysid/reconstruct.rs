@@ -148,7 +148,7 @@ fn sensors_of_the_air_that_meet_no_other_sensor_are_believed() {
     let errors = state_errors(&flown, &found);
     println!("{errors:?}");
     assert!(errors[2][1] < 0.1 && errors[6][1] < 0.003 && errors[7][1] < 0.003, "{errors:?}");
-    assert_eq!(found.notes.iter().filter(|n| n.contains("cannot tell")).count(), 1);
+    assert_eq!(found.notes.iter().filter(|n| n.contains("do not determine")).count(), 1);
 }
 
 #[test]

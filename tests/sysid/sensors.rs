@@ -103,7 +103,7 @@ fn a_held_constant_stays_and_one_that_the_data_moves_is_noted() {
     let usual = with("");
     let scale = of(&usual, "airspeed_scale");
     assert!((scale.moved() - 0.3).abs() < 0.1, "{scale:?}");
-    assert!(usual.notes.iter().all(|n| !n.contains("what was known of it beforehand")));
+    assert!(usual.notes.iter().all(|n| !n.contains("from the prior mean")));
     let sure = with("airspeed_scale = { value = 1.0, sd = 0.01 }");
     assert!(of(&sure, "airspeed_scale").moved() > 3.0);
     assert!(

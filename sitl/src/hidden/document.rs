@@ -1,4 +1,4 @@
-//! The XML of an aircraft while hidden effects are written into it.
+//! Edits the XML of an aircraft to write hidden effects into it.
 
 use super::expression::{product, property, sum, value};
 use super::{FilterKind, HiddenError};
@@ -57,7 +57,7 @@ impl Surface {
     }
 }
 
-/// An aircraft's document, and what is still to be written into it.
+/// An aircraft's XML document and the edits that `finish` still has to write.
 pub(super) struct Document<'a> {
     xml: String,
     properties: &'a Properties,
@@ -116,7 +116,7 @@ impl<'a> Document<'a> {
         self.xml.contains(text)
     }
 
-    /// Adds the force ½ρV²S · `amplitude` · `terms`.
+    /// Adds the force ½ρV²S · `amplitude` · `terms`, lbf.
     pub(super) fn force(
         &mut self,
         axis: Axis,
@@ -130,7 +130,7 @@ impl<'a> Document<'a> {
         self.function(axis, name, &product(&all))
     }
 
-    /// Adds the moment ½ρV²S · length · `amplitude` · `terms`.
+    /// Adds the moment ½ρV²S · reference length · `amplitude` · `terms`, lbf ft.
     pub(super) fn moment(
         &mut self,
         axis: Axis,
@@ -151,7 +151,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// Passes both deflections through a flight-control component before they act.
+    /// Passes both deflections through a further flight-control component before they act.
     pub(super) fn pass_deflections(&mut self, component: &str, settings: &str) {
         for surface in SURFACES {
             let (input, name) = (
@@ -165,7 +165,7 @@ impl<'a> Document<'a> {
         self.passed += 1;
     }
 
-    /// Adds a filter of `input` (an expression), its output being the property `output`.
+    /// Adds a filter of the expression `input` with the output property `output`; `time_s` is its time constant or delay, s.
     pub(super) fn filter(
         &mut self,
         output: &str,
@@ -177,7 +177,7 @@ impl<'a> Document<'a> {
             "<fcs_function name=\"{output}-input\"><function>{input}</function></fcs_function>\n"
         );
         let (component, settings) = match kind {
-            // without a lag, a gain of one
+            // a lag without a time constant is a unit gain
             FilterKind::Lag if time_s <= 0.0 => ("pure_gain", "<gain>1</gain>".to_owned()),
             FilterKind::Lag => ("lag_filter", format!("<c1>{}</c1>", 1.0 / time_s)),
             FilterKind::Delay => ("actuator", self.delay(time_s)?),
@@ -188,17 +188,17 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// The settings of an actuator that delays by `time_s`, a whole number of steps.
+    /// Settings of an actuator that delays by `time_s`, s, which must be a whole number of steps.
     pub(super) fn delay(&self, time_s: f64) -> Result<String, HiddenError> {
         let frames = (time_s / self.step_s).round();
         if frames < 1.0 || (time_s - frames * self.step_s).abs() > 1e-9 {
             return Err(HiddenError::Delay { amplitude: time_s, step_s: self.step_s });
         }
-        // JSBSim's actuator delays by one frame less than is asked.
+        // JSBSim's actuator delays by one frame less than its setting.
         Ok(format!("<delay type=\"frames\">{}</delay>", frames + 1.0))
     }
 
-    /// The property of a deflection behind `passed` components.
+    /// Property of the deflection of `surface` after the first `passed` components.
     fn passed_name(&self, surface: Surface, passed: usize) -> String {
         match passed {
             0 => self.position(surface).to_owned(),
@@ -221,7 +221,7 @@ impl<'a> Document<'a> {
         self.thrust.push(expression);
     }
 
-    /// Lets the thrust act through a first-order lag of `constant`, s.
+    /// Lets the thrust act through a first-order lag with the time constant `constant`, s.
     pub(super) fn lag_thrust(&mut self, constant: f64) {
         let thrust = property("propulsion/engine/thrust-lbs");
         // flight controls are evaluated before the engines: both components hold the value of the previous frame
@@ -242,7 +242,7 @@ impl<'a> Document<'a> {
         self.add_thrust(product(&[value(-1.0), thrust]));
     }
 
-    /// Lets the whole thrust act `arm_ft` below the centre of gravity.
+    /// Lets the whole thrust act `arm_ft`, ft, below the centre of gravity.
     pub(super) fn offset_thrust(&mut self, arm_ft: f64) {
         self.thrust_offset_ft = Some(arm_ft);
     }
@@ -262,7 +262,7 @@ impl<'a> Document<'a> {
         self.change_after(tag, "x", |x, _| x + aft * per_metre)
     }
 
-    /// Replaces the number in the first element `name`, given the number and the opening tag.
+    /// Replaces the number in the first element `name` by the result of `new`, which gets that number and the opening tag.
     pub(super) fn change(&mut self, name: &str, new: impl Fn(f64, &str) -> f64) -> Done {
         self.change_after(0, name, new)
     }
@@ -278,7 +278,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// Where the tag `<name` begins.
+    /// Byte offset of the first tag `<name` at or after `from`.
     fn find_tag(&self, from: usize, name: &str) -> Option<usize> {
         let tag = format!("<{name}");
         self.xml[from..]
@@ -287,7 +287,7 @@ impl<'a> Document<'a> {
             .find(|at| self.xml[at + tag.len()..].starts_with([' ', '>', '\t', '\n', '\r']))
     }
 
-    /// The inside of an aerodynamic axis.
+    /// Byte range of an aerodynamic axis without its end tag.
     fn axis(&self, axis: Axis) -> Result<std::ops::Range<usize>, HiddenError> {
         let name = format!("<axis name=\"{}\"", axis.name());
         let place = || HiddenError::Place { place: format!("{name}>") };
@@ -296,7 +296,7 @@ impl<'a> Document<'a> {
         Ok(start..start + length)
     }
 
-    /// The document with everything written into it.
+    /// Writes the pending edits and returns the document.
     pub(super) fn finish(mut self) -> Result<String, HiddenError> {
         self.write_thrust()?;
         if !self.components.is_empty() {
@@ -328,7 +328,7 @@ impl<'a> Document<'a> {
         self.function(Axis::Pitch, "thrust-line-offset", &product(&[value(arm), sum(&whole)]))
     }
 
-    /// Makes the aerodynamics read the deflection after the effects.
+    /// Makes the aerodynamics read the deflection of `surface` after all effects.
     fn write_deflection(&mut self, surface: Surface) -> Done {
         let mut name = self.passed_name(surface, self.passed);
         let mut functions = String::new();
@@ -355,7 +355,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// Where the inside of `<aerodynamics>` begins and ends.
+    /// Byte offsets at which the content of `<aerodynamics>` begins and ends.
     fn aerodynamics(&self) -> Result<(usize, usize), HiddenError> {
         let place = || HiddenError::Place { place: "<aerodynamics>".to_owned() };
         let tag = self.find_tag(0, "aerodynamics").ok_or_else(place)?;
@@ -389,5 +389,4 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The result of an edit.
 type Done = Result<(), HiddenError>;

@@ -13,16 +13,16 @@ const V0_MPS: f64 = 16.67;
 const THROTTLE0: f64 = 0.118;
 /// Newton metres per lbf ft, which is also kg m² per slug ft².
 const LBF_FT: f64 = LBF * FT;
-/// Bound of coefficients: a larger amplitude is taken for a typing error.
+/// Bound of the magnitude of coefficients: a larger amplitude is refused as a probable typing error.
 const ANY: f64 = 1e3;
-/// Bound of amplitudes that scale with the size of the aircraft (N, N m, N m s, kg m²).
+/// Bound of the magnitude of amplitudes that scale with the size of the aircraft (N, N m, N m s, kg m²).
 const LARGE: f64 = 1e7;
 
-/// Every effect that can be hidden.
+/// The catalogue of hidden effects.
 pub static EFFECTS: [Effect; 25] = [
     Effect {
         id: "drag_alpha2",
-        formula: "drag Q a α², beside the drag table",
+        formula: "drag Q a α², in addition to the drag table",
         unit: "",
         bounds: (-ANY, ANY),
         write: |d, a| d.force(Axis::Drag, "drag-alpha2", a, &[alpha(), alpha()]),
@@ -221,7 +221,7 @@ pub static EFFECTS: [Effect; 25] = [
         unit: "kg m²",
         bounds: (-LARGE, LARGE),
         write: |d, a| {
-            // JSBSim's ixz is −Jxz, unless the element turns its sign rule off.
+            // JSBSim's ixz is −Jxz, unless the document sets negated_crossproduct_inertia to false.
             let sign = if d.has("negated_crossproduct_inertia=\"false\"") { 1.0 } else { -1.0 };
             let in_unit = |unit: &str| if unit.contains("SLUG") { a / LBF_FT } else { a };
             d.change("ixz", |ixz, unit| ixz + sign * in_unit(unit))

@@ -1,4 +1,4 @@
-//! Expressions of JSBSim's functions, as XML.
+//! Builds expressions of JSBSim's functions as XML text.
 
 /// A reference to the JSBSim property `name`: `<property>name</property>`.
 pub(super) fn property(name: &str) -> String {

@@ -1,10 +1,12 @@
 //! Finds which property of an aircraft commands which surface by trying all candidates.
 //!
-//! Candidates are the properties that the aircraft's systems read and do not write. Each is set to full command, with both signs
-//! where its domain has both (a negative flap command may give NaN), while the aircraft is held in its state, until lags, delays
-//! and hysteresis have settled. The aileron is the command, or the pair of a left and a right command, that rolls the aircraft
-//! most with the least pitching and yawing; usual names score higher. Elevator and rudder are found likewise. The position of a
-//! surface is a property that the aerodynamics read and that the command moves.
+//! Candidates are the properties that the aircraft's systems read and do not write. The aircraft is held in its state while a
+//! candidate is set to full command, until lags, delays and hysteresis have settled. Both signs are tried if both give finite
+//! values (a negative flap command may give NaN).
+//!
+//! The aileron is the command, or the pair of a left and a right command, that rolls the aircraft most with the least pitching
+//! and yawing moment. Usual names score higher. Elevator and rudder are selected by pitching and yawing moment in the same way.
+//! The position of a surface is a property that the aerodynamics read and that the command moves.
 
 mod document;
 mod roles;
@@ -20,17 +22,17 @@ use crate::aircraft;
 use document::Names;
 use roles::{Tried, choose};
 
-/// Most frames in which the surfaces may come to rest after a command: 20 s in frames of 10 ms.
+/// Longest time for surfaces to come to rest after a command, in frames: 20 s in frames of 10 ms.
 const FRAMES: usize = 2000;
-/// Frames without movement after which the surfaces count as at rest: longer than any delay of an actuator.
+/// Frames without movement after which the surfaces count as at rest; no actuator delay may be longer.
 const AT_REST: usize = 60;
-/// Relative movement below which a surface counts as still.
+/// Movement per frame, relative to the largest so far (at least to 1), below which a surface counts as at rest.
 const STILL: f64 = 1e-9;
-/// Airspeed at which commands are tried, ft/s: any speed with a dynamic pressure will do.
+/// Airspeed at which commands are tried, ft/s. Its only purpose is a nonzero dynamic pressure.
 const AIRSPEED_FPS: f64 = 150.0;
 /// Aerodynamic moments, body axes, lbf ft.
 const MOMENTS: [&str; 3] = ["moments/l-aero-lbsft", "moments/m-aero-lbsft", "moments/n-aero-lbsft"];
-/// Reference lengths that make moments comparable.
+/// Properties of the reference lengths, ft, by which moments are divided to make them comparable.
 const LENGTHS: [&str; 3] = ["metrics/bw-ft", "metrics/cbarw-ft", "metrics/bw-ft"];
 
 /// Result of the discovery of an aircraft's properties.
@@ -43,7 +45,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// The properties that are not the usual ones, as `--property` takes them.
+    /// The properties that differ from the defaults, written as arguments of `--property`.
     pub fn arguments(&self) -> Vec<String> {
         let (mut own, mut usual) = (self.properties.clone(), Properties::default());
         let named = |key: &&str| {
@@ -55,10 +57,10 @@ impl Found {
     }
 }
 
-/// Finds the commands and surfaces of the aircraft of `options`; `Err` names the axis that no command moves.
+/// Finds the commands and surfaces of the aircraft of `options`.
 ///
 /// # Errors
-/// If the aircraft cannot be loaded, or no command rolls or pitches it.
+/// If the aircraft cannot be loaded or simulated, or no command rolls or pitches it; the error then names that axis.
 pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
     let names =
         Names::read(options.aircraft_dir.as_deref().unwrap_or(Path::new("")), &options.aircraft);
@@ -78,7 +80,7 @@ pub fn discover(options: &PlantOptions) -> Result<Found, PlantError> {
     })
 }
 
-/// A loaded aircraft that is held at rest in the air.
+/// A loaded aircraft that is held in a constant state in the air.
 struct Bench {
     fdm: Fdm,
     start: Snapshot,
@@ -87,7 +89,7 @@ struct Bench {
     lengths: [f64; 3],
 }
 
-/// Moments divided by their reference lengths, lbf, and positions.
+/// Aerodynamic moments divided by their reference lengths, lbf, and positions in JSBSim's units.
 #[derive(Clone)]
 struct Seen {
     moments: [f64; 3],
@@ -135,8 +137,7 @@ impl Bench {
         Ok(Seen { moments, positions })
     }
 
-    /// Response once everything has settled at `value` of `command`; `None` where it is not a
-    /// number.
+    /// Response after the aircraft has settled at `value` of `command`. `None` if JSBSim fails or a value is not finite.
     fn at(&mut self, command: Option<NodeId>, value: f64) -> Result<Option<Seen>, PlantError> {
         self.fdm.restore(&self.start).map_err(jsbsim("going back to the loaded aircraft"))?;
         self.fdm.set_dt(STILL_S);
@@ -168,7 +169,7 @@ impl Bench {
         Ok(last)
     }
 
-    /// Motion caused by full `command`; `None` if it causes none or does not exist.
+    /// Motion caused by full `command`. `None` if the command does not exist, moves nothing or gives values that are not finite.
     fn attempt(&mut self, command: &str) -> Result<Option<Tried>, PlantError> {
         let Some(node) = look(&self.fdm, command) else { return Ok(None) };
         let Some(none) = self.at(Some(node), 0.0)? else { return Ok(None) };
@@ -195,7 +196,7 @@ impl Bench {
         }))
     }
 
-    /// The least command with the deflection of the command 1: an actuator may reach its stop earlier.
+    /// The least command that gives the full deflection: an actuator may reach its stop before the command 1.
     fn full_at(&mut self, node: NodeId, none: &Seen, full: &Seen) -> Result<f64, PlantError> {
         let reach = |seen: &Seen| -> f64 {
             let pairs = seen.positions.iter().zip(&none.positions);
@@ -218,7 +219,7 @@ impl Bench {
         Ok(most)
     }
 
-    /// The command that moves the throttle; `None` if the usual one does, or if none does.
+    /// The command that moves the throttle; `None` if the default command moves it, or if none does.
     fn throttle(&mut self, names: &Names) -> Result<Option<String>, PlantError> {
         let Some(place) = look(&self.fdm, "fcs/throttle-pos-norm") else { return Ok(None) };
         let usual = super::options::THROTTLE_COMMAND.to_owned();
@@ -236,11 +237,13 @@ impl Bench {
     }
 }
 
-/// Loads the aircraft of `options` with the properties named there, or the usual ones. If the usual ones are missing, move no
-/// surface or deflect one to the wrong side, those that `discover` finds take their place and are returned with the plant.
+/// Loads the aircraft of `options` with its named or default properties.
+///
+/// If defaults are missing, move no surface or deflect one to the wrong side, the properties that `discover` finds replace them
+/// and are returned with the plant. Properties named in `options` are never replaced.
 ///
 /// # Errors
-/// If it cannot be loaded or nothing steers it. Names that were given are not replaced.
+/// If the aircraft cannot be loaded, or no command steers it.
 pub fn steered(options: &PlantOptions) -> Result<(super::Plant, Option<Found>), PlantError> {
     let as_it_is = super::Plant::new(options).and_then(|mut plant| {
         let travel = plant.travel()?;

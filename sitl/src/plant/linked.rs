@@ -1,22 +1,22 @@
-//! One value that stands for several properties: `NAME`, or `[-]NAME[*SCALE],…`.
+//! A control that is linked to one or several properties, written `NAME` or `[-]NAME[*SCALE],…`.
 //!
-//! For example, an aircraft whose left and right aileron have separate commands, in rad up to 0.52,
-//! has the aileron `fcs/left_rad*0.52,-fcs/right_rad*0.52`. A write gives each property the value
-//! times its factor; a read gives the mean of the properties times their factors.
+//! An example is an aircraft whose left and right aileron have separate commands, in rad up to 0.52. Its aileron is
+//! `fcs/left_rad*0.52,-fcs/right_rad*0.52`. A write gives each property the value times its factor. A read gives the mean of the
+//! properties times their factors.
 
 use jsbsim::{Error, Fdm, NodeId};
 
 use super::PlantError;
 use super::lookup::needed;
 
-/// A name with its factor.
+/// A property name with its factor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Part {
     pub name: String,
     pub factor: f64,
 }
 
-/// The parts of a text.
+/// Parses a text of the form that the module comment describes.
 pub(super) fn parts(text: &str) -> Vec<Part> {
     let part = |part: &str| {
         let part = part.trim();
@@ -38,7 +38,7 @@ pub(super) fn parts(text: &str) -> Vec<Part> {
 pub(super) struct Linked(Vec<(NodeId, f64)>);
 
 impl Linked {
-    /// Looks every part up on a loaded aircraft; the error names the first that is missing.
+    /// Looks up every part on a loaded aircraft; the error names the first missing property.
     pub fn find(fdm: &Fdm, aircraft: &str, text: &str) -> Result<Linked, PlantError> {
         let node = |part: Part| Ok((needed(fdm, aircraft, &part.name)?, part.factor));
         Ok(Linked(parts(text).into_iter().map(node).collect::<Result<_, PlantError>>()?))
@@ -59,7 +59,7 @@ impl Linked {
         }
     }
 
-    /// Mean of the parts, each times its factor.
+    /// Mean of the properties, each times its factor.
     pub fn read(&self, fdm: &mut Fdm) -> Result<f64, Error> {
         let mut sum = 0.0;
         for (node, factor) in &self.0 {
@@ -68,7 +68,7 @@ impl Linked {
         Ok(if self.0.len() == 1 { sum } else { sum / self.0.len() as f64 })
     }
 
-    /// Whether it shares a property with `other`.
+    /// Whether `self` and `other` have a property in common.
     pub fn shares(&self, other: &Linked) -> bool {
         self.0.iter().any(|(node, _)| other.0.iter().any(|(theirs, _)| node == theirs))
     }

@@ -1,4 +1,4 @@
-//! Loads: the forces and moments of the air on an aircraft that is held in a state.
+//! Loads: aerodynamic forces and moments on an aircraft that is held in a state.
 
 use super::settling::STILL_S;
 use super::{Inputs, Plant, PlantError, Start, Truth, jsbsim};
@@ -7,45 +7,46 @@ use super::{Inputs, Plant, PlantError, Start, Truth, jsbsim};
 const LBF: f64 = 4.448_221_615_260_5;
 const FT_LBF: f64 = LBF * 0.3048;
 
-/// Aerodynamic force and moment on an aircraft in a state.
+/// Aerodynamic force and moment on an aircraft in a given state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loads {
     /// Aerodynamic force, body axes, N.
     pub force_n: [f64; 3],
     /// Aerodynamic moment about the centre of gravity, body axes, N m.
     pub moment_nm: [f64; 3],
-    /// State and deflections in which they act.
+    /// State and deflections at which force and moment act.
     pub truth: Truth,
 }
 
-/// Mass properties as JSBSim has them.
+/// Mass properties that JSBSim holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// Mass of aircraft, fuel and payload, kg.
     pub mass_kg: f64,
-    /// Jx, Jy, Jz and Jxz (the inertia matrix holds −Jxz), kg m².
+    /// Jx, Jy, Jz and Jxz, body axes, kg m²; the inertia matrix holds −Jxz.
     pub inertia_kgm2: [f64; 4],
 }
 
-/// JSBSim's integrators: with all of them off, the state is held while engines and filters run.
+/// JSBSim's integrators. With all of them off, the state is constant while engines and filters run.
 const INTEGRATORS: [&str; 4] = [
     "simulation/integrator/rate/rotational",
     "simulation/integrator/rate/translational",
     "simulation/integrator/position/rotational",
     "simulation/integrator/position/translational",
 ];
-/// Longest time that engines are given to settle, s.
+/// Longest time for engines to settle, s.
 const SETTLING_S: f64 = 60.0;
-/// Change of the thrust within a second that counts as settled, as a fraction of the thrust (at least of 1 N).
+/// Largest change of the thrust within 1 s that counts as settled, as a fraction of the thrust (or of 1 N if that is larger).
 const SETTLED: f64 = 1e-4;
 
 impl Plant {
-    /// Thrust along body x, N, and the state once the engines have settled at `throttle` (0..1) with the
-    /// aircraft held in `start`. Engines that have not settled after 60 s give their values at that time.
-    /// Reset the plant before it is stepped.
+    /// Thrust along body x, N, and the state after the engines have settled at `throttle` (0..1).
+    ///
+    /// The aircraft is held in `start`. Engines that have not settled after 60 s give their values at that time. Reset the plant
+    /// before it is stepped.
     ///
     /// # Errors
-    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn settled_thrust(
         &mut self,
         start: &Start,
@@ -54,12 +55,14 @@ impl Plant {
         self.held_in(start, |plant| plant.settle_engines(&Inputs { throttle, ..Inputs::default() }))
     }
 
-    /// Thrust along body x (N) and throttle position (0..1) once the engines have settled at the first of the
-    /// `throttles` (0..1), and after each step of one of the others, with the aircraft held in `start`. Reset the plant
-    /// before it is stepped.
+    /// Response of the engines to a sequence of throttle commands: thrust along body x, N, and throttle position, 0..1.
+    ///
+    /// The first element is the response after the engines have settled at the first of the `throttles` (0..1). Each further
+    /// element is the response after one step at the next of them. The aircraft is held in `start`. Reset the plant before it is
+    /// stepped.
     ///
     /// # Errors
-    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn thrust_response(
         &mut self,
         start: &Start,
@@ -79,11 +82,12 @@ impl Plant {
         })
     }
 
-    /// Loads and thrust along body x (N) once the engines have settled at the throttle of `inputs` and the surfaces
-    /// where it commands them, with the aircraft held in `start`. Reset the plant before it is stepped.
+    /// Loads and thrust along body x (N) after the engines have settled at `inputs`, with the surfaces at their commands.
+    ///
+    /// The aircraft is held in `start`. Reset the plant before it is stepped.
     ///
     /// # Errors
-    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn powered_loads(
         &mut self,
         start: &Start,
@@ -95,7 +99,7 @@ impl Plant {
         })
     }
 
-    /// Result of `work` while the aircraft is held in `start` and only its systems and engines run.
+    /// Result of `work` while the aircraft is held in `start`: only its systems and engines run.
     fn held_in<T>(
         &mut self,
         start: &Start,
@@ -123,7 +127,7 @@ impl Plant {
         (1.0 / self.options.step_s).round() as usize
     }
 
-    /// Thrust along body x, N, of an aircraft of `mass`, kg.
+    /// Thrust along body x, N, from the specific force of an aircraft of `mass`, kg.
     fn thrust(&mut self, mass: f64) -> Result<f64, PlantError> {
         let aero = self.property("forces/fbx-aero-lbs")? * LBF;
         Ok(mass * self.truth.specific_force_mps2[0] - aero)
@@ -139,7 +143,7 @@ impl Plant {
             }
             seconds += 1.0;
             let thrust = self.thrust(mass)?;
-            // a starting engine's thrust may stand at zero for longer than a second
+            // the thrust of a starting engine may remain zero for longer than a second
             let still = (thrust - last).abs() <= SETTLED * thrust.abs().max(1.0);
             if seconds >= SETTLING_S || (still && seconds >= 5.0) {
                 return Ok((thrust, self.truth));
@@ -148,14 +152,13 @@ impl Plant {
         }
     }
 
-    /// The loads in `start` with the surfaces at rest where `inputs` command them. Reset the plant
-    /// before it is stepped.
+    /// Loads in `start` with the surfaces at rest at the commands `inputs`. Reset the plant before it is stepped.
     ///
     /// # Errors
-    /// [`PlantError`] when the aircraft cannot be evaluated there.
+    /// [`PlantError`] if `start` is out of range, or the aircraft cannot be simulated there.
     pub fn loads(&mut self, start: &Start, inputs: &Inputs) -> Result<Loads, PlantError> {
         self.reset(start)?;
-        // Filters keep the step for which they were discretised; nothing else moves in a step this short.
+        // Filters keep the step for which they were discretised; the state does not move in a step this short.
         self.fdm.set_dt(STILL_S);
         let held = self.come_to_rest(inputs, "holding a state");
         let found = held.and_then(|_| self.loads_now());
@@ -192,7 +195,7 @@ impl Plant {
         for (value, name) in inertia.iter_mut().zip(names) {
             *value = of(&format!("inertia/{name}-slugs_ft2"))? * SLUG_FT2;
         }
-        // the property is the element of the inertia matrix, which holds -Jxz
+        // the JSBSim property is the element of the inertia matrix, which is -Jxz
         inertia[3] = -inertia[3];
         Ok(MassProperties { mass_kg, inertia_kgm2: inertia })
     }

@@ -1,4 +1,4 @@
-//! Properties of a loaded aircraft by their names.
+//! Looks up properties of a loaded aircraft by name.
 
 use jsbsim::{Fdm, NodeId};
 
@@ -9,7 +9,7 @@ pub(super) fn look(fdm: &Fdm, name: &str) -> Option<NodeId> {
     fdm.node(name).ok().flatten()
 }
 
-/// A property that a loaded aircraft has to have.
+/// A property of a loaded aircraft; the error names the aircraft and the missing property.
 pub(super) fn needed(fdm: &Fdm, aircraft: &str, name: &str) -> Result<NodeId, PlantError> {
     look(fdm, name).ok_or_else(|| PlantError::Property {
         aircraft: aircraft.to_owned(),

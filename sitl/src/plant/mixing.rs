@@ -1,7 +1,7 @@
-//! The mixer of an aircraft whose surfaces and motors are commanded one by one.
+//! Mixer of an aircraft whose surfaces and motors are commanded one by one.
 //!
-//! The shim shares no code with the companion, so that the two check each other: here the controls are computed
-//! from the positions by normal equations.
+//! The shim shares no code with the companion, which makes each a check of the other. This mixer therefore computes the controls
+//! from the positions by least squares (normal equations).
 
 use super::{Inputs, Properties};
 
@@ -10,18 +10,18 @@ use super::{Inputs, Properties};
 pub struct Moved {
     /// Name of the surface or motor.
     pub name: String,
-    /// Property of its command; `None` if the aircraft derives it from the usual commands itself.
+    /// Property of its command; `None` if the aircraft itself derives the command from aileron, elevator, rudder and throttle.
     pub command: Option<String>,
     /// Property of its position: rad for a surface, 0..1 for a motor.
     pub position: String,
-    /// Command per unit of aileron, elevator, rudder and throttle.
+    /// Command per unit of the aileron, elevator, rudder and throttle command.
     pub gains: [f64; 4],
-    /// Deflections at −1 and 1, rad; `None` is a motor.
+    /// Deflections at the commands −1 and 1, rad; `None` for a motor.
     pub travel: Option<[f64; 2]>,
 }
 
 impl Moved {
-    /// The one motor that follows the aircraft's throttle.
+    /// A single motor that follows the aircraft's throttle.
     pub fn throttle(properties: &Properties) -> Moved {
         Moved {
             name: "throttle".into(),
@@ -42,11 +42,11 @@ impl Moved {
     }
 }
 
-/// Surfaces and motors of an aircraft, with their shares of the controls.
+/// Surfaces and motors of an aircraft, and the controls computed from their positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixing {
     moved: Vec<Moved>,
-    /// For each surface or motor, the deflection of each control (rad, throttle 0..1) per unit of its position.
+    /// For each surface or motor, the value of each control (rad; throttle 0..1) per unit of its position (rad; motor 0..1).
     shares: Vec<[f64; 4]>,
     has_rudder: bool,
 }
@@ -54,10 +54,11 @@ pub struct Mixing {
 const CONTROLS: [&str; 4] = ["aileron", "elevator", "rudder", "throttle"];
 
 impl Mixing {
-    /// The mixing of `moved`.
+    /// Makes the mixing of the surfaces and motors `moved`.
     ///
     /// # Errors
-    /// A message: a control moves no surface or motor, or two controls move the surfaces alike.
+    /// A message for the user if nothing moves the aileron, elevator or throttle, or if two controls move the surfaces in the
+    /// same way.
     pub fn new(moved: Vec<Moved>) -> Result<Mixing, String> {
         let used: [bool; 4] = std::array::from_fn(|j| moved.iter().any(|m| m.gains[j] != 0.0));
         if let Some(j) = [0, 1, 3].into_iter().find(|j| !used[*j]) {
@@ -96,25 +97,25 @@ impl Mixing {
         &self.moved
     }
 
-    /// Whether a rudder is among the controls.
+    /// Whether a surface or motor moves with the rudder.
     pub fn has_rudder(&self) -> bool {
         self.has_rudder
     }
 
-    /// Commands of the surfaces and motors, in their order.
+    /// Commands of the surfaces and motors, in the order of `moved`.
     pub(super) fn mix(&self, inputs: &Inputs) -> impl Iterator<Item = f64> {
         let asked = [inputs.aileron, inputs.elevator, inputs.rudder, inputs.throttle];
         let sum = move |m: &Moved| m.gains.iter().zip(asked).map(|(g, c)| g * c).sum::<f64>();
         self.moved.iter().map(move |m| m.limited(sum(m)))
     }
 
-    /// Aileron, elevator, rudder (rad) and throttle at the positions.
+    /// Aileron, elevator, rudder (rad) and throttle (0..1) at the `positions` of surfaces (rad) and motors (0..1).
     pub(super) fn controls(&self, positions: &[f64]) -> [f64; 4] {
         std::array::from_fn(|j| self.shares.iter().zip(positions).map(|(s, x)| s[j] * x).sum())
     }
 }
 
-/// Deflection of control `j` at a command of one: mean over the surfaces that it moves, else over the motors.
+/// Value of control `j` at the command 1: the mean over the surfaces that it moves, or over motors if it moves no surface.
 fn mean_unit(moved: &[Moved], j: usize) -> f64 {
     let all = || moved.iter().filter(|m| m.gains[j] != 0.0);
     let surfaces: Vec<f64> = all()
@@ -128,7 +129,7 @@ fn mean_unit(moved: &[Moved], j: usize) -> f64 {
     }
 }
 
-/// Inverse by Gauss–Jordan elimination with pivots; `None` of a singular matrix.
+/// Inverse by Gauss–Jordan elimination with pivoting; `None` if the matrix is singular.
 fn inverse(mut a: [[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     let mut out: [[f64; 4]; 4] =
         std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));

@@ -1,4 +1,4 @@
-//! JSBSim's property nodes, looked up once, read in SI units.
+//! JSBSim's property nodes: found once after loading, then read and written in SI units.
 
 use jsbsim::{Error, Fdm, NodeId};
 
@@ -16,10 +16,10 @@ const SLUG: f64 = LBF / FT;
 /// Pascals per pound per square foot.
 const PSF: f64 = LBF / (FT * FT);
 
-/// Nodes of everything that is read or written in a step.
+/// Nodes of all properties that a step reads or writes.
 pub(super) struct Nodes {
     steering: Steering,
-    /// Properties held at a value.
+    /// Held properties and their values.
     held: Vec<(NodeId, f64)>,
     attitude: [NodeId; 3],
     rates: [NodeId; 3],
@@ -33,15 +33,15 @@ pub(super) struct Nodes {
     place: [NodeId; 3],
     density: NodeId,
     pressure: NodeId,
-    /// Thrust of each engine.
+    /// Thrust of each engine, lbf.
     thrusts: Vec<NodeId>,
-    /// Whether each engine runs; empty when none has to be started.
+    /// Whether each engine runs; empty if no engine has a starter.
     running: Vec<NodeId>,
     hidden_thrust: Option<NodeId>,
 }
 
 impl Nodes {
-    /// Looks every property up on a loaded aircraft.
+    /// Looks up every property on a loaded aircraft.
     pub(super) fn find(fdm: &Fdm, options: &PlantOptions) -> Result<Self, PlantError> {
         let look = |name: &str| look(fdm, name);
         let node = |name: &str| needed(fdm, &options.aircraft, name);
@@ -88,13 +88,13 @@ impl Nodes {
         self.steering.is_glider()
     }
 
-    /// Whether a property is moved by more than one control.
+    /// Whether two controls may share a property.
     pub(super) fn is_shared(&self) -> bool {
         self.steering.is_shared()
     }
 
-    /// Starts every engine that can be off, and returns the index of the first that does not run
-    /// after that. JSBSim starts engines at full power; they then follow the throttle.
+    /// Starts every engine that can be off. Returns the index of the first that does not run after the start.
+    /// JSBSim starts engines at full power; they then follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {
         if self.running.is_empty() {
             return Ok(None);
@@ -112,13 +112,13 @@ impl Nodes {
         if stands.is_none() {
             return Ok(None);
         }
-        // Fuel systems that the aircraft's XML computes feed an engine only after a frame.
+        // A fuel system in the aircraft's XML feeds an engine only after a frame.
         settle(fdm, step_s)?;
         fdm.set_property("propulsion/set-running", ALL)?;
         self.stands(fdm)
     }
 
-    /// The first engine that does not run.
+    /// Index of the first engine that does not run.
     fn stands(&self, fdm: &mut Fdm) -> Result<Option<usize>, Error> {
         for (engine, running) in self.running.iter().enumerate() {
             if fdm.read_node(*running)? == 0.0 {
@@ -179,14 +179,14 @@ impl Nodes {
         self.blow(fdm, options)
     }
 
-    /// Sets wind and turbulence once the aircraft is at its start.
+    /// Sets wind and turbulence after the aircraft is at its start.
     fn blow(&self, fdm: &mut Fdm, options: &PlantOptions) -> Result<(), Error> {
         let wind = options.air.wind_ned_mps;
         for (name, speed) in ["north", "east", "down"].into_iter().zip(wind) {
             fdm.set_property(&format!("atmosphere/wind-{name}-fps"), speed / FT)?;
         }
         if wind == [0.0; 3] {
-            // The initial condition leaves a rounding error in the wind, and with it a wind direction.
+            // The initial condition leaves a rounding error in the wind, which gives a spurious wind direction.
             fdm.set_property("atmosphere/psiw-rad", 0.0)?;
         } else {
             settle(fdm, options.step_s)?;
@@ -201,7 +201,7 @@ impl Nodes {
         Ok(())
     }
 
-    /// Reads everything but time and actuator rates.
+    /// Reads the state except time and actuator rates.
     pub(super) fn truth(&self, fdm: &mut Fdm) -> Result<Truth, Error> {
         let [roll_rad, pitch_rad, yaw_rad] = read3(fdm, &self.attitude, 1.0)?;
         let [p_radps, q_radps, r_radps] = read3(fdm, &self.rates, 1.0)?;
@@ -249,14 +249,14 @@ impl Nodes {
     }
 }
 
-/// The nodes of that name of every engine.
+/// The nodes of the property `name` of all engines.
 fn each_engine(fdm: &Fdm, name: &str) -> Vec<NodeId> {
     let names = (0..).map(|i| format!("propulsion/engine[{i}]/{name}"));
     names.map_while(|name| fdm.node(&name).ok().flatten()).collect()
 }
 
 impl Start {
-    /// Velocity over the ground, body axes, m/s, in `wind_ned`, m/s.
+    /// Velocity over the ground, body axes, m/s, in the wind `wind_ned`, north-east-down, m/s.
     fn ground_velocity(&self, wind_ned: [f64; 3]) -> [f64; 3] {
         let (sin_alpha, cos_alpha) = self.alpha_rad.sin_cos();
         let (sin_beta, cos_beta) = self.beta_rad.sin_cos();
@@ -266,7 +266,7 @@ impl Start {
     }
 }
 
-/// Turns a vector from north-east-down to forward-right-down, at the attitude `[roll, pitch, yaw]`.
+/// Transforms a vector from north-east-down to body axes (forward-right-down) at the attitude `[roll, pitch, yaw]`, rad.
 pub(crate) fn to_body(attitude: [f64; 3], [north, east, down]: [f64; 3]) -> [f64; 3] {
     let [(sin_roll, cos_roll), (sin_pitch, cos_pitch), (sin_yaw, cos_yaw)] =
         attitude.map(f64::sin_cos);
@@ -275,10 +275,10 @@ pub(crate) fn to_body(attitude: [f64; 3], [north, east, down]: [f64; 3]) -> [f64
     [x, right * cos_roll + below * sin_roll, below * cos_roll - right * sin_roll]
 }
 
-/// A seed for JSBSim, 0 to 2³¹ − 2, far from those of neighbouring seeds.
+/// A seed for JSBSim, 0 to 2³¹ − 2, far from the results for neighbouring seeds.
 ///
-/// JSBSim's generator is multiplicative: small seeds draw multiples of one another's numbers, and
-/// their turbulence is alike. The mixing is that of SplitMix64 (Steele, Lea, Flood 2014).
+/// JSBSim's generator is multiplicative: small seeds give multiples of each other's numbers and thus similar turbulence. The hash
+/// is that of SplitMix64 (Steele, Lea, Flood 2014).
 fn scattered(seed: u32) -> f64 {
     let mut z = (u64::from(seed) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,4 +1,4 @@
-//! Options from which a plant is made.
+//! Options for the creation of a plant.
 
 use std::path::PathBuf;
 
@@ -7,35 +7,35 @@ use crate::air::Air;
 use crate::aircraft;
 use crate::hidden::Hidden;
 
-/// The aircraft to fly, its air, and the effects hidden in it.
+/// The aircraft, the air and the hidden effects of a simulation.
 #[derive(Clone, Debug)]
 pub struct PlantOptions {
-    /// Folder that holds `NAME/NAME.xml`; `None` is one of those built into the program.
+    /// Folder that contains `NAME/NAME.xml`; `None` for an aircraft built into the program.
     pub aircraft_dir: Option<PathBuf>,
     /// Name of the aircraft: the folder and file below `aircraft_dir`, or a built-in one.
     pub aircraft: String,
     /// The properties through which the aircraft is flown.
     pub properties: Properties,
-    /// Surfaces and motors that are commanded one by one, in place of the aircraft's aileron, elevator and rudder.
+    /// Surfaces and motors with their own commands, in place of aileron, elevator and rudder; `None` if there are none.
     pub mixing: Option<Mixing>,
-    /// Properties held at a value in flight, such as a flap command.
+    /// Properties held at a value in flight, such as a flap command, by name and in JSBSim's units.
     pub held: Vec<(String, f64)>,
     /// Wind, turbulence and gusts.
     pub air: Air,
-    /// Effects hidden in the aircraft; empty flies the aircraft's file as it is.
+    /// Hidden effects that are written into the aircraft; without any, JSBSim loads the aircraft's file unchanged.
     pub hidden: Vec<Hidden>,
     /// Seed of the turbulence: the same seed gives the same flight.
     pub seed: u32,
-    /// Geodetic latitude of the start, deg. The default, 46.8, is where JSBSim's gravity less the
-    /// earth's centrifugal acceleration is 9.806 m/s² at 600 m.
+    /// Geodetic latitude of the start, deg. At the default, 46.8, JSBSim's gravity minus the earth's centrifugal acceleration is
+    /// 9.806 m/s² at 600 m.
     pub latitude_deg: f64,
     /// Longitude of the start, deg.
     pub longitude_deg: f64,
     /// The state at which the episodes of a simulator start.
     pub start: Start,
-    /// Length of one step, s: [`DT_S`](super::DT_S) unless something else is needed. JSBSim
-    /// discretises the actuators' filters for the step when it loads the aircraft, so another step
-    /// gives a slightly different aircraft (`sitl/tests/plant/step.rs` measures the difference).
+    /// Length of one step, s; the default is [`DT_S`](super::DT_S). JSBSim discretises the actuators' filters for the step when
+    /// it loads the aircraft. Another step therefore gives a slightly different aircraft (`sitl/tests/plant/step.rs` measures the
+    /// difference).
     pub step_s: f64,
 }
 
@@ -80,11 +80,11 @@ pub struct Properties {
     pub rudder_position: String,
 }
 
-/// The aileron's position by FW-JSBGym's name, of a flying wing with two elevons.
+/// FW-JSBGym's property of the aileron position of a flying wing with two elevons.
 const AILERON_POSITION: &str = "fcs/effective-aileron-pos";
-/// The aileron's position by JSBSim's own name.
+/// JSBSim's standard property of the aileron position.
 const LEFT_AILERON_POSITION: &str = "fcs/left-aileron-pos-rad";
-/// The throttle command by JSBSim's own name, which every aircraft with an engine has.
+/// JSBSim's standard property of the throttle command; every aircraft with an engine has it.
 pub(super) const THROTTLE_COMMAND: &str = "fcs/throttle-cmd-norm";
 
 impl Properties {
@@ -100,7 +100,7 @@ impl Properties {
         "rudder_position",
     ];
 
-    /// The name under `key`, one of [`Self::KEYS`].
+    /// The property name under `key`, one of [`Self::KEYS`]; `None` for any other key.
     pub fn name_mut(&mut self, key: &str) -> Option<&mut String> {
         match key {
             "aileron_command" => Some(&mut self.aileron_command),
@@ -115,7 +115,7 @@ impl Properties {
         }
     }
 
-    /// The aileron's position where the aircraft lacks the first choice.
+    /// Property of the aileron position for an aircraft that lacks the default property.
     pub(super) fn aileron_fallback(&self) -> &str {
         if self.aileron_position == AILERON_POSITION {
             LEFT_AILERON_POSITION
@@ -124,7 +124,7 @@ impl Properties {
         }
     }
 
-    /// The names that an aircraft's `document` uses.
+    /// The property names for an aircraft with the XML text `document`.
     pub(crate) fn in_document(&self, document: &str) -> Properties {
         let mut names = self.clone();
         if !document.contains(&self.aileron_position) {

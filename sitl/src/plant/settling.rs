@@ -1,11 +1,11 @@
-//! Frames in which the aircraft is held while its systems come to rest.
+//! Lets systems come to rest while the aircraft is held in its state.
 
 use jsbsim::{Error, Fdm, NodeId};
 
 /// A step too short to move the aircraft, s. Filters and kinematics keep the step for which they were discretised.
 pub(super) const STILL_S: f64 = 1e-12;
 
-/// Longest time that flaps and gear are given to reach the position that is held, s.
+/// Longest time for flaps and gear to reach their held positions, s.
 const TRANSIT_S: f64 = 60.0;
 /// Time without a change of the aerodynamic loads after which flaps and gear count as at rest, s.
 const AT_REST_S: f64 = 0.5;
@@ -29,10 +29,10 @@ pub(super) fn hold(fdm: &mut Fdm, held: &[(NodeId, f64)]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Evaluates derivatives in the air as it now is, and fills the integrators' histories with them.
+/// Evaluates the derivatives in the present air and fills the integrators' histories with them.
 ///
-/// JSBSim's initial condition takes no vertical wind, so the wind is set after it; five frames
-/// fill the longest history (Adams-Bashforth 3 needs three of them).
+/// JSBSim's initial condition accepts no vertical wind, so the wind is set after it. Five frames fill the longest history
+/// (Adams-Bashforth 3 needs three).
 pub(super) fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {
     fdm.set_dt(STILL_S);
     for _ in 0..5 {
@@ -42,7 +42,7 @@ pub(super) fn settle(fdm: &mut Fdm, step_s: f64) -> Result<(), Error> {
     Ok(())
 }
 
-/// Holds the properties `held` until flaps, gear and other systems have reached their positions, 60 s at most.
+/// Holds the properties `held` until flaps, gear and other systems are at rest, for at most 60 s. `step_s` is in s.
 pub(super) fn settle_conditions(
     fdm: &mut Fdm,
     held: &[(NodeId, f64)],

@@ -7,31 +7,31 @@ pub const FULL_DEFLECTION_RAD: f64 = 0.5235;
 /// The state at which an episode starts; velocities are relative to the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
-    /// Roll angle φ, rad.
+    /// Roll angle φ, rad; right wing down positive.
     pub roll_rad: f64,
-    /// Pitch angle θ, rad.
+    /// Pitch angle θ, rad; nose up positive.
     pub pitch_rad: f64,
-    /// Yaw angle ψ from true north, rad.
+    /// Yaw angle ψ from true north, rad; clockwise positive.
     pub yaw_rad: f64,
     /// True airspeed, m/s, positive.
     pub airspeed_mps: f64,
-    /// Angle of attack, rad.
+    /// Angle of attack, rad; positive if the relative wind comes from below.
     pub alpha_rad: f64,
-    /// Sideslip angle, rad; positive when the air comes from the right.
+    /// Sideslip angle, rad; positive if the relative wind comes from the right.
     pub beta_rad: f64,
-    /// Roll rate, body axes, rad/s.
+    /// Roll rate, body axes, rad/s; right wing down positive.
     pub p_radps: f64,
-    /// Pitch rate, body axes, rad/s.
+    /// Pitch rate, body axes, rad/s; nose up positive.
     pub q_radps: f64,
-    /// Yaw rate, body axes, rad/s.
+    /// Yaw rate, body axes, rad/s; nose right positive.
     pub r_radps: f64,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
 }
 
 impl Start {
-    /// The start of an episode: wings level, no incidence, 16.67 m/s, 600 m, not trimmed
-    /// (section V-A of \[GSFM26\]).
+    /// The start of an episode: wings level, zero angle of attack and sideslip, 16.67 m/s, 600 m, not trimmed (section V-A of
+    /// \[GSFM26\]).
     pub const NEUTRAL: Start = Start {
         roll_rad: 0.0,
         pitch_rad: 0.0,
@@ -96,29 +96,29 @@ impl Inputs {
 pub struct Truth {
     /// Time since the reset, s.
     pub time_s: f64,
-    /// Roll angle φ, rad.
+    /// Roll angle φ, rad; right wing down positive.
     pub roll_rad: f64,
-    /// Pitch angle θ, rad.
+    /// Pitch angle θ, rad; nose up positive.
     pub pitch_rad: f64,
-    /// Yaw angle ψ from true north, rad.
+    /// Yaw angle ψ from true north, rad; clockwise positive.
     pub yaw_rad: f64,
-    /// Roll rate over the ground, body axes, rad/s.
+    /// Roll rate relative to the earth, body axes, rad/s; right wing down positive.
     pub p_radps: f64,
-    /// Pitch rate over the ground, body axes, rad/s.
+    /// Pitch rate relative to the earth, body axes, rad/s; nose up positive.
     pub q_radps: f64,
-    /// Yaw rate over the ground, body axes, rad/s.
+    /// Yaw rate relative to the earth, body axes, rad/s; nose right positive.
     pub r_radps: f64,
-    /// True airspeed, relative to the air with its turbulence, m/s.
+    /// True airspeed, relative to the air including turbulence, m/s.
     pub airspeed_mps: f64,
-    /// Angle of attack relative to the air, rad.
+    /// Angle of attack relative to the air, rad; positive if the relative wind comes from below.
     pub alpha_rad: f64,
-    /// Sideslip angle relative to the air, rad.
+    /// Sideslip angle relative to the air, rad; positive if the relative wind comes from the right.
     pub beta_rad: f64,
-    /// Specific force at the centre of gravity, forward-right-down, m/s²; −9.81 on z in level flight.
+    /// Specific force at the centre of gravity, body axes (forward-right-down), m/s²; −9.81 on z in level flight.
     pub specific_force_mps2: [f64; 3],
     /// Velocity over the ground, north-east-down, m/s.
     pub velocity_ned_mps: [f64; 3],
-    /// Velocity of the air over the ground with gusts and turbulence, north-east-down, m/s.
+    /// Velocity of the air over the ground including gusts and turbulence, north-east-down, m/s.
     pub wind_ned_mps: [f64; 3],
     /// Geodetic latitude, deg, north positive.
     pub latitude_deg: f64,
@@ -130,21 +130,21 @@ pub struct Truth {
     pub air_density_kgpm3: f64,
     /// Static pressure of the air, Pa.
     pub static_pressure_pa: f64,
-    /// Deflection of the aileron, rad.
+    /// Deflection of the aileron, rad; positive rolls right.
     pub aileron_rad: f64,
     /// Aileron rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub aileron_rate_radps: f64,
-    /// Deflection of the elevator, rad.
+    /// Deflection of the elevator, rad; positive pitches down.
     pub elevator_rad: f64,
     /// Elevator rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub elevator_rate_radps: f64,
     /// Position of the throttle, 0..1.
     pub throttle: f64,
-    /// Deflection of the rudder, rad.
+    /// Deflection of the rudder, rad; positive yaws left; 0 for an aircraft without a rudder.
     pub rudder_rad: f64,
     /// Rudder rate, rad/s: the change of the deflection over the last step, divided by the step.
     pub rudder_rate_radps: f64,
-    /// Thrust along the body x axis, N, hidden effects on it included.
+    /// Thrust along the body x axis, N, including hidden effects on the thrust.
     pub thrust_n: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The properties by which an aircraft is steered: aileron, elevator, rudder and throttle, or surfaces one by one.
+//! Command and position properties of an aircraft: aileron, elevator, rudder and throttle, or each surface by itself.
 
 use jsbsim::{Error, Fdm, NodeId};
 
@@ -10,9 +10,9 @@ use super::{Inputs, PlantError, PlantOptions, Properties};
 
 /// Nodes of commands and positions.
 pub(super) enum Steering {
-    /// By JSBSim's usual properties.
+    /// Aileron, elevator, rudder and throttle commands.
     Usual(Usual),
-    /// By surfaces and motors that are commanded one by one.
+    /// Surfaces and motors with separate commands.
     Mixed(Box<Mixed>),
 }
 
@@ -28,16 +28,16 @@ pub(super) struct Usual {
 
 pub(super) struct Mixed {
     mixing: Mixing,
-    /// Command of each surface and motor; `None` follows the usual commands.
+    /// Command of each surface and motor; `None` if it follows the usual commands.
     commands: Vec<Option<NodeId>>,
     positions: Vec<NodeId>,
-    /// The usual commands (aileron, elevator, rudder), for parts without a command of their own.
+    /// The usual commands (aileron, elevator, rudder), which move the surfaces without a separate command.
     usual: [Option<NodeId>; 3],
     throttles: Vec<NodeId>,
 }
 
 impl Steering {
-    /// Looks the properties up on a loaded aircraft.
+    /// Looks up the properties on a loaded aircraft.
     pub(super) fn find(fdm: &Fdm, options: &PlantOptions) -> Result<Self, PlantError> {
         let look = |name: &str| look(fdm, name);
         let node = |name: &str| needed(fdm, &options.aircraft, name);
@@ -114,7 +114,7 @@ impl Steering {
         Ok(())
     }
 
-    /// Aileron, elevator, rudder (rad) and throttle (0..1) as they are.
+    /// Present aileron, elevator and rudder positions (rad) and throttle position (0..1).
     pub(super) fn positions(&self, fdm: &mut Fdm) -> Result<[f64; 4], Error> {
         match self {
             Steering::Usual(usual) => {
@@ -131,7 +131,7 @@ impl Steering {
         }
     }
 
-    /// Whether two controls share a property, so that only one control at a time can be commanded in full.
+    /// Whether two controls share a property; only one control at a time can then reach its full command.
     pub(super) fn is_shared(&self) -> bool {
         match self {
             Steering::Usual(usual) => {
@@ -153,7 +153,7 @@ impl Steering {
     }
 }
 
-/// Command and position of the rudder; a rudder that the options name must exist.
+/// Command and position of the rudder; a rudder that is named in the options must exist.
 fn rudder(
     fdm: &Fdm,
     aircraft: &str,
@@ -169,7 +169,7 @@ fn rudder(
     Ok(Some([find(rudder_command)?, find(rudder_position)?]))
 }
 
-/// The nodes `NAME`, `NAME[1]`, … up to the first that is not there.
+/// The nodes `NAME`, `NAME[1]`, … up to the first that does not exist.
 fn numbered(fdm: &Fdm, name: &str) -> Vec<NodeId> {
     let names = (0..).map(|i| if i == 0 { name.to_owned() } else { format!("{name}[{i}]") });
     names.map_while(|name| fdm.node(&name).ok().flatten()).collect()

@@ -1,22 +1,22 @@
-//! How far an aircraft's surfaces deflect at full command.
+//! Measures the travel of an aircraft's surfaces, that is their deflections at full command.
 
 use super::lookup::look;
 use super::{FULL_DEFLECTION_RAD, Inputs, Plant, PlantError, jsbsim};
 
-/// Most steps in which an actuator may reach its stop while the aircraft is held: 20 s in steps of 10 ms.
+/// Largest number of steps for an actuator to reach its stop while the aircraft is held: 20 s in steps of 10 ms.
 const STEPS: usize = 2000;
-/// Steps without movement after which a surface counts as being at its stop: half a second, longer
-/// than any delay of an actuator.
+/// Steps without movement after which a surface counts as being at its stop: 0.5 s in steps of 10 ms, longer than any delay of an
+/// actuator.
 const AT_REST: usize = 50;
 /// Movement per step below which a surface counts as still, rad.
 const STILL_RAD: f64 = 1e-12;
 /// Travel below which a surface counts as fixed, rad.
 const LEAST_RAD: f64 = 1e-3;
-/// A travel that differs from [`FULL_DEFLECTION_RAD`] by less than this is taken as equal to it,
-/// rad: an actuator's filter stops short of its end by rounding.
+/// Largest difference to [`FULL_DEFLECTION_RAD`], rad, that counts as rounding: an actuator's filter stops slightly short of its
+/// final value.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Where a surface comes to rest at full command.
+/// Deflections of a surface at rest at full command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stops {
     /// At the command −1, rad.
@@ -31,13 +31,13 @@ impl Stops {
         Stops { least_rad: -most_rad, most_rad }
     }
 
-    /// The larger of both deflections, rad.
+    /// The larger magnitude of both deflections, rad.
     pub fn largest_rad(&self) -> f64 {
         self.most_rad.abs().max(self.least_rad.abs())
     }
 }
 
-/// Deflections at full command.
+/// Travel of all surfaces of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travel {
     /// Stops of the aileron.
@@ -49,7 +49,7 @@ pub struct Travel {
 }
 
 impl Travel {
-    /// Travel of the X8's surfaces.
+    /// Travel of the X8's surfaces: ±0.5235 rad.
     pub const X8: Travel = Travel {
         aileron: Stops::symmetric(FULL_DEFLECTION_RAD),
         elevator: Stops::symmetric(FULL_DEFLECTION_RAD),
@@ -64,11 +64,11 @@ impl Default for Travel {
 }
 
 impl Plant {
-    /// Measures the travel of the surfaces: commands them fully both ways with the aircraft held in
-    /// its state, then restores it.
+    /// Measures the travel of the surfaces by full commands in both directions, with the aircraft held in its state. The state is
+    /// then restored.
     ///
     /// # Errors
-    /// [`PlantError::Travel`] when a surface does not follow its command.
+    /// [`PlantError::Travel`] if the aileron or elevator does not follow its command.
     pub fn travel(&mut self) -> Result<Travel, PlantError> {
         let before = self.snapshot()?;
         let measured = self.stops(1.0).and_then(|up| Ok((up, self.stops(-1.0)?)));
@@ -87,7 +87,7 @@ impl Plant {
         })
     }
 
-    /// The property that is read as the aileron's position.
+    /// The property from which the aileron position is read.
     fn aileron_position(&self) -> &str {
         let named = &self.options.properties;
         match look(&self.fdm, &named.aileron_position) {
@@ -107,8 +107,8 @@ impl Plant {
         })
     }
 
-    /// Aileron, elevator and rudder where they come to rest at `command`, rad. Two controls at full command
-    /// would drive a surface that they share to its stop too early, so each is then commanded alone.
+    /// Deflections of aileron, elevator and rudder at rest at `command`, rad. If controls share a surface, each control is
+    /// commanded alone: together they would reach its stop too early.
     fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
         let [aileron, elevator, rudder] = [command; 3];
         if !self.nodes.is_shared() {
@@ -122,14 +122,14 @@ impl Plant {
         ])
     }
 
-    /// Aileron, elevator and rudder where they come to rest at `inputs`, rad.
+    /// Deflections of aileron, elevator and rudder at rest at `inputs`, rad.
     fn rest(&mut self, inputs: &Inputs) -> Result<[f64; 3], PlantError> {
-        // Filters keep the step for which they were discretised; nothing else moves in a step this short.
+        // Filters keep the step for which they were discretised; the state does not move in a step this short.
         self.fdm.set_dt(super::settling::STILL_S);
         self.come_to_rest(inputs, "measuring the travel of the surfaces")
     }
 
-    /// Aileron, elevator and rudder after they have come to rest at `inputs`, rad, in steps of the present length.
+    /// Runs steps of the present length until the surfaces are at rest at `inputs`; returns their deflections, rad.
     pub(super) fn come_to_rest(
         &mut self,
         inputs: &Inputs,
@@ -152,7 +152,7 @@ impl Plant {
     }
 }
 
-/// A deflection without the rounding error with which a filter stops short of its end.
+/// Removes the rounding error of an actuator's filter from a deflection, rad.
 fn rounded(deflection: f64) -> f64 {
     if (deflection.abs() - FULL_DEFLECTION_RAD).abs() < ROUNDING_RAD {
         return FULL_DEFLECTION_RAD.copysign(deflection);

@@ -1,4 +1,4 @@
-//! The companion's answer, made safe for the plant.
+//! Checks and limits the companion's actuator command before it reaches the plant.
 
 use super::codec::HilActuatorControls;
 use crate::plant::Inputs;
@@ -6,21 +6,21 @@ use crate::plant::Inputs;
 /// Bit MAV_MODE_FLAG_SAFETY_ARMED of `base_mode`.
 pub const ARMED: u8 = 128;
 
-/// An answer that can be flown: finite, within the actuators' ranges, zero when disarmed.
+/// A valid actuator command: finite, within the actuators' ranges, zero if disarmed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// The time of the frame that is answered, µs.
+    /// Time stamp of the state frame that the companion answers, µs.
     pub echo_us: u64,
     /// Whether the companion is armed.
     pub armed: bool,
-    /// The command that the actuators get.
+    /// Command for the actuators, after limits; zero while the companion is disarmed.
     pub inputs: Inputs,
-    /// Whether a control lay outside its range and was limited.
+    /// Whether a control was outside its range and was limited.
     pub limited: bool,
 }
 
 impl Answer {
-    /// Reads an answer; `None` when aileron, elevator or throttle is not finite. A non-finite rudder becomes 0.
+    /// Reads an answer. `None` if aileron, elevator or throttle is not finite. A non-finite rudder becomes 0.
     pub fn read(message: &HilActuatorControls) -> Option<Self> {
         let [aileron, elevator, throttle, rudder, ..] = message.controls;
         if ![aileron, elevator, throttle].iter().all(|control| control.is_finite()) {

@@ -1,4 +1,4 @@
-//! The profile `sitl` without link or clock: bytes out, bytes in, one step a call.
+//! The profile `sitl` without link or clock: bytes in, bytes out, one step per call.
 
 use super::answer::Answer;
 use super::codec::{Encoder, HilActuatorControls, Parser};
@@ -10,11 +10,11 @@ use super::session::{COMPANION, SHIM};
 use super::telemetry::{StateFrame, encode_slow};
 use crate::plant::{Inputs, Truth};
 
-/// An answer older than this is not flown, µs: as in real time.
+/// Largest age of an answer that is used, µs; the same limit as in real time.
 const STALE_US: u64 = 500_000;
 
-/// The shim on a bench. As in real time, a step uses the newest answer that came within it; without
-/// an answer the last command stays.
+/// The shim without link and clock, for in-process tests. As in real time, a step uses the newest answer that arrived before it.
+/// Without a new answer, the last command holds.
 pub struct Bench {
     flight: Flight,
     parser: Parser,
@@ -29,10 +29,10 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The aircraft at its start.
+    /// Puts the aircraft at its start.
     ///
     /// # Errors
-    /// If the aircraft cannot be loaded.
+    /// If the aircraft cannot be loaded or started, or a file of the options cannot be used.
     pub fn new(options: &ShimOptions) -> Result<Self, ShimError> {
         let (measured, inputs) = (Truth::default(), Inputs::default());
         Ok(Bench {
@@ -48,7 +48,7 @@ impl Bench {
         })
     }
 
-    /// Distorts the sensors from now on.
+    /// Sets the sensor distortion from the next frame on.
     pub fn distort(&mut self, distortion: Distortion) {
         self.distorter.now = distortion;
     }
@@ -63,7 +63,7 @@ impl Bench {
         StateFrame::new(time_us, &shown, self.flight.travel()).encode(&mut self.encoder, out);
     }
 
-    /// Takes bytes that have arrived.
+    /// Parses received bytes and keeps the newest valid answer of the companion.
     pub fn receive(&mut self, bytes: &[u8]) {
         let mut frames = Vec::new();
         self.parser.stream(bytes, &mut |frame| frames.push(frame));
@@ -71,7 +71,7 @@ impl Bench {
             let message = frame.decode::<HilActuatorControls>();
             let Some(answer) = message.and_then(|m| Answer::read(&m)) else { continue };
             let age = self.shown_us.saturating_sub(answer.echo_us);
-            // A clock that was set back makes older times new again.
+            // After the clock was set back, answers with earlier times count as new.
             let newer = answer.echo_us > self.answered_us || self.shown_us < self.answered_us;
             if answer.echo_us <= self.shown_us && age <= STALE_US && newer {
                 self.answered_us = answer.echo_us;
@@ -80,10 +80,10 @@ impl Bench {
         }
     }
 
-    /// Flies one step.
+    /// Makes one step with the newest answer.
     ///
     /// # Errors
-    /// If the plant cannot be stepped.
+    /// If the plant cannot be stepped, or the truth file cannot be written.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         if let Some(answer) = self.newest.take() {
             self.inputs = answer.inputs;
@@ -94,12 +94,12 @@ impl Bench {
         self.flight.advance(self.inputs)
     }
 
-    /// Last measurement, before it was distorted.
+    /// Last measurement, before the distortion.
     pub fn measured(&self) -> Truth {
         self.measured
     }
 
-    /// The command that the actuators get.
+    /// The present command of the actuators.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }

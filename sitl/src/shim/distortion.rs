@@ -1,23 +1,23 @@
-//! Faults of the measurements apart from noise: sensors that freeze, err or jump.
+//! Sensor and clock faults other than noise: freeze, offset, NaN, clock jump.
 
 use crate::plant::Truth;
 
 /// Present errors of the sensors and the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
-    /// Every sensor keeps the value that it had when this began.
+    /// Every sensor keeps its last value before the freeze.
     pub frozen: bool,
-    /// The airspeed sensor shows this, as a blocked tube does, m/s.
+    /// Value that replaces the airspeed, as a blocked pitot tube would show, m/s; `None` for no fault.
     pub airspeed_mps: Option<f64>,
-    /// Added to the angle of attack, rad.
+    /// Offset of the angle of attack, rad.
     pub alpha_rad: f64,
-    /// The pitch rate is not a number.
+    /// The pitch rate is NaN.
     pub rate_not_a_number: bool,
-    /// Added to the time that frames show, µs.
+    /// Offset of the frames' time stamp, µs.
     pub clock_us: i64,
 }
 
-/// Distortions with their memory.
+/// The present distortion and the last measurement.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Distorter {
     pub(super) now: Distortion,

@@ -1,4 +1,4 @@
-//! Why a run of the shim could not begin or had to end.
+//! Errors that prevent or end a run of the shim.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ pub enum ShimError {
     /// An option has an invalid value.
     #[error("cannot start the shim: {rule}; correct the option")]
     Option {
-        /// The rule that is broken.
+        /// The violated rule.
         rule: &'static str,
     },
     /// The simulated stack has no parameter of that name.
@@ -25,7 +25,7 @@ pub enum ShimError {
         /// Parameters that the stack has.
         known: String,
     },
-    /// A place without a known magnetic field.
+    /// The World Magnetic Model has no field for the start.
     #[error(
         "the World Magnetic Model has no field at {latitude_deg}°, {longitude_deg}°, {altitude_m} m; \
          start between -1 and 850 km"
@@ -38,13 +38,13 @@ pub enum ShimError {
         /// Altitude of the start above mean sea level, m.
         altitude_m: f64,
     },
-    /// The plant could not be built, or could not go on.
+    /// The plant could not be loaded, started or stepped.
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// The link could not be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The truth file exists.
+    /// The truth file exists, and the options do not allow its replacement.
     #[error("the truth file {} exists; choose another name with --truth, or allow overwriting with --force", path.display())]
     TruthExists {
         /// Path of the truth file.

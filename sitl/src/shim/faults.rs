@@ -1,4 +1,4 @@
-//! Frame faults: which state frames are lost, which come late.
+//! Frame faults: draws which state frames are lost and which are delayed.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::options::FrameFaults;
 
-/// Draws losses and delays of frames from separate random streams, so that neither changes the other.
+/// Draws frame losses and delays from separate random streams, so a change of one does not change the other.
 #[derive(Clone, Debug)]
 pub struct Faults {
     rule: FrameFaults,
@@ -16,7 +16,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Faults whose draws are fixed by `seed`.
+    /// Faults by `rule`, whose draws depend only on `seed`.
     pub fn new(rule: FrameFaults, seed: u64) -> Self {
         let stream = |number| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -26,12 +26,12 @@ impl Faults {
         Faults { rule, drops: stream(2), delays: stream(3) }
     }
 
-    /// Whether the next sending is lost.
+    /// Draws whether the next frame is lost.
     pub fn drops(&mut self) -> bool {
         self.drops.random::<f64>() < self.rule.drop_probability
     }
 
-    /// Random delay of the next frame beyond the constant delay.
+    /// Draws the random delay of the next frame, in addition to the constant delay.
     pub fn lateness(&mut self) -> Duration {
         let jitter = self.delays.random::<f64>() * self.rule.jitter_ms;
         let late = self.delays.random::<f64>() < self.rule.late_probability;
@@ -39,7 +39,7 @@ impl Faults {
     }
 }
 
-/// A duration from milliseconds that are known to be finite, positive or zero, and bounded.
+/// A duration from milliseconds, which must be finite, not negative and bounded.
 pub(super) fn milliseconds(ms: f64) -> Duration {
     Duration::from_secs_f64(ms * 1e-3)
 }

@@ -1,4 +1,4 @@
-//! The aircraft between two frames: held at its start, then flown.
+//! Steps the aircraft frame by frame: held at its start before launch, simulated after launch.
 
 use std::collections::VecDeque;
 
@@ -14,7 +14,7 @@ use crate::plant::{Inputs, Plant, Travel, Truth};
 pub enum Over {
     /// The requested duration has been flown.
     Duration,
-    /// The aircraft has come down to sea level.
+    /// The aircraft has reached sea level.
     Ground,
 }
 
@@ -24,9 +24,9 @@ pub struct Flight {
     travel: Travel,
     sensors: Sensors,
     log: Option<TruthLog>,
-    /// States not yet shown, oldest first; the last is the present one.
+    /// States not yet sent, oldest first; the last is the present state.
     pending: VecDeque<(u64, Truth)>,
-    /// How far the plant runs ahead of what is shown, steps.
+    /// Number of steps by which the plant runs ahead of the state that is sent.
     ahead: usize,
     time_us: u64,
     launched: bool,
@@ -46,7 +46,7 @@ impl Flight {
             Pace::Lockstep => (options.faults.delay_ms * 1e3 / FRAME_US as f64).ceil() as usize,
         };
         let zero = (options.clock_start_s * 1e6) as u64 / FRAME_US * FRAME_US;
-        // Time 0 is never shown: an answer that echoes 0 answers nothing.
+        // Time 0 is never sent: an answer with the echo 0 answers no frame.
         let pending: VecDeque<_> =
             (1..=ahead as u64 + 1).map(|k| (zero + k * FRAME_US, start)).collect();
         let steps = |seconds: f64| (seconds * 1e6 / FRAME_US as f64).round().max(1.0) as u64;
@@ -69,7 +69,7 @@ impl Flight {
         })
     }
 
-    /// The time of the frame to be shown now, µs.
+    /// The time of the frame that is due, µs.
     pub fn shown_us(&self) -> u64 {
         self.time_us - self.ahead as u64 * FRAME_US
     }
@@ -84,17 +84,17 @@ impl Flight {
         self.plant.notes()
     }
 
-    /// Altitude of the start, m.
+    /// Altitude of the start above mean sea level, m.
     pub fn home_m(&self) -> f64 {
         self.home_m
     }
 
-    /// Whether the aircraft flies.
+    /// Whether the aircraft has been launched.
     pub fn is_launched(&self) -> bool {
         self.launched
     }
 
-    /// Simulated flight so far, s.
+    /// Simulated time since launch, s.
     pub fn flown_s(&self) -> f64 {
         self.flown as f64 * FRAME_US as f64 * 1e-6
     }
@@ -104,14 +104,14 @@ impl Flight {
         self.launched = true;
     }
 
-    /// Measures the state to be shown now.
+    /// Measures the state that is due; returns its frame and the measurement.
     pub fn measure(&mut self) -> (StateFrame, Truth) {
         let (time_us, truth) = self.pending.front().copied().unwrap_or_default();
         let measured = self.sensors.measure(&truth);
         (StateFrame::new(time_us, &measured, self.travel), measured)
     }
 
-    /// Advances by one frame, flying `inputs` if launched; `Some` when the flight is over.
+    /// Advances by one frame, with a plant step at `inputs` if launched. Returns `Some` when the flight is over.
     pub fn advance(&mut self, inputs: Inputs) -> Result<Option<Over>, ShimError> {
         let mut truth = self.pending.back().map_or_else(Truth::default, |(_, truth)| *truth);
         if self.launched {
@@ -130,7 +130,7 @@ impl Flight {
         Ok(self.last.filter(|&last| self.flown >= last).map(|_| Over::Duration))
     }
 
-    /// Writes out the truth file.
+    /// Writes the buffered rows to the truth file.
     pub fn finish(&mut self) -> Result<(), ShimError> {
         self.log.as_mut().map_or(Ok(()), TruthLog::finish)
     }

@@ -1,11 +1,11 @@
-//! The aircraft on its stand, on the catapult, in flight.
+//! Launch of the aircraft: at rest on its stand, accelerated by a catapult, or in flight.
 
 use crate::plant::{Inputs, Plant, PlantError, PlantOptions, Start, Travel, Truth, to_body};
 use crate::shim::options::Launch;
 
-/// How long the catapult pulls, s: 1.7 g for 16.67 m/s, within 8.3 m.
+/// Duration of the catapult's pull, s: about 1.7 g over 8.3 m for a final speed of 16.67 m/s.
 const PULL_S: f64 = 1.0;
-/// The catapult is released at this throttle; PX4 and ArduPlane idle below it before a take-off.
+/// Throttle above which the catapult is released. PX4 and ArduPlane idle below it before a take-off.
 const LAUNCH_THROTTLE: f64 = 0.1;
 /// Radius of the earth's equator, m, and its first eccentricity squared (WGS 84).
 const EQUATOR_M: f64 = 6_378_137.0;
@@ -15,31 +15,31 @@ const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Stand,
-    /// Steps since the catapult was released.
+    /// On the catapult; the value is the number of steps since the release.
     Catapult(u64),
     Flight,
 }
 
-/// A plant that begins on the ground, as an estimator needs it to align itself.
+/// A plant that starts at rest on the ground, as an estimator needs for its alignment.
 ///
-/// The catapult brings it along a straight line to the start that was asked for, with its
-/// attitude, and lets JSBSim take over there: every quantity but acceleration is continuous.
+/// The catapult accelerates the aircraft along a straight line to the start state, in the attitude of that state. JSBSim takes
+/// over there. Every quantity except acceleration is continuous at that moment.
 pub struct Launcher {
     plant: Plant,
     start: Start,
     at_once: Launch,
     step_s: f64,
     phase: Phase,
-    /// The start state in JSBSim.
+    /// The start state as JSBSim evaluates it.
     released: Truth,
     shown: Truth,
 }
 
 impl Launcher {
-    /// The aircraft on its stand, or in flight if it is launched immediately.
+    /// Puts the aircraft on its stand, or in flight if `launch` is immediate.
     ///
     /// # Errors
-    /// If the aircraft cannot be loaded or cannot be flown from `start`.
+    /// If the aircraft cannot be loaded, or `start` is outside the accepted range.
     pub fn new(options: &PlantOptions, start: &Start, launch: Launch) -> Result<Self, PlantError> {
         let plant = Plant::new(options)?;
         let (released, step_s) = (Truth::default(), options.step_s);
@@ -60,7 +60,7 @@ impl Launcher {
     /// Puts the aircraft back to its start.
     ///
     /// # Errors
-    /// If it cannot be flown from its start.
+    /// If the aircraft cannot be evaluated at its start.
     pub fn begin_anew(&mut self) -> Result<(), PlantError> {
         self.released = self.plant.reset(&self.start)?;
         self.phase = match self.at_once {
@@ -71,10 +71,10 @@ impl Launcher {
         Ok(())
     }
 
-    /// Travel of the aircraft's surfaces.
+    /// Measures the travel of the aircraft's surfaces.
     ///
     /// # Errors
-    /// If a surface does not follow its command.
+    /// If the aileron or elevator does not follow its command.
     pub fn travel(&mut self) -> Result<Travel, PlantError> {
         self.plant.travel()
     }
@@ -89,7 +89,7 @@ impl Launcher {
         self.shown
     }
 
-    /// Whether JSBSim flies the aircraft.
+    /// Whether JSBSim simulates the motion of the aircraft.
     pub fn is_flying(&self) -> bool {
         self.phase == Phase::Flight
     }
@@ -103,7 +103,7 @@ impl Launcher {
         wanted
     }
 
-    /// Advances one step.
+    /// Advances the aircraft by one step and returns its state.
     ///
     /// # Errors
     /// If the plant cannot be stepped.
@@ -121,7 +121,7 @@ impl Launcher {
         Ok(self.shown)
     }
 
-    /// The state while JSBSim does not fly, or at the moment when it begins to.
+    /// The state before JSBSim takes over, or at the moment when it does.
     fn state(&self) -> Truth {
         match self.phase {
             Phase::Stand => self.pulled(0.0, 0.0),
@@ -130,11 +130,12 @@ impl Launcher {
         }
     }
 
-    /// The state at the fraction `share` of the final speed; `pull` is 1 on the catapult, 0 on the stand.
+    /// The state at the fraction `share` of the final speed. The factor `pull` of the catapult's acceleration is 1 on the
+    /// catapult and 0 on the stand.
     fn pulled(&self, share: f64, pull: f64) -> Truth {
         let released = self.released;
         let velocity = released.velocity_ned_mps.map(|v| v * share);
-        // Distance before the release: at constant acceleration half the speed times the time.
+        // Displacement from the release point, at constant acceleration; negative before the release.
         let way = released.velocity_ned_mps.map(|v| 0.5 * v * PULL_S * (share * share - 1.0));
         let (north_m, east_m) = metres_per_degree(released.latitude_deg);
         let attitude = [released.roll_rad, released.pitch_rad, released.yaw_rad];
@@ -171,7 +172,7 @@ pub(super) fn metres_per_degree(latitude_deg: f64) -> (f64, f64) {
     (meridian_m * degree, EQUATOR_M / flat.sqrt() * cos * degree)
 }
 
-/// Gravity with the earth's rotation: international gravity formula 1980 with free-air decrease.
+/// Gravity including the earth's rotation, m/s²: international gravity formula 1980 with free-air decrease.
 fn gravity_mps2(latitude_deg: f64, altitude_m: f64) -> f64 {
     let sin = latitude_deg.to_radians().sin();
     let sin_twice = (2.0 * latitude_deg.to_radians()).sin();

@@ -1,4 +1,4 @@
-//! Lockstep: a step is made on the companion's answer and never without.
+//! Lockstep: each step waits for the companion's answer to the frame before it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -11,12 +11,12 @@ use super::session::Session;
 use super::summary::Event;
 use super::telemetry::{FRAME_US, StateFrame, encode_slow};
 
-/// A frame without an answer is repeated after this time.
+/// Time after which a frame without an answer is sent again.
 const REPEAT: Duration = Duration::from_secs(1);
-/// A frame that was lost on purpose is repeated after this time.
+/// Time after which a frame that the fault rule dropped is sent again.
 const REPEAT_LOST: Duration = Duration::from_millis(20);
 
-/// Flies until asked to stop or until the flight is over.
+/// Runs until a stop request or the end of the flight.
 pub fn fly(
     session: &mut Session<'_>,
     flight: &mut Flight,
@@ -44,7 +44,7 @@ pub fn fly(
     }
 }
 
-/// Times and sendings of a frame that is not answered yet.
+/// Times and number of transmissions of a frame that is not yet answered.
 struct Asking {
     since: Instant,
     next: Instant,
@@ -53,7 +53,7 @@ struct Asking {
     paused: bool,
 }
 
-/// Sends `frame` until it is answered; `None` when asked to stop.
+/// Sends `frame` until it is answered; `None` after a stop request.
 fn ask(
     session: &mut Session<'_>,
     frame: &StateFrame,
@@ -112,7 +112,7 @@ fn send_if_due(
     }
 }
 
-/// The answer to the frame of `time_us`; counts all others.
+/// The answer to the frame of `time_us`, µs; all other answers are counted.
 fn pick(session: &mut Session<'_>, time_us: u64, answers: &[Answer]) -> Option<Answer> {
     let mut picked = None;
     for answer in answers {

@@ -1,8 +1,7 @@
-//! The shim: plays the flight controller to a companion, over MAVLink.
+//! The shim: simulates the flight controller for a companion, over MAVLink.
 //!
-//! `sitl/PROTOCOL.md` is the contract. The shim flies the plant, shows it as sensors would through
-//! state frames, and steps it with the companion's answers, in [`Pace::Lockstep`] or in
-//! [`Pace::RealTime`]. It shares no MAVLink code with the companion.
+//! `sitl/PROTOCOL.md` specifies the messages. The shim sends the measured state of the plant in state frames and steps the plant
+//! with the companion's answers, in [`Pace::Lockstep`] or in [`Pace::RealTime`]. It shares no MAVLink code with the companion.
 //!
 //! ```text
 //! Flight ─ Truth ─► Sensors ─► StateFrame ─► codec ─► Link ─► companion
@@ -56,11 +55,11 @@ use flight::Flight;
 use link::{Link, Wait};
 use session::Session;
 
-/// Flies until `stop` is set (polled about every 20 ms), the flight is over, or the plant fails;
-/// reports every change of state to `observer`. Blocks the calling thread.
+/// Runs until `stop` is set (polled about every 20 ms), the flight is over, or the plant fails. Reports every change of state to
+/// `observer`. Blocks the calling thread.
 ///
-/// Options are checked and the link is opened before the truth file is made, so that a run that
-/// cannot begin leaves nothing behind.
+/// The options are checked and the link is opened before the truth file is created. A run that cannot begin therefore leaves no
+/// file.
 pub fn run(
     options: &ShimOptions,
     stop: &AtomicBool,
@@ -72,7 +71,7 @@ pub fn run(
         Pace::RealTime => Wait::Never,
     };
     if let Some(px4) = &options.px4 {
-        // A step is due every 4 ms, which is shorter than a patient wait.
+        // A step is due every 4 ms; a patient wait could take longer.
         let link = Link::open(&options.link, Wait::Never)?;
         return px4_sim::fly(link, options, px4, stop, observer);
     }

@@ -12,40 +12,40 @@ use crate::plant::{PlantOptions, Start};
 /// Clock that paces the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// The wall clock: one frame every 10 ms whatever the companion does.
+    /// The wall clock: one frame every 10 ms, independent of the companion.
     RealTime,
-    /// The companion: a step is made on its answer and never without.
+    /// The companion: each step waits for its answer.
     Lockstep,
 }
 
 /// When the aircraft begins to fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Launch {
-    /// At the first armed answer; until then it stays at its start while time runs.
+    /// At the first armed answer; until then the aircraft stays at its start while time advances.
     WhenArmed,
     /// In the first frame, without waiting for an armed answer.
     Immediate,
 }
 
-/// Treatment of a truth file that exists.
+/// Treatment of an existing truth file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// Keep it and refuse to start.
+    /// Keep the file and refuse to start.
     Keep,
-    /// Replace it without asking.
+    /// Overwrite the file.
     Replace,
 }
 
-/// Where the plant's truth goes.
+/// Output file for the plant's truth.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TruthFile {
     /// A CSV file in the columns of the flight-log format.
     pub path: PathBuf,
-    /// Treatment of a file that exists.
+    /// Treatment of an existing file.
     pub existing: Existing,
 }
 
-/// Standard deviations of white sensor noise, one draw a frame.
+/// Standard deviations of white sensor noise; each frame draws new values.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Noise {
     /// Rate gyros, each axis, rad/s.
@@ -54,7 +54,7 @@ pub struct Noise {
     pub accelerometer_mps2: f64,
     /// Attitude, each Euler angle, rad.
     pub attitude_rad: f64,
-    /// True airspeed, m/s, one draw a frame.
+    /// True airspeed, m/s.
     pub airspeed_mps: f64,
     /// Angle-of-attack and sideslip vanes, rad.
     pub vane_rad: f64,
@@ -73,8 +73,8 @@ impl Noise {
         altitude_m: 0.0,
     };
 
-    /// Typical noise of a small autopilot in flight with the motor running: an assumption, not a
-    /// measurement of one product (0.3 °/s, 0.3 m/s², 0.2°, 0.3 m/s, 0.3°, 0.2 m).
+    /// Typical noise of a small autopilot in flight with its motor running: 0.3 °/s, 0.3 m/s², 0.2°, 0.3 m/s, 0.3°, 0.2 m. The
+    /// values are assumptions, not measurements of a product.
     pub const REALISTIC: Noise = Noise {
         gyro_radps: 0.0052,
         accelerometer_mps2: 0.3,
@@ -103,7 +103,7 @@ pub struct Bias {
     pub gyro_radps: [f64; 3],
     /// Added to the specific force, body axes, m/s².
     pub accelerometer_mps2: [f64; 3],
-    /// Added to roll, pitch and yaw, rad: alignment, compass.
+    /// Added to roll, pitch and yaw, rad, as by misalignment or a compass error.
     pub attitude_rad: [f64; 3],
     /// Added to the angle of attack, rad.
     pub alpha_rad: f64,
@@ -126,32 +126,32 @@ impl Default for Bias {
     }
 }
 
-/// Faults of the transmission of state frames.
+/// Faults in the transmission of state frames.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct FrameFaults {
-    /// Every frame comes this much late, ms. In lockstep, where only simulated time exists, it is
-    /// rounded up to whole steps and the plant runs ahead of the frames.
+    /// Constant delay of every frame, ms. In lockstep, which has only simulated time, the delay is rounded up to whole steps, and
+    /// the plant runs ahead of the frames.
     pub delay_ms: f64,
-    /// A frame is lost with this probability, 0..1.
+    /// Probability that a frame is lost, 0 to below 1.
     pub drop_probability: f64,
-    /// Each frame comes late by a further uniform 0..this, ms of wall time.
+    /// Upper limit of a further uniformly distributed delay of each frame, from 0, ms of wall time.
     pub jitter_ms: f64,
-    /// A frame comes late by `late_ms` more with this probability, 0..1.
+    /// Probability that a frame is delayed by a further `late_ms`, 0..1.
     pub late_probability: f64,
-    /// Delay of such a frame, ms of wall time.
+    /// Delay of a frame that is drawn with `late_probability`, ms of wall time.
     pub late_ms: f64,
 }
 
-/// Everything a run needs.
+/// Options of a run of the shim.
 #[derive(Clone, Debug)]
 pub struct ShimOptions {
-    /// Address of the link to the companion, or to the stack whose simulator this run is.
+    /// Address of the link to the companion, or to the flight stack for which the shim is the simulator.
     pub link: Address,
     /// Clock that paces the run.
     pub pace: Pace,
     /// When the aircraft begins to fly.
     pub launch: Launch,
-    /// Simulated flight after which the run ends, s; the time held at the start does not count.
+    /// Simulated flight time after which the run ends, s; time at the start before launch does not count. `None` for no limit.
     pub duration_s: Option<f64>,
     /// The state at the start.
     pub start: Start,
@@ -159,7 +159,7 @@ pub struct ShimOptions {
     pub plant: PlantOptions,
     /// Seed of sensor noise and frame faults.
     pub seed: u64,
-    /// Where the truth goes, if anywhere.
+    /// Output file for the truth; `None` for no file.
     pub truth: Option<TruthFile>,
     /// Standard deviations of the white sensor noise.
     pub noise: Noise,
@@ -171,7 +171,7 @@ pub struct ShimOptions {
     pub personality: Option<Personality>,
     /// Parameters of the simulated stack that differ from its defaults.
     pub parameters: Vec<(String, f64)>,
-    /// Names in the parameter file that the simulated stack lacks: they are printed and have no effect.
+    /// Parameters of the parameter file that the simulated stack does not have; they are printed and have no effect.
     pub unplayed: Vec<String>,
     /// Options for a run as the simulator of PX4 SITL; `None` for a run with a companion.
     pub px4: Option<Px4Options>,
@@ -187,7 +187,7 @@ impl ShimOptions {
         Address { transport: Transport::UdpOut, endpoint: "127.0.0.1:14600".to_owned() }
     }
 
-    /// Real time, perfect sensors, held until armed, towards [`ShimOptions::default_link`].
+    /// Options for real time and perfect sensors, held until armed, over [`ShimOptions::default_link`].
     pub fn new(plant: PlantOptions, start: Start) -> Self {
         ShimOptions {
             link: Self::default_link(),
@@ -210,7 +210,7 @@ impl ShimOptions {
         }
     }
 
-    /// Refuses invalid numbers before anything is opened.
+    /// Checks the options before anything is opened.
     pub(super) fn check(&self) -> Result<(), ShimError> {
         let faults = &self.faults;
         let mut errors = self.noise.values().to_vec();
@@ -234,9 +234,9 @@ impl ShimOptions {
         self.check_simulators()?;
         demand(
             self.personality.is_none() || self.pace == Pace::RealTime,
-            "a personality flies in real time, as the flight controller it plays does",
+            "a personality flies in real time, as the flight controller that it simulates does",
         )?;
-        // Ten thousand years, whose microseconds fit in 64 bits.
+        // The upper limit is about ten thousand years, whose microseconds fit into 64 bits.
         demand(
             (0.0..=3.2e11).contains(&self.clock_start_s),
             "the clock must start at 0 s or later, and at 3.2e11 s at the latest",
@@ -268,7 +268,7 @@ impl ShimOptions {
         demand(start.altitude_m > 0.0, "the altitude at the start must be positive")
     }
 
-    /// Refuses options that the simulator interfaces of PX4 and ArduPilot do not support.
+    /// Checks that the simulator interfaces of PX4 and ArduPilot support the options.
     fn check_simulators(&self) -> Result<(), ShimError> {
         if let Some(px4) = &self.px4 {
             demand(
@@ -307,7 +307,7 @@ impl ShimOptions {
         Ok(())
     }
 
-    /// Whether state frames have no faults.
+    /// Whether the options set no frame faults.
     fn frames_are_spared(&self) -> bool {
         let FrameFaults { delay_ms, drop_probability, jitter_ms, late_probability, .. } =
             self.faults;

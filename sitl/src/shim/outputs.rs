@@ -5,8 +5,7 @@ use std::str::FromStr;
 
 use crate::plant::Inputs;
 
-/// Something that an output moves. A positive output lifts a trailing edge, as PX4 and ArduPilot
-/// have it.
+/// A control surface or throttle that an output moves. As in PX4 and ArduPilot, a positive output moves a trailing edge up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Effector {
     /// Both ailerons on one channel; positive rolls right.
@@ -39,7 +38,7 @@ impl Effector {
         Effector::ALL.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
     }
 
-    /// Effect of a positive output on roll (right) and on pitch (up).
+    /// Effect of a positive output on roll (right wing down positive) and on pitch (nose up positive).
     fn acts(self) -> (f64, f64) {
         match self {
             Effector::Aileron | Effector::RightAileron => (1.0, 0.0),
@@ -52,10 +51,10 @@ impl Effector {
     }
 }
 
-/// ArduPilot has 32 outputs, PX4's simulator interface 16.
+/// Largest output number: ArduPilot has 32 outputs, PX4's simulator interface 16.
 const OUTPUTS: usize = 32;
 
-/// One output: what it moves, its place counted from 0, its sign.
+/// One output: its effector, its index from 0, and its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Output {
     effector: Effector,
@@ -63,14 +62,14 @@ struct Output {
     sign: f64,
 }
 
-/// Which outputs move aileron, elevator, rudder and throttle.
+/// Assignment of outputs to aileron, elevator, rudder and throttle.
 ///
-/// Written as `left-aileron=6,right-aileron=7,elevator=8,throttle=5`: the number is that of
-/// PX4's PWM_MAIN_FUNCn or of ArduPilot's SERVOn_FUNCTION, 1 to 32, a minus before it reverses.
+/// The written form is `left-aileron=6,right-aileron=7,elevator=8,throttle=5`. The number is that of PX4's PWM_MAIN_FUNCn or of
+/// ArduPilot's SERVOn_FUNCTION, 1 to 32. A minus before the number reverses the output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputMap(Vec<Output>);
 
-/// An assignment of outputs that cannot be used.
+/// Error of parsing an assignment of outputs.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "cannot read the outputs '{given}': {fault}; write them like left-aileron=6,right-aileron=7,elevator=8,throttle=5, with the numbers of PX4's PWM_MAIN_FUNCn or of ArduPilot's SERVOn_FUNCTION (aileron, left-aileron, right-aileron, elevator, left-elevon, right-elevon, rudder, throttle; a minus reverses)"
@@ -91,7 +90,7 @@ impl OutputMap {
         ])
     }
 
-    /// The outputs that ArduPlane has by default (SERVO1_FUNCTION 4, 19, 70, 21).
+    /// The default outputs of ArduPlane (SERVO1_FUNCTION to SERVO4_FUNCTION: 4, 19, 70, 21).
     pub fn ardupilot() -> Self {
         OutputMap(vec![
             Output::plain(Effector::Aileron, 1),
@@ -155,18 +154,18 @@ impl FromStr for OutputMap {
     }
 }
 
-/// Commands of all outputs combined.
+/// Plant commands computed from all outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mixed {
-    /// Commands of the plant.
+    /// Commands for the plant.
     pub inputs: Inputs,
-    /// Whether an output lay outside its range and was limited.
+    /// Whether an output was outside its range and was limited.
     pub limited: bool,
 }
 
 impl OutputMap {
-    /// Mixes outputs, which `at` reads by their place counted from 0: surfaces −1..1, throttle
-    /// 0..1 with `Range::Throttle`. `None` when an output that is used is not a finite number.
+    /// Mixes the outputs that `at` returns by index from 0: −1..1 for a surface, 0..1 with `Range::Throttle`. `None` if an
+    /// assigned output is not finite.
     pub fn mix(&self, at: impl Fn(usize, Range) -> f64) -> Option<Mixed> {
         let (mut roll, mut pitch, mut mixed) = (Mean::default(), Mean::default(), Mixed::default());
         for Output { effector, place, sign } in &self.0 {
@@ -182,18 +181,18 @@ impl OutputMap {
             pitch.take(pitches, within);
             match effector {
                 Effector::Throttle => mixed.inputs.throttle = within,
-                // The plant's rudder yaws left when positive.
+                // a positive rudder of the plant yaws left
                 Effector::Rudder => mixed.inputs.rudder = -within,
                 _ => {}
             }
         }
         mixed.inputs.aileron = roll.value();
-        // The plant's elevator pitches down when positive.
+        // a positive elevator of the plant pitches down
         mixed.inputs.elevator = -pitch.value();
         Some(mixed)
     }
 
-    /// The highest number of an output that moves something.
+    /// The highest number of an assigned output.
     pub fn highest(&self) -> usize {
         self.0.iter().map(|output| output.place + 1).max().unwrap_or(0)
     }
@@ -223,7 +222,7 @@ impl Effector {
     }
 }
 
-/// Mean of several outputs that move one control, such as left and right elevon.
+/// Mean of the outputs that move one control, such as left and right elevon.
 #[derive(Default)]
 struct Mean {
     sum: f64,
@@ -252,8 +251,7 @@ mod tests {
 
     #[test]
     fn elevons_and_ailerons_mean_what_px4_allocates() {
-        // Control allocation of a flying wing (torques ∓0.5 and 0.5): roll r and pitch p come as
-        // left = p − r, right = p + r.
+        // Control allocation of a flying wing (torques ∓0.5 and 0.5): from roll r and pitch p, left = p − r and right = p + r.
         let (roll, pitch) = (0.25, 0.5);
         let wing = mixed(
             "left-elevon=1,right-elevon=2,throttle=3",
@@ -261,11 +259,11 @@ mod tests {
         );
         let inputs = Inputs { aileron: 0.25, elevator: -0.5, throttle: 0.75, rudder: 0.0 };
         assert_eq!(wing.unwrap().inputs, inputs);
-        // Of a plane: left = −r, right = r, elevator = p; the default of the stock airframes.
+        // For a conventional aircraft: left = −r, right = r, elevator = p, as in the stock airframes.
         let plane = OutputMap::px4().to_string();
         let plane = mixed(&plane, &[(6, -roll), (7, roll), (8, pitch), (5, 0.75)]);
         assert_eq!(plane.unwrap().inputs, inputs);
-        // One channel, reversed.
+        // Both ailerons on one reversed channel.
         let single =
             mixed("aileron=-1,elevator=2,throttle=3", &[(1, -roll), (2, pitch), (3, 0.75)]);
         assert_eq!(single.unwrap().inputs, inputs);

@@ -1,4 +1,4 @@
-//! Real time: one frame every 10 ms of the wall clock, whatever the companion does.
+//! Real time: one frame every 10 ms of the wall clock, independent of the companion.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,28 +15,28 @@ use super::telemetry::{FRAME_US, encode_slow};
 use crate::plant::Inputs;
 
 const PERIOD: Duration = Duration::from_micros(FRAME_US);
-/// A cycle that begins later than this is late.
+/// Delay of a cycle beyond which it counts as late.
 const LATE: Duration = Duration::from_millis(2);
-/// Delay beyond which the clock is reset: no burst of frames makes up for it.
+/// Delay beyond which the schedule restarts at the present time, without a burst of frames.
 const HOPELESS: Duration = Duration::from_millis(100);
-/// An answer older than this is not flown, µs.
+/// Age beyond which an answer is stale and is not used, µs.
 const STALE_US: u64 = 500_000;
-/// Intervals at which the link is polled while an answer is expected: short while the answer may be
-/// punctual, to measure its time, then long.
+/// Intervals between polls of the link while an answer is expected. The first applies within `PUNCTUAL` of the frame, for an
+/// accurate measurement of the answer time; the second applies later.
 const LOOKS: [Duration; 2] = [Duration::from_micros(100), Duration::from_millis(1)];
-/// An answer within this time is punctual.
+/// Time after the frame during which the link is polled at the short interval.
 const PUNCTUAL: Duration = Duration::from_millis(4);
-/// Largest number of packets taken per poll; a flood waits in the kernel.
+/// Largest number of packets handled per poll; further packets wait in the kernel.
 const ARRIVALS: usize = 500;
-/// Sending times that are remembered, frames.
+/// Number of frames whose sending times are kept.
 const SENT: usize = 64;
 
-/// The running state of the real-time loop.
+/// State of the real-time loop.
 struct Cycle<'s, 'o> {
     session: &'s mut Session<'o>,
-    /// Frames under way to the companion: when to send, time of the frame, bytes.
+    /// Frames that wait to be sent: sending time, time stamp of the frame, bytes.
     outbox: VecDeque<(Instant, u64, Vec<u8>)>,
-    /// When the latest frames were sent, by frame number.
+    /// Sending times of the latest frames, indexed by frame number.
     sent: [Option<(u64, Instant)>; SENT],
     answers: Vec<Answer>,
     /// The newest answer since the last step.
@@ -47,7 +47,7 @@ struct Cycle<'s, 'o> {
     now_us: u64,
 }
 
-/// Flies until asked to stop or until the flight is over.
+/// Runs until a stop request or the end of the flight; `delay_ms` is the constant delay of the frames, ms.
 pub fn fly(
     session: &mut Session<'_>,
     flight: &mut Flight,
@@ -96,7 +96,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
         }
     }
 
-    /// Records the lateness of this cycle; returns the deadline from which the next one counts.
+    /// Records the lateness of this cycle and returns the deadline from which the next cycle counts.
     fn begin(&mut self, deadline: Instant) -> Instant {
         let now = Instant::now();
         let late = now.saturating_duration_since(deadline);
@@ -124,12 +124,12 @@ impl<'s, 'o> Cycle<'s, 'o> {
             self.session.counts.dropped_frames += 1;
             return;
         }
-        // Frames keep their order: one that is late holds up those behind it.
+        // Frames keep their order: a late frame delays those behind it.
         let due = self.outbox.back().map_or(due, |&(before, ..)| due.max(before));
         self.outbox.push_back((due, frame.time_us, bytes));
     }
 
-    /// Sends what falls due and takes what arrives until `deadline`.
+    /// Sends the frames that are due and receives messages until `deadline`.
     fn converse_until(&mut self, deadline: Instant) {
         let punctual_until = deadline - PERIOD + PUNCTUAL;
         loop {
@@ -178,7 +178,7 @@ impl<'s, 'o> Cycle<'s, 'o> {
         }
     }
 
-    /// Keeps the newest answer that may be flown; counts the others.
+    /// Keeps the newest valid answer and counts the others.
     fn judge(&mut self, answer: Answer) {
         let echo = answer.echo_us;
         let counts = &mut self.session.counts;

@@ -1,4 +1,4 @@
-//! Sensors: from the plant's truth to what the flight controller would measure.
+//! Sensor model: converts the plant's truth to measurements of the flight controller.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::options::{Bias, Noise};
 use crate::plant::Truth;
 
-/// The random stream of the sensors, apart from those of the frame faults.
+/// Number of the random stream for the sensors; frame faults use other streams.
 const STREAM: u64 = 1;
 
 /// Sensors with constant errors and white noise.
@@ -19,17 +19,17 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Sensors whose noise is fixed by `seed`.
+    /// Sensors with noise that depends only on `seed`.
     pub fn new(noise: Noise, bias: Bias, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(STREAM);
         Sensors { noise, bias, random }
     }
 
-    /// What the sensors show of `truth`: scale, then bias, then noise.
+    /// Measurement of `truth`: scale error, then bias, then noise.
     ///
-    /// The same number of draws is made whatever the options are, so that one group's noise does
-    /// not change another's.
+    /// The number of random draws does not depend on the options. A change of one sensor's noise therefore leaves the noise of
+    /// the others unchanged.
     pub fn measure(&mut self, truth: &Truth) -> Truth {
         let (noise, bias) = (self.noise, self.bias);
         let mut draw = |deviation: f64| {

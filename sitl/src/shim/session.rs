@@ -1,4 +1,4 @@
-//! Exchange of messages with the companion: its presence, its answers and their counts.
+//! Message exchange with the companion: detects its presence, receives its answers and counts messages.
 
 use std::time::{Duration, Instant};
 
@@ -8,23 +8,23 @@ use super::link::{Address, Arrival, Link};
 use super::summary::{Event, Notice, Summary};
 use super::telemetry::{StateFrame, encode_heartbeat};
 
-/// System and component of the shim.
+/// System and component ID of the shim.
 pub const SHIM: (u8, u8) = (1, 200);
-/// System and component of the companion.
+/// System and component ID of the companion.
 pub const COMPANION: (u8, u8) = (1, 1);
-/// After this silence the companion counts as lost.
+/// Silence after which the companion counts as lost.
 const SILENCE: Duration = Duration::from_secs(2);
 
-/// Whether a receive brought anything.
+/// Whether a receive call returned an arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
-    /// The wait ended without an arrival.
+    /// Nothing arrived during the wait.
     Nothing,
-    /// Bytes, or a change of the link.
+    /// Bytes arrived, or the state of the link changed.
     Something,
 }
 
-/// Exchange of messages of one run.
+/// Message exchange of one run.
 pub struct Session<'a> {
     link: Link,
     address: Address,
@@ -33,7 +33,7 @@ pub struct Session<'a> {
     observer: &'a mut dyn FnMut(Notice),
     /// The counts so far.
     pub counts: Summary,
-    /// Simulated time that events are stamped with, µs.
+    /// Simulated time for the time stamps of events, µs.
     pub time_us: u64,
     last_message: Option<Instant>,
     armed: bool,
@@ -43,7 +43,7 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Begins on an open link.
+    /// Begins a session on an open link.
     pub fn new(link: Link, address: Address, observer: &'a mut dyn FnMut(Notice)) -> Self {
         let local = link.local();
         let mut session = Session {
@@ -70,13 +70,12 @@ impl<'a> Session<'a> {
         (self.observer)(Notice { time_s: self.time_us as f64 * 1e-6, event });
     }
 
-    /// Whether the companion is present: it sent a message in the last two seconds, on an open
-    /// link.
+    /// Whether the companion is present: its last message is at most 2 s old and the link is open.
     pub fn is_alive(&self) -> bool {
         self.last_message.is_some()
     }
 
-    /// Whether the companion has become reachable since the last call.
+    /// Whether the companion has become reachable since the last call of this function.
     pub fn take_newly_reachable(&mut self) -> bool {
         std::mem::take(&mut self.newly_reachable)
     }
@@ -93,7 +92,7 @@ impl<'a> Session<'a> {
         self.counts.unsent_frames += u64::from(!self.link.send(bytes));
     }
 
-    /// Sends the bytes that `write` encodes, if any, as a separate datagram.
+    /// Sends the bytes that `write` encodes as a separate batch; sends nothing if there are none.
     pub fn send_slow(&mut self, write: impl FnOnce(&mut Encoder, &mut Vec<u8>)) {
         self.batch.clear();
         write(&mut self.encoder, &mut self.batch);
@@ -102,12 +101,12 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends an additional heartbeat while simulated time is stopped.
+    /// Sends an additional heartbeat, for use while simulated time is stopped.
     pub fn send_heartbeat(&mut self) {
         self.send_slow(encode_heartbeat);
     }
 
-    /// Takes what has arrived and appends the answers that can be flown to `answers`.
+    /// Receives one arrival and appends the valid answers in it to `answers`.
     pub fn receive(&mut self, answers: &mut Vec<Answer>) -> Received {
         let mut frames = std::mem::take(&mut self.frames);
         frames.clear();
@@ -180,7 +179,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Notices a companion that has fallen silent.
+    /// Detects a companion that has become silent.
     pub fn watch(&mut self, now: Instant) {
         if self.last_message.is_some_and(|last| now.saturating_duration_since(last) > SILENCE) {
             self.link.abandon();
@@ -188,7 +187,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Counts an answer that is flown and notices arming and disarming.
+    /// Counts an answer that is used, and reports arming and disarming.
     pub fn use_answer(&mut self, answer: &Answer) {
         self.counts.answers += 1;
         self.counts.limited_answers += u64::from(answer.limited);
@@ -198,7 +197,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Ends the session and returns its counts.
+    /// Ends the session and returns the counts.
     pub fn finish(mut self) -> Summary {
         self.counts.bad_frames = self.parser.bad();
         self.counts.foreign_frames += self.parser.unknown();

@@ -1,4 +1,4 @@
-//! Events of a run and the counts at its end.
+//! Events during a run, and the counts at its end.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -12,25 +12,25 @@ use super::px4_sim::Px4Event;
 /// A change of state, reported to the observer of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// The link is open; this side's own address where there is one.
+    /// The link is open; the second field is the local address, if the link has one.
     Open(Address, Option<SocketAddr>),
     /// A note on the aircraft.
     Note(String),
-    /// No companion has sent a message yet, or the last one was lost.
+    /// No companion has sent a message yet, or the companion was lost.
     Waiting(Address),
     /// The first message of the companion has arrived.
     Found,
     /// The companion has sent nothing for two seconds, or has closed its stream.
     Lost,
-    /// The first armed answer has come: the aircraft flies.
+    /// The first armed answer has arrived, and the aircraft begins to fly.
     Launched,
     /// The companion is armed.
     Armed,
     /// The companion is disarmed.
     Disarmed,
-    /// Lockstep: no answer to the present frame for a second; nothing moves until one comes.
+    /// Lockstep: no answer to the present frame arrived for 1 s; simulated time stops until an answer arrives.
     Paused,
-    /// Lockstep: the answer has come after all.
+    /// Lockstep: an answer has arrived after the interruption.
     Resumed,
     /// The simulated flight controller has changed its mode.
     Mode(String),
@@ -38,7 +38,7 @@ pub enum Event {
     Px4(Px4Event),
     /// Event of a run against ArduPilot.
     Ardupilot(ArdupilotEvent),
-    /// The clock lagged too far and was advanced by this time.
+    /// The loop was late by this time, so its schedule restarted at the present time.
     Skipped(Duration),
 }
 
@@ -79,7 +79,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// An event with the simulated time at which it happened.
+/// An event with its simulated time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
     /// Simulated time of the event, s.
@@ -88,7 +88,7 @@ pub struct Notice {
     pub event: Event,
 }
 
-/// Time from sending a frame to receiving its answer, in bins of 10 µs up to 20 ms.
+/// Distribution of the time from sending a frame to receiving its answer, in bins of 10 µs up to 20 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Latency {
     bins: Vec<u64>,
@@ -110,7 +110,7 @@ impl Latency {
         self.longest = self.longest.max(taken);
     }
 
-    /// Number of answers measured.
+    /// Number of measured answers.
     pub fn count(&self) -> u64 {
         self.count
     }
@@ -120,7 +120,7 @@ impl Latency {
         self.longest
     }
 
-    /// The quantile `share` (0..1) of the times from frame to answer, to the bin; zero without answers.
+    /// The quantile `share` (0..1) of the times from frame to answer, with a resolution of one bin; zero without answers.
     pub fn quantile(&self, share: f64) -> Duration {
         let wanted = (share * self.count as f64).ceil() as u64;
         let mut seen = 0;
@@ -134,48 +134,48 @@ impl Latency {
     }
 }
 
-/// The counts of a run.
+/// Counts and times of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// State frames made, repetitions not counted.
+    /// State frames, without repetitions.
     pub frames: u64,
-    /// State frames that were sent again because no answer came.
+    /// State frames sent again because no answer arrived.
     pub repeated_frames: u64,
-    /// State frames lost on purpose.
+    /// State frames dropped by the fault rule.
     pub dropped_frames: u64,
-    /// State frames that could not be sent: no peer, or no room.
+    /// State frames that could not be sent: no peer, or no room in the send buffer.
     pub unsent_frames: u64,
-    /// Answers that were flown (or, before the launch, would have been).
+    /// Answers that were used; before the launch, they do not move the aircraft.
     pub answers: u64,
-    /// Answers to a frame that was answered already.
+    /// Repeated answers to an answered frame.
     pub repeated_answers: u64,
-    /// Answers older than 0.5 s; not flown.
+    /// Answers older than 0.5 s; not used.
     pub stale_answers: u64,
-    /// Answers that echo a time no frame had; not flown.
+    /// Answers that echo a time of no frame; not used.
     pub wrong_answers: u64,
-    /// Answers with a control that is not a finite number; not flown.
+    /// Answers with a control that is not finite; not used.
     pub unusable_answers: u64,
-    /// Answers with a control outside its range, limited to it.
+    /// Answers with a control outside its range; the control was limited.
     pub limited_answers: u64,
-    /// Real time: steps made without a new answer to fly since the launch.
+    /// Real time: steps after the launch without a new valid answer.
     pub unanswered_steps: u64,
     /// Real time: cycles that began more than 2 ms late.
     pub late_cycles: u64,
-    /// Real time: the largest delay of the start of a cycle.
+    /// Real time: largest delay at the beginning of a cycle.
     pub latest_cycle: Duration,
-    /// Runs of bytes that were no frame.
+    /// Runs of bytes that were not part of a frame.
     pub bad_frames: u64,
-    /// Valid frames of other senders than the companion, and frames with unknown messages.
+    /// Valid frames from senders other than the companion, and frames with unknown messages.
     pub foreign_frames: u64,
-    /// Simulated time that was shown, s.
+    /// Simulated time of the frames, s.
     pub simulated_s: f64,
     /// Simulated time since the launch, s.
     pub flown_s: f64,
     /// Wall time of the run, s.
     pub wall_s: f64,
-    /// From sending a frame to receiving its answer.
+    /// Distribution of the time from sending a frame to receiving its answer.
     pub latency: Latency,
-    /// Why the run ended; `None` when it was asked to stop.
+    /// Why the run ended; `None` after a stop request.
     pub over: Option<Over>,
 }
 

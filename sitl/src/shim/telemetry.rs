@@ -1,6 +1,6 @@
-//! Telemetry: from measured quantities to the messages of PROTOCOL.md.
+//! Converts measured quantities to the messages that `sitl/PROTOCOL.md` specifies.
 //!
-//! Here, in one place, SI units and radians become the units of the wire.
+//! This module converts SI units and radians to the units of the messages.
 
 use super::codec::{
     ActuatorOutputStatus, AoaSsa, AttitudeQuaternion, Encoder, GlobalPositionInt, GpsRawInt,
@@ -30,7 +30,7 @@ const IMU_FIELDS: u16 = 0x0007 | 0x0038 | 0x0200 | 0x0800 | 0x1000;
 /// MAV_SYS_STATUS_SENSOR bits: 3D gyro, 3D accelerometer, absolute and differential pressure, GPS.
 const SENSORS: u32 = 0x01 | 0x02 | 0x08 | 0x10 | 0x20;
 
-/// The five messages that make a state frame.
+/// The five messages of a state frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateFrame {
     /// Simulated time that identifies the frame, µs.
@@ -43,7 +43,7 @@ pub struct StateFrame {
 }
 
 impl StateFrame {
-    /// The frame of `time_us` that shows `measured` of an aircraft with this travel.
+    /// The frame with time stamp `time_us`, µs, for the measurement `measured` of an aircraft with this travel.
     pub fn new(time_us: u64, measured: &Truth, travel: Travel) -> Self {
         StateFrame {
             time_us,
@@ -59,7 +59,7 @@ impl StateFrame {
         }
     }
 
-    /// Appends the five messages in their order.
+    /// Appends the five messages in the order of the protocol.
     pub fn encode(&self, encoder: &mut Encoder, out: &mut Vec<u8>) {
         encoder.encode(&self.imu, out);
         encoder.encode(&self.hud, out);
@@ -74,7 +74,7 @@ pub fn encode_heartbeat(encoder: &mut Encoder, out: &mut Vec<u8>) {
     encoder.encode(&HEARTBEAT, out);
 }
 
-/// Appends the slower messages that are due at `time_us`; altitude above home counts from `home_m`.
+/// Appends the slower messages that are due at `time_us`, µs; `home_m` is the altitude of home above mean sea level, m.
 pub fn encode_slow(
     time_us: u64,
     measured: &Truth,
@@ -167,7 +167,7 @@ pub(super) fn attitude(time_us: u64, measured: &Truth) -> AttitudeQuaternion {
     }
 }
 
-/// The rotation NED→FRD of the Euler angles ZYX, w first, w ≥ 0.
+/// Quaternion of the rotation NED→FRD for Euler angles ZYX, rad; w first, w ≥ 0.
 pub(super) fn quaternion(roll: f64, pitch: f64, yaw: f64) -> [f64; 4] {
     let (sr, cr) = (0.5 * roll).sin_cos();
     let (sp, cp) = (0.5 * pitch).sin_cos();
@@ -186,7 +186,7 @@ pub(super) fn health() -> SysStatus {
         onboard_control_sensors_present: SENSORS,
         onboard_control_sensors_enabled: SENSORS,
         onboard_control_sensors_health: SENSORS,
-        // The battery is not simulated: 12.6 V, current and charge unknown.
+        // The battery is not simulated: 12.6 V, with unknown current and remaining charge.
         voltage_battery: 12_600,
         current_battery: -1,
         battery_remaining: -1,

@@ -1,4 +1,4 @@
-//! The plant's truth as a CSV file in the columns of the flight-log format.
+//! Writes the plant's truth to a CSV file in the columns of the flight-log format.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
@@ -12,10 +12,10 @@ const HEADER: &str = "time_s,roll_rad,pitch_rad,yaw_rad,p_radps,q_radps,r_radps,
 alpha_rad,beta_rad,ax_mps2,ay_mps2,az_mps2,vn_mps,ve_mps,vd_mps,altitude_m,air_density_kgpm3,\
 aileron_rad,elevator_rad,throttle,aileron_cmd,elevator_cmd,throttle_cmd,rate_hold_s";
 
-/// The further columns of an aircraft with a rudder.
+/// Additional columns of an aircraft with a rudder.
 const RUDDER: &str = ",rudder_rad,rudder_cmd";
 
-/// A truth file that is being written.
+/// A truth file that is open for writing.
 #[derive(Debug)]
 pub struct TruthLog {
     path: PathBuf,
@@ -26,8 +26,8 @@ pub struct TruthLog {
 }
 
 impl TruthLog {
-    /// Creates the file with its header row for a plant that steps by `step_s` (s) and whose surfaces
-    /// have this `travel`; refuses one that exists unless asked to replace it.
+    /// Creates the file with its header row, for a plant with the step `step_s`, s, and surfaces of this `travel`. Refuses an
+    /// existing file unless `target` asks for its replacement.
     pub fn create(target: &TruthFile, step_s: f64, travel: &Travel) -> Result<Self, ShimError> {
         let path = target.path.clone();
         let mut how = OpenOptions::new();
@@ -49,7 +49,7 @@ impl TruthLog {
         Ok(log)
     }
 
-    /// Appends the state at `time_us` with the command that acts from then to the next row.
+    /// Appends the state at `time_us`, µs, with the command that acts from this row to the next.
     pub fn row(&mut self, time_us: u64, truth: &Truth, inputs: Inputs) -> Result<(), ShimError> {
         let [ax, ay, az] = truth.specific_force_mps2;
         let [vn, ve, vd] = truth.velocity_ned_mps;
@@ -91,7 +91,7 @@ impl TruthLog {
         self.check(written)
     }
 
-    /// Writes the buffered rows.
+    /// Writes the buffered rows to the file.
     pub fn finish(&mut self) -> Result<(), ShimError> {
         let written = self.file.flush();
         self.check(written)

@@ -1,4 +1,4 @@
-//! The air blows as told, or is refused.
+//! Tests of wind, gusts and turbulence in the plant, and of the refusal of invalid air.
 
 use crate::flights::{fly, plant, plant_in};
 use greylag_sitl::air::{Air, Gust, Turbulence};
@@ -49,7 +49,7 @@ fn gust_blows_when_and_as_told() {
     let mut plant = plant_in(Air { gusts: vec![gust], ..Air::default() });
     let flight = fly(&mut plant, 0, 200);
     let down: Vec<f64> = flight.iter().map(|t| t.wind_ned_mps[2]).collect();
-    // Entry 50 is the step that begins at 0.50 s, the gust's own zero.
+    // Entry 50 is the step that begins at 0.50 s, the start of the gust.
     assert!(down[..=50].iter().all(|w| *w == 0.0), "{down:?}");
     assert!((down[60] + 1.5).abs() < 1e-6, "half up after half the rise: {}", down[60]);
     assert!(down[71..89].iter().all(|w| (w + 3.0).abs() < 1e-6), "{:?}", &down[71..89]);
@@ -110,6 +110,6 @@ fn the_wildest_flight_never_panics() {
             }
         }
     }
-    println!("{failed} of 10 wild flights of 30 s left the numbers");
+    println!("{failed} of 10 wild flights of 30 s diverged");
     assert!(failed < 10, "none flew to its end");
 }

@@ -1,4 +1,4 @@
-//! Which aircraft can be flown, and what is said of one that cannot.
+//! Tests of aircraft that can be loaded, and of the errors for aircraft that cannot.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ fn shipped() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("aircraft")
 }
 
-/// A folder with the X8 under the name `twin`, its document changed by `edit`.
+/// A folder with the X8 under the name `twin`; `edit` changes its document.
 fn twin(edit: impl Fn(String) -> String) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let (from, to) = (shipped().join("x8"), folder.path().join("twin"));
@@ -31,7 +31,7 @@ fn options(folder: &Path, aircraft: &str) -> PlantOptions {
     }
 }
 
-/// What is said of an aircraft that cannot be flown: one line.
+/// The one-line error for an aircraft that cannot be loaded.
 fn refusal(options: &PlantOptions) -> String {
     let message = Plant::new(options).err().expect("this aircraft cannot be flown").to_string();
     println!("{message}");
@@ -108,7 +108,7 @@ fn the_aileron_is_found_by_jsbsims_own_name() {
     let options = options(renamed.path(), "twin");
     let mut other = Plant::new(&options).unwrap();
     assert_same(&fly(&mut other, 0, 50), &fly(&mut plant(), 0, 50));
-    // What is hidden acts through that name too.
+    // Hidden effects also use this property.
     let hidden = vec!["roll_control_alpha=1".parse().unwrap()];
     let mut other = Plant::new(&PlantOptions { hidden: hidden.clone(), ..options }).unwrap();
     let mut built_in = Plant::new(&PlantOptions { hidden, ..PlantOptions::default() }).unwrap();
@@ -130,7 +130,7 @@ fn a_property_the_plant_needs_and_the_aircraft_lacks_is_named() {
     assert_same(&fly(&mut named, 0, 50), &fly(&mut plant(), 0, 50));
 }
 
-/// Full throttle for 5 s.
+/// Thrust, N, after full throttle for 5 s.
 fn open_throttle(plant: &mut Plant) -> f64 {
     for _ in 0..500 {
         plant.step(Inputs { throttle: 1.0, ..Inputs::default() }).unwrap();
@@ -147,11 +147,11 @@ fn every_engine_gets_the_throttle_and_its_thrust_counts() {
     });
     let mut two = Plant::new(&options(twin_engined.path(), "twin")).unwrap();
     let (one, both) = (open_throttle(&mut plant()), open_throttle(&mut two));
-    // The second engine has no lag of its own; the first has settled to exp(−25) of its range.
+    // The second engine has no lag; the first has settled to exp(−25) of its range.
     assert!(one > 10.0 && (both / one - 2.0).abs() < 1e-6, "{one} N, {both} N");
 }
 
-/// The X8 with a turbine of 5 lbf and a tank that holds `fuel_lbs`.
+/// The X8 with a turbine of 5 lbf and a tank with `fuel_lbs` of fuel.
 fn with_turbine(fuel_lbs: f64) -> tempfile::TempDir {
     let tank = format!(
         r#"<tank type="FUEL"><location unit="M"><x>0</x><y>0</y><z>0</z></location>
@@ -177,7 +177,7 @@ fn an_engine_that_stands_still_when_loaded_is_started() {
     let folder = with_turbine(1.0);
     let mut plant = Plant::new(&options(folder.path(), "twin")).unwrap();
     assert_eq!(plant.property("propulsion/engine/set-running").unwrap(), 1.0);
-    // 5 lbf are 22.2 N; without a start there are none.
+    // The expected thrust is 5 lbf, 22.2 N; without a start, there would be no thrust.
     let thrust = open_throttle(&mut plant);
     assert!((thrust - 22.2).abs() < 1.0, "{thrust} N");
 }
@@ -224,7 +224,7 @@ fn the_travel_is_measured_on_the_aircraft_and_leaves_it_where_it_was() {
     let mut undisturbed = self::plant();
     assert_same(&before, &fly(&mut undisturbed, 0, 50));
     assert_same(&fly(&mut plant, 50, 50), &fly(&mut undisturbed, 50, 50));
-    // 15° and 25° of travel: two surfaces, two numbers.
+    // The two surfaces get different travels, 15° and 25°.
     let other = twin(|xml| {
         let mut parts = xml.splitn(3, "0.5235 </gain>");
         let mut next = || parts.next().unwrap();
@@ -244,7 +244,7 @@ fn a_surface_that_does_not_follow_its_command_has_no_travel() {
     assert!(message.contains("fcs/effective-aileron-pos"), "{message}");
 }
 
-/// Flaps that take 3 s to come down are down when a flight begins: a condition is a setting, not a movement.
+/// Flaps that need 3 s to extend are extended at the start of a flight, because a held property is a setting, not a movement.
 #[test]
 fn what_is_held_has_reached_its_position_at_the_start() {
     const FLAPS: &str = "<channel name=\"flaps\"><kinematic name=\"fcs/flaps\"><input>fcs/flap-cmd-norm</input>\
@@ -265,6 +265,6 @@ fn what_is_held_has_reached_its_position_at_the_start() {
         assert_eq!(plant.truth().time_s, 0.0);
         plant.loads(&Start::NEUTRAL, &Inputs::default()).unwrap().force_n[2]
     });
-    // 0.3 of q S: 0.5 · 1.156 kg/m³ · (16.67 m/s)² · 0.75 m²
+    // The expected difference is 0.3 q S, with q S = 0.5 · 1.156 kg/m³ · (16.67 m/s)² · 0.75 m².
     assert!((up - down - 0.3 * 120.5).abs() < 1.0, "{up} {down} N");
 }

@@ -1,11 +1,11 @@
-//! Commands and surfaces are found by trying them.
+//! Tests that commands and surfaces of an aircraft are found by trying all candidates.
 
 use std::path::Path;
 
 use greylag_sitl::plant::discovery::{discover, steered};
 use greylag_sitl::plant::{Inputs, PlantOptions, Properties, Start};
 
-/// The aircraft of a flight laboratory, the XML of which tests may change.
+/// An aircraft with unusual property names; tests may change its XML.
 fn lab() -> PlantOptions {
     PlantOptions {
         aircraft_dir: Some(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data")),
@@ -20,13 +20,13 @@ fn surfaces_behind_actuators_with_names_of_their_own_are_found_and_steer() {
     let found = found.unwrap();
     println!("{:?} {:?}", found.properties, found.notes);
     let named = found.properties;
-    // both ailerons, one against the other; the flaps roll it too, and are none
+    // the two ailerons with opposite signs; the flaps also roll the aircraft but must not be selected
     assert!(named.aileron_command.contains("cmdAilL") && named.aileron_command.contains("cmdAilR"));
     assert!(named.elevator_command.contains("cmdElev_ext_rad"));
     assert!(named.rudder_position.contains("posRud_rad"));
     let travel = plant.travel().unwrap();
     for stops in [travel.aileron, travel.elevator, travel.rudder.unwrap()] {
-        // the stops of the actuators, within their hysteresis
+        // the travel of the actuators, within their hysteresis
         assert!(
             (stops.most_rad - 0.5).abs() < 0.02 && (stops.least_rad + 0.5).abs() < 0.02,
             "{stops:?}"
@@ -50,7 +50,7 @@ fn names_that_are_given_are_not_replaced() {
     assert!(refused.contains("no property"), "{refused}");
 }
 
-/// What cannot be steered is told by axis, with what was tried.
+/// The error for an aircraft that cannot be steered names the axis and the commands that were tried.
 #[test]
 fn an_aircraft_without_an_elevator_is_told_what_was_tried() {
     let folder = tempfile::tempdir().unwrap();
@@ -75,7 +75,7 @@ fn an_aircraft_without_an_elevator_is_told_what_was_tried() {
     assert_eq!(said.lines().count(), 1);
 }
 
-/// An aircraft that reads what only another program defines is told the property, and flies with it once it is held.
+/// The error for a property that only another program defines names the property. With the property held, the aircraft flies.
 #[test]
 fn a_property_of_another_program_is_named_and_can_be_given() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The plant reproduces the measured facts of the X8 in JSBSim.
+//! Tests that the plant reproduces measured properties of the X8 in JSBSim.
 
 use crate::flights::{IDLE, assert_same, busy, differ, fly, hold, plant, plant_in};
 use greylag_sitl::air::{Air, Gust, Turbulence};
@@ -7,7 +7,7 @@ use greylag_sitl::plant::{DT_S, FULL_DEFLECTION_RAD, Inputs, PlantError, Start};
 #[test]
 fn neutral_start_pitches_up_at_5_74_rad_per_s2() {
     let mut plant = plant();
-    // Cm0 ½ρV²Sc/Jy = 0.0227 · ½ · 1.1560 · 16.67² · 0.75 · 0.3571 / 0.1702; measured 5.74.
+    // Expected: Cm0 ½ρV²Sc/Jy = 0.0227 · ½ · 1.1560 · 16.67² · 0.75 · 0.3571 / 0.1702. Measured: 5.74 rad/s².
     let measured = plant.property("accelerations/qdot-rad_sec2").unwrap();
     println!("pitch acceleration at the start: {measured:.4} rad/s²");
     assert!((measured - 5.74).abs() < 0.005, "{measured}");
@@ -15,7 +15,7 @@ fn neutral_start_pitches_up_at_5_74_rad_per_s2() {
     assert!((truth.air_density_kgpm3 - 1.1560).abs() < 5e-5, "{truth:?}");
     assert!((truth.airspeed_mps - 16.67).abs() < 1e-9, "{truth:?}");
     assert_eq!((truth.time_s, truth.aileron_rad, truth.thrust_n), (0.0, 0.0, 0.0));
-    // One Euler step carries the acceleration into the rate.
+    // One Euler step integrates the acceleration to the rate.
     let after = plant.step(IDLE).unwrap();
     assert!((after.q_radps - measured * DT_S).abs() < 1e-4, "{after:?}");
 }
@@ -25,14 +25,14 @@ fn full_throttle_is_26_246_newton_at_any_airspeed() {
     for airspeed_mps in [12.0, 16.67, 25.0] {
         let mut plant = plant();
         plant.reset(&Start { airspeed_mps, ..Start::NEUTRAL }).unwrap();
-        // 3 s are 15 time constants of the throttle's lag: e^-15 = 3e-7 is left.
+        // 3 s are 15 time constants of the throttle lag, so an error of e^-15 = 3e-7 remains.
         let truth = hold(&mut plant, Inputs { throttle: 1.0, ..IDLE }, 300);
         println!("thrust at full throttle from {airspeed_mps} m/s: {:.4} N", truth.thrust_n);
         assert!((truth.thrust_n - 26.246).abs() < 1e-3, "{truth:?}");
     }
 }
 
-/// Tustin's rule at 0.01 s for ωn = 100 rad/s, ζ = 1/√2, clipped behind the state.
+/// The actuator filter by Tustin's rule at 0.01 s, with ωn = 100 rad/s and ζ = 1/√2; only the output is limited.
 #[derive(Default)]
 struct Surface {
     u: [f64; 2],
@@ -40,7 +40,7 @@ struct Surface {
 }
 
 impl Surface {
-    /// b, a1, a2 of y = b (u + 2 u₋₁ + u₋₂) + a1 y₋₁ − a2 y₋₂.
+    /// The coefficients b, a1, a2 of y = b (u + 2 u₋₁ + u₋₂) + a1 y₋₁ − a2 y₋₂.
     fn coefficients() -> [f64; 3] {
         let (wn, zeta) = (100.0 * DT_S, std::f64::consts::FRAC_1_SQRT_2);
         let denominator = 4.0 + 4.0 * zeta * wn + wn * wn;
@@ -72,7 +72,7 @@ fn actuators_follow_their_recurrences_to_1e_12() {
     let (mut lagged, mut last) = (0.0, 0.0);
     let (mut worst, mut clipped) = (0.0_f64, 0);
     for k in 0..400 {
-        // Full steps overshoot by 4 % at this damping, so the clip behind the filter is met too.
+        // Full steps overshoot by 4 % at this damping, so the limit after the filter is also tested.
         let square = |period: u32| {
             if (k / period).is_multiple_of(2) { 1.0 } else { -1.0 }
         };
@@ -104,7 +104,7 @@ fn actuators_follow_their_recurrences_to_1e_12() {
 #[test]
 fn level_flight_feels_one_g_upwards() {
     let mut plant = plant();
-    // The level trim of the X8 at 16.67 m/s: α = θ = 2.283°, δe = 0.01855 rad, throttle 0.118.
+    // Level trim of the X8 at 16.67 m/s: α = θ = 2.283°, δe = 0.01855 rad, throttle 0.118.
     let alpha = 2.283_f64.to_radians();
     plant.reset(&Start { pitch_rad: alpha, alpha_rad: alpha, ..Start::NEUTRAL }).unwrap();
     let truth = hold(
@@ -113,7 +113,7 @@ fn level_flight_feels_one_g_upwards() {
         200,
     );
     let [x, y, z] = truth.specific_force_mps2;
-    // Surfaces and throttle start centred, so a small phugoid remains: 2 % of g, 1 m.
+    // Surfaces and throttle start centred, which excites a small phugoid: 2 % of g, 1 m.
     assert!((z + 9.806 * alpha.cos()).abs() < 0.2, "{truth:?}");
     assert!((x - 9.806 * alpha.sin()).abs() < 0.2 && y.abs() < 0.01, "{truth:?}");
     assert!((truth.altitude_m - 600.0).abs() < 1.0, "{truth:?}");
@@ -159,7 +159,7 @@ fn same_seed_same_flight_and_another_seed_another() {
         plant.reset(&Start::NEUTRAL).unwrap();
         let first = fly(&mut plant, 0, 200);
         plant.reset(&Start::NEUTRAL).unwrap();
-        // A reset starts the same flight again.
+        // A reset repeats the flight from its start.
         assert_same(&first, &fly(&mut plant, 0, 200));
         first
     };
@@ -216,7 +216,7 @@ fn a_start_that_cannot_be_flown_from_is_refused() {
     }
 }
 
-/// A level trim of the X8 in JSBSim: airspeed m/s, α deg, elevator rad, throttle.
+/// Level trims of the X8 in JSBSim: airspeed, m/s; α, °; elevator, rad; throttle, 0..1.
 const TRIMS: [(f64, f64, f64, f64); 3] =
     [(16.67, 2.283, 0.01855, 0.118), (20.0, 0.858, 0.0688, 0.185), (25.0, -0.30, 0.1096, 0.308)];
 
@@ -231,13 +231,13 @@ fn three_level_trims_balance() {
         let mut read = |name: &str| plant.property(name).unwrap() * LBF;
         let (drag, lift) = (read("forces/fwx-aero-lbs"), read("forces/fwz-aero-lbs"));
         let moment = read("moments/m-total-lbsft") * 0.3048;
-        // The elevator starts centred: what it adds is CLδe, CDδe and Cmδe of the X8.
+        // The elevator starts centred, so its contribution is added with CLδe, CDδe and Cmδe of the X8.
         let area = 0.5 * truth.air_density_kgpm3 * airspeed_mps.powi(2) * 0.75;
         let balancing = moment / (area * 0.3571 * 0.2292);
         let needed = (drag + area * 0.0633 * elevator.abs()) / alpha.cos() / 26.246;
         let upward = lift + area * 0.2781 * elevator + throttle * 26.246 * alpha.sin();
         println!("trim at {airspeed_mps} m/s: elevator {balancing:.5} rad, throttle {needed:.4}");
-        // Half a unit of the last printed digit, and what half a unit of α's makes.
+        // Tolerances: half a unit of the last printed digit, plus the effect of half a unit of α.
         assert!((balancing - elevator).abs() < 2.5e-4, "{balancing} for {elevator}");
         assert!((needed - throttle).abs() < 6e-4, "{needed} for {throttle}");
         let weight = 3.364 * 9.806;

@@ -1,4 +1,4 @@
-//! Every hidden effect acts in its own channels, by its own formula.
+//! Tests that every hidden effect acts in the expected channels, by the formula of the catalogue.
 
 use crate::flights::{plant, plant_with};
 use greylag_sitl::plant::{DT_S, Inputs, Plant, Start, Truth};
@@ -12,7 +12,7 @@ const B: f64 = 2.10;
 /// Chord, m.
 const C: f64 = 0.3571;
 
-/// A start at which every state-dependent effect acts, below the stall.
+/// A start at which every state-dependent effect acts, below the stall angle.
 const LIVELY: Start = Start {
     airspeed_mps: 20.0,
     alpha_rad: 0.1,
@@ -23,10 +23,10 @@ const LIVELY: Start = Start {
     ..Start::NEUTRAL
 };
 
-/// A command that moves all actuators.
+/// Commands that move all actuators.
 const FIRM: Inputs = Inputs { aileron: 0.9, elevator: -0.8, throttle: 1.0, rudder: 0.0 };
 
-/// What acts on the aircraft: drag, side force and lift in wind axes, N; moments, N m; thrust, N.
+/// Loads on the aircraft: drag, side force and lift in wind axes, N; moments, N m; thrust, N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Loads {
     drag: f64,
@@ -44,7 +44,7 @@ impl Loads {
 
     fn of(plant: &mut Plant) -> Loads {
         let mut read = |name: &str, unit: f64| plant.property(name).unwrap() * unit;
-        // JSBSim's force in wind axes counts drag and lift positive.
+        // JSBSim's forces in wind axes have positive drag and lift.
         let (drag, side, lift) = (
             read("forces/fwx-aero-lbs", LBF),
             read("forces/fwy-aero-lbs", LBF),
@@ -63,10 +63,10 @@ impl Loads {
     }
 }
 
-/// Takes `plant` to `LIVELY`, then flies `steps` of `FIRM`.
+/// Resets `plant` to `LIVELY` and makes `steps` steps with `FIRM`.
 ///
-/// One step does not let the surfaces act on the state yet, so two aircraft that differ by an effect
-/// of the controls are still in the same state, with the same deflections.
+/// After one step, the surfaces have not yet changed the state. Two aircraft that differ by an effect of the controls are then
+/// still in the same state, with the same deflections.
 fn lively(plant: &mut Plant, steps: u32) -> Truth {
     plant.reset(&LIVELY).unwrap();
     for _ in 0..steps {
@@ -75,8 +75,8 @@ fn lively(plant: &mut Plant, steps: u32) -> Truth {
     plant.truth()
 }
 
-/// Asserts that `effect` changes the loads after `steps` by what `expected` says of the state, given
-/// as truth and ½ρV².
+/// Asserts that `effect` changes the loads after `steps` steps by the result of `expected`, which gets the plant, its truth and
+/// ½ρV², Pa.
 fn acts(effect: &str, steps: u32, expected: impl Fn(&mut Plant, &Truth, f64) -> Loads) {
     let (mut plain, mut hidden) = (plant(), plant_with(&[effect]));
     let (a, b) = (lively(&mut plain, steps), lively(&mut hidden, steps));
@@ -87,7 +87,7 @@ fn acts(effect: &str, steps: u32, expected: impl Fn(&mut Plant, &Truth, f64) -> 
     assert!(expected.iter().any(|x| x.abs() > 1e-4), "{effect} expects nothing: {expected:?}");
     for i in 0..7 {
         let change = after[i] - before[i];
-        // JSBSim's unit factors are good to 1e-8; loads here are up to some 100 N.
+        // The relative error of JSBSim's unit factors is 1e-8; the loads here are up to about 100 N.
         let tolerance = 1e-6 * (1.0 + expected[i].abs());
         assert!(
             (change - expected[i]).abs() < tolerance,
@@ -149,7 +149,7 @@ fn effects_of_throttle_act_in_their_channels() {
     acts("motor_torque=0.5", 1, |_, t, _| Loads { l: -0.5 * t.throttle, ..Loads::NONE });
 }
 
-/// Loads that the X8's deflections make: C_δ δ for a change of deflection δa, δe.
+/// Loads of the X8 from changes of the deflections δa and δe, rad: force and moment coefficients times deflection.
 fn of_deflections(q: f64, aileron: f64, elevator: f64, drag: f64) -> Loads {
     Loads {
         drag: q * S * 0.0633 * drag,
@@ -162,7 +162,7 @@ fn of_deflections(q: f64, aileron: f64, elevator: f64, drag: f64) -> Loads {
     }
 }
 
-/// The change in loads when both deflections act as `f` of themselves.
+/// Change of the loads if both deflections act as their values after `f`.
 fn acting_as(t: &Truth, q: f64, f: impl Fn(f64) -> f64) -> Loads {
     let (aileron, elevator) = (t.aileron_rad, t.elevator_rad);
     let drag = f(elevator).abs() - elevator.abs();
@@ -179,7 +179,7 @@ fn effects_on_the_surfaces_act_in_every_channel_the_surfaces_act_in() {
         acting_as(t, q, |x| x.signum() * (x.abs() - 0.02).max(0.0))
     });
     acts("backlash=0.02", 1, |_, t, q| acting_as(t, q, |x| x.signum() * (x.abs() - 0.01).max(0.0)));
-    // From rest: one step of the limit; half a step of a Tustin lag; nothing yet.
+    // From rest: one step at the rate limit; half a step of a Tustin lag; no response to a delayed command.
     acts("rate_limit=0.5", 1, |_, t, q| acting_as(t, q, |x| x.signum() * 0.5 * DT_S));
     acts("actuator_lag=0.04", 1, |_, t, q| acting_as(t, q, |x| x * DT_S / (2.0 * 0.04 + DT_S)));
     acts("time_delay=0.05", 1, |_, t, q| acting_as(t, q, |_| 0.0));
@@ -220,7 +220,7 @@ fn inertia_xz_changes_roll_and_yaw_acceleration_as_eulers_equations_say() {
         let Loads { l, m, n, .. } = Loads::of(&mut plant);
         let (p, q, r) = (t.p_radps, t.q_radps, t.r_radps);
         let (jx, jy, jz) = (1.2290, 0.1702, 0.8808);
-        // Jx ṗ − Jxz ṙ = l + (Jy − Jz) q r + Jxz p q, and so on (Beard & McLain, section 3.3).
+        // Jx ṗ − Jxz ṙ = l + (Jy − Jz) q r + Jxz p q, and correspondingly for pitch and yaw (Beard & McLain, section 3.3).
         let roll = l + (jy - jz) * q * r + jxz * p * q;
         let yaw = n + (jx - jy) * p * q - jxz * q * r;
         let gamma = jx * jz - jxz * jxz;
@@ -231,7 +231,7 @@ fn inertia_xz_changes_roll_and_yaw_acceleration_as_eulers_equations_say() {
         ];
         for (name, expected) in ["p", "q", "r"].into_iter().zip(expected) {
             let got = plant.property(&format!("accelerations/{name}dot-rad_sec2")).unwrap();
-            // The earth's rotation, 7e-5 rad/s, is left out of the equations.
+            // The equations neglect the earth's rotation, 7e-5 rad/s.
             assert!((got - expected).abs() < 2e-3, "{effect:?} {name}: {got} for {expected}");
         }
     }

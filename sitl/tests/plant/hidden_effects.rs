@@ -1,4 +1,4 @@
-//! Hidden effects change flights as told, or are refused.
+//! Tests that hidden effects change flights by their formulas, and that invalid effects are refused.
 
 use crate::flights::{IDLE, assert_same, busy, fly, plant, plant_with};
 use greylag_sitl::hidden::{EFFECTS, Hidden, HiddenError};
@@ -61,7 +61,7 @@ fn the_thrust_lag_follows_its_recurrence() {
     assert!(most > 1.0, "the lag was not met: {most} lbf");
 }
 
-/// An amplitude within the bounds that a flight of 3 s survives.
+/// An amplitude within the bounds at which a flight of 3 s stays finite.
 fn mild(id: &str) -> f64 {
     match id {
         "time_delay" => 0.03,

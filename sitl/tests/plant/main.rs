@@ -1,4 +1,4 @@
-//! The aircraft in JSBSim: its files, its steps, the air, hidden effects.
+//! Tests of the plant: aircraft files, steps, air, and hidden effects.
 
 mod air;
 mod aircraft;

@@ -1,4 +1,4 @@
-//! The plant in steps of 4 ms, as PX4 wants them, against steps of 10 ms, as everything else flies.
+//! Compares the plant in steps of 4 ms, as for PX4, with steps of 10 ms, the default.
 
 use greylag_sitl::plant::{Inputs, Plant, PlantError, PlantOptions, Start, Truth};
 
@@ -6,7 +6,7 @@ fn plant(step_s: f64) -> Plant {
     Plant::new(&PlantOptions { step_s, ..PlantOptions::default() }).expect("the X8")
 }
 
-/// States every 20 ms of a flight of 5 s with commands held for 20 ms.
+/// States every 20 ms of a 5 s flight, with each command held for 20 ms.
 fn fly(step_s: f64) -> Vec<Truth> {
     let mut plant = plant(step_s);
     plant.reset(&Start::NEUTRAL).expect("a start");
@@ -44,11 +44,11 @@ fn another_step_is_nearly_the_same_aircraft() {
     };
     let (roll, pitch, aileron) = report("4 ms against 10 ms", &slow, &fast);
     let (near_roll, near_pitch, near_aileron) = report("4 ms against 1 ms", &finest, &fast);
-    // The filters of the actuators (100 rad/s) are laid out for the step, and a command acts on
-    // the step after it: deflections differ for some 10 ms after a change, attitudes by what that
-    // adds up to. Measured when written: 0.035° of roll, 0.13° of pitch, 0.0003 rad of aileron.
+    // The filters of the actuators (100 rad/s) are discretised for the step, and a command acts on the step after it. Deflections
+    // therefore differ for about 10 ms after a change, and attitudes by the integral of that difference. Measured: 0.035° of
+    // roll, 0.13° of pitch, 0.0003 rad of aileron.
     assert!(roll < 0.1 && pitch < 0.3 && aileron < 1e-3, "{roll}° {pitch}° {aileron} rad");
-    // The finer the steps the nearer they are to the aircraft that the file describes.
+    // A finer step gives a smaller difference from the aircraft that the file describes.
     assert!(near_roll < roll && near_pitch < pitch && near_aileron < aileron);
 }
 
@@ -63,7 +63,7 @@ fn a_held_deflection_is_the_same_whatever_the_step() {
         // 0.5 s are 35 time constants of the surfaces.
         assert!((truth.aileron_rad - 0.05235).abs() < 1e-9, "{truth:?}");
         assert!((truth.elevator_rad + 0.05235).abs() < 1e-9, "{truth:?}");
-        // The throttle's lag of 0.2 s: 1 − e^−2.5 of the way, to the step.
+        // The throttle lag of 0.2 s gives 1 − e^−2.5 of the change, within one step.
         let lag = 0.5 * (1.0 - (-2.5_f64).exp());
         assert!((truth.throttle - lag).abs() < 0.5 * step_s / 0.2, "{} for {lag}", truth.throttle);
     }

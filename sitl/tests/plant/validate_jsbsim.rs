@@ -1,4 +1,4 @@
-//! The embedded JSBSim follows the official JSBSim 1.3.3 on the X8.
+//! Tests that the embedded JSBSim agrees with the official JSBSim 1.3.3 for the X8.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,10 +9,10 @@ use crate::flights::{plant, plant_in};
 use greylag_sitl::air::{Air, Gust, Turbulence};
 use greylag_sitl::plant::{FULL_DEFLECTION_RAD, Inputs, Plant, Start};
 
-/// Relative to each column's largest magnitude; the port was measured at 1e-12, rounding alone.
+/// Largest difference relative to each column's largest magnitude; the port's measured difference is 1e-12, rounding only.
 const TOLERANCE: f64 = 1e-9;
 
-/// Flies the commands of `golden`; the states where it has one.
+/// Flies the commands of `golden`; returns the states at the steps for which it has a state.
 fn replay(plant: &mut Plant, golden: &Golden) -> Vec<Row> {
     let mut rows = Vec::new();
     for (inputs, state) in &golden.steps {
@@ -24,7 +24,7 @@ fn replay(plant: &mut Plant, golden: &Golden) -> Vec<Row> {
     rows
 }
 
-/// Prints the worst column of a flight and holds it to the tolerance.
+/// Prints the worst column of a flight and asserts that it is within the tolerance.
 fn judge(name: &str, golden: &Golden, rows: &[Row]) -> f64 {
     assert_eq!(golden.steps.len(), 1000, "{name}");
     assert_eq!((golden.states().count(), rows.len()), (200, 200), "{name}");
@@ -53,7 +53,7 @@ fn validate_jsbsim_histories_reach_stall_and_high_bank() {
         let golden = Golden::read(&folder(), name);
         golden.states().map(|row| row[column].abs()).fold(0.0, f64::max).to_degrees()
     };
-    // The wing stalls at 12.3°; a history that stays below it would not test the tables.
+    // The wing stalls at 12.3°; a history that stays below this angle would not test the stall tables.
     assert!(extreme("ornstein_uhlenbeck", 7) > 12.3 + 5.0);
     assert!(extreme("held", 0) > 60.0);
 }
@@ -102,7 +102,7 @@ fn validate_jsbsim_golden_files_are_what_the_official_jsbsim_flies() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     for name in HISTORIES.into_iter().chain(["wind", "gust"]) {
         let (kept, new) = (Golden::read(&folder(), name), Golden::read(fresh.path(), name));
-        // Another processor may round a PID command in its sixth decimal the other way.
+        // Another processor may round the sixth decimal of a PID command differently.
         for (a, b) in kept.steps.iter().zip(&new.steps) {
             let apart = |x: f64, y: f64| (x - y).abs() > 1.1e-6;
             let (a, b) = (a.0, b.0);
@@ -115,7 +115,7 @@ fn validate_jsbsim_golden_files_are_what_the_official_jsbsim_flies() {
     assert!(kept.worst(&new) < 4.0);
 }
 
-/// Mean and standard error by row ("mean_square", "psd_…_hz") and signal.
+/// Mean and standard error, by row ("mean_square", "psd_…_hz") and by signal.
 struct Statistics(BTreeMap<String, BTreeMap<String, [f64; 2]>>);
 
 impl Statistics {
@@ -125,7 +125,7 @@ impl Statistics {
         Statistics(serde_json::from_value(document["statistics"].clone()).unwrap())
     }
 
-    /// Distance of each pair of means in standard errors of their difference, with its name.
+    /// Difference of each pair of means in standard errors of the difference, with a name.
     fn distances(&self, other: &Statistics) -> Vec<(String, f64)> {
         assert!(self.0.keys().eq(other.0.keys()));
         let named = self.0.iter().flat_map(|(row, signals)| signals.iter().map(move |s| (row, s)));
@@ -143,7 +143,7 @@ impl Statistics {
     }
 }
 
-// The flights of the turbulence statistics, as in generate.py but for their number.
+// Parameters of the flights for the turbulence statistics, as in generate.py except for their number.
 const EPISODES: u32 = 200;
 const SKIPPED: usize = 2000;
 const KEPT: usize = 6000;
@@ -154,7 +154,7 @@ const SIGNALS: [&str; 6] = ["north", "east", "down", "p", "q", "r"];
 const RATES: [&str; 3] =
     ["atmosphere/p-turb-rad_sec", "atmosphere/q-turb-rad_sec", "atmosphere/r-turb-rad_sec"];
 
-/// The six turbulence signals of one flight, held wings level at 20 m/s.
+/// The six turbulence signals of one flight, which is controlled to wings level at 20 m/s.
 fn turbulent_flight(plant: &mut Plant, seed: u32) -> [Vec<f64>; 6] {
     let alpha_rad = 0.858_f64.to_radians();
     plant.reseed(seed);
@@ -180,7 +180,7 @@ fn turbulent_flight(plant: &mut Plant, seed: u32) -> [Vec<f64>; 6] {
             })
             .unwrap();
         if k >= SKIPPED {
-            // In calm air the wind is the turbulence alone.
+            // Without steady wind, the total wind is the turbulence.
             let [north, east, down] = truth.wind_ned_mps;
             let [p, q, r] = RATES.map(|name| plant.property(name).unwrap());
             for (signal, value) in signals.iter_mut().zip([north, east, down, p, q, r]) {
@@ -202,7 +202,7 @@ fn periodogram(x: &[f64], j: usize) -> f64 {
     (s1 * s1 + s2 * s2 - coefficient * s1 * s2) * DT_S / n
 }
 
-/// Mean square, then the periodogram averaged over each band.
+/// Mean square, then the mean of the periodogram over each band.
 fn power(x: &[f64]) -> Vec<f64> {
     let mean_square = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
     let band = |centre: &str| {
@@ -238,9 +238,9 @@ fn validate_jsbsim_turbulence_has_the_official_variance_and_spectrum() {
         println!("turbulence {name}, {distance:.2} standard errors apart");
     }
     println!("turbulence: worst of 36 statistics {worst:.2} standard errors");
-    // 36 comparisons of honest samples exceed 4 standard errors in 0.2 % of cases; seeds are fixed.
+    // With correct code, one of 36 comparisons exceeds 4 standard errors in 0.2 % of cases; the seeds are fixed.
     assert!(worst < 4.0, "{worst}");
-    // The test can fail: a tenth more or less in any mean square of the wind would be seen.
+    // The test is sensitive enough: a standard error is below 7 % of any mean square of the wind.
     for [mean, error] in official.0["mean_square"].values() {
         assert!(error / mean < 0.07, "{mean} ± {error}");
     }

@@ -1,4 +1,4 @@
-//! The shim's codec against frames made by pymavlink 2.4.50 (`shim_vectors.py` makes them again).
+//! Compares the shim's codec with frames from pymavlink 2.4.50 (`shim_vectors.py` generates them).
 
 use greylag_sitl::shim::codec::*;
 
@@ -20,7 +20,7 @@ fn parsed(bytes: &[u8]) -> (Vec<Frame>, Parser) {
     (frames, parser)
 }
 
-/// Both ways: our bytes are pymavlink's, and pymavlink's bytes read as our values.
+/// Checks both directions: the encoded bytes equal pymavlink's, and pymavlink's bytes decode to the same values.
 fn agrees<M: Message + PartialEq + std::fmt::Debug>(name: &str, sequence: u8, ours: M) {
     let theirs = vector(name);
     let mut encoder = Encoder::new(1, 200);
@@ -205,10 +205,10 @@ fn mavlink_1_and_signed_frames_are_read() {
     assert_eq!(frames[0].decode::<Heartbeat>().map(|m| m.custom_mode), Some(7));
 }
 
-/// A whole frame of a message that the shim does not know.
+/// A complete frame of a message that the shim does not define.
 fn unknown() -> Vec<u8> {
     let mut bytes = vector("statustext");
-    // the identifier of MAVLink 2, least byte first
+    // the message identifier of MAVLink 2, least significant byte first
     bytes[7..10].copy_from_slice(&60_000_u32.to_le_bytes()[..3]);
     bytes
 }
@@ -223,14 +223,14 @@ fn an_unknown_message_is_skipped_whole_and_is_not_bad() {
 
 #[test]
 fn every_flipped_bit_is_caught() {
-    // Every bit behind the magic byte is under the checksum (a flipped length moves it).
+    // The checksum covers every bit after the magic byte; a flipped length bit moves the checksum.
     let good = vector("hil_actuator_controls");
     for bit in 8..good.len() * 8 {
         let mut bytes = good.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);
         let (frames, parser) = parsed(&bytes);
         assert!(frames.is_empty(), "bit {bit}");
-        // A flipped bit in the identifier makes a message that cannot be checked.
+        // A flipped bit in the identifier can give an unknown message, whose checksum cannot be checked.
         assert_eq!(parser.bad() + parser.unknown(), 1, "bit {bit}");
     }
 }
@@ -256,8 +256,7 @@ fn a_stream_in_pieces_of_any_size_gives_the_same_frames() {
         for piece in stream.chunks(size) {
             parser.stream(piece, &mut |frame| ids.push(frame.id));
         }
-        // The unknown one is followed by noise, so nothing vouches for it unless it ends a
-        // piece; either way it yields no frame.
+        // The unknown frame is followed by noise, so it is accepted only if it ends a piece. In both cases it yields no frame.
         assert_eq!(ids, [0, 105, 0, 11020], "pieces of {size}");
         assert!(
             (4..=5).contains(&parser.bad()),
@@ -269,7 +268,7 @@ fn a_stream_in_pieces_of_any_size_gives_the_same_frames() {
 
 #[test]
 fn random_bytes_never_panic_and_hold_no_frame() {
-    // A 64-bit xorshift; a chance frame needs magic, flags, a known id and 16 checksum bits.
+    // A 64-bit xorshift generator. A random valid frame needs the magic byte, flags, a known identifier and 16 checksum bits.
     let mut x = 0x9E37_79B9_7F4A_7C15_u64;
     let mut parser = Parser::default();
     let mut frames = 0;
@@ -279,7 +278,7 @@ fn random_bytes_never_panic_and_hold_no_frame() {
                 x ^= x << 13;
                 x ^= x >> 7;
                 x ^= x << 17;
-                // Magic bytes are made common, so that the inside of the parser is reached.
+                // Magic bytes are frequent, because the later stages of the parser must also be tested.
                 match x % 8 {
                     0 => 0xFD,
                     1 => 0xFE,
@@ -297,8 +296,7 @@ fn random_bytes_never_panic_and_hold_no_frame() {
 
 #[test]
 fn the_checksum_is_mcrf4xx() {
-    // The check value of CRC-16/MCRF4XX over "123456789" is 0x6F91; its last byte is used as
-    // CRC_EXTRA.
+    // The check value of CRC-16/MCRF4XX over "123456789" is 0x6F91; its last byte serves as CRC_EXTRA.
     assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
 }
 

@@ -1,4 +1,4 @@
-//! Lockstep over real sockets: simulated time moves on the companion's answers and on nothing else.
+//! Tests of lockstep over real sockets: simulated time advances only on the companion's answers.
 
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use greylag_sitl::shim::{Event, Over};
 const STEP_US: u64 = 10_000;
 const NEUTRAL: [f32; 3] = [0.0; 3];
 
-/// The times of `states` follow one another without a gap, from `first_us`.
+/// Asserts that the times of `states` are consecutive, from `first_us`, µs.
 fn assert_consecutive(states: &[State], first_us: u64) {
     for (i, state) in states.iter().enumerate() {
         assert_eq!(state.time_us(), first_us + i as u64 * STEP_US, "frame {i}");
@@ -19,7 +19,7 @@ fn assert_consecutive(states: &[State], first_us: u64) {
 
 #[test]
 fn flies_over_every_transport() {
-    // 300 frames: three seconds of flight, so that the 1 Hz messages come thrice.
+    // 300 frames are 3 s of flight, in which each 1 Hz message occurs three times.
     let fly = |mut companion: Companion, shim: Shim| {
         let states = companion.fly(300, |_| NEUTRAL);
         assert_consecutive(&states, STEP_US);
@@ -56,7 +56,7 @@ fn never_steps_without_an_answer() {
     companion.fly(3, |_| NEUTRAL);
     let begun = Instant::now();
     let mut times = Vec::new();
-    // 2.6 s: the frame itself, repetitions after 1 and 2 s, and room for slow machines.
+    // 2.6 s cover the frame, its repetitions after 1 and 2 s, and delays of a slow machine.
     while let Some(left) = Duration::from_millis(2600).checked_sub(begun.elapsed()) {
         times.extend(companion.state_within(left).map(|state| state.time_us()));
     }
@@ -108,7 +108,7 @@ fn garbage_is_counted_and_harmless() {
     let mut flipped = whole.clone();
     flipped[20] ^= 1;
     companion.send_bytes(&flipped);
-    // Somebody else on the wire: a ground station's heartbeat, and an answer that is not ours.
+    // Messages of other senders: a ground station's heartbeat, and an answer from another system.
     for (system, component) in [(255, 190), (2, 1)] {
         let mut bytes = Vec::new();
         let mut other = Encoder::new(system, component);
@@ -117,7 +117,7 @@ fn garbage_is_counted_and_harmless() {
         companion.send_bytes(&bytes);
     }
     assert!(companion.state_within(Duration::from_millis(300)).is_none(), "no step");
-    // A good answer behind rubbish in the same datagram still counts.
+    // A valid answer after garbage in the same datagram is accepted.
     let mut behind = b"rubbish".to_vec();
     behind.extend(&whole);
     companion.send_bytes(&behind);
@@ -147,8 +147,8 @@ fn a_torn_tcp_stream_is_read_and_garbage_in_it_skipped() {
 
 #[test]
 fn pauses_when_the_companion_dies_and_goes_on_when_it_returns() {
-    // UDP: the port closes (refused datagrams) and opens again. TCP: the stream ends and is set
-    // up again, from either side.
+    // With UDP, the port closes (datagrams are refused) and opens again. With TCP, the stream ends and is set up again, by either
+    // side.
     let (mut companion, link) = listening();
     let at = companion.address().to_string();
     let shim = Shim::start(lockstep(&link));
@@ -168,7 +168,7 @@ fn pauses_when_the_companion_dies_and_goes_on_when_it_returns() {
     let before = Companion::tcp_out(to).fly(50, |_| NEUTRAL);
     let mut companion = Companion::tcp_out(to);
     let after = companion.fly(50, |_| NEUTRAL);
-    // The next frame proves that the last answer has been flown.
+    // The next frame proves that the last answer was used.
     companion.state();
     assert_consecutive(&[before, after].concat(), STEP_US);
     assert!(shim.events().contains(&Event::Lost));
@@ -180,7 +180,7 @@ fn pauses_when_the_companion_dies_and_goes_on_when_it_returns() {
     let before = Companion::tcp_in(&listener).fly(50, |_| NEUTRAL);
     let mut companion = Companion::tcp_in(&listener);
     let after = companion.fly(50, |_| NEUTRAL);
-    // The next frame proves that the last answer has been flown.
+    // The next frame proves that the last answer was used.
     companion.state();
     assert_consecutive(&[before, after].concat(), STEP_US);
     assert_eq!(shim.stop().answers, 100);
@@ -193,12 +193,12 @@ fn a_listening_udp_link_takes_the_companion_that_returns_on_another_port() {
     let mut companion = Companion::udp_out(to);
     companion.heartbeat();
     let before = companion.fly(20, |_| NEUTRAL);
-    // While the first is alive, a second one is a stranger.
+    // While the first companion is alive, frames of a second companion are foreign.
     let mut second = Companion::udp_out(to);
     second.heartbeat();
     assert!(second.state_within(Duration::from_millis(100)).is_none());
     drop(companion);
-    // After two seconds of silence the link is free; heartbeats come once a second.
+    // After two seconds of silence, the link accepts another companion; heartbeats arrive once per second.
     let mut first = None;
     for _ in 0..5 {
         second.heartbeat();
@@ -215,7 +215,7 @@ fn a_listening_udp_link_takes_the_companion_that_returns_on_another_port() {
 
 #[test]
 fn waits_for_a_companion_that_comes_later() {
-    // tcpout towards a port where nobody listens yet: connection refused again and again.
+    // tcpout to a port without listener: the connection is refused repeatedly.
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let at = listener.local_addr().expect("an address");
     drop(listener);
@@ -236,7 +236,7 @@ fn a_second_tcp_client_does_not_take_the_link() {
     let mut companion = Companion::tcp_out(to);
     companion.fly(5, |_| NEUTRAL);
     let mut intruder = Companion::tcp_out(to);
-    // The shim looks for newcomers every 0.1 s while it is being answered.
+    // The shim checks for new connections every 0.1 s while it receives answers.
     let until = Instant::now() + Duration::from_millis(400);
     while Instant::now() < until {
         companion.fly(1, |_| NEUTRAL);
@@ -257,10 +257,10 @@ fn lost_frames_delay_and_never_skip() {
     let states = companion.fly(200, |_| NEUTRAL);
     assert_consecutive(&states, STEP_US);
     let summary = shim.stop();
-    // Of 200 frames sent until one passes, 200 · 0.3/0.7 = 86 sendings are lost, ± 11 (1 σ).
+    // For 200 frames, each sent until it passes, 200 · 0.3/0.7 = 86 transmissions are lost, ± 11 (1 σ).
     assert!((40..=140).contains(&summary.dropped_frames), "{}", summary.dropped_frames);
     assert_eq!(summary.dropped_frames, summary.repeated_frames);
-    // Each costs some 20 ms, not the second of a real loss.
+    // Each loss costs about 20 ms, not 1 s as for a frame that really was lost.
     assert!(begun.elapsed() < Duration::from_secs(15));
 }
 
@@ -280,8 +280,8 @@ fn is_held_until_armed_while_time_runs() {
         assert_eq!(state.actuators.actuator, [0.0; 32], "nor do its surfaces");
     }
     let flown = companion.fly(30, |_| [0.0, 0.0, 0.5]);
-    // The first armed answer is to flown[0], so the first step lies between it and flown[1]:
-    // q̇ = +5.74 rad/s² at the neutral start (FACTS.md), so q = 0.057 rad/s after one step.
+    // The first armed answer is to flown[0], so the first step is between flown[0] and flown[1]. At the neutral start, q̇ = +5.74
+    // rad/s² (FACTS.md), which gives q = 0.057 rad/s after one step.
     assert_eq!(flown[0].attitude.pitchspeed, held[0].attitude.pitchspeed);
     assert!((flown[1].attitude.pitchspeed - 0.0574).abs() < 0.001, "{:?}", flown[1].attitude);
     let notices: Vec<_> = shim.notices.try_iter().collect();
@@ -292,9 +292,8 @@ fn is_held_until_armed_while_time_runs() {
 
 #[test]
 fn a_delayed_frame_shows_the_past() {
-    // The same flight with and without 45 ms of delay, which lockstep rounds up to 5 steps: what
-    // is shown at a time is the same, but the answers to it act 5 steps later. So the response of
-    // the aileron to a pulse at frame 10 appears 5 frames later.
+    // The same flight without delay and with a delay of 45 ms, which lockstep rounds up to 5 steps. The frames at equal times are
+    // equal, but the answers act 5 steps later. The aileron's response to a pulse at frame 10 therefore appears 5 frames later.
     let response = |delay_ms: f64| {
         let (mut companion, link) = listening();
         let mut options = lockstep(&link);

@@ -1,4 +1,4 @@
-//! The MAVLink side of the simulator in lockstep.
+//! Tests of the shim in lockstep over MAVLink.
 
 mod codec;
 mod lockstep;

@@ -1,4 +1,4 @@
-//! The program `greylag-sitl` as its user meets it: lines, exit codes, Ctrl-C.
+//! Tests of the program `greylag-sitl` on the command line: output, exit codes, Ctrl-C.
 
 use std::net::UdpSocket;
 use std::process::{Command, Output, Stdio};
@@ -12,7 +12,7 @@ fn sitl(arguments: &[&str]) -> Command {
     command
 }
 
-/// Fails with one line on stderr that names `named`.
+/// Asserts that the program fails and that its error contains `named`.
 fn fails(arguments: &[&str], named: &str) {
     let output = sitl(arguments).output().expect("the program runs");
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -127,12 +127,12 @@ fn all_options_together_fly_in_lockstep() {
     let states = companion.fly(50, |_| [0.0, 0.0, 0.4]);
     let output = child.wait_with_output().expect("it ends");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    // 10 degrees left with 0.2 degrees of noise; 20 m/s shown as 30.
+    // The start has 10° of left bank with 0.2° of noise, and the airspeed of 20 m/s is measured as 30 m/s.
     assert!((states[0].euler()[0].to_degrees() + 10.0).abs() < 1.0);
     assert!((states[0].hud.airspeed - 30.0).abs() < 0.5, "{:?}", states[0].hud);
     let rows = std::fs::read_to_string(&truth).expect("a truth file").lines().count();
     assert_eq!(rows, 51);
-    // The same again without --force is refused.
+    // A repetition without --force is refused.
     fails(&arguments, "--force");
 }
 

@@ -1,11 +1,11 @@
-//! Sensor errors as the companion sees them, the truth file, equal seeds.
+//! Tests of sensor errors in the companion's messages, of the truth file, and of equal seeds.
 
 use crate::shim_companion::*;
 use greylag_sitl::plant::PlantOptions;
 use greylag_sitl::shim::{self, Bias, Existing, Noise, ShimError, ShimOptions, TruthFile};
 use std::sync::atomic::AtomicBool;
 
-/// Frames shown while the aircraft is held, so that only the sensors move.
+/// Frames while the aircraft is held at its start, so only the sensor errors vary.
 fn held(change: impl FnOnce(&mut ShimOptions), frames: usize) -> Vec<State> {
     let (mut companion, link) = listening();
     let mut options = lockstep(&link);
@@ -30,7 +30,7 @@ fn mean_and_deviation(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 
 #[test]
 fn noise_has_the_deviation_asked_for_in_every_group() {
-    // 3000 draws estimate a deviation to 1.3 % (1 σ): 6 % is 4.6 σ; seeds are fixed besides.
+    // 3000 draws estimate a standard deviation to 1.3 % (1 σ), so 6 % is 4.6 σ; the seeds are fixed.
     let states = held(|o| o.noise = Noise::REALISTIC, 3000);
     let noise = Noise::REALISTIC;
     type Channel = (&'static str, fn(&State) -> f64, f64);
@@ -51,7 +51,7 @@ fn noise_has_the_deviation_asked_for_in_every_group() {
         let (_, deviation) = mean_and_deviation(states.iter().map(channel));
         assert!((deviation / expected - 1.0).abs() < 0.06, "{name}: {deviation} for {expected}");
     }
-    // Channels do not share their draws: a correlation of 3000 draws is below 0.09 (5 σ).
+    // Channels have independent draws: the correlation of 3000 draws is below 0.09 (5 σ).
     let p = mean_and_deviation(states.iter().map(|s| f64::from(s.imu.xgyro)));
     let q = mean_and_deviation(states.iter().map(|s| f64::from(s.imu.ygyro)));
     let shared = states
@@ -88,8 +88,8 @@ fn a_bias_moves_its_channel_and_no_other() {
     assert_eq!((with.euler(), with.hud.alt), (without.euler(), without.hud.alt));
 }
 
-/// The truth file of one second of noisy, lossy flight in which the companion flies on what it is
-/// shown, so that every draw reaches the truth.
+/// The truth file of one second of flight with noise and frame losses. The companion's commands depend on its measurements, so
+/// every random draw affects the truth.
 fn truth_of(seed: u64) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("truth.csv");

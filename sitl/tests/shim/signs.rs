@@ -1,6 +1,6 @@
-//! The table of signs: what the plant does appears with its sign and size in the decoded messages.
+//! Tests of signs: quantities of the plant appear with the correct sign and size in the decoded messages.
 //!
-//! The truth comes from the truth file, so each row checks plant → sensors → telemetry → codec.
+//! The truth is read from the truth file, so each row checks the chain plant → sensors → telemetry → codec.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ impl Table {
     }
 }
 
-/// Flies 100 frames with `command` and returns what was shown with what was true.
+/// Flies 100 frames with `command`; returns the received states, the truth and the companion.
 fn fly(change: impl FnOnce(&mut ShimOptions), command: [f32; 3]) -> (Vec<State>, Table, Companion) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("truth.csv");
@@ -45,14 +45,14 @@ fn fly(change: impl FnOnce(&mut ShimOptions), command: [f32; 3]) -> (Vec<State>,
     (states, Table::read(&path), companion)
 }
 
-/// Single precision on the wire: seven digits.
+/// Asserts equality within the single precision of the messages, seven digits.
 fn close(shown: f32, truth: f64) {
     assert!((f64::from(shown) - truth).abs() <= 2e-6 * truth.abs().max(1.0), "{shown} for {truth}");
 }
 
 #[test]
 fn every_frame_shows_the_truth() {
-    // A start with everything in it, all signs mixed, in a wind.
+    // A start with all states nonzero and signs mixed, in wind.
     let start = Start {
         roll_rad: -0.4,
         pitch_rad: 0.2,
@@ -126,16 +126,16 @@ fn slow_messages_show_the_truth(companion: &Companion, truth: &Table) {
     }
     let wind: Vec<WindCov> = slow(WindCov::ID).filter_map(|frame| frame.decode()).collect();
     assert_eq!(wind.len(), 1, "once in the hundred frames");
-    // JSBSim keeps the wind in ft/s in its local frame; it comes back to 1e-6.
+    // JSBSim stores the wind in ft/s in the local frame; the conversion loses about 1e-6.
     for (shown, given) in [(wind[0].wind_x, 3.0), (wind[0].wind_y, -2.0), (wind[0].wind_z, 0.5)] {
         close(shown, given);
     }
 }
 
-/// One row of the table: what is done, where it must show, with which sign.
+/// One row: cause, change of the options, command, frame, measured quantity, and expected value or sign.
 type Row = (&'static str, fn(&mut ShimOptions), [f32; 3], usize, fn(&State) -> f32, f32);
 
-/// The level flight that the rows start from is not trimmed, but each row's cause outweighs that.
+/// The level flight at the start of each row is not trimmed, but the effect of each cause is larger.
 const TABLE: [Row; 19] = [
     ("right bank", |o| o.start.roll_rad = 0.3, [0.0; 3], 0, |s| s.euler()[0] as f32, 0.3),
     ("left bank", |o| o.start.roll_rad = -0.3, [0.0; 3], 0, |s| s.euler()[0] as f32, -0.3),
@@ -146,9 +146,9 @@ const TABLE: [Row; 19] = [
     ("yawing right", |o| o.start.r_radps = 0.5, [0.0; 3], 0, |s| s.imu.zgyro, 0.5),
     ("air from below", |o| o.start.alpha_rad = 0.1, [0.0; 3], 0, |s| s.vanes.aoa, 5.729578),
     ("air from the right", |o| o.start.beta_rad = 0.1, [0.0; 3], 0, |s| s.vanes.ssa, 5.729578),
-    // Side force of a positive sideslip points left: CYβ < 0.
+    // The side force of a positive sideslip points left: CYβ < 0.
     ("sideslip pushes left", |o| o.start.beta_rad = 0.1, [0.0; 3], 0, |s| s.imu.yacc, f32::MIN),
-    // Lift is felt upwards, as a negative reading on z.
+    // Lift gives a negative specific force on z.
     ("lift", |o| o.start.alpha_rad = 0.1, [0.0; 3], 0, |s| s.imu.zacc, f32::MIN),
     ("thrust pushes forward", |_| (), [0.0, 0.0, 1.0], 50, |s| s.imu.xacc, f32::MAX),
     ("aileron command", |_| (), [0.5, 0.0, 0.0], 30, |s| s.actuators.actuator[0], 0.5),
@@ -176,7 +176,7 @@ fn causes_show_with_their_sign() {
         match expected {
             f32::MAX => assert!(value > 0.05, "{cause}: {value}"),
             f32::MIN => assert!(value < -0.05, "{cause}: {value}"),
-            // Settled surfaces agree to 1e-3, states at the start to single precision.
+            // Settled surfaces agree to 1e-3, and states at the start to single precision.
             value_expected => assert!((value - value_expected).abs() < 1e-3, "{cause}: {value}"),
         }
     }
@@ -184,7 +184,7 @@ fn causes_show_with_their_sign() {
 
 #[test]
 fn a_headwind_lowers_the_ground_speed_and_leaves_the_airspeed() {
-    // Nose north at the start: 16.67 m/s through the air, 5 m/s of wind towards the south.
+    // At the start, the nose points north, the airspeed is 16.67 m/s, and the wind is 5 m/s towards the south.
     let (states, _, _) = fly(|o| o.plant.air.wind_ned_mps = [-5.0, 0.0, 0.0], [0.0; 3]);
     assert!((states[0].hud.airspeed - 16.67).abs() < 1e-3, "{:?}", states[0].hud);
     assert!((states[0].hud.groundspeed - 11.67).abs() < 1e-3, "{:?}", states[0].hud);

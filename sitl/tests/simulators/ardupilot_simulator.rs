@@ -1,4 +1,4 @@
-//! ArduPilot's JSON interface: a played ArduPilot that sends servo packets and reads the answers.
+//! Tests of ArduPilot's JSON interface with a simulated ArduPilot that sends servo packets and reads the states.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::process::{Command, Stdio};
@@ -15,11 +15,11 @@ use greylag_sitl::shim::{
 };
 use serde_json::Value;
 
-/// Longer than anything a test waits for on purpose.
+/// Longest wait of any test.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Enough of a moment for an answer that would come.
+/// Sufficient wait to detect an unwanted answer.
 const MOMENT: Duration = Duration::from_millis(60);
-/// Pulse widths that leave everything where it is, with the engine idle.
+/// Pulse widths for neutral surfaces and closed throttle, µs.
 const IDLE: [u16; 4] = [1500, 1500, 1000, 1500];
 
 fn options() -> ShimOptions {
@@ -33,7 +33,7 @@ fn in_flight() -> ShimOptions {
     ShimOptions { launch: Launch::Immediate, ..options() }
 }
 
-/// A simulator that runs in a thread.
+/// A simulator in a separate thread.
 struct Simulator {
     notices: Receiver<Notice>,
     address: SocketAddr,
@@ -56,7 +56,7 @@ impl Simulator {
         Simulator { notices, address, stop, thread }
     }
 
-    /// Waits for an event, passing over others; what it says.
+    /// Waits for an event and discards others; returns the text of the event.
     fn until(&self, wanted: impl Fn(&ArdupilotEvent) -> bool) -> String {
         let end = Instant::now() + PATIENCE;
         loop {
@@ -74,7 +74,7 @@ impl Simulator {
     }
 }
 
-/// The played ArduPilot.
+/// The simulated ArduPilot.
 struct ArduPilot {
     socket: UdpSocket,
     magic: u16,
@@ -108,7 +108,7 @@ impl ArduPilot {
         Some(String::from_utf8(buffer[..length].to_vec()).expect("text"))
     }
 
-    /// Sends a packet and takes its answer.
+    /// Sends a packet and returns the state in the answer.
     fn step(&mut self, pwm: &[u16]) -> State {
         self.send(pwm);
         let state = State::read(&self.receive(PATIENCE).expect("an answer"));
@@ -121,7 +121,7 @@ impl ArduPilot {
     }
 }
 
-/// What ArduPilot reads out of a line.
+/// The values that ArduPilot reads from a line.
 #[derive(Clone, Debug, PartialEq)]
 struct State {
     timestamp: f64,
@@ -150,7 +150,7 @@ impl State {
     }
 }
 
-/// The state after 0.2 s of flight with these pulse widths.
+/// The state after 0.2 s of flight with these pulse widths, µs.
 fn response(pwm: [u16; 4], options: ShimOptions) -> State {
     let simulator = Simulator::start(options);
     let state = ArduPilot::new(&simulator).fly(200, &pwm);
@@ -166,7 +166,7 @@ fn each_channel_acts_with_arduplanes_sign() {
         ShimOptions { plant, start, ..in_flight() }
     };
     let neutral = response([1500, 1500, 1300, 1500], in_flight());
-    // 0.2 s with a fifth of the travel: the X8 rolls at some 0.3 rad/s and pitches at 0.5.
+    // After 0.2 s with a fifth of the travel, the X8 rolls at about 0.3 rad/s and pitches at 0.5 rad/s.
     let right = response([1600, 1500, 1300, 1500], in_flight());
     assert!(right.gyro[0] > neutral.gyro[0] + 0.1, "aileron above its trim rolls right");
     let up = response([1500, 1600, 1300, 1500], in_flight());
@@ -174,7 +174,7 @@ fn each_channel_acts_with_arduplanes_sign() {
     let faster = response([1500, 1500, 1900, 1500], in_flight());
     assert!(faster.force[0] > neutral.force[0] + 0.5, "throttle pulls");
     assert!(faster.airspeed > neutral.airspeed, "and accelerates");
-    // The X8 has no rudder; the Aerosonde yaws by some 0.1 rad/s in that time.
+    // The X8 has no rudder, so the Aerosonde is used; it yaws at about 0.1 rad/s after 0.2 s.
     let straight = response([1500, 1500, 1300, 1500], aerosonde());
     let yawed = response([1500, 1500, 1300, 1700], aerosonde());
     assert!(yawed.gyro[2] > straight.gyro[2] + 0.02, "rudder above its trim: {yawed:?}");
@@ -191,8 +191,8 @@ fn elevons_move_as_arduplane_mixes_them() {
         });
         options
     };
-    // ArduPlane with MIXING_GAIN 1: left is elevator less aileron, right is their sum. So 50 µs of
-    // aileron and 100 µs of elevator are 50 and 150 µs, and fly as the single channels do.
+    // With MIXING_GAIN 1, ArduPlane's left elevon is elevator minus aileron, and its right elevon is elevator plus aileron. Thus
+    // 50 µs of aileron and 100 µs of elevator give 50 µs and 150 µs, which must act like separate channels.
     let mixed = response([1550, 1650, 1300, 1500], elevons());
     let single = response([1550, 1600, 1300, 1500], in_flight());
     assert_eq!(mixed, single);
@@ -205,7 +205,7 @@ fn a_packet_makes_one_step_of_the_plant_of_the_length_that_is_asked_for() {
     let plant = PlantOptions { step_s: 0.001, ..PlantOptions::default() };
     let mut plant = Plant::new(&plant).unwrap();
     plant.reset(&Start::NEUTRAL).unwrap();
-    // 1200 Hz, ArduPilot's default, is flown at 1000; 50 Hz, too coarse for its sensors, at 500.
+    // 1200 Hz, ArduPilot's default, is simulated at 1000 Hz; 50 Hz, too slow for its sensors, at 500 Hz.
     for (rate_hz, steps) in [(1200, 1), (500, 2), (50, 2), (1000, 1)] {
         ardupilot.rate_hz = rate_hz;
         let before = plant.truth().time_s;
@@ -223,7 +223,7 @@ fn a_packet_makes_one_step_of_the_plant_of_the_length_that_is_asked_for() {
             (state.force, truth.specific_force_mps2),
             (state.velocity, truth.velocity_ned_mps),
         ] {
-            // Decimal and back costs the last bit.
+            // The conversion to decimal and back may change the last bit.
             assert!(shown.iter().zip(flown).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs()));
         }
     }
@@ -251,7 +251,7 @@ fn a_count_that_goes_back_is_an_ardupilot_started_again() {
     let stand = ardupilot.step(&IDLE);
     assert_eq!(stand.velocity, [0.0; 3], "on its stand while the throttle is closed");
     assert!((stand.force[2] + 9.81).abs() < 0.02, "it feels gravity: {stand:?}");
-    // The catapult pulls for a second from 10 % of throttle on.
+    // Above 10 % throttle, the catapult pulls for 1 s.
     let flown = ardupilot.fly(1500, &[1500, 1500, 1500, 1500]);
     simulator.until(|e| *e == ArdupilotEvent::Catapult);
     assert!(flown.velocity[0] > 15.0 && flown.position[0] > 5.0, "{flown:?}");

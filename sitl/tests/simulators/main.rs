@@ -1,4 +1,4 @@
-//! The simulator in real time, and as the simulator of PX4 and ArduPilot.
+//! Tests of the shim in real time and as the simulator of PX4 and ArduPilot.
 
 mod ardupilot_simulator;
 mod px4_client;

@@ -1,4 +1,4 @@
-//! PX4 as its simulator meets it: a TCP client through rust-mavlink, by the public protocol.
+//! A simulated PX4 as the client of its simulator: TCP with rust-mavlink, by the public protocol.
 #![allow(dead_code)] // each test that includes this module uses its part
 
 use std::io::{ErrorKind, Read, Write};
@@ -16,17 +16,17 @@ use greylag_sitl::shim::{
 use mavlink::dialects::ardupilotmega::*;
 use mavlink::{MavHeader, MavlinkVersion, Message as _};
 
-/// Longer than anything a test waits for on purpose.
+/// Longest wait of any test.
 pub const PATIENCE: Duration = Duration::from_secs(10);
-/// The step that PX4 expects of its simulators, µs.
+/// Step that PX4 expects from its simulators, µs.
 pub const STEP_US: u64 = 4_000;
-/// Outputs of the stock fixed-wing airframes (PWM_MAIN_FUNC5..8), counted from 0.
+/// Indices, from 0, of the outputs of the stock fixed-wing airframes (PWM_MAIN_FUNC5 to PWM_MAIN_FUNC8).
 pub const THROTTLE: usize = 4;
 pub const LEFT_AILERON: usize = 5;
 pub const RIGHT_AILERON: usize = 6;
 pub const ELEVATOR: usize = 7;
 
-/// Options of a run without noise, as fast as the client answers.
+/// Options for a run without noise that is as fast as the client answers.
 pub fn hurried() -> ShimOptions {
     let mut options = ShimOptions::new(PlantOptions::default(), Start::NEUTRAL);
     options.link = "tcpin:127.0.0.1:0".parse().expect("an address");
@@ -35,7 +35,7 @@ pub fn hurried() -> ShimOptions {
     options
 }
 
-/// A simulator that runs in a thread.
+/// A simulator in a separate thread.
 pub struct Simulator {
     pub notices: Receiver<Notice>,
     pub address: SocketAddr,
@@ -58,7 +58,7 @@ impl Simulator {
         Simulator { notices, address, stop, thread }
     }
 
-    /// Waits for an event, passing over others.
+    /// Waits for an event and discards others.
     pub fn until(&self, wanted: impl Fn(&Px4Event) -> bool) -> Px4Event {
         let end = Instant::now() + PATIENCE;
         loop {
@@ -80,7 +80,7 @@ impl Simulator {
     }
 }
 
-/// All that one step shows.
+/// All messages of one step.
 #[derive(Clone, Debug, Default)]
 pub struct Shown {
     pub sensor: HIL_SENSOR_DATA,
@@ -88,12 +88,12 @@ pub struct Shown {
     pub state: Option<HIL_STATE_QUATERNION_DATA>,
 }
 
-/// The client.
+/// The simulated PX4.
 pub struct Px4 {
     stream: TcpStream,
     held: Vec<u8>,
     sequence: u8,
-    /// Time of the first HIL_SENSOR, from which PX4 counts its own time.
+    /// Time of the first HIL_SENSOR, µs, at which PX4's time is zero.
     first_us: Option<u64>,
     pub flags: u64,
     pub version: MavlinkVersion,
@@ -108,7 +108,7 @@ impl Px4 {
         Px4 { stream, held, sequence: 0, first_us: None, flags: 1, version, armed: false }
     }
 
-    /// Connects and sends what PX4 sends first.
+    /// Connects and sends the first messages of PX4.
     pub fn boot(to: SocketAddr) -> Self {
         let mut px4 = Px4::connect(to);
         px4.ask_for_state(5e3);
@@ -144,7 +144,7 @@ impl Px4 {
         self.stream.write_all(bytes).expect("sent");
     }
 
-    /// The next message, if one comes within `wait`.
+    /// The next message; `None` if none arrives within `wait`.
     pub fn receive(&mut self, wait: Duration) -> Option<MavMessage> {
         let end = Instant::now() + wait;
         loop {
@@ -167,7 +167,7 @@ impl Px4 {
         }
     }
 
-    /// A whole MAVLink 2 frame, with its checksum proved, off the front of what is held.
+    /// Removes a complete MAVLink 2 frame from the front of `held` and checks its checksum.
     fn held_message(&mut self) -> Option<MavMessage> {
         let &length = self.held.get(1)?;
         assert_eq!(self.held[0], 0xFD, "every byte belongs to a MAVLink 2 frame");
@@ -202,17 +202,17 @@ impl Px4 {
         }
     }
 
-    /// The controls of PX4's message: `time_us` is the simulator's.
+    /// Sends the controls; `time_us` is the simulator's time, µs.
     pub fn answer(&mut self, time_us: u64, controls: [f32; 16]) {
         let time_usec = time_us - self.first_us.expect("a step before the answer");
         self.answer_at(time_usec, controls);
     }
 
-    /// The controls at a time of the client's own.
+    /// Sends the controls with a time stamp of the client, µs.
     pub fn answer_at(&mut self, time_usec: u64, controls: [f32; 16]) {
         let mut mode = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED;
         mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, self.armed);
-        // As PX4 does, zero when disarmed.
+        // As in PX4, the controls are zero when disarmed.
         let controls = if self.armed { controls } else { [0.0; 16] };
         let flags = HilActuatorControlsFlags::from_bits_retain(self.flags);
         self.send(&MavMessage::HIL_ACTUATOR_CONTROLS(HIL_ACTUATOR_CONTROLS_DATA {
@@ -223,29 +223,29 @@ impl Px4 {
         }));
     }
 
-    /// Takes a step and answers it.
+    /// Receives a step and answers it.
     pub fn step(&mut self, controls: [f32; 16]) -> Shown {
         let shown = self.shown();
         self.answer(shown.sensor.time_usec, controls);
         shown
     }
 
-    /// Takes and answers so many steps without moving anything.
+    /// Receives and answers `steps` steps with zero controls.
     pub fn idle(&mut self, steps: usize) {
         for _ in 0..steps {
             self.step([0.0; 16]);
         }
     }
 
-    /// Arms, and answers until JSBSim flies; the last step before it does.
+    /// Arms and answers until JSBSim simulates the flight; returns the last step before.
     pub fn launch(&mut self) -> Shown {
         self.armed = true;
-        // The answer that lets the catapult go, 250 steps of pull: the next step shown is the start.
+        // 250 answers cover the release and the pull of the catapult; the next step shows the start state.
         (0..250).map(|_| self.step(outputs(0.0, 0.0, 0.5))).last().expect("steps")
     }
 }
 
-/// Outputs for roll (right), pitch (up) and throttle, as PX4 allocates them on a plane.
+/// Outputs for roll (right), pitch (up) and throttle, as PX4 allocates them for a conventional aircraft.
 pub fn outputs(roll: f32, pitch: f32, throttle: f32) -> [f32; 16] {
     let mut controls = [0.0; 16];
     (controls[LEFT_AILERON], controls[RIGHT_AILERON]) = (-roll, roll);

@@ -1,15 +1,15 @@
-//! What PX4 is shown against the truth, and its noise against the figures that are stated.
+//! Compares the sensor messages for PX4 with the truth, and their noise with its specification.
 
 use crate::px4_client::*;
 use greylag_sitl::shim::{Bias, Existing, FIRST_US, Launch, Px4Noise, Px4Options, TruthFile};
 
-/// The field at the home position (46.8° N, 0° E, 600 m, 2026.0) by WMM2025 as pygeomag 1.1.0 has
-/// it, an implementation that shares nothing with the simulator's: north, east, down, gauss.
+/// Magnetic field at the home position (46.8° N, 0° E, 600 m, 2026.0) by WMM2025: north, east, down, gauss. The source is
+/// pygeomag 1.1.0, which is independent of the simulator's implementation.
 const FIELD: [f64; 3] = [0.221_101, 0.005_322, 0.422_151];
-/// Gravity there with the earth's rotation, m/s² (FACTS.md of the X8: what JSBSim has at 600 m).
+/// Gravity at the home position including the earth's rotation, m/s² (FACTS.md of the X8: JSBSim's value at 600 m).
 const GRAVITY: f64 = 9.806;
 
-/// A row of the truth file by column.
+/// A row of the truth file.
 #[derive(Clone, Debug)]
 struct Row(Vec<f64>);
 
@@ -50,7 +50,7 @@ impl Row {
         names.map(|name| self.get(name))
     }
 
-    /// North-east-down into the body by the textbook's direction cosines (ZYX).
+    /// Transforms a vector from north-east-down to body axes by direction cosines (ZYX).
     fn body(&self, [n, e, d]: [f64; 3]) -> [f64; 3] {
         let [(sr, cr), (sp, cp), (sy, cy)] =
             self.three(["roll_rad", "pitch_rad", "yaw_rad"]).map(f64::sin_cos);
@@ -62,7 +62,7 @@ impl Row {
     }
 }
 
-/// Four seconds of a flight that rolls, pitches and turns, with its truth.
+/// Messages and truth of 4 s of a flight that rolls, pitches and turns.
 fn flight() -> (Vec<Shown>, Vec<Row>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("truth.csv");
@@ -100,7 +100,7 @@ fn without_noise_every_sensor_shows_the_truth_in_its_unit() {
         let s = &shown.sensor;
         assert_eq!(s.time_usec, FIRST_US + k as u64 * STEP_US);
         near("time", k, row.get("time_s"), k as f64 * 0.004, 1e-9);
-        // Floats on the wire: 1e-6 of the size.
+        // The messages contain floats, with a relative error of 1e-6.
         let wide = |x: [f32; 3]| x.map(f64::from);
         let pairs = [
             (
@@ -121,18 +121,18 @@ fn without_noise_every_sensor_shows_the_truth_in_its_unit() {
         if !k.is_multiple_of(5) {
             continue;
         }
-        // The field of an independent implementation, 1e-4 gauss (0.02 %) from ours.
+        // The field of an independent implementation differs by 1e-4 gauss (0.02 %).
         let field = row.body(FIELD);
         let magnetic = wide([s.xmag, s.ymag, s.zmag]);
         (0..3).for_each(|i| near("magnetometer", k, magnetic[i], field[i], 1e-4));
-        // The standard atmosphere by height, in the other direction than the simulator's:
-        // JSBSim's geopotential height differs from the geometric by 0.06 m at 600 m.
+        // The standard atmosphere as a function of height, the inverse of the simulator's conversion. JSBSim's geopotential
+        // height differs from the geometric height by 0.06 m at 600 m.
         let altitude = row.get("altitude_m");
         let pressure = 1013.25 * (1.0 - 2.255_77e-5 * altitude).powf(5.255_88);
         near("pressure, hPa", k, s.abs_pressure.into(), pressure, 0.02);
         near("pressure altitude", k, s.pressure_alt.into(), altitude, 0.2);
         near("temperature", k, s.temperature.into(), 15.0 - 0.0065 * altitude, 0.05);
-        // A pitot tube along the body: u of the air-relative velocity.
+        // A pitot tube along body x measures the component u of the air-relative velocity.
         let ahead =
             row.get("airspeed_mps") * row.get("alpha_rad").cos() * row.get("beta_rad").cos();
         let dynamic = 0.005 * row.get("air_density_kgpm3") * ahead * ahead;
@@ -149,22 +149,22 @@ fn accelerometer_and_gyro_are_the_derivatives_of_what_gps_and_attitude_show() {
         let (before, now, after) = (&truth[k - 1], &truth[k], &truth[k + 1]);
         let names = ["vn_mps", "ve_mps", "vd_mps"];
         let (b, a) = (before.three(names), after.three(names));
-        // Specific force is acceleration less gravity.
+        // The specific force is the acceleration minus gravity.
         let mut felt: [f64; 3] = std::array::from_fn(|i| (a[i] - b[i]) / 0.008);
         felt[2] -= GRAVITY;
         let felt = now.body(felt);
         let s = &shown[k].sensor;
         let force = [s.xacc, s.yacc, s.zacc].map(f64::from);
         (0..3).for_each(|i| worst_force = worst_force.max((force[i] - felt[i]).abs()));
-        // Kinematics of roll: its derivative is p + (q sin φ + r cos φ) tan θ.
+        // Roll kinematics: dφ/dt = p + (q sin φ + r cos φ) tan θ.
         let derivative = (after.get("roll_rad") - before.get("roll_rad")) / 0.008;
         let (sr, cr) = now.get("roll_rad").sin_cos();
         let [p, q, r] = [s.xgyro, s.ygyro, s.zgyro].map(f64::from);
         let kinematic = p + (q * sr + r * cr) * now.get("pitch_rad").tan();
         worst_rate = worst_rate.max((derivative - kinematic).abs());
     }
-    // Central differences over 8 ms; the earth's rotation (0.003 m/s²) is left out. Measured when
-    // written: 0.002 m/s² and 0.0005 rad/s; an axis that is wrong, or a step of delay, is 0.1.
+    // Central differences over 8 ms; the earth's rotation (0.003 m/s²) is neglected. Measured: 0.002 m/s² and 0.0005 rad/s. A
+    // wrong axis or one step of delay would give 0.1.
     println!("specific force within {worst_force:.4} m/s², roll rate within {worst_rate:.5} rad/s");
     assert!(worst_force < 0.02, "{worst_force} m/s²");
     assert!(worst_rate < 0.005, "{worst_rate} rad/s");
@@ -179,7 +179,7 @@ fn gps_and_state_agree_with_the_truth() {
         if let Some(gps) = &shown.gps {
             fixes += 1;
             assert_eq!((gps.fix_type, gps.time_usec), (3, shown.sensor.time_usec));
-            // Whole centimetres a second, whole millimetres.
+            // The resolutions are 1 cm/s and 1 mm.
             let shown = [gps.vn, gps.ve, gps.vd].map(f64::from);
             (0..3).for_each(|i| near("GPS velocity", k, shown[i], velocity[i] * 1e2, 0.51));
             near("GPS speed", k, gps.vel.into(), velocity[0].hypot(velocity[1]) * 1e2, 0.51);
@@ -205,7 +205,7 @@ fn gps_and_state_agree_with_the_truth() {
         }
     }
     assert!(fixes >= 39, "{fixes}");
-    // The way between two fixes is the velocity's: 1e-7 degrees are 11 mm, of 1.7 m a tenth second.
+    // The displacement between two fixes must equal velocity times 0.1 s, about 1.7 m; the resolution of 1e-7° is 11 mm.
     let fixes: Vec<_> = shown.iter().filter_map(|s| s.gps.as_ref()).collect();
     for pair in fixes.windows(2) {
         let north = f64::from(pair[1].lat - pair[0].lat) * 1e-7 * 111_160.0;
@@ -223,9 +223,9 @@ fn on_the_stand_it_feels_gravity_alone_and_the_catapult_leads_to_the_start() {
     let mut px4 = Px4::boot(simulator.address);
     let standing: Vec<Shown> = (0..300).map(|_| px4.step(outputs(0.0, 0.0, 1.0))).collect();
     for Shown { sensor: s, gps, .. } in &standing {
-        // Disarmed: nothing moves, whatever PX4 would have.
+        // Disarmed: nothing moves, whatever PX4 commands.
         assert_eq!([s.xgyro, s.ygyro, s.zgyro], [0.0; 3]);
-        // JSBSim leaves rounding in the wind.
+        // JSBSim leaves a rounding error in the wind.
         assert!(s.diff_pressure.abs() < 1e-20, "{s:?}");
         let expected = [GRAVITY * 0.1_f64.sin(), 0.0, -GRAVITY * 0.1_f64.cos()];
         for (shown, expected) in [s.xacc, s.yacc, s.zacc].into_iter().zip(expected) {
@@ -236,13 +236,13 @@ fn on_the_stand_it_feels_gravity_alone_and_the_catapult_leads_to_the_start() {
         }
     }
     let stand = standing.iter().rev().find_map(|s| s.gps.clone()).unwrap();
-    // Armed without throttle it stays.
+    // Armed without throttle, the aircraft stays on its stand.
     px4.armed = true;
     assert!(px4.step(outputs(0.0, 0.0, 0.0)).sensor.diff_pressure < 1e-20);
     px4.step(outputs(0.0, 0.0, 0.0));
     px4.step(outputs(0.0, 0.0, 0.5));
     let pulled: Vec<Shown> = (0..400).map(|_| px4.step(outputs(0.0, 0.0, 0.5))).collect();
-    // One second of 16.67 m/s²: along the path, which is 0.05 rad below the nose.
+    // The catapult accelerates at 16.67 m/s² for 1 s along the path, which is 0.05 rad below the nose.
     let push = f64::from(pulled[100].sensor.xacc) - GRAVITY * 0.1_f64.sin();
     assert!((push - 16.67 * 0.05_f64.cos()).abs() < 0.01, "{push}");
     let speed: f64 = pulled[..250]
@@ -253,11 +253,11 @@ fn on_the_stand_it_feels_gravity_alone_and_the_catapult_leads_to_the_start() {
     let flying: Vec<_> = pulled.iter().filter_map(|s| s.gps.clone()).collect();
     let at_release = flying.iter().find(|gps| gps.time_usec >= FIRST_US + (303 + 250) * STEP_US);
     let at_release = at_release.unwrap();
-    // It has gone half a second's way at full speed, 8.3 m, and less than 0.1 s more.
+    // The displacement is half of 1 s at full speed, 8.3 m, plus that of less than 0.1 s of flight.
     let north = f64::from(at_release.lat - stand.lat) * 1e-7 * 111_160.0;
     assert!((8.0..10.2).contains(&north), "{north} m");
     assert!((f64::from(at_release.vel) - 1667.0).abs() < 60.0, "{at_release:?}");
-    // Nothing jumps but the acceleration: neighbours differ by what the motion does in a step.
+    // Only the acceleration may jump: consecutive states differ by at most the motion within a step.
     for pair in pulled.windows(2).filter(|p| p[0].state.is_some() && p[1].state.is_some()) {
         let [a, b] = [&pair[0].state, &pair[1].state].map(|s| s.clone().unwrap());
         assert!((b.true_airspeed as i32 - a.true_airspeed as i32).abs() < 15, "{a:?} {b:?}");
@@ -314,7 +314,7 @@ fn noise_has_the_deviations_that_are_stated_and_is_white() {
     for (name, values, stated) in &channels {
         let (mean, deviation) = statistics(values);
         let n = values.len() as f64;
-        // A deviation is estimated to 1/√2n (1 σ), a correlation of neighbours to 1/√n: 4.5 σ.
+        // The relative standard error of a standard deviation is 1/√(2n), that of a correlation 1/√n; the limit is 4.5 σ.
         let uncertain = 4.5 / (2.0 * n).sqrt();
         let neighbours = values.windows(2).map(|v| (v[0] - mean) * (v[1] - mean)).sum::<f64>();
         let correlation = neighbours / (n * deviation * deviation);
@@ -324,7 +324,7 @@ fn noise_has_the_deviations_that_are_stated_and_is_white() {
         assert!((deviation / stated - 1.0).abs() < uncertain, "{name}: {deviation} for {stated}");
         assert!(correlation.abs() < 4.5 / n.sqrt(), "{name}: correlation {correlation}");
     }
-    // Channels have draws of their own.
+    // The channels must have independent draws.
     for pair in channels[..6].windows(2) {
         let ((ma, da), (mb, db)) = (statistics(&pair[0].1), statistics(&pair[1].1));
         let shared =
@@ -343,7 +343,7 @@ fn a_bias_moves_its_sensor_and_equal_seeds_give_equal_flights() {
         let simulator = Simulator::start(options);
         let mut px4 = Px4::boot(simulator.address);
         px4.armed = true;
-        // It flies on what it is shown, so that every draw reaches the aircraft.
+        // The commands depend on the measurements, so every random draw affects the flight.
         let mut last = Shown::default();
         let all: Vec<Shown> = (0..200)
             .map(|_| {
@@ -382,7 +382,7 @@ fn a_bias_moves_its_sensor_and_equal_seeds_give_equal_flights() {
         (with.xacc, without.xacc, 0.1),
         (with.yacc, without.yacc, -0.2),
         (with.zacc, without.zacc, 0.3),
-        // The pressure goes with the square.
+        // The differential pressure is proportional to the square of the airspeed.
         (with.diff_pressure, without.diff_pressure, 0.21 * without.diff_pressure),
     ] {
         assert!((shown - was - by).abs() < 1e-5, "{shown}, was {was}");

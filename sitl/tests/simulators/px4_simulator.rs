@@ -1,4 +1,4 @@
-//! The PX4 simulator API: rates, lockstep, reconnection, clients that are not what they should be.
+//! Tests of the PX4 simulator API: rates, lockstep, reconnection, and clients that are not PX4.
 
 use std::io::Read;
 use std::net::TcpStream;
@@ -13,7 +13,7 @@ use greylag_sitl::shim::{Launch, Pace, Px4Event, ShimOptions};
 use mavlink::MavlinkVersion;
 use mavlink::dialects::ardupilotmega::*;
 
-/// Enough of a moment for a message that would come.
+/// Sufficient wait to detect an unwanted message.
 const MOMENT: Duration = Duration::from_millis(60);
 
 #[test]
@@ -23,15 +23,15 @@ fn sensors_come_every_4_ms_of_simulated_time_and_the_others_at_their_rates() {
     let steps: Vec<Shown> = (0..2500).map(|_| px4.step([0.0; 16])).collect();
     let times: Vec<u64> = steps.iter().map(|s| s.sensor.time_usec).collect();
     assert!(times.windows(2).all(|t| t[1] - t[0] == STEP_US), "250 Hz, none left out");
-    // Ten seconds: GPS at 10 Hz, not before the first HIL_SENSOR.
+    // In 10 s: GPS at 10 Hz, but not before the first HIL_SENSOR.
     let gps: Vec<u64> = steps.iter().filter_map(|s| Some(s.gps.as_ref()?.time_usec)).collect();
     assert!((99..=100).contains(&gps.len()), "{}", gps.len());
     assert!(gps.windows(2).all(|t| t[1] - t[0] == 100_000));
     assert!(steps[0].gps.is_none(), "PX4 has no clock before its first HIL_SENSOR");
-    // PX4 asks for the state every 5 ms.
+    // PX4 requests the state every 5 ms.
     let states = steps.iter().filter(|s| s.state.is_some()).count();
     assert!((1980..=2001).contains(&states), "{states} in 10 s");
-    // Slower sensors at 50 Hz, by the flags.
+    // The flags of magnetometer and air-pressure sensors are set at 50 Hz.
     let slow = HilSensorUpdatedFlags::from_bits_retain(0x1FC0);
     let fast = HilSensorUpdatedFlags::from_bits_retain(0x003F);
     assert!(steps.iter().all(|s| s.sensor.fields_updated.contains(fast)));
@@ -54,8 +54,8 @@ fn no_step_is_made_beyond_the_last_that_was_answered() {
     for turn in 0..10 {
         let shown = px4.shown().sensor.time_usec;
         assert_eq!(shown, last + STEP_US);
-        // Nothing, the answers to earlier steps, one from the future, one that is no number: none
-        // of them makes a step.
+        // Neither silence, nor answers to earlier steps, nor an answer with a future time, nor an answer with NaN may cause a
+        // step.
         assert!(px4.receive(MOMENT).is_none(), "turn {turn}: a step without an answer");
         px4.answer(last, [0.0; 16]);
         px4.answer(last - 5 * STEP_US, [0.0; 16]);
@@ -64,7 +64,7 @@ fn no_step_is_made_beyond_the_last_that_was_answered() {
         px4.send_bytes(b"\xFD garbage \xFE\x00");
         assert!(px4.receive(MOMENT).is_none(), "turn {turn}: a step on a wrong answer");
         px4.answer(shown, [0.0; 16]);
-        // Twice the same answer makes one step.
+        // A repeated answer does not cause a second step.
         px4.answer(shown, [0.0; 16]);
         last = shown;
     }
@@ -111,7 +111,7 @@ fn outputs_move_the_aircraft_exactly_as_they_move_the_plant() {
     let mut largest: f64 = 0.0;
     for k in 0..750 {
         let t = k as f32 * 0.004;
-        // All three at once, each with its own period.
+        // Roll, pitch and throttle vary together, each with a different period.
         let (roll, pitch, throttle) =
             (0.1 * (3.0 * t).sin(), 0.05 * (2.0 * t).cos(), 0.4 + 0.3 * t.sin());
         let shown = px4.step(outputs(roll, pitch, throttle));
@@ -126,10 +126,10 @@ fn outputs_move_the_aircraft_exactly_as_they_move_the_plant() {
             largest = largest.max((f64::from(shown) - truth).abs());
         }
         let [roll, pitch, throttle] = [roll, pitch, throttle].map(f64::from);
-        // A positive elevator of the plant pitches down; PX4's pitches up.
+        // A positive elevator of the plant pitches down, but that of PX4 pitches up.
         plant.step(Inputs { aileron: roll, elevator: -pitch, throttle, rudder: 0.0 }).unwrap();
     }
-    // A float on the wire holds 1e-6 of 10 m/s².
+    // The messages contain floats, whose resolution is 1e-6 at 10 m/s².
     assert!(largest < 2e-6, "{largest}");
     simulator.stop();
 }
@@ -152,12 +152,12 @@ fn each_output_acts_with_its_sign() {
         controls[output] = value;
         respond(controls)
     };
-    // 0.2 s with a fifth of the travel: the X8 rolls at some 0.3 rad/s and pitches at 0.5.
+    // After 0.2 s with a fifth of the travel, the X8 rolls at about 0.3 rad/s and pitches at 0.5 rad/s.
     assert!(one(RIGHT_AILERON, 0.2).xgyro > neutral.xgyro + 0.1, "right trailing edge up: right");
     assert!(one(LEFT_AILERON, 0.2).xgyro < neutral.xgyro - 0.1, "left trailing edge up: left");
     assert!(one(ELEVATOR, 0.2).ygyro > neutral.ygyro + 0.1, "trailing edge up: nose up");
     assert!(one(THROTTLE, 0.9).xacc > neutral.xacc + 0.5, "throttle pulls");
-    // Outputs that nothing hangs on move nothing.
+    // Outputs without a control have no effect.
     assert_eq!(one(0, 1.0), neutral);
     assert_eq!(one(15, -1.0), neutral);
 }
@@ -175,9 +175,9 @@ fn without_lockstep_time_is_the_walls() {
         last = px4.step([0.0; 16]).sensor.time_usec;
     }
     let simulated = (last - first) as f64 * 1e-6;
-    // A machine that stops for more than 0.1 s loses that time; 10 % are allowed for it.
+    // A machine that pauses for more than 0.1 s loses that time; the limit allows 10 %.
     assert!((1.8..2.05).contains(&simulated), "{simulated} s in 2 s");
-    // A client that falls silent does not stop the simulation, and is reported.
+    // A client that becomes silent does not stop the simulation, and the silence is reported.
     std::thread::sleep(Duration::from_millis(1300));
     simulator.until(|e| *e == Px4Event::Silent);
     let (mut now, drained) = (last, Instant::now());
@@ -199,7 +199,7 @@ fn lockstep_keeps_to_the_wall_clock_unless_it_is_told_to_hurry() {
     let begun = Instant::now();
     px4.idle(250);
     let taken = begun.elapsed();
-    // Never faster; slower by what the machine was busy with.
+    // The run must not be faster than real time, but may be slower on a busy machine.
     assert!((0.98..2.0).contains(&taken.as_secs_f64()), "{taken:?} for a second");
     simulator.stop();
 }
@@ -211,17 +211,17 @@ fn a_client_that_stops_answering_is_told_and_may_be_replaced() {
     let begun = Instant::now();
     simulator.until(|e| *e == Px4Event::Stopped);
     assert!((0.5..4.0).contains(&begun.elapsed().as_secs_f64()), "{:?}", begun.elapsed());
-    // It goes on where it stood.
+    // After an interruption, the run resumes at the same step.
     let time = hung.shown().sensor.time_usec;
     assert!(hung.receive(MOMENT).is_none());
     hung.answer(time, [0.0; 16]);
     simulator.until(|e| *e == Px4Event::Resumed);
     assert_eq!(hung.shown().sensor.time_usec, time + STEP_US);
-    // It may wait for a sensor itself: a step is made, once in three seconds.
+    // The client itself may wait for a sensor, so a step is made every 3 s.
     let begun = Instant::now();
     assert_eq!(hung.shown().sensor.time_usec, time + 2 * STEP_US);
     assert!(begun.elapsed() > Duration::from_secs(2), "{:?}", begun.elapsed());
-    // Silent for good; another takes its place.
+    // While the client stays silent, another client replaces it.
     simulator.until(|e| *e == Px4Event::Stopped);
     let mut other = Px4::boot(simulator.address);
     other.idle(10);
@@ -275,7 +275,7 @@ fn what_is_not_px4_is_said_once_and_a_wrong_protocol_is_not_flown() {
     old.armed = true;
     for _ in 0..5 {
         let time = old.shown().sensor.time_usec;
-        // MAVLink 1 has this message too: it is not taken for an answer.
+        // MAVLink 1 also has this message, but it must not count as an answer.
         old.answer(time, outputs(0.0, 0.0, 1.0));
     }
     let told = simulator.until(|e| matches!(e, Px4Event::Refused(_))).to_string();

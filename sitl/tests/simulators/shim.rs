@@ -1,4 +1,4 @@
-//! Real time over real sockets: the wall clock rules, whatever the companion does.
+//! Tests of the shim in real time over real sockets: time advances by the wall clock, independent of the companion.
 
 use std::time::{Duration, Instant};
 
@@ -20,8 +20,7 @@ fn sends_a_hundred_frames_a_second_without_drift() {
         count += 1;
         companion.answer(last.time_us(), [0.0, 0.0, 0.3]);
     }
-    // Absolute deadlines: simulated time equals wall time to within one frame, plus what a busy
-    // machine adds to the one frame at the end.
+    // With absolute deadlines, simulated time equals wall time within one frame, plus delays of a busy machine in the last frame.
     let (wall, simulated) =
         (begun.elapsed().as_secs_f64(), (last.time_us() - first.time_us()) as f64 * 1e-6);
     assert!((wall - simulated).abs() < 0.03, "{wall} s of wall time, {simulated} s simulated");
@@ -32,13 +31,13 @@ fn sends_a_hundred_frames_a_second_without_drift() {
 }
 
 fn time_runs_without_anybody_there() {
-    // Nobody listens on the port: every datagram is refused.
+    // No program listens on the port, so every datagram is refused.
     let (companion, link) = listening();
     drop(companion);
     let shim = Shim::start(real_time(&link));
     std::thread::sleep(Duration::from_millis(1000));
     let summary = shim.stop();
-    // 100 frames, give or take what the thread's start and a busy machine cost.
+    // 100 frames, with a tolerance for the start of the thread and a busy machine.
     assert!((85..=103).contains(&summary.frames), "{} frames", summary.frames);
     assert_eq!((summary.answers, summary.flown_s), (0, 0.0), "held until armed");
 }
@@ -52,10 +51,10 @@ fn a_silent_companion_leaves_the_surfaces_where_they_are_commanded() {
     std::thread::sleep(Duration::from_millis(2500));
     let mut companion = Companion::udp_in(&at);
     let state = companion.state();
-    // Surfaces settle in 0.1 s, the throttle lag (0.2 s) in 2.5 s to 4e-6.
+    // Surfaces settle within 0.1 s; after 2.5 s, the throttle lag (0.2 s) has settled to 4e-6.
     assert!((state.actuators.actuator[1] - 0.25).abs() < 1e-3, "{:?}", state.actuators.actuator);
     assert!((state.actuators.actuator[2] - 0.5).abs() < 1e-3);
-    // It returns, and is flown with again.
+    // The companion returns, and its commands are used again.
     companion.fly(50, |_| [0.0, -0.25, 0.5]);
     let state = companion.state();
     assert!((state.actuators.actuator[1] + 0.25).abs() < 1e-2, "{:?}", state.actuators.actuator);
@@ -138,10 +137,10 @@ fn frames_are_delayed_and_dropped_as_asked() {
     }
     assert!(times.is_sorted(), "frames keep their order");
     let summary = shim.stop();
-    // 300 frames, of which 75 ± 7.5 (1 σ) are lost.
+    // Of 300 frames, 75 ± 7.5 (1 σ) are lost.
     assert!((45..=105).contains(&summary.dropped_frames), "{}", summary.dropped_frames);
-    // The answer to a frame that is 35 ms late comes when 3 or 4 younger frames are made: the
-    // latency counts from the sending, so it stays that of the socket.
+    // The answer to a frame with 35 ms of delay arrives after 3 or 4 newer frames. The latency is measured from the transmission,
+    // so it is that of the socket.
     assert!(summary.latency.quantile(0.5) < Duration::from_millis(5), "{summary}");
     assert_eq!(summary.wrong_answers + summary.stale_answers, 0, "{summary}");
 }
@@ -150,7 +149,7 @@ fn over_tcp_a_companion_that_does_not_read_costs_no_cycle() {
     let shim = Shim::start(real_time("tcpin:127.0.0.1:0"));
     let mut companion = Companion::tcp_out(shim.address());
     companion.fly(20, |_| [0.0, 0.0, 0.3]);
-    // 2 s without reading: some 60 kB wait in the socket.
+    // During 2 s without reading, about 60 kB accumulate in the socket.
     std::thread::sleep(Duration::from_secs(2));
     let mut last = companion.state().time_us();
     for _ in 0..250 {
@@ -180,19 +179,19 @@ fn late_frames_hold_up_those_behind_them_and_none_is_lost() {
         last = (time_us, Instant::now());
     }
     let summary = shim.stop();
-    // Of 300 frames 6 are late; the chance that none is 0.2 %, and the seed is fixed. A frame that
-    // is 100 ms late, with 5 ms of jitter, leaves a gap of 105 to 115 ms; a busy machine adds to it.
+    // On average, 6 of 300 frames are late; the probability of none is 0.2 %, and the seed is fixed. A frame with a delay of 100
+    // ms and a jitter of 5 ms leaves a gap of 105 to 115 ms, or more on a busy machine.
     let longest = gaps.iter().max().expect("gaps");
     assert!(
         (Duration::from_millis(95)..Duration::from_millis(250)).contains(longest),
         "{longest:?}"
     );
-    // Frames that were held up come in a burst.
+    // Delayed frames arrive in a burst.
     assert!(gaps.iter().filter(|gap| **gap < Duration::from_millis(1)).count() >= 8);
     assert_eq!(summary.dropped_frames, 0);
 }
 
-/// `cargo test -p greylag-sitl --release --test simulators shim:: -- --ignored --nocapture`
+/// Run with `cargo test -p greylag-sitl --release --test simulators shim:: -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute; prints the punctuality of the clock on this machine"]
 fn a_minute_of_real_time() {

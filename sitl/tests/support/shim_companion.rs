@@ -1,4 +1,4 @@
-//! A companion for tests: the far end of the link, over real sockets, told what to answer.
+//! A simulated companion for tests: the other end of the link, over real sockets, with prescribed answers.
 #![allow(dead_code)] // each test that includes this module uses its part
 
 use std::io::{Read, Write};
@@ -13,7 +13,7 @@ use greylag_sitl::plant::{PlantOptions, Start};
 use greylag_sitl::shim::codec::*;
 use greylag_sitl::shim::{self, Event, Notice, Pace, ShimError, ShimOptions, Summary};
 
-/// Longer than anything a test waits for on purpose.
+/// Longest wait of any test.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Options of a lockstep run towards `link`.
@@ -28,7 +28,7 @@ pub fn real_time(link: &str) -> ShimOptions {
     options
 }
 
-/// A shim that runs in a thread.
+/// A shim in a separate thread.
 pub struct Shim {
     pub notices: Receiver<Notice>,
     stop: Arc<AtomicBool>,
@@ -46,7 +46,7 @@ impl Shim {
         Shim { notices, stop, thread }
     }
 
-    /// Where a listening shim listens.
+    /// Address on which a listening shim listens.
     pub fn address(&self) -> SocketAddr {
         match self.notices.recv_timeout(PATIENCE).expect("an event").event {
             Event::Open(_, Some(address)) => address,
@@ -54,7 +54,7 @@ impl Shim {
         }
     }
 
-    /// The events so far.
+    /// The events since the last call.
     pub fn events(&self) -> Vec<Event> {
         self.notices.try_iter().map(|notice| notice.event).collect()
     }
@@ -69,7 +69,7 @@ impl Shim {
     }
 }
 
-/// A whole state frame as received.
+/// A complete state frame as received.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct State {
     pub imu: HighresImu,
@@ -101,13 +101,13 @@ enum Road {
     Tcp(TcpStream),
 }
 
-/// The companion's end.
+/// The simulated companion.
 pub struct Companion {
     road: Road,
     parser: Parser,
     encoder: Encoder,
     waiting: Vec<Frame>,
-    /// All frames of the slower messages so far.
+    /// All received frames of the slower messages.
     pub slow: Vec<Frame>,
     partial: State,
 }
@@ -124,7 +124,7 @@ impl Companion {
         }
     }
 
-    /// Listens for datagrams; answers whom it hears.
+    /// Listens for datagrams and answers the first sender.
     pub fn udp_in(at: &str) -> Self {
         Self::on(Road::Udp(UdpSocket::bind(at).expect(at), None))
     }
@@ -146,7 +146,7 @@ impl Companion {
         Self::on(Road::Tcp(stream))
     }
 
-    /// This side's own address.
+    /// Local address of the companion.
     pub fn address(&self) -> SocketAddr {
         match &self.road {
             Road::Udp(socket, _) => socket.local_addr(),
@@ -174,22 +174,22 @@ impl Companion {
         self.send(&Heartbeat { kind: 1, mavlink_version: 3, ..Heartbeat::default() });
     }
 
-    /// Answers the frame of `time_us`, armed.
+    /// Answers the frame of `time_us`, µs, as an armed companion.
     pub fn answer(&mut self, time_us: u64, command: [f32; 3]) {
         self.send(&answer(time_us, command, 128));
     }
 
-    /// Answers the frame of `time_us`, disarmed.
+    /// Answers the frame of `time_us`, µs, as a disarmed companion.
     pub fn answer_disarmed(&mut self, time_us: u64) {
         self.send(&answer(time_us, [0.0; 3], 0));
     }
 
-    /// The next state frame, within `patience`.
+    /// The next state frame; `None` if none is complete within `patience`.
     pub fn state_within(&mut self, patience: Duration) -> Option<State> {
         let until = Instant::now() + patience;
         loop {
             for frame in std::mem::take(&mut self.waiting) {
-                // A frame that completes leaves the rest of its batch for the next call.
+                // After a complete state frame, the next call handles the rest of the batch.
                 if let Some(state) = self.place(&frame) {
                     return Some(state);
                 }
@@ -233,7 +233,7 @@ impl Companion {
             }
             Road::Tcp(stream) => {
                 stream.set_read_timeout(Some(patience)).expect("a timeout");
-                // One frame's worth at a time, so that no batch holds two.
+                // Reads at most one frame at a time, so no batch contains two.
                 let length = stream.read(&mut buffer[..64]).ok().filter(|&n| n > 0)?;
                 self.parser.stream(&buffer[..length], &mut |frame| waiting.push(frame));
             }
@@ -241,12 +241,12 @@ impl Companion {
         Some(())
     }
 
-    /// Runs of received bytes that were no frame.
+    /// Number of received byte runs that were not part of a frame.
     pub fn bad(&self) -> u64 {
         self.parser.bad()
     }
 
-    /// Flies `frames` frames, answering each with `command` of it.
+    /// Receives `frames` state frames and answers each with the result of `command`.
     pub fn fly(
         &mut self,
         frames: usize,
@@ -263,14 +263,14 @@ impl Companion {
     }
 }
 
-/// An answer message.
+/// An answer to the frame of `time_us`, µs.
 pub fn answer(time_us: u64, command: [f32; 3], mode: u8) -> HilActuatorControls {
     let mut controls = [0.0; 16];
     controls[..3].copy_from_slice(&command);
     HilActuatorControls { time_usec: time_us, flags: 0, controls, mode }
 }
 
-/// A companion that listens on a port of its own, with the `udpout:` address for the shim.
+/// A companion that listens on a free port, and the `udpout:` address of this port for the shim.
 pub fn listening() -> (Companion, String) {
     let companion = Companion::udp_in("127.0.0.1:0");
     let link = format!("udpout:{}", companion.address());

@@ -1,4 +1,4 @@
-//! `greylag aircraft check`: how a model's aircraft flies.
+//! `greylag aircraft check`: computes how a model's aircraft flies.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ struct Document<'a> {
     found: &'a AircraftCheck,
 }
 
-/// Checks and prints; the exit status is 3 if something should be mended before a flight.
+/// Checks the aircraft and prints the results. The exit status is 3 if something should be corrected before a flight.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.writable(Overwrite::Never)?;
     if let Some(path) = &arguments.report {
@@ -65,12 +65,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(status(&found))
 }
 
-/// The exit status: 3 if something should be mended before a flight.
+/// The exit status: 3 if something should be corrected before a flight.
 pub fn status(found: &AircraftCheck) -> ExitCode {
     if found.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(IN_DOUBT) }
 }
 
-/// The page of the aircraft of `model`, whose file is `file`.
+/// The page of the aircraft of `model`. `file` is the path of the model file.
 ///
 /// # Errors
 /// If the aircraft cannot be trimmed or stabilised at its cruise airspeed.
@@ -106,13 +106,13 @@ pub fn print(found: &AircraftCheck) {
     }
     let controller = found.controller;
     println!(
-        "controller to begin with: {}, whose loops bear {:.0} ms of delay",
+        "controller to begin with: {}, whose loops tolerate {:.0} ms of delay",
         controller.name,
         1e3 * controller.delay_s
     );
     match found.findings.is_empty() {
-        true => println!("nothing to mend"),
-        false => found.findings.iter().for_each(|finding| println!("mend: {finding}")),
+        true => println!("nothing to correct"),
+        false => found.findings.iter().for_each(|finding| println!("correct: {finding}")),
     }
 }
 

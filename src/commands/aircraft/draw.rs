@@ -1,4 +1,4 @@
-//! `greylag aircraft draw`: aircraft from a distribution, and whether others lie among them.
+//! `greylag aircraft draw`: draws aircraft from a distribution, and compares models with them.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use crate::model::GreyBox;
 use crate::model::population::{Character, Drawn, Population, TRAITS};
 use crate::num::statistics::quantile;
 
-/// Models of the shipped aircraft, which are placed among the draws by default.
+/// Models of the shipped aircraft, which are compared with the draws by default.
 const SHIPPED: [&str; 5] = [
     "params/x8/jsbsim.toml",
     "params/aerosonde/jsbsim.toml",
@@ -20,7 +20,7 @@ const SHIPPED: [&str; 5] = [
     "params/c172p-flaps/jsbsim.toml",
     "params/a430/prior.toml",
 ];
-/// Quantiles of the draws between which every number of an aircraft must lie for the aircraft to count as covered.
+/// An aircraft counts as covered if each of its traits lies between these quantiles of the draws.
 const INSIDE: [f64; 2] = [0.005, 0.995];
 
 /// Options of `greylag aircraft draw`.
@@ -119,7 +119,7 @@ fn listed(drawn: &Drawn) -> Vec<String> {
     ]
 }
 
-/// Prints the quantiles of each trait beside the values of `models`, then the traits in which a model lies outside
+/// Prints the quantiles of each trait and the values of `models`. Then prints the traits in which a model lies outside
 /// the draws.
 fn print(characters: &[Character], models: &[GreyBox]) -> Result<()> {
     let own = models

@@ -1,4 +1,4 @@
-//! `greylag aircraft export`: a model as an aircraft of another program.
+//! `greylag aircraft export`: writes a model as an aircraft of another program.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -36,7 +36,7 @@ struct Jsbsim {
     name: String,
 }
 
-/// Writes the aircraft's files and lists what the format cannot hold.
+/// Writes the aircraft's files and lists the properties that the format cannot represent.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let To::Jsbsim(jsbsim) = &arguments.to;
     let Jsbsim { dir, name, .. } = jsbsim;

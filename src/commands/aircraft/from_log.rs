@@ -1,4 +1,4 @@
-//! `greylag aircraft from-log`: a model of an aircraft from its dimensions and its flight logs.
+//! `greylag aircraft from-log`: makes a model of an aircraft from its dimensions and its flight logs.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,9 @@ use crate::commands::{Command, command_of, given};
 use crate::logs::quoted;
 use crate::model::GreyBox;
 
-/// A coefficient is known if its standard deviation is at most this share of its magnitude.
+/// Largest ratio of standard deviation to magnitude at which a coefficient counts as determined.
 const KNOWN: f64 = 0.3;
-/// Start of a coefficient's name, and a manoeuvre that excites such coefficients.
+/// Prefix of a coefficient's name, and a manoeuvre that excites these coefficients.
 const MANOEUVRES: [(&str, &str); 7] = [
     ("roll_linear", "aileron doublets, then bank to bank reversals"),
     ("pitch_linear", "elevator doublets at three airspeeds"),

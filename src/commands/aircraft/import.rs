@@ -1,4 +1,4 @@
-//! `greylag aircraft import`: an aircraft of another program as airframe and model.
+//! `greylag aircraft import`: imports an aircraft of another program as airframe and model.
 
 use std::process::ExitCode;
 
@@ -22,7 +22,7 @@ enum From {
     Jsbsim(super::import_jsbsim::Jsbsim),
 }
 
-/// Imports an aircraft, writes its files and lists what was left out.
+/// Imports an aircraft, writes its files and lists the effects that they do not represent.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.from {
         From::Derivatives(file) => super::import_derivatives::run(file),

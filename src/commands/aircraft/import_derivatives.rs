@@ -1,4 +1,5 @@
-//! `greylag aircraft import derivatives`: airframe and model from the stability derivatives of an aerodynamic tool.
+//! `greylag aircraft import derivatives`: makes airframe and model from the stability derivatives of an aerodynamic
+//! tool.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,7 +39,7 @@ pub struct Derivatives {
     control_unit: Angle,
 }
 
-/// Imports the derivatives and lists missing and implausible values. With implausible ones the exit status is 3.
+/// Imports the derivatives and lists missing and implausible values. The exit status is 3 if a value is implausible.
 pub fn run(arguments: &Derivatives) -> Result<ExitCode> {
     let Derivatives { file, out, common, unit_m, control_unit } = arguments;
     if !(*unit_m > 0.0 && *unit_m < 1e3) {

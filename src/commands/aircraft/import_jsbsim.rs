@@ -1,4 +1,4 @@
-//! `greylag aircraft import jsbsim`: a JSBSim aircraft as airframe and model.
+//! `greylag aircraft import jsbsim`: imports a JSBSim aircraft as airframe and model.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ pub struct Jsbsim {
     set: Vec<(String, f64)>,
 }
 
-/// Imports the aircraft, writes its files and lists what was left out.
+/// Imports the aircraft, writes its files and lists the effects that they do not represent.
 pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     let mut options = PlantOptions {
         aircraft_dir: Some(jsbsim.dir.clone()),
@@ -77,7 +77,7 @@ pub fn run(jsbsim: &Jsbsim) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The imported model, written to a temporary folder and read back: files that cannot be read are not kept.
+/// Writes the imported files to a temporary folder and reads the model back. Files that cannot be read are not kept.
 fn read_back(found: &Imported) -> Result<GreyBox> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let model = folder.path().join("model.toml");

@@ -1,4 +1,4 @@
-//! `greylag aircraft new`: an airframe and a prior model from mass and dimensions.
+//! `greylag aircraft new`: estimates an airframe and a prior model from mass and dimensions.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,9 +15,9 @@ use crate::physics::atmosphere::STANDARD_GRAVITY;
 
 /// Smallest upper airspeed limit to which the envelope is reduced, as a multiple of the cruise airspeed.
 const LEAST_ABOVE_CRUISE: f64 = 1.1;
-/// Static thrust by default, as a share of the weight.
+/// Default static thrust, as a fraction of the weight.
 const THRUST: f64 = 0.5;
-/// Pitch speed by default, as a multiple of the airspeed of level flight at a lift coefficient of 0.6.
+/// Default pitch speed of the propeller, as a multiple of the airspeed of level flight at a lift coefficient of 0.6.
 const PITCH_SPEED: f64 = 2.0;
 
 /// Surface that trims the aircraft in pitch.
@@ -78,8 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     write(&arguments.folder, &measures.airframe(), &measures.model())
 }
 
-/// Writes both files into `folder`, then prints the flight characteristics; exit status 3 if
-/// something needs correction.
+/// Writes both files into `folder`, then prints the flight characteristics. The exit status is 3 if something needs
+/// correction.
 pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode> {
     let model = files(folder, airframe, model_text)?;
     println!("wrote {} and airframe.toml beside it", model.display());
@@ -92,8 +92,8 @@ pub fn write(folder: &Path, airframe: &str, model_text: &str) -> Result<ExitCode
     Ok(super::check::status(&found))
 }
 
-/// The text of the airframe file with the upper airspeed limit reduced to the fastest level flight, unless that limit
-/// would lie within 10 % of the cruise airspeed.
+/// The text of the airframe file with the upper airspeed limit reduced to the fastest level flight. The limit is kept
+/// if the reduced one would be at most 1.1 times the cruise airspeed.
 fn flown_level(airframe: &str, model_text: &str) -> Result<String> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = scratch.path().join("model.toml");

@@ -27,7 +27,7 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     }
 }
 
-/// `model` with the bounds `all` set.
+/// Sets the bounds `all` in `model`.
 ///
 /// # Errors
 /// If the model has no such coefficient, or the coefficient's value lies outside the bounds.

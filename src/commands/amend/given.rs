@@ -28,13 +28,13 @@ struct Parameter {
     value: Option<f64>,
 }
 
-/// The effects that the diagnosis in `path` asserts of `model`. The fit of each starts at the coefficients of the
-/// diagnosis.
+/// The effects that the diagnosis in `path` asserts for the model named `model`. Their fit starts at the coefficients
+/// of the diagnosis.
 pub fn asserted(path: &Path, model: &str) -> Result<Vec<Added>> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the diagnosis {}", path.display()))?;
     let written: Written = serde_json::from_str(&text).with_context(|| {
-        format!("{} is no diagnosis; write one with `greylag diagnose --json`", path.display())
+        format!("{} is not a diagnosis; write one with `greylag diagnose --json`", path.display())
     })?;
     if written.schema != "greylag.diagnosis/1" || written.model != model {
         bail!(

@@ -1,4 +1,4 @@
-//! `greylag amend --leave-one-out`: a table of structures, each judged on flights that its fit did not see.
+//! `greylag amend --leave-one-out`: compares model structures by their errors on flights that were left out of the fit.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,9 +17,9 @@ use crate::sysid::per_flight::PerFlight;
 /// Default standard deviation of the misalignment of the measured axes, °, for an installation aligned by eye.
 const ASKEW_DEG: f64 = 3.0;
 
-/// The structures to try: the model as given; its coefficients fitted, then also with trims of each flight, with a
-/// misalignment of each flight's axes, and with both; a fit with physical bounds as the only prior; each of
-/// `effects`, and all of them.
+/// The structures to try: the model as given; its coefficients fitted; the same fit with trims of each flight, with a
+/// misalignment of each flight's axes, and with both; a fit with physical bounds as the only prior; a fit with each of
+/// `effects`, and with all of them.
 pub fn structures(effects: &[Added], asked: PerFlight) -> Vec<Structure> {
     let of = |name: String, effects: &[Added], per_flight: PerFlight| Structure {
         name,
@@ -99,7 +99,7 @@ fn table(scored: &[Scored]) -> Table {
         "free",
         "error on the flight left out",
         "± standard error",
-        "± beside the best",
+        "± relative to the best",
         "",
     ]);
     for column in table.column_iter_mut().skip(1) {

@@ -1,4 +1,4 @@
-//! `greylag amend`: a model refitted to flights, missing effects added.
+//! `greylag amend`: refits a model to flights and adds missing effects.
 
 mod bounds;
 mod given;
@@ -101,7 +101,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Reads, reconstructs, fits; prints before and after; writes the model.
+/// Reads and reconstructs the flights and fits the model. Prints the errors before and after, and writes the model.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let path = shipped(&arguments.model);
     let overwrite = arguments.force.into();
@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
     let worse = story.worse().filter(|_| !arguments.accept_anyway);
-    // drawn before anything is written, so that Ctrl-C leaves nothing behind
+    // the page is drawn before anything is written; Ctrl-C then leaves no file behind
     let draw = || page(arguments, &model, &amended, &tests, &places, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
         Some(path) if !all_refused && worse.is_none() => Some((path, draw()?)),
@@ -187,7 +187,7 @@ fn doubtful(story: &Amendment) -> bool {
         || !amend::contradictions(&story.parameters).is_empty()
 }
 
-/// `--leave-one-out`: a table of structures in place of a model.
+/// Carries out `--leave-one-out`: prints a table of structures and writes no model.
 fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
     std::fs::create_dir_all(&arguments.out)?;
@@ -203,7 +203,7 @@ fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     Ok(if taken.in_doubt { ExitCode::from(IN_DOUBT) } else { done })
 }
 
-/// Refuses effects that the program does not know or the model has already.
+/// Refuses effects that are unknown to the program or already in the model.
 fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     for id in effects {
         if catalogue::describe(id).is_none() {
@@ -221,8 +221,8 @@ fn check_new(effects: &[String], model: &GreyBox) -> Result<()> {
     Ok(())
 }
 
-/// The flights that judge the fit: those held out. If none are held out, the last third of the only flight in
-/// `taken`, which keeps the first two thirds. With `--fit-all`, all flights.
+/// The flights for validation: the flights held out. If none is held out, it is the last third of the only flight in
+/// `taken`, which keeps the first two thirds. With `--fit-all` it is all flights.
 fn tests(
     arguments: &Arguments,
     held: Vec<PathBuf>,
@@ -250,7 +250,7 @@ fn tests(
     Ok(more.flights)
 }
 
-/// The report as HTML, with the growth of the errors on the flights that the fit did not see.
+/// The report as HTML, with the growth of the errors on the validation flights.
 fn page(
     arguments: &Arguments,
     model: &GreyBox,
@@ -280,7 +280,8 @@ fn page(
     Ok(report.page().render())
 }
 
-/// Logs to fit to and logs to judge by. If none are held out, the last log judges; a single log stays whole.
+/// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log stays
+/// whole.
 fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf>) {
     match (logs, hold_out) {
         ([first @ .., last], []) if !first.is_empty() => (first.to_vec(), vec![last.clone()]),
@@ -288,7 +289,8 @@ fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf
     }
 }
 
-/// Error message when the diagnosis of the fitted flights asserts no effect: its verdict, and the commands to run next.
+/// Error message if the diagnosis of the fitted flights asserts no effect. The message has the verdict of the diagnosis
+/// and the commands to run next.
 fn nothing_asserted(
     arguments: &Arguments,
     diagnosis: &Diagnosis,
@@ -311,7 +313,7 @@ fn nothing_asserted(
     )
 }
 
-/// The effects to add: those that a diagnosis asserts, then those named.
+/// The effects to add: those asserted by a diagnosis, then those named by options.
 fn wanted(
     arguments: &Arguments,
     effects: &[String],

@@ -30,10 +30,10 @@ pub struct Places {
 }
 
 impl Drop for Places {
-    /// A folder that this run made does not stay behind empty.
+    /// Removes the folder if this run made it and it is empty.
     fn drop(&mut self) {
         if self.made {
-            // fails if the folder has files; an empty one is removed
+            // a folder with files is not removed
             let _ = fs::remove_dir(&self.folder);
         }
     }

@@ -37,7 +37,7 @@ fn parameter_table(parameters: &[Parameter]) -> Table {
 /// Constants estimated for each flight; angles in degrees.
 fn own_table(flights: &[FittedFlight]) -> Table {
     let mut table =
-        table(["flight", "its own", "value", "± 95 %", "beside the flights' mean", "± 95 %"], 1);
+        table(["flight", "its own", "value", "± 95 %", "minus the flights' mean", "± 95 %"], 1);
     for f in flights {
         for c in &f.own {
             let (factor, unit) = own_unit(c.name);
@@ -51,7 +51,7 @@ fn own_table(flights: &[FittedFlight]) -> Table {
     table
 }
 
-/// Factor to the unit in which a constant of a flight is shown, and that unit.
+/// Factor to the display unit of a constant of a flight, and this unit.
 fn own_unit(name: &str) -> (f64, &'static str) {
     match name {
         name if name.starts_with("askew") => (1f64.to_degrees(), "°"),
@@ -60,7 +60,7 @@ fn own_unit(name: &str) -> (f64, &'static str) {
     }
 }
 
-/// Free-run errors on the flights that the fit did not see.
+/// Free-run errors on the validation flights.
 fn error_table(story: &Amendment) -> Table {
     let header = ["NRMSE on held-out flights", "1 s", "2 s", "5 s", "10 s", "diverged"];
     let mut table = table(header, 1);

@@ -1,5 +1,5 @@
-//! Cost of the cells of a campaign: measured on cells of the same stage, else as the campaign file
-//! states.
+//! Cost of the cells of a campaign. The cost is measured on cells of the same stage. Without a measurement it is the
+//! figure in the campaign file.
 
 use anyhow::Result;
 
@@ -21,13 +21,13 @@ pub struct Cost {
 pub enum Source {
     /// The median of this many cells.
     Measured(usize),
-    /// As the campaign file states.
+    /// The figure in the campaign file.
     Stated,
 }
 
 impl Cost {
-    /// Cost of a cell of `stage`; `None` if it is unknown. Interrupted cells are not counted, because the time of their last
-    /// session is not that of the whole cell.
+    /// Cost of a cell of `stage`; `None` if it is unknown. Resumed cells are not counted, because their time covers the
+    /// last session only.
     ///
     /// # Errors
     /// If the times of a cell cannot be read.
@@ -54,7 +54,7 @@ impl std::fmt::Display for Source {
     }
 }
 
-/// Formats a time given in s, in s, min or h.
+/// Formats `seconds` (s) in s, min or h.
 pub fn time(seconds: f64) -> String {
     match seconds {
         s if s < 99.5 => format!("{s:.0} s"),

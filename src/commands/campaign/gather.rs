@@ -1,4 +1,4 @@
-//! `greylag campaign gather`: join the results and list the missing cells.
+//! `greylag campaign gather`: joins the results and lists the missing cells.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use crate::campaign::gather::{Gathered, Joined, gather, read_lines, write_lines}
 use crate::commands::files::{self, Overwrite};
 use crate::commands::status::IN_DOUBT;
 
-/// Largest number of cells that are listed by name; of more, only the count is printed.
+/// Largest number of cells that are listed by name. Further cells are only counted.
 const NAMED: usize = 20;
 
 /// Options of `greylag campaign gather`.
@@ -33,7 +33,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Joins the results that exist.
+/// Joins the results and prints the cells that are not done.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.results.iter().chain(&arguments.times) {

@@ -1,5 +1,4 @@
-//! All cells of a campaign on this machine: each in a separate process, as a scheduler would run
-//! it.
+//! Runs all cells of a campaign on this machine, each in a separate process, as a scheduler does.
 
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
@@ -20,7 +19,7 @@ use crate::sysid::progress::Stage;
 const LOOK: Duration = Duration::from_millis(50);
 /// Pause before another attempt at a cell.
 const PAUSE: Duration = Duration::from_secs(2);
-/// Time that a process has to come to its checkpoint after Ctrl-C.
+/// Time within which a process must end at its checkpoint after Ctrl-C.
 const GRACE: Duration = Duration::from_secs(20);
 /// Largest number of starts of a cell whose process was ended by a signal, for example for lack of memory.
 const KILLS: u32 = 3;
@@ -30,9 +29,9 @@ const LOGS: &str = "logs";
 /// Treatment of cells that failed before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failed {
-    /// Leave them as they are.
+    /// Failed cells are left as they are.
     Leave,
-    /// Try them again.
+    /// Failed cells are tried again.
     Again,
 }
 
@@ -71,7 +70,7 @@ pub fn run(
     let bar = Bar::new();
     let mut local = Local { plan, store, file, jobs, states, running: BTreeMap::new(), bar };
     let interrupted = local.all();
-    // whatever went wrong, no process is left behind
+    // no process may remain, even after an error
     local.end();
     let interrupted = interrupted?;
     drop(local);
@@ -110,7 +109,7 @@ fn ended(plan: &Plan, store: &Store) -> Result<ExitCode> {
 }
 
 impl Local<'_> {
-    /// Runs cells until none is left that can be run. Returns whether Ctrl-C ended the run.
+    /// Runs cells as long as one can be run. Returns whether Ctrl-C ended the run.
     fn all(&mut self) -> Result<bool> {
         self.show()?;
         loop {
@@ -131,7 +130,7 @@ impl Local<'_> {
         }
     }
 
-    /// The first cell that can be run at once.
+    /// The first cell that can be run at once; `None` if there is none.
     fn next(&self, now: Instant) -> Option<usize> {
         let ready = |i: &usize| {
             let State::Waiting { not_before, .. } = self.states[*i] else { return false };
@@ -140,7 +139,7 @@ impl Local<'_> {
         (0..self.states.len()).find(ready)
     }
 
-    /// Whether any waiting cell can still be run: none of the cells that it depends on has failed.
+    /// Whether any waiting cell can still be run: no cell on which it depends has failed.
     fn is_waiting(&self) -> bool {
         let waits = |i: &usize| matches!(self.states[*i], State::Waiting { .. });
         (0..self.states.len()).filter(waits).any(|i| self.may_come(i))
@@ -167,7 +166,7 @@ impl Local<'_> {
             .arg(self.file)
             .arg("--out")
             .arg(self.store.folder())
-            // by id, because the numbers of the cells change if the campaign file is edited meanwhile
+            // The cell is named by id. Its number changes if the campaign file is edited during the run.
             .args(["--cell", &cell.id])
             .env("RAYON_NUM_THREADS", (cores / self.jobs).max(1).to_string())
             .stdin(Stdio::null())
@@ -225,7 +224,7 @@ impl Local<'_> {
         Ok(())
     }
 
-    /// The metrics of a result that the campaign's tables use, three at most.
+    /// At most three metrics of a result, from those in the campaign's tables.
     fn reached(&self, record: &Record) -> String {
         let file = &self.plan.file;
         let of = |choice: &str| {
@@ -242,8 +241,8 @@ impl Local<'_> {
         self.states.iter().filter(|s| **s == state).count()
     }
 
-    /// Processor time of all cells, and the time left of this run on its parallel jobs, s; `None` if the cost of a
-    /// stage is not known.
+    /// Processor time of all cells, and remaining time of this run with its parallel jobs, s. `None` if the cost of a
+    /// stage is unknown.
     fn left(&self) -> Result<Option<[f64; 2]>> {
         let (mut all, mut left) = (0.0, 0.0);
         for stage in &self.plan.file.stages {
@@ -276,7 +275,7 @@ impl Local<'_> {
             std::thread::sleep(LOOK);
         }
         for child in self.running.values_mut() {
-            // its files are complete, and a restart resumes from them
+            // the cell's files are complete, and a restart resumes from them
             let _ = child.kill();
             let _ = child.wait();
         }

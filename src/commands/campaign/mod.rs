@@ -1,4 +1,4 @@
-//! `greylag campaign`: many runs over priors, controllers and seeds; their tables.
+//! `greylag campaign`: plans, runs, joins and reports many runs over priors, controllers and seeds.
 
 mod cost;
 mod gather;
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Which {
-    /// The campaign with its cells, whose commands are checked, and the folder of its results.
+    /// Opens the campaign and the folder of its results, and checks the commands of its cells.
     fn open(&self) -> Result<(Plan, Store)> {
         let path = shipped(&self.file);
         let plan = campaign::plan(CampaignFile::load(&path)?, &path, &shipped)?;

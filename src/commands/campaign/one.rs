@@ -1,4 +1,4 @@
-//! `greylag campaign run --cell`: one cell, in this process.
+//! `greylag campaign run --cell`: runs one cell in this process.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -21,8 +21,8 @@ const KNOWN: [(&str, bool, &str); 3] = [
     ("train", cfg!(feature = "learn"), "learn"),
 ];
 
-/// Fails if the command of a stage is unknown; a command that needs another build is reported when
-/// it is run.
+/// Fails if the command of a stage cannot be a cell. A command that needs another build is reported only when the cell
+/// is run.
 pub fn check(plan: &Plan, store: &Store, path: &Path) -> Result<()> {
     for cell in &plan.cells {
         let about = || format!("campaign file {}: stage {}", path.display(), cell.stage);
@@ -45,7 +45,7 @@ fn line(cell: &Cell, folder: &Path) -> Vec<OsString> {
     cell.words_in(folder).into_iter().map(OsString::from).collect()
 }
 
-/// Runs a cell, unless it is done; the exit status shows whether a later attempt may succeed.
+/// Runs a cell, unless it is done. The exit status shows whether a later attempt may succeed.
 pub fn run(plan: &Plan, store: &Store, cell: &Cell) -> Result<ExitCode> {
     let id = &cell.id;
     if let Standing::Done(_) = store.standing(cell)? {
@@ -71,7 +71,7 @@ pub fn run(plan: &Plan, store: &Store, cell: &Cell) -> Result<ExitCode> {
     let Some(claimed) = store.claim(cell)? else {
         return Ok(later(&format!("cell {id} is being run by another process")));
     };
-    // another process may have ended it in the meantime
+    // another process may have finished the cell in the meantime
     if let Standing::Done(_) = store.standing(cell)? {
         return Ok(ExitCode::SUCCESS);
     }
@@ -147,7 +147,7 @@ fn times(cell: &Cell, claimed: &Claimed, seconds: f64) -> Times {
 
 /// Processor time of all threads of this process, s, from Linux's /proc.
 fn core_seconds() -> Option<f64> {
-    /// Ticks a second of the figures in /proc.
+    /// Ticks per second of the times in /proc.
     const TICKS: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     // the second field is a name in parentheses, which may hold spaces
@@ -162,7 +162,7 @@ fn processor() -> String {
     name.map_or(std::env::consts::ARCH.into(), |(_, name)| name.trim().to_owned())
 }
 
-/// Whether the cause is a state of the machine that may pass, such as a full disk.
+/// Whether the cause of the error is temporary, for example a full disk.
 fn is_temporary(error: &anyhow::Error) -> bool {
     use ErrorKind::{
         Interrupted, OutOfMemory, QuotaExceeded, ResourceBusy, StaleNetworkFileHandle, StorageFull,

@@ -1,4 +1,4 @@
-//! `greylag campaign plan`: what a campaign holds, and what it costs.
+//! `greylag campaign plan`: shows the cells of a campaign and their cost.
 
 use std::process::ExitCode;
 
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints a table of the stages, and the sum.
+/// Prints a table of the stages, and the total cost.
 fn print_costs(plan: &Plan, store: &Store) -> Result<()> {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);

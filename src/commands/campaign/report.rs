@@ -1,4 +1,4 @@
-//! `greylag campaign report`: the tables and the page.
+//! `greylag campaign report`: writes the tables and the page of a campaign.
 
 use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ pub struct Arguments {
     force: bool,
 }
 
-/// Prints the tables, writes the page.
+/// Prints the tables, and writes tables and page.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let overwrite: Overwrite = arguments.force.into();
     for path in arguments.report.iter().chain(&arguments.tables) {
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// The results of the plan's cells; results of other cells are dropped, with a note.
+    /// The results of the plan's cells. Results of other cells are dropped, with a note.
     fn records(&self, plan: &Plan, store: &Store) -> Result<Vec<Record>> {
         let Some(path) = &self.results else {
             let all = gather(plan, store)?;

@@ -1,4 +1,4 @@
-//! `greylag campaign run`: cells on this machine, one cell, or the script of a scheduler.
+//! `greylag campaign run`: runs all cells on this machine or one cell, or prints the script of a scheduler.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -60,7 +60,7 @@ enum Launch {
 /// Number of attempts at a cell whose exit status allows a later attempt.
 const ATTEMPTS: usize = 20;
 
-/// Runs the chosen variant.
+/// Runs the chosen cells, or prints or submits the script.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (plan, store) = arguments.which.open()?;
     if let Some(name) = &arguments.cell {
@@ -77,14 +77,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 impl Arguments {
-    /// Prints or runs the script.
+    /// Prints the script, or submits it by running it.
     fn launch(&self, launcher: Launch, plan: &Plan, store: &Store) -> Result<ExitCode> {
         let launcher = match launcher {
             Launch::Slurm => Launcher::Slurm,
             Launch::Hyperqueue => Launcher::Hyperqueue,
             Launch::Parallel => Launcher::Parallel,
         };
-        // a job begins in another folder
+        // a job starts in another folder, so all paths are absolute
         let job = Job {
             program: absolute(&std::env::current_exe().context("finding this program")?)?,
             file: absolute(&shipped(&self.which.file))?,

@@ -67,8 +67,9 @@ impl Client {
         })
     }
 
-    /// Arms, enters offboard, flies every leg, and goes to hold. `watch` sees the view with the
-    /// number of the leg and the seconds flown on it. Once `ended`, the rest of the legs is left out.
+    /// Arms, enters offboard, flies every leg, and goes to hold. `watch` receives the number of the leg, the time on
+    /// the leg (s) and the view. If `ended` becomes true, the remaining legs are skipped. Returns the companion's texts
+    /// with their times, s.
     pub fn fly(
         &mut self,
         legs: &Legs,
@@ -109,7 +110,7 @@ impl Client {
         self.target = (leg.roll_deg.to_radians(), leg.pitch_deg.to_radians());
     }
 
-    /// Sends the request every half second until `so` holds; fails after `ANSWER_TIMEOUT`.
+    /// Sends the request every half second until `so` holds. Fails after `ANSWER_TIMEOUT`.
     fn until(
         &mut self,
         what: &str,
@@ -171,7 +172,7 @@ impl Client {
         let _ = self.socket.send(bytes);
     }
 
-    /// The last text that does not merely confirm a request.
+    /// The companion's last text, without confirmations of requests.
     fn last_text(&self) -> &str {
         let done = |words: &str| words.starts_with("mode ") || words.starts_with("armed");
         let last = self.texts.iter().rev().find(|(_, words)| !done(words));

@@ -6,15 +6,15 @@ pub const ROWS: usize = 9;
 const COLUMNS: usize = 27;
 /// Degrees of pitch in a row.
 const DEGREES_A_ROW: f64 = 10.0;
-/// Height of a letter over its width.
+/// Ratio of height to width of a character.
 const ASPECT: f64 = 2.0;
 
-/// The rows for an attitude, degrees: `░` is the ground, the aircraft stays in the middle.
+/// The rows of characters for an attitude in degrees. `░` is the ground, and the aircraft symbol stays in the middle.
 pub fn rows(roll_deg: f64, pitch_deg: f64) -> [String; ROWS] {
     let (sin, cos) = roll_deg.to_radians().sin_cos();
     let middle = |n: usize| (n / 2) as f64;
     std::array::from_fn(|row| {
-        // right and down from the middle, in rows
+        // distances to the right of and below the middle, rows
         let down = row as f64 - middle(ROWS);
         let cell = |column: usize| {
             let right = (column as f64 - middle(COLUMNS)) / ASPECT;
@@ -61,7 +61,7 @@ mod tests {
             ground(&banked.iter().map(half).collect::<Vec<_>>())
         };
         assert!(side(true) > 2 * side(false), "{banked:#?}");
-        // on its back the ground is above
+        // in inverted flight the ground is above
         assert!(
             ground(&rows(180.0, 0.0)[..ROWS / 2]) > 4 * ground(&rows(180.0, 0.0)[ROWS / 2 + 1..])
         );

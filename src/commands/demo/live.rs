@@ -7,12 +7,12 @@ use super::client::View;
 use super::indicator::{self, ROWS};
 use super::schedule::{Leg, Legs};
 
-/// Time between two drawings.
+/// Interval between two drawings.
 const EVERY: Duration = Duration::from_millis(100);
 /// Width of the bar that shows the flown part of a leg, characters.
 const BAR: usize = 24;
 
-/// One line per leg, written when it ends; on a terminal the attitude above it while it is flown.
+/// Prints one line per leg when the leg ends. A terminal also shows the attitude during the leg.
 pub struct Live<'a> {
     legs: &'a Legs,
     terminal: bool,
@@ -38,7 +38,7 @@ impl Live<'_> {
         }
     }
 
-    /// Shows `view`, `seconds` after the leg number `leg` was begun.
+    /// Shows `view` at the time `seconds` (s) after the start of the leg with index `leg`.
     pub fn show(&mut self, leg: usize, seconds: f64, view: &View) {
         if self.leg != Some(leg) {
             self.end();
@@ -100,7 +100,7 @@ fn line(seconds: f64, target: &Leg, view: &View) -> String {
     )
 }
 
-/// The attitude indicator with the numbers beside it.
+/// The rows of the attitude indicator, with numbers to the right.
 fn block(what: &str, flown: f64, target: &Leg, view: &View) -> Vec<String> {
     let (roll, pitch) = (view.roll.to_degrees(), view.pitch.to_degrees());
     let done = (flown.clamp(0.0, 1.0) * BAR as f64).round() as usize;

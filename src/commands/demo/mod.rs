@@ -1,4 +1,4 @@
-//! `greylag demo`: shim, companion and client in one program, over real sockets.
+//! `greylag demo`: runs shim, companion and client in one program, over real sockets.
 
 mod client;
 mod indicator;
@@ -51,7 +51,7 @@ pub struct Arguments {
     /// Folder of the trained policy, for controllers that need one.
     #[arg(long, value_name = "DIR", default_value = controllers::POLICY)]
     policy: PathBuf,
-    /// Settings of the planner in other than their usual size, as KEY=VALUE.
+    /// Settings of the planner that differ from the defaults, as KEY=VALUE.
     #[arg(long = "planner", value_name = "KEY=VALUE", num_args = 1..)]
     changes: Vec<Change>,
     /// Fly this flight-test schedule in place of the six attitudes.
@@ -76,10 +76,10 @@ pub struct Arguments {
     faults: FaultArgs,
 }
 
-/// Flies the schedule; the exit status is 0 if every target was tracked.
+/// Flies the schedule. The exit status is 0 if every target was tracked.
 ///
 /// # Errors
-/// If something cannot be opened, or the flight ends before the schedule does.
+/// If a file, a link or the simulator cannot be opened, or the flight ends before the schedule does.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let model = fly::model(&arguments.model, None)?;
     let Arguments { controller, policy, changes, .. } = arguments;
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         .map_or_else(|| Legs::demonstration(&model.airframe.envelope), Legs::during);
     let tracked = if schedule.is_none() { legs.legs.as_slice() } else { &[] };
     schedule.iter().for_each(|schedule| flying.pilot.follow(schedule.clone()));
-    // an aircraft that cannot fly is found before anything is opened or written
+    // an aircraft that cannot fly is reported before anything is opened or written
     let plant = plant(arguments, &model)?;
     Plant::new(&plant)?.reset(&plant.start)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -160,7 +160,7 @@ fn announce(
     println!("shim: aircraft {} in JSBSim, real time, towards udp {vehicle}", plant.aircraft);
 }
 
-/// Options of the flight, as the recording keeps them.
+/// Options of the flight that are stored with the recording.
 fn chosen(arguments: &Arguments) -> Chosen<'_> {
     Chosen {
         controller: arguments.controller,
@@ -174,7 +174,8 @@ fn chosen(arguments: &Arguments) -> Chosen<'_> {
     }
 }
 
-/// Flies the legs as a client of the companion at `to`; the texts that it received.
+/// Flies the legs as a client of the companion at `to`. Returns the texts that the client received, with their times,
+/// s.
 fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(f64, String)>> {
     let mut table = Live::begin(legs);
     let ended = arguments.attached.then(input_ends).unwrap_or_default();
@@ -184,7 +185,7 @@ fn as_client(arguments: &Arguments, to: SocketAddr, legs: &Legs) -> Result<Vec<(
     flown
 }
 
-/// Candidates of the planner, replayed from the recording with `again`. Without them the flight is still reported.
+/// Candidates of the planner, replayed from the recording with `again`. The list is empty if the replay fails.
 fn sights(
     folder: &Path,
     mut again: Companion,
@@ -199,7 +200,7 @@ fn sights(
     })
 }
 
-/// Becomes true when standard input ends.
+/// A flag that becomes true when standard input ends.
 fn input_ends() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
     let heard = ended.clone();
@@ -230,7 +231,7 @@ fn options(arguments: &Arguments, model: &GreyBox) -> Result<FlightOptions> {
     })
 }
 
-/// The simulator's aircraft as the model's airframe describes it, at its start.
+/// The simulator's aircraft with the model's airframe and the initial state of the options.
 fn plant(arguments: &Arguments, model: &GreyBox) -> Result<PlantOptions> {
     let mut plant = arguments.plant.options(arguments.seed);
     let models = std::slice::from_ref(model);

@@ -1,4 +1,4 @@
-//! The schedule of the demonstration: which attitudes, for how long.
+//! The schedule of the demonstration: attitude targets and their duration.
 
 use crate::manoeuvres::Schedule;
 use crate::physics::airframe::Envelope;
@@ -15,15 +15,15 @@ pub struct Leg {
     pub difficulty: Difficulty,
 }
 
-/// Length of a leg, s: six legs and the start-up take less than a minute.
+/// Length of a leg, s. Six legs and the start-up take less than a minute.
 pub const LEG_S: f64 = 8.0;
 
 /// Largest bank for which the legs are written, degrees: that of the paper's hard targets.
 const BANK_DEG: f64 = 60.0;
-/// Largest pitch for which the legs are written, degrees, up and down.
+/// Largest magnitude of pitch for which the legs are written, degrees.
 const PITCH_DEG: f64 = 30.0;
 
-/// Easy targets, then hard ones; climbs and dives alternate, so that the altitude comes back.
+/// Easy targets, then hard targets. Climbs and dives alternate to restore the altitude.
 pub const LEGS: [Leg; 6] = [
     leg(20.0, 5.0, Difficulty::Easy),
     leg(-30.0, 12.0, Difficulty::Easy),
@@ -47,7 +47,7 @@ pub struct Legs {
 }
 
 impl Legs {
-    /// The demonstration's own: [`LEGS`] with roll and pitch in proportion to what `envelope` allows.
+    /// The legs of the demonstration: [`LEGS`], with roll and pitch scaled down to the limits of `envelope`.
     pub fn demonstration(envelope: &Envelope) -> Legs {
         let Envelope { bank_max_deg, pitch_max_deg, pitch_min_deg, .. } = *envelope;
         let within = |l: &Leg| {
@@ -61,7 +61,7 @@ impl Legs {
         Legs { legs: LEGS.iter().map(within).collect(), seconds: LEG_S }
     }
 
-    /// Wings level while the companion flies `schedule`, and a little longer.
+    /// Wings level while the companion flies `schedule`, and for 2 s longer.
     pub fn during(schedule: &Schedule) -> Legs {
         Legs { legs: vec![leg(0.0, 0.0, Difficulty::Easy)], seconds: schedule.duration() + 2.0 }
     }

@@ -110,10 +110,10 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     if !files::is_stdout(arguments.json.as_deref()) {
         println!("{}", summary(kinds, &drawn));
         println!(
-            "lost: beyond recovery within 60 s of 12 random attitudes; settled and integral: of those kept, the integral beside that of"
+            "lost: beyond recovery within 60 s of 12 random attitudes; settled and integral: of those kept, the integral relative to that of"
         );
         println!(
-            "the first controller that knows the aircraft's own model, aircraft by aircraft; medians, then the 90th percentile"
+            "the first controller designed from the aircraft's own model, aircraft by aircraft; medians, then the 90th percentile"
         );
         if !changed.is_empty() {
             println!("{}", after_changes(kinds, &drawn, &changed));

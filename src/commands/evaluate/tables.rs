@@ -1,4 +1,4 @@
-//! The terminal's tables of an evaluation: a table for each group of targets, a column for each controller.
+//! Tables of an evaluation on the terminal: a table for each group of targets, a column for each controller.
 
 use comfy_table::{ContentArrangement, Table};
 
@@ -8,12 +8,12 @@ use crate::report::evaluation_answer;
 use crate::sim::evaluation::{Evaluation, Score};
 use crate::sim::published::published;
 
-/// Columns of a terminal that a table may take.
+/// Largest width of a table, terminal columns.
 const WIDTH: u16 = 100;
 /// Largest number of controllers in a table.
 const BESIDE: usize = 4;
 
-/// The measures that a terminal shows; JSON and page have all.
+/// The measures that the terminal shows. JSON and page have all measures.
 const SHOWN: [&str; 13] = [
     "error_integral_deg_s",
     "to_one_deg_s",
@@ -30,7 +30,7 @@ const SHOWN: [&str; 13] = [
     "outside_s",
 ];
 
-/// Prints the tables, what their words mean, and the answer.
+/// Prints the tables, the definitions of their terms, and the conclusion.
 pub(super) fn print(evaluations: &[Evaluation]) {
     tables(evaluations).iter().for_each(|table| println!("{table}"));
     println!(
@@ -42,7 +42,7 @@ pub(super) fn print(evaluations: &[Evaluation]) {
     println!(
         "envelope kept: load factor and angle of attack, 5 % beyond the airframe file's limits at most"
     );
-    // printed last: the end of the output is what the user sees first
+    // printed last, because a user sees the end of the output first
     println!();
     evaluation_answer(evaluations).iter().for_each(|sentence| println!("{}", broken(sentence)));
 }
@@ -109,7 +109,7 @@ fn interval([low, high]: [f64; 2]) -> String {
     format!("[{}, {}]", number(low), number(high))
 }
 
-/// Three digits, without an exponent.
+/// Formats a number with about three significant digits, without an exponent.
 fn number(x: f64) -> String {
     match x.abs() {
         _ if !x.is_finite() => "–".into(),

@@ -1,4 +1,4 @@
-//! Targets of an evaluation: those of a file, or steps between attitudes.
+//! Flights of an evaluation: to the targets of a file, and steps between attitudes.
 
 use anyhow::{Result, bail};
 
@@ -33,7 +33,7 @@ pub(super) fn rows(arguments: &Arguments) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The targets that the airframe's envelope allows; prints how many it excludes.
+/// The targets inside the airframe's envelope. Prints the number of excluded targets.
 pub(super) fn within_envelope(
     mut rows: Vec<Row>,
     arguments: &Arguments,
@@ -59,7 +59,7 @@ pub(super) fn within_envelope(
     Ok(rows)
 }
 
-/// The flights: to the targets at an airspeed (m/s), then the steps.
+/// The flights to the targets `rows` at `airspeed` (m/s), then the steps.
 pub(super) fn courses(
     arguments: &Arguments,
     rows: &[Row],

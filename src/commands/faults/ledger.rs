@@ -1,4 +1,5 @@
-//! The file in which a campaign records its flights, one JSON object a line, so that it can be resumed.
+//! The file in which a fault campaign records its flights, one JSON object a line. An interrupted campaign resumes from
+//! this file.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim::faults::{Case, Cause, Fault, Finding, Found, Report, draw};
 
-/// A flight that was flown. Its faults follow from its seed.
+/// A flight of the campaign. Its faults follow from its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// Name of the controller.
@@ -31,7 +32,7 @@ pub struct Note {
     pub at_s: f64,
     /// Name of the finding.
     pub finding: String,
-    /// Name of the fault that explains it.
+    /// Name of the established cause; `None` without one.
     pub cause: Option<String>,
 }
 
@@ -71,12 +72,12 @@ impl Entry {
 }
 
 impl Note {
-    /// Whether the finding is a failure of the companion itself, which no fault excuses.
+    /// Whether the finding is a failure of the companion itself, which is never attributed to a fault.
     pub fn is_own(&self) -> bool {
         Finding::ALL.iter().any(|f| f.name() == self.finding && f.is_own())
     }
 
-    /// Name of the cause to which the finding is attributed.
+    /// Name of the cause, `the companion's own` for a failure of the companion itself, or `unexplained`.
     pub fn standing(&self) -> &str {
         match &self.cause {
             Some(cause) => cause,
@@ -85,20 +86,20 @@ impl Note {
         }
     }
 
-    /// Whether the finding fails the campaign: it has no cause, or the controller caused it without any fault.
+    /// Whether the finding fails the campaign: it has no established cause, or it occurs without any fault too.
     pub fn is_failure(&self) -> bool {
         self.cause.as_deref().is_none_or(|cause| cause == Cause::Itself.name())
     }
 }
 
-/// The flights of earlier runs, with the file that takes the new ones.
+/// The flights of earlier runs, and the file to which new flights are appended.
 pub struct Ledger {
     known: HashMap<(String, String, u64), Entry>,
     file: Mutex<File>,
 }
 
 impl Ledger {
-    /// Opens or creates the file. An incomplete last line, as a kill leaves it, is removed, and its flight is flown
+    /// Opens or creates the file. An incomplete last line, which a killed run leaves, is removed. Its flight is flown
     /// again.
     pub fn open(path: &Path) -> Result<Self> {
         let mut known = HashMap::new();

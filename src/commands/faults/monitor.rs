@@ -9,23 +9,23 @@ use rayon::prelude::*;
 
 use crate::sim::faults::{ATTITUDE_DEG, CompanionFactory, FAILS_S, Failure, Watched};
 
-/// Largest share of healthy flights with a false alarm: one in forty.
+/// Largest accepted fraction of healthy flights with a false alarm: one in forty.
 const FALSE_ALARMS: f64 = 1.0 / 40.0;
 
-/// Flies and prints a table; the exit status shows whether too many healthy flights raised an alarm.
+/// Flies and prints a table. The exit status is 1 if too many healthy flights raised an alarm.
 ///
 /// # Errors
-/// If the aircraft cannot be made.
+/// If the aircraft cannot be built.
 pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitCode> {
     let [roll, pitch, heading] = ATTITUDE_DEG;
     println!(
-        "{flights} flights of 60 s each beside a played ArduPlane, attitude off by up to {roll} deg in roll, {pitch} in pitch, \
+        "{flights} flights of 60 s each with a simulated ArduPlane, attitude off by up to {roll} deg in roll, {pitch} in pitch, \
          {heading} in heading; surfaces stick at {FAILS_S} s"
     );
     let mut table = Table::new();
     table.load_style(NOTHING);
     table.set_header(["aircraft", "engaged", "false alarms", "found", "delay, median", "90 %"]);
-    let mut accused = 0;
+    let mut alarmed = 0;
     for failure in Failure::ALL {
         let watched: Result<Vec<Watched>, _> = (first..first + flights)
             .into_par_iter()
@@ -34,7 +34,7 @@ pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitC
         let watched = watched?;
         let alarms: usize = watched.iter().map(|w| w.false_alarms(failure)).sum();
         if failure == Failure::None {
-            accused = watched.iter().filter(|w| w.false_alarms(failure) > 0).count();
+            alarmed = watched.iter().filter(|w| w.false_alarms(failure) > 0).count();
         }
         table.add_row(row(failure, &watched, alarms));
         for (seed, flight) in (first..).zip(&watched) {
@@ -49,8 +49,8 @@ pub fn run(factory: &CompanionFactory, first: u64, flights: u64) -> Result<ExitC
     }
     println!("{table}");
     let bound = FALSE_ALARMS * flights as f64;
-    println!("healthy flights accused: {accused} of {flights} (at most 1 in 40)");
-    Ok(if accused as f64 <= bound.max(0.0) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    println!("healthy flights with a false alarm: {alarmed} of {flights} (at most 1 in 40)");
+    Ok(if alarmed as f64 <= bound.max(0.0) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn row(failure: Failure, watched: &[Watched], alarms: usize) -> Vec<String> {

@@ -1,4 +1,4 @@
-//! `greylag faults --search`: looks for flights that break a rule of flight.
+//! `greylag faults --search`: searches for flights that violate a flight rule.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -33,7 +33,7 @@ struct Row<'a> {
     broken: u64,
     distance: Option<f64>,
     at_s: f64,
-    /// The flight that came nearest to breaking the rule, reduced if it breaks the rule.
+    /// The flight with the smallest robustness, reduced if it violates the rule.
     scenario: Option<&'a Scenario>,
 }
 
@@ -43,7 +43,7 @@ struct Document<'a> {
     policies: Vec<Row<'a>>,
 }
 
-/// Searches and prints how near the flights came to breaking each rule; fails if one is broken.
+/// Searches, and prints the smallest robustness of each rule. The exit status is 1 if a rule was violated.
 pub(super) fn run(search_for: &Search) -> Result<ExitCode> {
     let Search { factory, counterparts, flights, seed, json } = *search_for;
     let bar = Bar::new();
@@ -91,7 +91,7 @@ fn print(found: &[Nearest]) {
     println!("{table}");
     for n in found.iter().filter(|n| n.broken > 0) {
         let Some(scenario) = &n.scenario else { continue };
-        // numbers and names cannot fail to be written
+        // a scenario of numbers and names can always be serialised
         let text = serde_json::to_string(scenario).unwrap_or_default();
         println!(
             "\n{}, the smallest flight found; `greylag faults --scenario FILE` flies it:\n{text}",
@@ -100,7 +100,7 @@ fn print(found: &[Nearest]) {
     }
 }
 
-/// Flies the scenario in `file` and prints its distance to breaking each rule; fails if one is broken.
+/// Flies the scenario in `file`, and prints the robustness of each rule. The exit status is 1 if a rule was violated.
 pub(super) fn fly(factory: &CompanionFactory, file: &Path) -> Result<ExitCode> {
     let text = crate::physics::text_file::read(file)
         .with_context(|| format!("reading the scenario {}", file.display()))?;

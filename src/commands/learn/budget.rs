@@ -22,7 +22,7 @@ pub enum Algorithm {
     Td3,
 }
 
-/// Amounts of a budget before the policy is trained.
+/// Numbers of flights and updates of a budget, without those of the policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
     /// Number of random episodes.
@@ -35,7 +35,7 @@ pub struct Sizes {
     pub passing_updates: u64,
     /// Updates of the last model.
     pub updates: u64,
-    /// Units of the residual's hidden layers.
+    /// Units of the residual's hidden layers, separated by commas.
     pub hidden: &'static str,
 }
 

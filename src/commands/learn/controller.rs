@@ -14,10 +14,10 @@ use crate::sysid::amend::document::effect_file;
 
 /// Name of the controller's folder below that of a learning.
 pub const CONTROLLER: &str = "controller";
-/// Name of the record of origin.
+/// File name of the record of origin.
 pub const ORIGIN: &str = "learned.toml";
 
-/// The files that fly, below the folder of the learning.
+/// The controller's files: folder below that of the learning, and name.
 const FILES: [(&str, &str); 6] = [
     (MODEL, "airframe.toml"),
     (MODEL, "residual.safetensors"),
@@ -27,7 +27,7 @@ const FILES: [(&str, &str); 6] = [
     (MODEL, "model.toml"),
 ];
 
-/// Where a controller comes from.
+/// Record of the origin of a controller.
 #[derive(Serialize)]
 struct Origin<'a> {
     schema: u32,
@@ -48,8 +48,8 @@ struct Content {
     sha256: String,
 }
 
-/// Copies the model and the policy of the learning in `out` into one folder. The model file is written after all
-/// others that fly, so that a folder with a model file is complete.
+/// Copies the model and the policy of the learning in `out` into one folder. The model file is written last of these
+/// files. A folder with a model file is therefore complete.
 ///
 /// # Errors
 /// If a file cannot be read or written.

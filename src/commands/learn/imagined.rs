@@ -13,10 +13,11 @@ use crate::model::GreyBox;
 use crate::sim::evaluation::{Evaluation, imagine};
 use crate::sim::{Group, TargetFile};
 
-/// Seed of the targets: neither those that controllers are scored on nor those that trainings are judged by.
+/// Seed of the targets. They differ from the targets that score controllers and from the targets by which a training
+/// chooses its policy.
 const TARGETS: u64 = 3;
-/// Each controller flies one in this many targets: a planner takes milliseconds a step, and few targets suffice for
-/// the LQI.
+/// Each controller flies one in this many targets. A planner takes milliseconds a step, and few targets suffice for the
+/// LQI.
 const EVERY: [(ControllerKind, u32); 3] =
     [(ControllerKind::Policy, 1), (ControllerKind::Lqi, 4), (ControllerKind::HybridLqi, 24)];
 
@@ -31,15 +32,16 @@ pub struct Reached {
     pub easy_deg: f64,
     /// Mean settled error in the hard corners, degrees.
     pub hard_deg: f64,
-    /// Share of the targets that were lost.
+    /// Fraction of the targets that diverged (settled error over 10°).
     pub divergence_rate: f64,
 }
 
-/// Flies the controllers in the model of `folder` with the policy in `policy`; `None` if interrupted.
+/// Flies the controllers in the model of the folder `folder`, with the policy in the folder `policy`. `None` if
+/// interrupted.
 ///
 /// # Errors
-/// If a file cannot be used. Rows of controllers other than the policy that cannot be built, such as an LQI that
-/// cannot be designed, are left out.
+/// If the model or the policy cannot be read or is invalid. Other controllers that cannot be built are left out, for
+/// example an LQI that cannot be designed.
 pub fn reached(
     folder: &Path,
     policy: &Path,

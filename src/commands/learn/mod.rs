@@ -1,4 +1,4 @@
-//! `greylag learn`: from a prior to a controller that flies, in one command.
+//! `greylag learn`: learns model and policy from a prior in one command.
 
 mod budget;
 mod controller;
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let stop = Interruption::watch()?;
     let prior = GreyBox::load(&shipped(&arguments.prior_file()?))?;
     let stages = arguments.stages(&prior)?;
-    // what is wrong with an option is found before the first flight
+    // errors of the options are reported before the first flight
     stages.iter().try_for_each(|stage| super::check_line(&stage.line))?;
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make {}", arguments.out.display()))?;
@@ -154,7 +154,7 @@ impl Arguments {
         let policy = shipped(&flying(folder)?.join(plan::POLICY));
         if !policy.exists() {
             bail!(
-                "cannot go on from {}: it has a model and no policy; give the folder of `greylag learn`",
+                "cannot continue from {}: it has a model and no policy; give the folder of `greylag learn`",
                 folder.display()
             );
         }
@@ -256,7 +256,7 @@ impl Arguments {
     }
 }
 
-/// Share of the targets that a controller may lose and still be called ready to fly: the LQI loses none.
+/// Largest fraction of diverged targets with which a controller counts as ready to fly. The LQI loses none.
 const LOST: f64 = 0.02;
 
 /// Verdict on the learned policy in words, with the command that flies it.
@@ -280,13 +280,13 @@ fn worth(reached: &[Reached], options: &str) -> String {
     }
 }
 
-/// The folder of model and policy of a learning: `folder` itself, or its controller.
+/// The folder of model and policy of a learning: the folder of its controller if there is one, else `folder` itself.
 fn flying(folder: &Path) -> Result<PathBuf> {
     let places = [folder.join(controller::CONTROLLER), folder.to_owned()];
     let place = places.into_iter().find(|place| shipped(&place.join("model.toml")).exists());
     place.with_context(|| {
         format!(
-            "cannot go on from {}: it has no model.toml; give the --out of `greylag learn` that ended",
+            "cannot continue from {}: it has no model.toml; give the --out of `greylag learn` that ended",
             folder.display()
         )
     })

@@ -12,7 +12,7 @@ pub const MODEL: &str = "model";
 /// Folder of the policy, below that of a learning.
 pub const POLICY: &str = "policy";
 
-/// Where the flights come from.
+/// Source of the flights.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// JSBSim, with these further options of `greylag collect`.
@@ -26,13 +26,13 @@ pub enum Source {
 /// Results of an earlier learning from which this one continues.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recent {
-    /// Folder of its flights, if there is one.
+    /// Folder of the earlier learning's flights; `None` if there is none.
     pub flights: Option<PathBuf>,
-    /// The folder of its policy.
+    /// Folder of the earlier learning's policy.
     pub policy: PathBuf,
     /// Paths of the logs.
     pub logs: Vec<PathBuf>,
-    /// Share of these logs among all samples.
+    /// Fraction of all samples that these logs make up.
     pub share: f64,
 }
 
@@ -43,11 +43,11 @@ pub struct Inputs<'a> {
     pub prior: &'a Path,
     /// Folder of all outputs.
     pub out: &'a Path,
-    /// Where flights come from.
+    /// Source of the flights.
     pub source: Source,
     /// Number of planned rounds.
     pub rounds: u32,
-    /// Coefficients of the prior that are learned; none leaves it frozen.
+    /// Coefficients of the prior that are learned. An empty list freezes the prior.
     pub trainable: &'a [String],
     /// Whether the widths of the coefficients are ignored.
     pub from_scratch: bool,
@@ -103,7 +103,7 @@ impl Inputs<'_> {
         stages
     }
 
-    /// The folder of the model that flies `round`, or of the last one.
+    /// The folder of the model that plans `round`, or of the last model.
     fn folder(&self, round: Option<u32>) -> PathBuf {
         match round {
             Some(round) => self.out.join(format!("{MODEL}-{round}")),
@@ -129,7 +129,7 @@ impl Inputs<'_> {
         Stage { what: format!("{episodes} flights {how}"), line: line.0 }
     }
 
-    /// The training of the model that flies `round`, or of the last one.
+    /// The training of the model that plans `round`, or of the last model.
     fn model(&self, round: Option<u32>) -> Stage {
         let sizes = self.budget.sizes();
         let updates = round.map_or(sizes.updates, |_| sizes.passing_updates);
@@ -192,7 +192,7 @@ impl Inputs<'_> {
 }
 
 impl Stage {
-    /// The command as one would type it in a shell.
+    /// The command as typed in a shell.
     pub fn command(&self) -> String {
         let quoted = |word: &OsString| match word.to_string_lossy() {
             word if word.contains([' ', '\'', '"', '$', '*']) => {

@@ -1,4 +1,4 @@
-//! Progress of a learning on disk, from which it resumes after an interruption.
+//! Record of a learning's progress on disk. An interrupted learning resumes from the record.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::model::residual::hash;
 
 /// Name of the record's file.
 pub const RECORD: &str = "learn.json";
-/// The layout that this program reads and writes.
+/// Schema of the record's file.
 const SCHEMA: &str = "greylag.learn/1";
 
 /// Content of the record's file.
@@ -87,7 +87,7 @@ impl Record {
         &self.file.stages
     }
 
-    /// Notes that a further stage is done.
+    /// Records that a further stage is done.
     ///
     /// # Errors
     /// If the file cannot be written.

@@ -1,4 +1,4 @@
-//! Results on latency, delay and parameters, as lines of text.
+//! Prints the results of `greylag link check` on latency, delay margin and parameters.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! The actor of `greylag train policy --algorithm analytic`.
+//! Trains actor and critics for `greylag train policy --algorithm analytic`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,9 +19,10 @@ const LINE: u64 = 50;
 /// Updates of the critics between two lines of output.
 const CRITICS: u64 = 1000;
 
-/// Ascends the gradient of the reward in `model`, from the actor `from` where one is given; writes the curve of
-/// `judge`'s results into `folder`. Returns the actor of the last update, by which the learning rate has fallen to a
-/// hundredth; `None` if interrupted. An interrupted run is not resumed but repeated, because it takes minutes only.
+/// Trains an actor by gradient ascent of the reward in `model`, starting from the actor `from` if one is given. Writes
+/// the learning curve with the results of `judge` into `folder`. Returns the actor of the last update, at which the
+/// learning rate has fallen to a hundredth; `None` if interrupted. An interrupted run starts again, because it takes
+/// only minutes.
 ///
 /// # Errors
 /// If a parameter is no longer finite or the curve cannot be written.

@@ -1,4 +1,4 @@
-//! `greylag train curves`: the learning curves of trainings side by side.
+//! `greylag train curves`: compares the learning curves of trainings.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use crate::commands::files::{self, Overwrite};
 use crate::learn::policy::learning_curve::{self, CURVE};
 use crate::report::{LearningReport, Training};
 
-/// Start of the name of one seed's folder in a training of several seeds.
+/// Prefix of the folder of one seed in a training of several seeds.
 const SEED: &str = "seed-";
 
 /// Options of `greylag train curves`.

@@ -1,4 +1,4 @@
-//! `greylag train dynamics`: learn a dynamics model.
+//! `greylag train dynamics`: learns a dynamics model from flights.
 
 mod recipe;
 mod tables;
@@ -31,7 +31,7 @@ const HORIZONS: [usize; 4] = [1, 10, 100, 500];
 /// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
 
-/// History of the training for its report.
+/// File name of the training's history, which the report shows.
 const HISTORY: &str = "history.json";
 /// File name of the report.
 const REPORT: &str = "training.html";
@@ -153,7 +153,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }
 
-/// As [`run`], until `stop` is set.
+/// Trains like [`run`] until `stop` is set.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let path = shipped(&arguments.prior);
     let prior = arguments.prior(&path)?;
@@ -215,7 +215,8 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
 }
 
 impl Document<'_> {
-    /// Writes the scores into `folder`, and the report with its title and subtitle; `prior` is that model's file.
+    /// Writes the scores, and the report with its title and subtitle, into `folder`. `prior` is the path of the prior's
+    /// file.
     fn save(&self, folder: &Path, [title, subtitle]: [String; 2], prior: &Path) -> Result<()> {
         let json = folder.join("training.json");
         files::write(&json, &(serde_json::to_string_pretty(self)? + "\n"), Overwrite::Force)?;
@@ -258,13 +259,13 @@ impl Arguments {
         Ok(prior)
     }
 
-    /// `prior`; if only logs are learned from and `--from-scratch` is not given, with the stated or default prior
-    /// width of each coefficient.
+    /// `prior`, with the stated or default width of each coefficient as its prior. It is unchanged with
+    /// `--from-scratch`, or if rounds of `greylag collect` or recent flights are used.
     fn narrowed(&self, prior: GreyBox) -> GreyBox {
         if !self.flights.is_logs_alone() || self.from_scratch {
             return prior;
         }
-        // as in `amend`: a flight without identification manoeuvres determines only part of the coefficients
+        // As in `amend`: a flight without identification manoeuvres determines only some of the coefficients.
         prior.with_widths(|c| Some(c.width()).filter(|width| *width > 0.0))
     }
 }
@@ -277,7 +278,7 @@ fn begun(mut trainer: Trainer, kept: &Path) -> Result<Trainer> {
     if kept.exists() {
         trainer
             .resume(Checkpoint::load(kept)?)
-            .with_context(|| format!("cannot go on from {}", kept.display()))?;
+            .with_context(|| format!("cannot continue from {}", kept.display()))?;
         eprintln!("going on after {} updates", trainer.update());
     }
     Ok(trainer)
@@ -294,7 +295,7 @@ fn worse([before, after]: &[Vec<Horizon>; 2]) -> Option<String> {
     ))
 }
 
-/// Trains to the end; `false` if interrupted. The last good state is in the checkpoint either way.
+/// Trains to the end. Returns `false` if interrupted. In both cases the last good state is in the checkpoint.
 fn train(
     trainer: &mut Trainer,
     kept: &Path,
@@ -316,7 +317,7 @@ fn train(
         lines += 1;
         let interrupted = stop.is_set();
         if lines % KEEP == 0 || interrupted || trainer.is_done() {
-            // the history is written first: entries beyond the checkpoint are dropped when the training is resumed
+            // The history is written first. A resumed training drops the entries beyond its checkpoint.
             files::write(past, &serde_json::to_string(&history)?, Overwrite::Force)?;
             trainer.checkpoint().save(kept)?;
         }

@@ -1,4 +1,4 @@
-//! The flights to learn from: recorded logs, and the rounds of `greylag collect`.
+//! Flights for training: recorded logs, and the rounds of `greylag collect`.
 
 use std::path::{Path, PathBuf};
 
@@ -13,11 +13,12 @@ use crate::physics::{Controls, State};
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// One in this many tracks is held out, if there are at least that many.
+/// One in this many tracks is held out for validation, if there are at least that many.
 const HELD_OUT: usize = 10;
-/// Share of a flight, at its end, that is held out: of each recent flight, and of each flight if there are few.
+/// Fraction at the end of a flight that is held out for validation: of each recent flight, or of each flight if there
+/// are fewer than `HELD_OUT` tracks.
 const HELD_OUT_PART: f64 = 0.2;
-/// Most copies of a recent flight.
+/// Largest number of copies of a recent flight in the training data.
 const MOST_COPIES: f64 = 50.0;
 
 /// Where flights come from.
@@ -31,7 +32,8 @@ pub struct FlightArguments {
     /// Folders that `greylag collect` wrote; every round below them is read, its states as they are.
     #[arg(long = "collect", num_args = 1..)]
     folders: Vec<PathBuf>,
-    /// Logs of recent flights, which outweigh the others; the last fifth of each judges and is not learned from.
+    /// Logs of recent flights, which outweigh the others; the last fifth of each is for validation and is not used for
+    /// training.
     #[arg(long = "recent", value_name = "LOG", num_args = 1..)]
     recent: Vec<PathBuf>,
     /// Part of all samples that recent flights make up, by being repeated; 1 leaves the others out.
@@ -41,11 +43,11 @@ pub struct FlightArguments {
 
 /// Flights for training and validation.
 pub struct Flights {
-    /// Tracks to learn from.
+    /// Tracks for training.
     pub learn: Vec<Track>,
-    /// Tracks to judge by, which are not learned from.
+    /// Tracks for validation, which are held out of the training.
     pub judge: Vec<Track>,
-    /// Samples to learn from, each counted once.
+    /// Number of training samples, each counted once.
     pub samples: usize,
     /// Time between samples of the slowest log, s.
     pub slowest_s: f64,
@@ -59,7 +61,7 @@ fn held_out(samples: usize) -> usize {
 }
 
 impl FlightArguments {
-    /// Reads the flights as `model` sees them.
+    /// Reads the flights, with effective controls and air density from `model`.
     ///
     /// # Errors
     /// If no flights are given, or a file cannot be read.
@@ -100,7 +102,7 @@ impl FlightArguments {
         self.folders.is_empty() && self.recent.is_empty()
     }
 
-    /// The rows (state, controls, altitude) of each stretch of `logs`.
+    /// The rows (state, controls, altitude) of each section of `logs` without gaps, resampled to the model's step.
     fn logged(
         &self,
         logs: &[PathBuf],
@@ -125,7 +127,8 @@ impl FlightArguments {
         Ok(all)
     }
 
-    /// The tracks `others` and the recent flights, which are repeated until they make up their share of all samples.
+    /// Joins the tracks `others` and the recent flights. Recent flights are repeated to make up their share of all
+    /// samples.
     fn with_recent(
         &self,
         others: Vec<Track>,
@@ -154,7 +157,7 @@ impl FlightArguments {
         let wanted = share / (1.0 - share) * old as f64 / new as f64;
         let copies = wanted.round().clamp(1.0, MOST_COPIES) as usize;
         notes.push(format!(
-            "{new} samples of recent flights count {copies} times beside {old} of others: {:.0} % of what is learned from.",
+            "{new} samples of recent flights count {copies} times against {old} of others: {:.0} % of the training data.",
             100.0 * (copies * new) as f64 / (copies * new + old) as f64
         ));
         let mut learn = others;
@@ -178,7 +181,7 @@ type Row = (State, Controls, f64);
 /// Warning for a flight that was sampled more slowly than the model steps.
 ///
 /// # Errors
-/// If it was sampled too slowly.
+/// If its sample time exceeds `SLOWEST_S`.
 fn slow(flight: &Reconstruction) -> Result<Option<String>> {
     let (name, step_s) = (&flight.name, flight.step_s);
     if step_s > 1.001 * SLOWEST_S {

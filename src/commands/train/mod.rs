@@ -1,4 +1,4 @@
-//! `greylag train`: learn a model from flights, a policy from a model.
+//! `greylag train`: learns a model from flights, or a policy in a model.
 
 mod analytic;
 mod curves;
@@ -31,7 +31,7 @@ enum What {
     Curves(curves::Arguments),
 }
 
-/// Trains until `stop` is set; refuses to draw curves.
+/// Runs the chosen training until `stop` is set. Drawing curves is an error.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     match &arguments.what {
         What::Dynamics(arguments) => dynamics::learn(arguments, stop),

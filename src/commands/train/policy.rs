@@ -1,4 +1,4 @@
-//! `greylag train policy`: train a policy in a model or in JSBSim.
+//! `greylag train policy`: trains a policy in a model or in JSBSim.
 
 mod ground;
 mod recipe;
@@ -27,7 +27,7 @@ use crate::sim::targets::Stratified;
 use ground::Ground;
 use run::Run;
 
-/// The page of the learning curves.
+/// File name of the page of the learning curves.
 const REPORT: &str = "policy.html";
 
 /// Options of `greylag train policy`.
@@ -148,7 +148,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(learn(arguments, &Interruption::watch()?)?.into())
 }
 
-/// As [`run`], until `stop` is set.
+/// Trains like [`run`] until `stop` is set.
 pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let ground = arguments.ground()?;
     if arguments.draws > 0 && !arguments.is_analytic() {
@@ -160,7 +160,7 @@ pub fn learn(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     println!("{:>8} {COLUMNS}", "seed");
     let one = |seed: u64| arguments.train(&ground, seed, stop);
     let seeds = arguments.seed..arguments.seed + arguments.seeds;
-    // RAYON_NUM_THREADS holds the number of cores that a scheduler has given
+    // a scheduler limits the number of cores by RAYON_NUM_THREADS
     let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build()?;
     use rayon::prelude::*;
     let seeds: Vec<u64> = seeds.collect();
@@ -248,17 +248,18 @@ impl Arguments {
         Ok(Ground { model: Some(Arc::new(model)), origin, airframe })
     }
 
-    /// The actor that is trained further, if any.
+    /// The actor from which the training starts; `None` without `--start`.
     fn started(&self, airframe: &Airframe) -> Result<Option<Arc<Actor>>> {
         let load = |folder: &PathBuf| -> Result<Arc<Actor>> {
-            let agent = Agent::load(folder, airframe)
-                .with_context(|| format!("cannot go on from the policy in {}", folder.display()))?;
+            let agent = Agent::load(folder, airframe).with_context(|| {
+                format!("cannot continue from the policy in {}", folder.display())
+            })?;
             Ok(agent.actor)
         };
         self.start.as_ref().map(load).transpose()
     }
 
-    /// Trains the policy of one seed; `false` if interrupted.
+    /// Trains the policy of one seed. Returns `false` if interrupted.
     fn train(&self, ground: &Ground, seed: u64, stop: &Interruption) -> Result<bool> {
         let folder = match self.seeds {
             1 => self.out.clone(),

@@ -1,20 +1,21 @@
 //! Control power, damping and stiffness of one axis of an unknown aircraft, estimated in flight.
 //!
-//! Recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark, "Adaptive Control",
-//! 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂, with both sides differentiated and low-passed alike. Constant and
-//! slow influences (trim, wind, asymmetry) drop out.
+//! The method is recursive least squares with a prior (a Kalman filter over constants, K. J. Åström, B. Wittenmark,
+//! "Adaptive Control", 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂. Both sides are differentiated and pass the
+//! same low-pass filters. The differentiation removes constant and slow influences (trim, wind, asymmetry).
 
 use greylag_model::STEP;
 
-/// Corner frequency of the low-pass filters of both sides of the regression, rad/s.
+/// Corner frequency of the low-pass filters on both sides of the regression, rad/s.
 const CORNER: f64 = 20.0;
 /// Corner frequencies of two first-order lags that approximate an unknown servo and an unknown delay, rad/s.
 const SERVO: [f64; 2] = [25.0, 40.0];
-/// Constant part of the regression's error, 1/s²; multiplied by V/g at cruise (s) it has the unit of the left side.
+/// Standard deviation of the regression's constant error, 1/s². Its product with V/g at cruise (s) has the unit of the
+/// regression's left side.
 const NOISE: f64 = 4.0;
-/// Relative part of the regression's error: the true servos and delays differ from those assumed.
+/// Standard deviation of the regression's relative error. It covers servos and delays that differ from the assumed ones.
 const SHARE: f64 = 0.2;
-/// Forgetting rate of the estimate, 1/s.
+/// Growth rate of each variance by forgetting, as a fraction of the prior variance, 1/s.
 const AGEING: f64 = 1e-3;
 
 /// Prior of control power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
@@ -22,11 +23,11 @@ const AGEING: f64 = 1e-3;
 pub(super) struct Prior {
     pub mean: [f64; 3],
     pub sd: [f64; 3],
-    /// Lower limit of the control power.
+    /// Lower limit of the control power, (g/V)².
     pub least: f64,
 }
 
-/// The running estimate of one axis.
+/// The running estimate of one axis, roll or pitch.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Estimate {
     prior: Prior,
@@ -44,9 +45,9 @@ pub(super) struct Seen {
     pub rate: f64,
     /// Command in force, −1..1, positive for positive rates.
     pub command: f64,
-    /// Estimate of the incidence angle of the axis, rad; zero for an axis without stiffness.
+    /// Estimate of the axis's incidence angle, rad. Zero for an axis without stiffness.
     pub incidence: f64,
-    /// Airspeed over that of cruise.
+    /// Airspeed divided by the cruise airspeed.
     pub speed: f64,
     /// V/g at cruise, s.
     pub time: f64,
@@ -59,7 +60,7 @@ impl Estimate {
         Estimate { prior, theta: prior.mean, covariance, servo: [0.0; 2], filters: None }
     }
 
-    /// Updates the estimate with the measurements of one instant; those with a NaN are ignored.
+    /// Updates the estimate with the measurements of one instant. Measurements that contain a NaN or an infinity are ignored.
     pub(super) fn see(&mut self, seen: &Seen) {
         let Seen { rate, command, incidence, speed, time } = *seen;
         if ![rate, command, incidence, speed].iter().all(|x| x.is_finite()) {
@@ -108,7 +109,7 @@ impl Estimate {
 mod tests {
     use super::*;
 
-    /// Estimated power, in units of (g/V)², of ω̇ = g u − a ω with V/g = 2 s after five seconds of a square wave.
+    /// Power, in units of (g/V)², that is estimated for ω̇ = g u − a ω with V/g = 2 s after five seconds of a square wave.
     fn found(power: f64, damping: f64) -> f64 {
         let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
         let mut estimate = Estimate::new(prior);
@@ -123,7 +124,8 @@ mod tests {
         estimate.theta[0]
     }
 
-    /// The true powers are 120 and 800, the prior is 400. The regression lacks one step of delay, which costs a fifth.
+    /// The true powers are 120 and 800, the prior is 400. The regression omits one step of delay, which biases the
+    /// estimates by about a fifth.
     #[test]
     fn the_power_of_an_axis_is_found_in_five_seconds() {
         for (power, damping) in [(30.0, 6.0), (200.0, 8.0)] {

@@ -1,9 +1,9 @@
-//! Attitude hold of an aircraft that nobody has modelled: cascaded loops whose gains are divided by control powers
-//! that are estimated in flight. It needs the cruise airspeed and whether there is a rudder.
+//! Adaptive attitude hold for an aircraft without a model. The gains of its cascaded loops are divided by control powers
+//! that are estimated in flight. The controller needs two facts: the cruise airspeed, and whether the aircraft has a rudder.
 //!
-//! Times and rates count in V/g at the cruise airspeed V (Froude's scaling), so that one set of numbers serves a toy and a
-//! light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`); the loops' gains were
-//! found on aircraft drawn from it, see `docs/validation/any-aircraft.md`.
+//! Times and rates are scaled by V/g at the cruise airspeed V (Froude scaling). One set of gains therefore serves toys
+//! and light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`), except the mean of the
+//! roll power. The gains were tuned on aircraft drawn from this distribution, see `docs/validation/any-aircraft.md`.
 
 mod estimate;
 
@@ -13,39 +13,40 @@ use greylag_model::STEP;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 
-/// Prior of the roll axis: twice the median control power, because a gain that is too low costs less than one too high.
+/// Prior of the roll axis. Its mean is twice the median control power, because a loop gain that is too low costs less than
+/// one that is too high.
 const ROLL: Prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
 /// Prior of the pitch axis.
 const PITCH: Prior = Prior { mean: [300.0, 10.0, 40.0], sd: [200.0, 7.0, 50.0], least: 10.0 };
-/// Lift slope −Z_α, in g/V: cruise at about half the lift of the stall makes it nearly the same for all.
+/// Lift slope −Z_α, in g/V. It is nearly the same for all aircraft, because they cruise at about half the lift of the stall.
 const LIFT_SLOPE: f64 = 9.0;
 
-/// Gain from an error in roll and in pitch to the commanded rate, 1/s.
+/// Gains from the errors in roll and in pitch to the commanded rates, 1/s.
 const ATTITUDE: [f64; 2] = [3.0, 2.4];
 /// Bandwidth of the rate loops, 1/s.
 const RATE: f64 = 6.0;
-/// Integral over proportional gain of the rate loops, 1/s.
+/// Ratio of the integral gain to the proportional gain of the rate loops, 1/s.
 const INTEGRAL: f64 = 3.5;
-/// Largest part of the command that the integral holds.
+/// Limit of the integral's part of the command, where 1 is full travel.
 const INTEGRAL_MOST: f64 = 0.8;
-/// Share of the estimated stiffness that is fed forward.
+/// Fraction of the estimated stiffness that is fed forward.
 const STIFFNESS_SHARE: f64 = 0.7;
-/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s.
+/// Largest rates of the reference in roll and pitch, rad/s, and the time constant of its approach to the target, s.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
 
-/// Throttle law: throttle at cruise; gain on the relative airspeed error; gain on its integral over time in V/g; gain
-/// on the sine of the pitch angle.
+/// Throttle law: throttle at cruise (0..1), gain on the relative airspeed error, gain on the integral of this error over
+/// time in units of V/g, gain on the sine of the pitch angle.
 const THROTTLE: [f64; 4] = [0.4, 1.5, 0.8, 1.2];
-/// Shares of the cruise airspeed between which the nose is lowered, by up to [`NOSE_DOWN`] (rad).
+/// Fractions of the cruise airspeed between which the nose is lowered progressively, by up to [`NOSE_DOWN`] (rad).
 const SLOW: [f64; 2] = [0.80, 0.65];
 const NOSE_DOWN: f64 = 0.15;
-/// Gain of the rudder on the yaw rate beyond that of a coordinated turn, V/g, and the largest rudder command.
+/// Rudder gain on the part of the yaw rate that exceeds a coordinated turn's, in V/g, and the largest rudder command.
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
-/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a
-/// second: a slow servo or a delay reduces them below the aerodynamic values.
+/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a second. A
+/// slow servo or a delay reduces them below the aerodynamic values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Belief {
     /// Roll acceleration at full aileron, rad/s².
@@ -56,7 +57,7 @@ pub struct Belief {
     pub pitch_power: f64,
     /// Decay of the pitch rate at a constant incidence, 1/s.
     pub pitch_damping: f64,
-    /// Pitch acceleration by incidence, nose down, 1/s².
+    /// Nose-down pitch acceleration per angle of attack, 1/s².
     pub pitch_stiffness: f64,
 }
 
@@ -72,8 +73,8 @@ impl Axis {
         Axis { estimate: Estimate::new(prior), integral: 0.0 }
     }
 
-    /// The command (−1..1) that drives `rate` to `wanted` (rad/s); `feed` maps damping (1/s) and stiffness (1/s²) to
-    /// the acceleration that holds the wanted rate (rad/s²).
+    /// The command (−1..1) that drives `rate` to `wanted` (rad/s). `feed` maps damping (1/s) and stiffness (1/s²) to the
+    /// acceleration that holds the wanted rate (rad/s²).
     fn command(
         &mut self,
         [rate, wanted]: [f64; 2],
@@ -87,7 +88,7 @@ impl Axis {
         let push = RATE * (wanted - rate) / power;
         let raw = push + feed(damping, stiffness) / power + self.integral;
         let grown = INTEGRAL * push * STEP;
-        // conditional integration: a surface at its stop does not wind up
+        // conditional integration: the integral does not wind up while the command is saturated
         let outward = (raw > 1.0 && grown > 0.0) || (raw < -1.0 && grown < 0.0);
         if !outward && grown.is_finite() {
             self.integral = (self.integral + grown).clamp(-INTEGRAL_MOST, INTEGRAL_MOST);
@@ -110,7 +111,7 @@ pub struct Adaptive {
 }
 
 impl Adaptive {
-    /// A controller of the aircraft of `airframe`, from which it takes the cruise airspeed and whether there is a rudder.
+    /// A controller of the aircraft with `airframe`, from which only the cruise airspeed and the rudder's presence are used.
     pub fn new(airframe: &Airframe) -> Adaptive {
         Adaptive {
             cruise: airframe.envelope.airspeed_cruise_mps,
@@ -135,7 +136,7 @@ impl Adaptive {
         }
     }
 
-    /// Moves the reference towards `wanted`; returns the reference (rad) and its rates (rad/s).
+    /// Moves the reference towards `wanted` (roll and pitch, rad). Returns the reference (rad) and its rates (rad/s).
     fn follow(&mut self, now: [f64; 2], wanted: [f64; 2]) -> [[f64; 2]; 2] {
         let mut reference = self.reference.unwrap_or(now);
         let mut rates = [0.0; 2];
@@ -162,7 +163,7 @@ impl Adaptive {
     }
 }
 
-/// The attitude to fly to, rad: below the airspeeds of `SLOW`, the nose is lowered and the bank reduced.
+/// The commanded roll and pitch, rad. Below the airspeeds of `SLOW` the nose is lowered and the bank reduced.
 fn wanted(target: &Target, speed: f64) -> [f64; 2] {
     let slow = ((SLOW[0] - speed) / (SLOW[0] - SLOW[1])).clamp(0.0, 1.0);
     let lower = target.pitch * (1.0 - slow) - slow * NOSE_DOWN;
@@ -208,7 +209,7 @@ impl Controller for Adaptive {
         self.axes[0].estimate.see(&seen_of(state.p, before.aileron, 0.0));
         self.axes[1].estimate.see(&seen_of(state.q, -before.elevator, self.incidence));
 
-        // airspeeds below cruise are raised to it, because the stall is unknown
+        // a target airspeed below cruise is raised to cruise, because the stall speed is unknown
         let asked = state.airspeed / target.airspeed.max(self.cruise);
         let wanted = wanted(target, speed);
         let [reference, rates] = self.follow([state.roll, state.pitch], wanted);

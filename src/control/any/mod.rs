@@ -1,6 +1,7 @@
-//! One recurrent policy for any fixed wing: a GRU that was trained by analytic gradients through the flight of
-//! aircraft drawn from a distribution (`params/any/train.py`). Like [`adaptive`](crate::adaptive) it needs the cruise
-//! airspeed and whether there is a rudder; its recurrent state adapts to all other properties in flight.
+//! One recurrent policy for all fixed-wing aircraft: a gated recurrent unit (GRU). It was trained with analytic gradients
+//! through simulated flights of aircraft drawn from a distribution (`params/any/train.py`). Like
+//! [`adaptive`](crate::adaptive) it needs the cruise airspeed and whether the aircraft has a rudder. Its recurrent state
+//! adapts to all other properties in flight.
 
 mod network;
 
@@ -10,16 +11,15 @@ use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
 use network::{HIDDEN, INPUTS, Network};
 
-/// Largest rates of the reference in roll and pitch, rad/s, and the time constant that rounds its ends, s. The policy
-/// was trained with them (`params/any/train.py`), so they must not be changed together with those of another
-/// controller.
+/// Largest rates of the reference in roll and pitch, rad/s, and the time constant of its approach to the target, s. The
+/// policy was trained with these values (`params/any/train.py`): they change only with a new training.
 const REFERENCE: [f64; 2] = [0.9, 0.5];
 const ROUNDING: f64 = 0.35;
-/// Largest integral of the attitude errors, rad s, and of the airspeed's, parts of the cruise airspeed times s.
+/// Limit of the integrals of the attitude errors, rad s, and of the relative airspeed error, s.
 const INTEGRAL_MOST: f64 = 0.5;
 const SPEED_INTEGRAL_MOST: f64 = 2.0;
 
-/// Memory of the policy.
+/// State of the policy between two steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Memory {
     hidden: [f64; HIDDEN],
@@ -42,10 +42,10 @@ pub struct AnyPolicy {
 }
 
 impl AnyPolicy {
-    /// The policy that the program ships, for the aircraft that `airframe` describes.
+    /// The policy shipped with the program, for the aircraft described by `airframe`.
     ///
     /// # Errors
-    /// If the shipped file does not hold such a policy.
+    /// If the shipped file lacks a tensor of the network, or a tensor has the wrong shape or a value that is not finite.
     pub fn new(airframe: &Airframe) -> Result<AnyPolicy, SetupError> {
         Ok(AnyPolicy {
             network: network::shipped()?,
@@ -55,7 +55,7 @@ impl AnyPolicy {
         })
     }
 
-    /// Inputs of the network, in the order of its training, and the memory after this step.
+    /// Inputs of the network in the order used in training, and the policy's state after this step.
     fn see(&self, seen: &Observation, target: &Target) -> ([f64; INPUTS], Memory) {
         let (s, u, mut memory) = (&seen.state, &seen.previous[0], self.memory);
         let time = self.cruise / STANDARD_GRAVITY;
@@ -74,7 +74,7 @@ impl AnyPolicy {
         memory.speed_integral = (memory.speed_integral + (1.0 - speed) * STEP)
             .clamp(-SPEED_INTEGRAL_MOST, SPEED_INTEGRAL_MOST);
         let (sin, cos) = s.roll.sin_cos();
-        // turn rate of a coordinated turn about the vertical, then about the body's y and z axes, rad/s
+        // rate of a coordinated turn about the vertical, then about the body's y and z axes, rad/s
         let turn = s.roll.clamp(-1.2, 1.2).tan() * s.pitch.cos() / (speed * time);
         let [pull, swing] = [sin, cos].map(|part| turn * part * s.pitch.cos());
         let inputs = [
@@ -123,7 +123,7 @@ impl Controller for AnyPolicy {
     fn command(&mut self, seen: &Observation, target: &Target) -> Command {
         let (inputs, mut memory) = self.see(seen, target);
         let [aileron, elevator, throttle, rudder] = self.network.step(&mut memory.hidden, &inputs);
-        // a NaN in the inputs gives a NaN command, and must not enter the recurrent state
+        // a NaN among the inputs gives a NaN command but must not enter the recurrent state
         if inputs.iter().all(|x| x.is_finite()) {
             self.memory = memory;
         }

@@ -1,4 +1,4 @@
-//! The network of the policy for any aircraft: a GRU and a parallel linear path.
+//! The network of the policy for all aircraft: a GRU with a linear path from the inputs to the outputs in parallel.
 
 use std::sync::LazyLock;
 
@@ -18,7 +18,7 @@ const GATES: usize = 3 * HIDDEN;
 static FILE: &[u8] = include_bytes!("../../../params/any/policy.safetensors");
 static SHIPPED: LazyLock<Result<Network, String>> = LazyLock::new(|| Network::read(FILE));
 
-/// The weights, rows by outputs.
+/// The weights of the network, as matrices with one row per gate or per output.
 #[derive(Clone, Debug)]
 pub(super) struct Network {
     input: Vec<f64>,
@@ -43,7 +43,7 @@ fn sigmoid(x: f64) -> f64 {
 }
 
 impl Network {
-    /// Reads a safetensors file of single precision.
+    /// Reads the network from a safetensors file with values in single precision.
     fn read(bytes: &[u8]) -> Result<Network, String> {
         let file = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
         let tensor = |name: &str, shape: &[usize]| {
@@ -60,7 +60,7 @@ impl Network {
                 numbers.map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect();
             match all.iter().all(|x| x.is_finite()) {
                 true => Ok(all),
-                false => Err(format!("{name} holds what is no number")),
+                false => Err(format!("{name} has a value that is not finite")),
             }
         };
         Ok(Network {
@@ -96,7 +96,7 @@ impl Network {
 mod tests {
     use super::*;
 
-    /// Inputs and outputs of five steps of the program that trained it, in single precision.
+    /// The file holds inputs and outputs of five steps of the training program, in single precision.
     #[test]
     fn the_network_is_the_one_that_was_trained() {
         let text = include_str!("../../../tests/data/any/policy.trace.csv");
@@ -108,7 +108,7 @@ mod tests {
                 network.step(&mut hidden, x.try_into().unwrap());
             let ours = [aileron, elevator, 0.5 + 0.5 * throttle, rudder];
             for (ours, theirs) in ours.iter().zip(u) {
-                // single precision, inputs of six decimals
+                // the outputs are single precision, the inputs have six decimals
                 assert!((ours - theirs).abs() < 1e-5, "step {steps}: {ours} {theirs}");
             }
             steps += 1;

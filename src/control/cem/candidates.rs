@@ -1,4 +1,4 @@
-//! The last tick's search for display: its candidates, each simulated with the model.
+//! The last planning tick for display: a sample of its candidates, each simulated with the model.
 
 use super::rollout::{HORIZON, WIDTH, slewed};
 use super::{Cem, Plan, flown};
@@ -8,12 +8,12 @@ use greylag_model::STEP;
 use greylag_physics::Command;
 use greylag_physics::actuators::Actuators;
 
-/// Number of candidates kept for the report, spread evenly over all.
+/// Number of candidates kept for the display, evenly spaced over all candidates.
 const SHOWN: usize = 48;
 
 impl Cem {
-    /// The candidates and the choice of the tick that was planned from `seen`. It integrates some thousand steps and
-    /// allocates: not for use in flight.
+    /// The candidates and the chosen plan of the tick that was planned from `seen`. The function integrates some thousand
+    /// steps and allocates memory. It is therefore not for use in flight.
     pub(super) fn last_insight(&self, seen: &Observation) -> Insight {
         let all = self.blocks.len() * WIDTH;
         let every = all.div_ceil(SHOWN).max(1);
@@ -26,7 +26,7 @@ impl Cem {
         }
     }
 
-    /// Roll and pitch along a plan, or along the base controller's own commands without one.
+    /// Roll and pitch (rad) at every step along `plan`. Without a plan, they follow the base controller's commands.
     fn path(&self, seen: &Observation, plan: Option<&Plan>) -> Path {
         let model = &self.model;
         let figures = &model.airframe.actuators;

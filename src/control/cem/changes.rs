@@ -27,7 +27,7 @@ pub enum Change {
     Kept(usize),
     /// Replaces [`Settings::proposals`], the candidates from the policy.
     Proposals(usize),
-    /// Replaces the standard deviation of [`Settings::noise`]; it is truncated at three standard deviations.
+    /// Replaces the standard deviation of [`Settings::noise`]. The noise is truncated at three standard deviations.
     Noise(f64),
     /// Replaces [`Settings::alpha`], the weight of the terminal value.
     Alpha(Option<f64>),

@@ -1,5 +1,5 @@
-//! Conditions for planning: the model's recent one-step predictions were good enough, and its residual is not
-//! extrapolating.
+//! Conditions for planning with the model: its recent one-step predictions were accurate enough, and its residual does
+//! not extrapolate.
 
 use super::rollout::{Actions, HORIZON, WIDTH};
 use super::{Cem, Settings, flown};
@@ -7,19 +7,19 @@ use crate::disturbance::{Disturbance, TIME_CONSTANT_S};
 use crate::{Observation, Target};
 use greylag_physics::Command;
 
-/// The observer of the model's prediction errors, if the settings ask for one.
+/// The observer of the model's prediction errors. `None` if no setting needs it.
 pub(super) fn predictions(settings: &Settings) -> Option<Disturbance> {
     settings.disturbance.or(settings.trust.map(|_| TIME_CONSTANT_S)).map(Disturbance::new)
 }
 
 impl Cem {
-    /// The estimated disturbance, where the settings include it in the plans.
+    /// The observer of the disturbance. `None` if the settings do not include the disturbance in the plans.
     pub(super) fn disturbance(&self) -> Option<&Disturbance> {
         self.predictions.as_ref().filter(|_| self.settings.disturbance.is_some())
     }
 
-    /// Whether the model may be planned with: its predictions over the last half second were good enough, gusts
-    /// aside, and its residual is within its training data.
+    /// Whether planning may use the model. It may not if the prediction errors exceed `Settings::trust` and do not look
+    /// like gusts, or if the distance from the residual's training data exceeds `Settings::known`.
     pub(super) fn is_trusted(&self, seen: &Observation) -> bool {
         let predicted = match (self.settings.trust, &self.predictions) {
             (Some(most), Some(predictions)) => !predictions.is_wrong(most),
@@ -37,7 +37,7 @@ impl Cem {
     /// The policy's own command, without a search.
     pub(super) fn unsearched(&mut self, seen: &Observation, target: &Target) -> Command {
         (self.last, self.planned_for) = (None, None);
-        // the first lane has no noise: it is the policy's own plan
+        // lane 0 has no noise and holds the policy's own plan
         self.blocks[0] = [[[0.0; WIDTH]; 3]; HORIZON];
         self.fly(seen, target, Actions::Policy, [0, 1]);
         flown(&self.candidate(0).plan[0])

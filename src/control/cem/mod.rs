@@ -1,5 +1,5 @@
-//! CEM-MPC, section III-D of \[GSFM26\]; with a policy's proposals and critics' values it is the hybrid
-//! controller of section IV-C.
+//! CEM-MPC planner, section III-D of \[GSFM26\]. With a policy's proposals and critics' values it is the hybrid controller
+//! of section IV-C.
 
 mod candidates;
 mod changes;
@@ -26,31 +26,31 @@ use rollout::{Actions, Block, HORIZON, Machine, WIDTH, Worth};
 pub use settings::{Instructions, Settings, Start, Update, Value};
 use surrogate::Surrogate;
 
-/// Candidates whose terminal states the critics value before the fitted plane replaces them.
+/// Number of candidates whose terminal states the critics value. A plane fitted to these values then replaces the critics.
 const SURVEYED: usize = 128;
 
-/// Candidates of the last iteration that the critics value again.
+/// Number of best candidates of the last iteration that the critics value again.
 const RESCORED: usize = 64;
 
-/// Sideslip that costs a reward of 1 per step where the base controller uses a rudder, rad. The paper's reward (eq.
-/// 30) has no sideslip term, so that a plan which rolls faster than the rudder can coordinate would cost nothing.
+/// Sideslip that costs a reward of 1 per step where the base controller uses a rudder, rad. The paper's reward (eq. 30)
+/// has no sideslip term. Without this term a roll faster than the rudder can coordinate would cost nothing.
 const SIDESLIP: f64 = 0.3;
 
-/// The policy, base controller and second planner that a search may use.
+/// The policy, base controller and iLQR planner that a search may use.
 #[derive(Clone, Debug, Default)]
 pub struct Aids {
     /// The policy that proposes candidates, with its critics.
     pub agent: Option<Agent>,
-    /// The controller that flies unless the search finds a plan that is better by the margin.
+    /// The controller that flies unless the search finds a plan whose return is higher by the setting `margin`.
     pub base: Option<Lqi>,
     /// The planner whose plan is added to the candidates.
     pub ilqr: Option<Ilqr>,
 }
 
-/// An action in the paper's units: aileron, elevator and throttle in −1..1 (eq. 29).
+/// An action in the paper's units (eq. 29): aileron, elevator and throttle, each −1..1.
 type Action = [f64; 3];
 
-/// Actions of one candidate over the horizon.
+/// Actions of one candidate at every step of the horizon.
 type Plan = [Action; HORIZON];
 
 /// A plan with its estimated return.
@@ -61,7 +61,7 @@ struct Valued {
     doubt: f32,
 }
 
-/// The CEM-MPC planner. All memory is allocated when it is built; the work per plan is constant.
+/// The CEM-MPC planner. All memory is allocated when the planner is built. The work per plan is constant.
 #[derive(Clone, Debug)]
 pub struct Cem {
     name: &'static str,
@@ -69,7 +69,7 @@ pub struct Cem {
     settings: Settings,
     agent: Option<Agent>,
     base: Option<Base>,
-    /// [`SIDESLIP`] where the base controller uses a rudder, else `None`.
+    /// [`SIDESLIP`] if the base controller uses a rudder. Otherwise `None`.
     sideslip: Option<f64>,
     ilqr: Option<Ilqr>,
     /// Observer of the model's one-step prediction errors.
@@ -80,11 +80,11 @@ pub struct Cem {
     blocks: Vec<Block>,
     worth: Vec<Worth>,
     order: Vec<(f32, u32)>,
-    /// The last tick's plan if the search's plan was flown, and the number of ticks for which it has been flown.
+    /// Plan of the last tick, `None` if the search's plan was not flown. `age` counts the ticks for which it has been flown.
     last: Option<Plan>,
     age: usize,
-    /// With [`Settings::delay`]: the observation and target that the next tick is planned for, and the time that
-    /// `last` is for.
+    /// With [`Settings::delay`]: the observation and target for which the next tick is planned. `planned_for` is the time
+    /// for which `last` was planned.
     next: Option<(Observation, Target)>,
     planned_for: Option<Time>,
     kept: Vec<Plan>,
@@ -94,7 +94,7 @@ pub struct Cem {
     tick: u64,
 }
 
-/// Processing time of the parts of a tick.
+/// Computation time of the phases of a tick.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
     prepare: Duration,
@@ -118,7 +118,7 @@ struct Base {
 }
 
 impl Cem {
-    /// A planner with `model`, registered under `name`.
+    /// A planner that predicts with `model` and is registered under `name`.
     ///
     /// # Panics
     /// If the settings ask for a policy or its critics and `aids` has none.
@@ -159,7 +159,7 @@ impl Cem {
         }
     }
 
-    /// Runs the iterations of a tick and returns their final plan.
+    /// Runs the iterations of a tick and returns the mean of the last distribution. `None` if too few returns are finite.
     fn search(&mut self, seen: &Observation, target: &Target) -> Option<Plan> {
         let mut rng = stream::stream(self.seed, &[self.tick]);
         self.tick += 1;
@@ -206,8 +206,8 @@ impl Cem {
         Some(mean)
     }
 
-    /// Searches around the base controller's plan. `Some` only if the best plan's return exceeds the base's by the
-    /// margin and by the critics' disagreement on either.
+    /// Searches around the base controller's plan. Returns the best plan only if its return exceeds the base's by the margin
+    /// plus the critics' disagreement. The larger disagreement of the two plans counts.
     fn search_around_base(
         &mut self,
         seen: &Observation,
@@ -252,7 +252,7 @@ impl Cem {
         (chosen.worth - base.worth > doubt).then_some(chosen.plan)
     }
 
-    /// The command planned a tick ago for this time, or a new one if there is none.
+    /// The command planned at the previous tick for the present time, or a new command if there is no plan for this time.
     fn planned_before(&mut self, seen: &Observation, target: &Target) -> Command {
         let off = |time: Time| (time.as_secs_f64() - seen.time.as_secs_f64()).abs();
         if !self.planned_for.is_some_and(|time| off(time) < STEP / 2.0) {
@@ -283,7 +283,7 @@ impl Cem {
         }
     }
 
-    /// The base controller's command, or that of a plan that is better by the margin.
+    /// The base controller's command, or the plan's if its return is higher by the margin.
     fn over_base(&mut self, mut base: Base, seen: &Observation, target: &Target) -> Command {
         let begun = Instant::now();
         base.lqi.look_ahead(seen, target, &mut base.ahead);
@@ -314,11 +314,11 @@ fn shifted(plan: &Plan) -> Plan {
     std::array::from_fn(|h| plan[(h + 1).min(HORIZON - 1)])
 }
 
-/// The command of a planner without a plan: NaN, so that the caller flies its fallback.
+/// The command of a planner without a plan. Its NaN makes the caller fly its fallback controller.
 const LOST: Command =
     Command { aileron: f64::NAN, elevator: f64::NAN, throttle: f64::NAN, rudder: 0.0 };
 
-/// The command that corresponds to an action.
+/// The command that corresponds to an action. The rudder is neutral.
 fn flown([aileron, elevator, thrust]: &Action) -> Command {
     let [aileron, elevator, thrust] = [*aileron, *elevator, *thrust];
     Command { aileron, elevator, throttle: (thrust + 1.0) / 2.0, rudder: 0.0 }.clamped()
@@ -347,7 +347,7 @@ impl Controller for Cem {
     }
 
     fn overruled(&mut self, by: &Overruled) {
-        // planning restarts from the observation, but the base controller has integrators
+        // planning restarts from each observation, but the base controller has integrators that must follow
         if let (None, Some(base)) = (&self.last, &mut self.base) {
             base.lqi.overruled(by);
         }
@@ -388,7 +388,7 @@ impl Controller for Cem {
         if self.last.is_none() || self.age >= self.settings.chunk {
             (self.last, self.age) = (self.search(seen, target), 0);
         }
-        // NaN signals failure; the pilot then flies its fallback
+        // NaN signals a failure, upon which the caller flies its fallback controller
         self.last.map_or(LOST, |plan| flown(&plan[self.age]))
     }
 }

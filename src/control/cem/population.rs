@@ -1,4 +1,4 @@
-//! The candidates of an iteration: sampling, rollouts, update of the distribution.
+//! The candidates of an iteration: sampling, rollouts and the update of the distribution.
 
 use std::cmp::Ordering;
 use std::time::Instant;
@@ -13,7 +13,7 @@ use crate::task::Task;
 use crate::{Observation, Target};
 
 impl Cem {
-    /// Samples the candidates of an iteration into the blocks from `first` on.
+    /// Samples the candidates of an iteration from the distribution into the blocks from `first` on.
     pub(super) fn sample(&mut self, rng: &mut impl Rng, first: usize, mean: &Plan, spread: &Plan) {
         let begun = Instant::now();
         let old = self.settings.persistence;
@@ -35,8 +35,8 @@ impl Cem {
         self.spent.draw += begun.elapsed();
     }
 
-    /// Samples the noise added to the proposals in the blocks from `first` up to `end`; lane 0 of the first block has
-    /// none.
+    /// Samples the noise that is added to the proposals in the blocks from `first` up to `end`. Lane 0 of the first block
+    /// has no noise.
     pub(super) fn sample_noise(&mut self, rng: &mut impl Rng, [first, end]: [usize; 2]) {
         let begun = Instant::now();
         let [deviation, most] = self.settings.noise;
@@ -76,7 +76,7 @@ impl Cem {
             sideslip: self.sideslip,
         };
         let (blocks, worth) = (&mut self.blocks[first..end], &mut self.worth[first..end]);
-        // blocks are paired as on one core, so that results are equal to the bit
+        // blocks form the same pairs as on one core, which makes the results bit-identical
         let half = blocks.len().div_ceil(4) * 2;
         match &mut self.second {
             Some(second) if half < blocks.len() => {
@@ -93,7 +93,7 @@ impl Cem {
         self.spent.fly += begun.elapsed();
     }
 
-    /// A candidate with its return.
+    /// The plan, return and critics' disagreement of the candidate `index`.
     pub(super) fn candidate(&self, index: usize) -> Valued {
         let (block, lane) = (index / WIDTH, index % WIDTH);
         let actions = &self.blocks[block];
@@ -102,8 +102,8 @@ impl Cem {
         Valued { plan, worth: returns[lane], doubt: doubt[lane] }
     }
 
-    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, weighted by
-    /// [`Update`], and the best candidate; `None` if too few returns are finite.
+    /// Mean and standard deviation of the actions of the candidates in the blocks up to `end`, weighted by [`Update`], and
+    /// the best candidate. `None` if too few returns are finite.
     pub(super) fn refit(&mut self, end: usize) -> Option<(Plan, Plan, Valued)> {
         let begun = Instant::now();
         let refitted = self.refitted(end);
@@ -158,7 +158,7 @@ impl Cem {
         Some((mean, spread, self.candidate(best.1 as usize)))
     }
 
-    /// Keeps the best candidates for the next iteration.
+    /// Keeps the plans of the `count` best candidates for the next iteration.
     pub(super) fn keep(&mut self, count: usize) {
         let count = count.min(self.order.len());
         self.kept.clear();
@@ -180,7 +180,7 @@ impl Cem {
     }
 }
 
-/// Orders candidates by falling return; ties go to the lower index, so that the order is the same on every machine.
+/// Orders candidates by falling return. The lower index wins a tie, which makes the order the same on every machine.
 fn better(a: &(f32, u32), b: &(f32, u32)) -> Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }

@@ -1,4 +1,4 @@
-//! Rollouts of many candidates at once, in the widest vectors that the processor has.
+//! Rollouts of many candidates at once, with the widest vector instructions of the processor.
 
 use super::surrogate::Surrogate;
 use crate::lqi::Ahead;
@@ -32,7 +32,7 @@ pub(super) struct Scene<'a> {
     pub target: &'a Target,
     /// The policy that proposes actions, and whose critics value the terminal state.
     pub agent: Option<&'a Agent>,
-    /// Weight α of the critics' terminal value, eq. (26); `None` leaves it out.
+    /// Weight α of the critics' terminal value, eq. (26). `None` omits the terminal value.
     pub alpha: Option<f64>,
     /// Terminal value function that replaces the critics.
     pub surrogate: Option<Surrogate>,
@@ -40,9 +40,9 @@ pub(super) struct Scene<'a> {
     pub memory: Memory,
     /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
-    /// Law of the base controller: it flies after the plan, and commands the throttle during the plan too.
+    /// Law of the base controller. It flies the steps after the plan and commands throttle and rudder during the plan too.
     pub ahead: Option<&'a Ahead>,
-    /// Total number of steps without a base controller: the policy flies those after the plan. Five without a policy.
+    /// Number of steps without a base controller. The policy flies the steps after the fifth. Without a policy, five steps.
     pub steps: usize,
     /// Sideslip that costs a reward of 1 per step where a rudder is flown, rad.
     pub sideslip: Option<f64>,
@@ -53,20 +53,20 @@ pub(super) struct Scene<'a> {
 pub(super) enum Actions {
     /// The block holds the actions.
     Given,
-    /// The policy; the block holds offsets to its actions, and the sums afterwards.
+    /// The policy. The block holds offsets to its actions before the rollout, and the sums after it.
     Policy,
-    /// The base controller; the block holds offsets to its actions, and the sums afterwards.
+    /// The base controller. The block holds offsets to its actions before the rollout, and the sums after it.
     Base,
 }
 
-/// Returns and terminal values of a block's candidates.
+/// Result of the rollout of a block's candidates: returns and terminal values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worth {
     /// Discounted returns, eq. (13), or eq. (26) with critics.
     pub returns: [f32; WIDTH],
-    /// Disagreement of the two critics on the terminal value, discounted and weighted like it.
+    /// Disagreement of the two critics on the terminal value, with the same discount and weight as that value.
     pub doubt: [f32; WIDTH],
-    /// Observation at the terminal state, where critics value it.
+    /// Observation at the terminal state, if the critics or the surrogate value this state.
     pub end: [[f32; WIDTH]; OBSERVATIONS],
     /// The smaller of the critics' values of the terminal state, or the surrogate's value.
     pub value: [f32; WIDTH],
@@ -83,7 +83,7 @@ impl Worth {
 
 /// The vector instruction set that rollouts are compiled for, with scratch memory for the networks.
 ///
-/// Fused multiply-add is used where the processor has it, so that the last bits differ between instruction sets.
+/// Fused multiply-add is used where the processor has it. The last bits therefore differ between instruction sets.
 #[derive(Clone, Debug)]
 pub(super) enum Machine {
     #[cfg(target_arch = "x86_64")]
@@ -93,7 +93,7 @@ pub(super) enum Machine {
     Baseline(Units<Base<BASE_FUSED>>),
 }
 
-/// Evaluates two blocks together, so that each network weight is loaded once for both.
+/// Evaluates two blocks together and thereby loads each network weight once for both.
 #[cfg(target_arch = "x86_64")]
 type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
@@ -199,8 +199,8 @@ struct Flight<R> {
 }
 
 impl<R: Packed> Flight<R> {
-    /// Lags and delays of the deflections start in steady state at the present deflections. Over the five steps of a plan, the
-    /// effect of the present deflections is therefore overestimated.
+    /// Lags and delays of the deflections start in steady state at the present deflections. Over the five steps of a plan,
+    /// the effect of the present deflections is therefore overestimated.
     #[inline(always)]
     fn new(scene: &Scene) -> Self {
         let lane = R::from_f64;
@@ -257,7 +257,7 @@ impl<R: Packed> Flight<R> {
     }
 }
 
-/// One component of the actions of all blocks at a step; the last block is repeated for missing ones.
+/// One component of the actions of all blocks at a step. The last block is repeated to fill the vector.
 #[inline(always)]
 fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     R::pack(
@@ -266,7 +266,7 @@ fn given<R: Packed>(blocks: &[Block], step: usize, component: usize) -> R {
     )
 }
 
-/// Returns of up to `R` blocks: the plan's five steps, then the base controller or policy.
+/// Returns of up to `R::ROWS` blocks: the plan flies five steps, then the base controller or the policy.
 #[inline(always)]
 fn rollout<R: Packed>(
     scene: &Scene,
@@ -285,8 +285,8 @@ fn rollout<R: Packed>(
         None if scene.agent.is_some() => scene.steps,
         None => HORIZON,
     };
-    // plain loops, because an iterator that is not inlined is compiled without the vector instructions;
-    // one call of the model, because a second inlined copy doubles a compile time of minutes
+    // plain loops, because an iterator that is not inlined is compiled without the vector instructions. Only one call of the
+    // model, because a second inlined copy doubles a compile time of minutes
     let mut step = 0;
     while step < steps {
         let mut chosen = [R::zero(); ACTIONS];
@@ -314,7 +314,7 @@ fn rollout<R: Packed>(
                 command.aileron = (command.aileron + base.aileron).clamp(-1.0, 1.0);
                 command.elevator = (command.elevator + base.elevator).clamp(-1.0, 1.0);
             }
-            // the base controller commands throttle and rudder: only aileron and elevator are planned
+            // a plan with a base controller has only aileron and elevator
             command.throttle = base.throttle;
             command.rudder = base.rudder;
             command = slewed(command, &flight.previous[0], &scene.model.airframe);
@@ -341,7 +341,7 @@ fn rollout<R: Packed>(
                 let first = critics[0].value(units, &view, &advised);
                 let second = critics[1].value(units, &view, &advised);
                 doubt = (first - second).abs().scale(alpha * flight.weight);
-                // a NaN stays NaN
+                // unlike the vector minimum, this form keeps a NaN
                 first + (second - first).min(R::zero())
             }
         };
@@ -361,8 +361,8 @@ fn rollout<R: Packed>(
     }
 }
 
-/// `command` with its surfaces limited to the airframe's slew rate from `last`. The pilot applies the same limit; a
-/// plan that ignores it oscillates when the channels are delayed as well.
+/// `command` with its surfaces limited to the airframe's slew rate from `last`. The pilot applies the same limit. A plan
+/// without this limit oscillates if the channels are also delayed.
 #[inline(always)]
 pub(super) fn slewed<R: Real>(
     command: Command<R>,

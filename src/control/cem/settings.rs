@@ -9,8 +9,8 @@ use crate::disturbance::{TIME_CONSTANT_S, TRUST};
 pub enum Update {
     /// Mean and standard deviation of the K best candidates: the cross-entropy method.
     Elites(usize),
-    /// Mean and standard deviation of all candidates, weighted with exp(return / λ): MPPI (Williams et al., 2017), λ
-    /// in units of the return.
+    /// Mean and standard deviation of all candidates, weighted with exp(return / λ): MPPI (Williams et al., 2017). λ is in
+    /// units of the return.
     Weighted(f64),
 }
 
@@ -25,85 +25,84 @@ pub enum Start {
     Last,
 }
 
-/// The terminal value function, where critics are used at all.
+/// The function that values the terminal states, if the settings include a terminal value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
-    /// The critics, for every candidate.
+    /// The critics value every candidate.
     Critics,
-    /// A plane fitted to the critics' values of the tick's first 128 candidates; the critics value the best 64 of the
-    /// last iteration again. Only without a base controller.
+    /// A plane fitted to the critics' values of the tick's first 128 candidates values the others. The critics value the
+    /// best 64 of the last iteration again. The setting is available only without a base controller.
     Fitted,
 }
 
 /// Vector instruction set of the rollouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
-    /// The widest that the processor supports.
+    /// The widest instruction set that the processor supports.
     Widest,
-    /// The baseline of the compilation target. Multiply-adds may round differently, so that a flight repeats to the
-    /// bit within one of the two choices, not across them.
+    /// The baseline of the compilation target. Its multiply-adds may round differently from those of the widest set. A
+    /// flight is therefore bit-identical only when it is repeated with the same choice.
     Portable,
 }
 
 /// Settings of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Candidates per iteration N, a multiple of 16.
+    /// Number N of candidates per iteration, a multiple of 16.
     pub population: usize,
     /// How the sampling distribution is updated.
     pub update: Update,
-    /// Iterations I per tick.
+    /// Number I of iterations per tick.
     pub iterations: usize,
     /// The initial mean of the distribution.
     pub start: Start,
-    /// Standard deviation of the first iteration, in units of the action.
+    /// Standard deviation of the first iteration's distribution, in units of the action (−1..1).
     pub spread: f64,
-    /// Correlation of a candidate's noise from one step to the next, 0..1 (iCEM's coloured noise, of first
-    /// order).
+    /// Correlation of a candidate's noise from one step to the next, 0..1 (first-order coloured noise, as in iCEM).
     pub persistence: f64,
-    /// Best candidates carried over to the next iteration (the kept elites of iCEM), fewer than 16.
+    /// Number of best candidates carried over to the next iteration (the kept elites of iCEM), fewer than 16.
     pub kept: usize,
-    /// Candidates of the first iteration that the policy proposes, a multiple of 16; the first of them
-    /// without noise.
+    /// Number of candidates of the first iteration that the policy proposes, a multiple of 16. The first proposal has no
+    /// noise.
     pub proposals: usize,
-    /// Standard deviation of the noise on the other proposals, and its truncation.
+    /// Standard deviation and truncation of the noise on the other proposals, in units of the action.
     pub noise: [f64; 2],
-    /// Weight α of the critics' terminal value, eq. (26).
+    /// Weight α of the critics' terminal value, eq. (26). `None` omits the terminal value.
     pub alpha: Option<f64>,
     /// The terminal value function of a plan.
     pub value: Value,
-    /// Horizon in steps: after the fifth the base controller flies, or the policy without one; without either the
-    /// horizon is five.
+    /// Horizon in steps. The base controller, or the policy if there is none, flies the steps after the fifth. Without
+    /// either the horizon is five steps.
     pub steps: usize,
-    /// Ticks for which a plan is flown before the next one is made, up to 5; with a base controller every tick is
-    /// planned.
+    /// Number of ticks, up to 5, for which a plan is flown before the next plan is made. With a base controller every tick
+    /// is planned.
     pub chunk: usize,
-    /// Whether a tick plans for the next one, from the state that the model predicts (RT-HCP's delay of one step), so
-    /// that planning may take the whole period. Only without a base controller, and a plan is then flown for one
-    /// tick.
+    /// Whether a tick plans for the next tick, from the state that the model predicts (RT-HCP's delay of one step).
+    /// Planning may then take the whole period, and a plan is flown for one tick. The setting has an effect only without a
+    /// base controller.
     pub delay: bool,
-    /// Return by which a plan must exceed the base controller's to be flown.
+    /// Amount by which a plan's return must exceed the base controller's return before the plan is flown.
     pub margin: f64,
-    /// Whether iLQR's plan is among the candidates; it needs a base controller.
+    /// Whether iLQR's plan is among the candidates, which requires a base controller.
     pub ilqr: bool,
-    /// Time constant of the disturbance estimate, s; `None` disables it.
+    /// Time constant of the disturbance estimate, s. `None` disables the estimate.
     pub disturbance: Option<f64>,
-    /// Largest relative one-step prediction error (root mean square over the last half second) at which plans are
-    /// made. Above it, unless the error looks like gusts, the base controller flies alone, or without one the policy;
-    /// one of them is required.
+    /// Largest relative one-step prediction error (root mean square over the last half second) at which plans are made.
+    /// Above it, unless the error looks like gusts, the base controller flies alone, or the policy if there is no base
+    /// controller. One of the two is required. `None` disables the check.
     pub trust: Option<f64>,
     /// Largest distance from the training data of the model's residual, see
-    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made (1 holds 99.9 % of the
-    /// training samples); beyond it, the same fallback as for `trust`.
+    /// [`Residual::distance`](greylag_model::Residual::distance), at which plans are made. Within 1 lie 99.9 % of the
+    /// training samples. Beyond the limit the fallback is that of `trust`. `None` disables the check.
     pub known: Option<f64>,
     /// Vector instruction set of the rollouts.
     pub instructions: Instructions,
-    /// Number of cores used by the rollouts, one or two; the commands are identical.
+    /// Number of cores used by the rollouts, one or two. The number does not change the commands.
     pub cores: usize,
 }
 
 impl Settings {
-    /// CEM-MPC alone. H = 5 as in the paper; N, K and I are not stated there: 1024 rollouts per tick in all.
+    /// CEM-MPC alone with 1024 rollouts per tick. H = 5 as in the paper, which does not state N, K and I.
     pub const PAPER: Settings = Settings {
         population: 256,
         update: Update::Elites(16),
@@ -131,9 +130,9 @@ impl Settings {
     pub const POLICY: Settings = Settings { proposals: 32, ..Settings::PAPER };
     /// CEM with the critics' terminal value (CEM + Q).
     pub const CRITICS: Settings = Settings { alpha: Some(1.0), ..Settings::PAPER };
-    /// The hybrid controller. It searches close to the policy's plan: critics are accurate to a few per cent of a
-    /// return, and a wider search exploits their errors (with a spread of 1 about the centre of the range and
-    /// proposals spread by 0.2, it is worse than the policy itself).
+    /// The hybrid controller. It searches close to the policy's plan, because the critics are accurate only to a few per
+    /// cent of a return and a wider search exploits their errors. With a spread of 1 about the centre of the range and a
+    /// proposal noise of 0.2, the hybrid controller performs worse than the policy.
     pub const HYBRID: Settings = Settings {
         alpha: Some(1.0),
         start: Start::Policy,
@@ -142,8 +141,8 @@ impl Settings {
         trust: Some(TRUST),
         ..Settings::POLICY
     };
-    /// The hybrid controller whose policy continues after each plan up to step 40 in the model, before the critics
-    /// value the terminal state. It performs equally well without critics.
+    /// The hybrid controller with a longer horizon: the policy flies the model from the end of each plan to step 40, where
+    /// the critics value the terminal state. It performs equally well without critics.
     pub const OVER_POLICY: Settings = Settings {
         population: 64,
         update: Update::Elites(8),
@@ -152,14 +151,14 @@ impl Settings {
         steps: 40,
         ..Settings::HYBRID
     };
-    /// MPPI over the same rollouts.
+    /// MPPI with the rollouts of `Settings::PAPER`.
     pub const MPPI: Settings = Settings { update: Update::Weighted(0.01), ..Settings::PAPER };
-    /// The hybrid controller over an LQI, which continues after each plan and so replaces the critics' terminal
-    /// value. Offset-free.
+    /// The hybrid controller over an LQI. The LQI flies the steps after each plan, which replaces the critics' terminal value.
+    /// The steady-state attitude error is zero.
     ///
-    /// The margin corresponds to 0.12° of attitude error over all steps: smaller gains are sampling noise, and flying
-    /// them opens the loop of the LQI's integrators (hard targets settle at 0.04° with a margin of 0.002, at 0.001°
-    /// with 0.05).
+    /// The margin corresponds to an attitude error of 0.12° at all steps. Improvements below it are sampling noise, and flying
+    /// them opens the loop of the LQI's integrators. Hard targets settle to 0.04° with a margin of 0.002, and to 0.001° with
+    /// 0.05.
     pub const OVER_LQI: Settings = Settings {
         population: 128,
         update: Update::Elites(12),
@@ -174,7 +173,7 @@ impl Settings {
         ..Settings::PAPER
     };
 
-    /// Whether the search requires a policy.
+    /// Whether the search requires a policy, with or without its critics.
     pub(crate) fn needs_policy(&self) -> bool {
         self.proposals > 0 || self.alpha.is_some() || self.start == Start::Policy
     }

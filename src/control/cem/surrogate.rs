@@ -1,7 +1,7 @@
-//! A cheap terminal value: a plane fitted to terminal states that the critics have valued.
+//! Terminal value of low cost: a plane fitted to terminal states that the critics have valued.
 //!
-//! Twin critics are piecewise linear, and the candidates of one tick end close together, so that a plane fitted anew
-//! in each tick approximates them well. It needs no training and no file.
+//! The two critics are piecewise linear, and the candidates of one tick end close together. A plane fitted in each tick
+//! therefore approximates them well. The plane needs no training and no file.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -9,11 +9,11 @@ use super::rollout::Worth;
 use crate::policy::OBSERVATIONS as N;
 use greylag_num::Real;
 
-/// Ridge regularisation as a fraction of each observation's variance: terminal states that lie on a plane determine
-/// the slope along it only.
+/// Ridge regularisation as a fraction of each observation's variance. Without it, terminal states that lie on a plane would not
+/// determine the slope across the plane.
 const RIDGE: f64 = 1e-4;
 
-/// v(o) ≈ level + slope · (o − centre), of observations as in eq. (28) of \[GSFM26\].
+/// The fitted plane v(o) ≈ level + slope · (o − centre) of observations o as in eq. (28) of \[GSFM26\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Surrogate {
     centre: [f64; N],
@@ -22,8 +22,8 @@ pub(super) struct Surrogate {
 }
 
 impl Surrogate {
-    /// The least-squares plane through the ends of the candidates of `worth`; `None` if fewer than
-    /// two for each slope are finite.
+    /// The least-squares plane through the terminal values of the candidates of `worth`. `None` if fewer than two candidates
+    /// for each slope are finite, or if the fit is not finite.
     pub fn fit(worth: &[Worth]) -> Option<Surrogate> {
         let ends = || worth.iter().flat_map(ends_of).filter(|(o, v)| (o.sum() + v).is_finite());
         let count = ends().count();
@@ -41,7 +41,7 @@ impl Surrogate {
             product.axpy(value - level, &off, 1.0);
         }
         for i in 0..N {
-            // an observation that does not vary has slope zero, and must not divide by zero
+            // an observation without variance has slope zero and must not divide by zero
             square[(i, i)] += RIDGE * square[(i, i)] + f64::MIN_POSITIVE;
         }
         let slope = square.cholesky()?.solve(&product);
@@ -49,7 +49,7 @@ impl Surrogate {
         surrogate.slope.iter().all(|x| x.is_finite()).then_some(surrogate)
     }
 
-    /// Evaluates the plane at observations in lanes.
+    /// Evaluates the plane at the observations of several candidates, one per lane.
     #[inline(always)]
     pub fn value<R: Real>(&self, seen: &[R; N]) -> R {
         let mut value = R::from_f64(self.level);
@@ -62,7 +62,7 @@ impl Surrogate {
     }
 }
 
-/// Terminal observations of a block's candidates with the critics' values.
+/// Terminal observations of a block's candidates, each with the critics' value.
 fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
     (0..worth.value.len()).map(|lane| {
         let end = SVector::from_fn(|i, _| f64::from(worth.end[i][lane]));
@@ -74,7 +74,7 @@ fn ends_of(worth: &Worth) -> impl Iterator<Item = (SVector<f64, N>, f64)> {
 mod tests {
     use super::*;
 
-    /// Ends that vary in eleven of their numbers, valued on a plane.
+    /// Terminal states with eleven varying observations and values on a plane.
     fn valued(block: usize) -> Worth {
         let mut worth = Worth::NONE;
         for lane in 0..worth.value.len() {
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(Surrogate::fit(&lost), None);
     }
 
-    /// Where nothing varies, the plane is flat.
+    /// Terminal states without variance give a plane of slope zero.
     #[test]
     fn equal_ends_have_their_value() {
         let mut worth = [Worth::NONE; 2];

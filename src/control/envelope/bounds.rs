@@ -1,17 +1,17 @@
-//! Envelope limits in SI units for plans and commands.
+//! Envelope limits in SI units, for planners and for the envelope limiter.
 
 use greylag_physics::Airframe;
 use greylag_physics::airframe::{Envelope, Incidence};
 
-/// Transient overshoot of bank above its largest command, rad: 3 % of a step from −60° to 60°.
+/// Allowed transient overshoot beyond the largest commanded bank, rad: 3 % of a step from −60° to 60°.
 const OVERSHOOT: f64 = 0.0628;
 
-/// Minimum and maximum of each limited quantity, SI units.
+/// Minimum and maximum of each limited quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Load factor along the body's z axis, in g, positive upward.
     pub load: [f64; 2],
-    /// Angle of attack below the stall, rad.
+    /// Angle of attack, rad. Both limits lie before the stall.
     pub alpha: [f64; 2],
     /// Largest |sideslip|, rad.
     pub sideslip: f64,
@@ -20,12 +20,12 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of an airframe file.
+    /// The bounds of the envelope in an airframe file.
     pub fn of(airframe: &Airframe) -> Bounds {
         Bounds::new(&airframe.envelope, &airframe.incidence)
     }
 
-    /// The bounds of `envelope` with the angles of attack of `incidence`.
+    /// The bounds of `envelope`, with the angles of attack from `incidence`.
     pub fn new(envelope: &Envelope, incidence: &Incidence) -> Bounds {
         let most = incidence.before_stall();
         Bounds {
@@ -36,7 +36,7 @@ impl Bounds {
         }
     }
 
-    /// The same bounds with load factor, incidence and sideslip scaled by `part`.
+    /// The same bounds with load factor, angle of attack and sideslip multiplied by `part`. The bank is unchanged.
     pub fn within(self, part: f64) -> Bounds {
         let scaled = |[low, high]: [f64; 2]| [part * low, part * high];
         Bounds {

@@ -1,4 +1,4 @@
-//! A controller behind the envelope limiter, as the pilot flies it.
+//! A controller whose commands pass through the envelope limiter, in the form in which the pilot flies it.
 
 use crate::envelope::EnvelopeLimiter;
 use crate::insight::Insight;
@@ -14,7 +14,7 @@ pub struct Guarded {
 }
 
 impl Guarded {
-    /// `controller` behind the envelope of the aircraft that `model` describes.
+    /// `controller` with the envelope limiter of the aircraft that `model` describes.
     pub fn new(controller: Box<dyn Controller>, model: &GreyBox) -> Guarded {
         Guarded { controller, limiter: EnvelopeLimiter::new(model), overruled: None }
     }

@@ -1,16 +1,18 @@
-//! The envelope limiter between a controller and the surfaces: elevator for load factor and incidence, aileron for bank.
+//! The envelope limiter between a controller and the surfaces. The elevator limits load factor and angle of attack, the
+//! aileron limits bank.
 //!
-//! Each limit gives a control law for the surface, and the command is clamped between the laws of both sides (min/max selection, as in
-//! fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6). The law is that of an
-//! exponential control barrier function (Nguyen and Sreenath, ACC 2016): where x is limited to x_lim and ẍ follows the surface,
+//! Each limit gives a control law for the surface. The command is clamped between the laws of both sides (min/max
+//! selection, as in fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6).
+//! The law is that of an exponential control barrier function (Nguyen and Sreenath, ACC 2016). If x is limited to x_lim
+//! and the surface controls ẍ,
 //!
 //! ```text
 //! ẍ + 2 ω (ẋ − ẋ_lim) + ω² (x − x_lim) = 0
 //! ```
 //!
-//! brings x to its limit without overshoot. Commands inside the limits are unchanged. Accelerations and surface effects are
-//! evaluated with the model at the state predicted for the time at which a command acts, so that they include rolling,
-//! speed and gravity.
+//! brings x to its limit without overshoot. Commands inside the limits are unchanged. The model gives accelerations and
+//! surface effects at the state predicted for the time at which a command acts. They therefore include the effects of
+//! rolling, airspeed and gravity.
 
 use crate::disturbance::{Disturbance, TIME_CONSTANT_S, TRUST};
 use crate::envelope::{Bounds, load_factor_under};
@@ -21,21 +23,21 @@ use greylag_physics::airframe::Envelope;
 use greylag_physics::servos::Travel;
 use greylag_physics::{Command, Controls, State};
 
-/// Fraction of the load-factor and incidence limits that is aimed at; the rest covers model error.
+/// Fraction of the limits of load factor and angle of attack at which the limiter aims. The rest covers model error.
 const PART: f64 = 0.96;
-/// ω of load factor and incidence, rad/s.
+/// Pole ω of the law for load factor and angle of attack, rad/s.
 const PITCH_POLE: f64 = 10.0;
-/// ω of bank, rad/s.
+/// Pole ω of the law for bank, rad/s.
 const BANK_POLE: f64 = 10.0;
-/// Steps after which a command acts: until the next tick, then the lag of a surface's actuator.
+/// Number of steps until a command acts: one to the next tick, the others for the lag of a surface's actuator.
 const AHEAD: usize = 3;
-/// Deflection for finite differences of a surface's effect, as a fraction of its travel.
+/// Deflection for the finite difference of a surface's effect, as a fraction of its travel.
 const PROBE: f64 = 0.1;
-/// Time step for finite differences of the model's rates, s.
+/// Time step for the finite difference of the model's rates, s.
 const SPAN_S: f64 = 1e-3;
 /// Change of the angle of attack for the finite difference of the load factor, rad.
 const SLOPE_STEP: f64 = 0.01;
-/// Newton steps from the present angle of attack to that of the load-factor limit.
+/// Number of Newton steps from the present angle of attack to the angle at the load-factor limit.
 const NEWTON: usize = 2;
 
 /// The limit that changed a command.
@@ -47,7 +49,7 @@ pub enum Limit {
     Incidence,
     /// The bank limit.
     Bank,
-    /// No limit: the model's predictions were wrong, so that the limiter is inactive.
+    /// No limit. The limiter is inactive because the model's predictions were wrong.
     Distrust,
 }
 
@@ -56,12 +58,12 @@ pub enum Limit {
 pub struct Limited {
     /// The command to be flown.
     pub command: Command,
-    /// The limit that changed it; `None` if it is unchanged.
+    /// The limit that changed the command, or the reason why the limiter is inactive. `None` if the command is within limits.
     pub by: Option<Limit>,
 }
 
 impl Limited {
-    /// The change that the controller must be told of, if a limit changed the command `wanted`; `None` otherwise.
+    /// The change of the command `wanted` by a limit, for the controller's integrators. `None` if no limit changed it.
     pub fn overruled(&self, wanted: Command) -> Option<Overruled> {
         let wanted = wanted.clamped();
         let limited = self.by.is_some_and(|by| by != Limit::Distrust);
@@ -69,7 +71,7 @@ impl Limited {
     }
 }
 
-/// The envelope limiter of one aircraft. It allocates only when it is built.
+/// The envelope limiter of one aircraft. It allocates memory only when it is built.
 #[derive(Clone, Debug)]
 pub struct EnvelopeLimiter {
     model: GreyBox,
@@ -84,7 +86,7 @@ enum Surface {
     Aileron,
 }
 
-/// Value of a limit and its rate, per second.
+/// Value of a limit in its unit, and the rate of this value per second.
 #[derive(Clone, Copy, Debug)]
 struct At {
     limit: Limit,
@@ -101,13 +103,13 @@ struct Moment<'a> {
     controls: Controls,
 }
 
-/// Second derivative of a limited quantity and its sensitivity to a surface.
+/// Value, first and second derivative of a limited quantity, and the effect of a surface on the second derivative.
 #[derive(Clone, Copy)]
 struct Motion {
     value: f64,
     rate: f64,
     acceleration: f64,
-    /// Sensitivity of the second derivative to the deflection, per rad.
+    /// Change of the second derivative per deflection, 1/rad.
     effect: f64,
     deflection: f64,
 }
@@ -122,18 +124,18 @@ impl EnvelopeLimiter {
         }
     }
 
-    /// Replaces the envelope from now on.
+    /// Uses `envelope` from now on.
     pub fn keep_to(&mut self, envelope: &Envelope) {
         self.bounds = Bounds::new(envelope, &self.model.airframe.incidence);
     }
 
-    /// Clears the disturbance estimate, as on re-engagement.
+    /// Clears the disturbance estimate. To be called when the controller engages.
     pub fn reset(&mut self) {
         self.disturbance = Disturbance::new(TIME_CONSTANT_S);
     }
 
-    /// The command nearest to `wanted` that stays inside the envelope. Call it once per tick with the command that
-    /// would fly; a command that is not finite is returned unchanged.
+    /// The command nearest to `wanted` that stays inside the envelope. To be called once per tick with the command that would
+    /// be flown. A command that is not finite is returned unchanged.
     pub fn limit(&mut self, seen: &Observation, wanted: Command) -> Limited {
         self.disturbance.update(&self.model, seen);
         if !wanted.is_finite() {
@@ -149,7 +151,7 @@ impl EnvelopeLimiter {
         out
     }
 
-    /// The predicted state when a command given now acts, earlier commands being held.
+    /// The predicted state at the time at which a new command acts. Until this time the previous command is held.
     fn when_it_acts(&self, seen: &Observation) -> Moment<'_> {
         let figures = &self.model.airframe.actuators;
         let mut actuators = Actuators::from_observed(&seen.actuators, &seen.previous, figures);
@@ -172,38 +174,37 @@ impl EnvelopeLimiter {
         let most = self.bounds.bank;
         let law = |value| motion.law(At { limit: Limit::Bank, value, rate: 0.0 }, BANK_POLE);
         let travel = self.model.airframe.actuators.aileron.travel;
-        // a positive aileron rolls right
+        // the law holds only if positive aileron rolls right
         if motion.effect > 0.0 {
             clamp(&mut out.command.aileron, &mut out.by, travel, [law(-most), law(most)]);
         }
     }
 
-    /// Load factor and incidence: both are limits of the angle of attack.
+    /// Limits load factor and angle of attack. Both are limits of the angle of attack.
     fn keep_load(&self, at: &Moment, out: &mut Limited) {
         let motion = at.motion(Surface::Elevator, |s| s.alpha);
-        // a positive elevator pitches down
+        // the law holds only if positive elevator pitches down
         if motion.effect >= 0.0 {
             return;
         }
         let bounds = self.bounds.within(PART);
         let travel = self.model.airframe.actuators.elevator.travel;
-        // the load factor is computed with the elevator that holds the angle of attack, because a moving surface adds
-        // lift of its own
+        // the load factor is computed for the elevator that holds the angle of attack, because a moving elevator adds its own
+        // lift
         let held = (motion.deflection - motion.acceleration / motion.effect)
             .clamp(travel.least, travel.most);
         let law = |side: usize| motion.law(at.incidence_limit(&bounds, side, held), PITCH_POLE);
         let [least, most] = [law(0), law(1)];
-        // the elevator's own lift acts before the angle of attack responds
+        // the elevator's lift acts before the angle of attack responds
         let [push, pull] = at.lift_limits(&self.bounds, motion.deflection);
         let low = if pull > most.0 { (pull.min(least.0), Limit::Load) } else { most };
         let high = if push < least.0 { (push.max(most.0), Limit::Load) } else { least };
-        // the lower bound limits nose-up commands and has priority: stall and largest load factor before the smallest
-        // load factor
+        // the lower bound limits nose-up commands and has priority: stall and largest load factor before smallest load factor
         clamp(&mut out.command.elevator, &mut out.by, travel, [low, high]);
     }
 }
 
-/// Clamps a command between the deflections of its limits; the first has priority.
+/// Clamps a command between the deflections (rad) of two limits. The lower limit has priority.
 fn clamp(
     command: &mut f64,
     by: &mut Option<Limit>,
@@ -241,10 +242,10 @@ impl Moment<'_> {
         self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
     }
 
-    /// Rates of the quantity `of` and the sensitivity to `surface`.
+    /// Value and derivatives of the quantity `of`, and their response to `surface`.
     fn motion(&self, surface: Surface, of: impl Fn(&State) -> f64) -> Motion {
         let mut controls = self.controls;
-        // rate and acceleration of the quantity: the acceleration is the change of the rate along the flow
+        // the acceleration is the change of the rate along the predicted motion
         let follow = |controls: &Controls| {
             let rate = self.rate(&self.state, controls);
             let later = self.rate(&self.state.advance(&rate, SPAN_S), controls);
@@ -260,20 +261,20 @@ impl Moment<'_> {
         Motion { value: of(&self.state), rate, acceleration, effect, deflection }
     }
 
-    /// The load factor at an angle of attack and elevator.
+    /// The load factor at an angle of attack and an elevator deflection (rad).
     fn load(&self, alpha: f64, elevator: f64) -> f64 {
         let state = State { alpha, ..self.state };
         let controls = Controls { elevator, ..self.controls };
         load_factor_under(&state, &self.rate(&state, &controls))
     }
 
-    /// The elevators at which the elevator's own lift reaches the largest and the smallest load factor.
+    /// The elevator deflections (rad) at which the elevator's lift alone reaches the largest and the smallest load factor.
     fn lift_limits(&self, bounds: &Bounds, elevator: f64) -> [f64; 2] {
         let load = self.load(self.state.alpha, elevator);
         let travel = Surface::Elevator.travel(self.model);
         let probe = if elevator > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         let slope = (self.load(self.state.alpha, elevator + probe) - load) / probe;
-        // a canard's lift has the other sign, as has its moment
+        // the lift of a canard has the other sign, as does its moment
         if slope <= 0.0 {
             return [f64::INFINITY, f64::NEG_INFINITY];
         }
@@ -281,7 +282,7 @@ impl Moment<'_> {
         [most, least]
     }
 
-    /// The angle of attack of one side of the bounds (0 minimum, 1 maximum), set by the load factor or the stall.
+    /// The limit of the angle of attack on one side (0 minimum, 1 maximum): the load factor's, or the stall's if it is nearer.
     fn incidence_limit(&self, bounds: &Bounds, side: usize, elevator: f64) -> At {
         let stall = At { limit: Limit::Incidence, value: bounds.alpha[side], rate: 0.0 };
         let mut alpha = self.state.alpha;
@@ -289,7 +290,7 @@ impl Moment<'_> {
         for _ in 0..NEWTON {
             let load = self.load(alpha, elevator);
             slope = (self.load(alpha + SLOPE_STEP, elevator) - load) / SLOPE_STEP;
-            // beyond the stall a larger angle of attack gives no more lift
+            // beyond the stall, more angle of attack gives no more lift
             if slope <= 0.0 || slope.is_nan() {
                 return stall;
             }

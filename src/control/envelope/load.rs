@@ -1,4 +1,4 @@
-//! The load factor of a step of the model.
+//! The load factor of the model: over one step, from state rates, and its derivatives.
 
 use greylag_model::STEP;
 use greylag_physics::State;
@@ -11,15 +11,16 @@ fn down(s: &State) -> f64 {
     s.airspeed * s.alpha.sin() * s.beta.cos()
 }
 
-/// The load factor along the body's z axis, positive upward, while `s` becomes `next` in one step: what an accelerometer at
-/// the centre of gravity would show. From the rigid body's force equation ẇ = g cosθ cosφ + Z/m + u q − v p, in still air.
+/// The load factor along the body's z axis, positive upward, in g, while `s` becomes `next` in one step. It is the reading
+/// of an accelerometer at the centre of gravity. It follows from the rigid body's force equation
+/// ẇ = g cosθ cosφ + Z/m + u q − v p in still air.
 pub fn load_factor(s: &State, next: &State) -> f64 {
     let (u, v) = (s.airspeed * s.alpha.cos() * s.beta.cos(), s.airspeed * s.beta.sin());
     let gravity = G0 * s.pitch.cos() * s.roll.cos();
     (gravity + u * s.q - v * s.p - (down(next) - down(s)) / STEP) / G0
 }
 
-/// The load factor along the body's z axis, positive upward, at `s` with the state's `rate`, per second.
+/// The load factor along the body's z axis, positive upward, in g, at the state `s` that changes with `rate` (per second).
 pub fn load_factor_under(s: &State, rate: &State) -> f64 {
     let ((sin_a, cos_a), (sin_b, cos_b)) = (s.alpha.sin_cos(), s.beta.sin_cos());
     let v = s.airspeed;
@@ -29,7 +30,7 @@ pub fn load_factor_under(s: &State, rate: &State) -> f64 {
     (gravity + v * cos_a * cos_b * s.q - v * sin_b * s.p - down) / G0
 }
 
-/// Derivatives of [`load_factor`]: by `s` at a fixed `next`, and by `next`.
+/// Derivatives of [`load_factor`], in g per unit of each state: by `s` at a fixed `next`, then by `next` at a fixed `s`.
 pub fn load_factor_slopes(s: &State, next: &State) -> [[f64; 8]; 2] {
     let ((sin_a, cos_a), (sin_b, cos_b)) = (s.alpha.sin_cos(), s.beta.sin_cos());
     let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (s.roll.sin_cos(), s.pitch.sin_cos());
@@ -59,7 +60,7 @@ mod tests {
 
     #[test]
     fn a_level_turn_carries_the_load_of_the_textbook() {
-        // 60°: n = 1/cos φ = 2, with q = g tan φ sin φ / V at a small angle of attack held
+        // at 60° bank n = 1/cos φ = 2, with q = g tan φ sin φ / V at a constant angle of attack
         let roll = std::f64::consts::FRAC_PI_3;
         let q = G0 * roll.tan() * roll.sin() / 20.0;
         let s = State { roll, q, airspeed: 20.0, alpha: 0.0, ..State::NEUTRAL };

@@ -1,4 +1,4 @@
-//! Envelope protection behind every controller: load factor, incidence and bank.
+//! Envelope protection for every controller: load factor, angle of attack and bank.
 
 mod bounds;
 mod guarded;

@@ -1,4 +1,4 @@
-//! Scalar cost terms with their derivatives.
+//! Scalar cost terms of iLQR with their derivatives.
 
 use std::ops::AddAssign;
 
@@ -22,13 +22,13 @@ impl AddAssign for Cost {
     }
 }
 
-/// ½ (x / size)².
+/// The cost ½ (x / size)².
 pub(super) fn square(x: f64, size: f64) -> Cost {
     let w = 1.0 / size;
     Cost { value: 0.5 * (x * w) * (x * w), slope: w * w * x, curvature: w * w }
 }
 
-/// Quadratic near zero and linear beyond `far` (pseudo-Huber); quadratic throughout for `None`.
+/// A cost that is quadratic near zero and linear beyond `far` (pseudo-Huber). With `None` it is quadratic everywhere.
 pub(super) fn attitude(x: f64, size: f64, far: Option<f64>) -> Cost {
     let Some(far) = far else { return square(x, size) };
     let w = 1.0 / (size * size);
@@ -36,7 +36,7 @@ pub(super) fn attitude(x: f64, size: f64, far: Option<f64>) -> Cost {
     Cost { value: w * far * far * (root - 1.0), slope: w * x / root, curvature: w / root }
 }
 
-/// Squared excess outside the bounds, over `size`.
+/// The cost ½ (e / size)² of the excess e of `x` beyond the bounds. Zero inside the bounds.
 pub(super) fn beyond(x: f64, [low, high]: [f64; 2], size: f64) -> Cost {
     if x > high {
         square(x - high, size)

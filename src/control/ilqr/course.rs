@@ -1,9 +1,9 @@
-//! The attitude that a plan follows: a path to the target that the aircraft can fly.
+//! The attitude reference that a plan follows: a path to the target that the aircraft can fly.
 //!
-//! Each axis is driven by a cascade of limited rate and acceleration, as a flight controller drives its rate loops
-//! from its attitude loops. Pitch is limited by the load factor n: in coordinated flight θ̇ = (g / V) (n cos φ − cos
-//! θ), from the rigid body's force equations with V and α constant. The path continues from tick to tick, and is held
-//! back while the aircraft lags behind it.
+//! Each axis is driven by a cascade with limited rate and acceleration, like the attitude and rate loops of a flight
+//! controller. The load factor n limits pitch. In coordinated flight θ̇ = (g / V) (n cos φ − cos θ), from the rigid body's
+//! force equations with V and α constant. The path continues from tick to tick. The path waits while the aircraft lags behind
+//! it.
 
 use super::STEPS;
 use crate::envelope::G0;
@@ -11,47 +11,47 @@ use greylag_model::{GreyBox, STEP};
 use greylag_physics::State;
 use std::f64::consts::TAU;
 
-/// Largest bank (rad) for the body rates of the path; at a steeper bank those of this one are used.
+/// Limit of the bank (rad) in the formula for the path's body rates, which is singular at 90°.
 const STEEP: f64 = 1.4;
 /// Largest roll and pitch rates, rad/s: 70 and 60 °/s, the defaults of PX4's FW_R_RMAX and FW_P_RMAX_POS.
 const MOST: [f64; 2] = [1.22, 1.05];
-/// How far the path may be ahead of the aircraft, rad.
+/// Largest lead of the path over the aircraft in each axis, rad.
 const AHEAD: f64 = 0.02;
-/// Intermediate banks that are tried, as fractions of the target bank, and the numbers of ticks for which they are
-/// held.
+/// Intermediate banks that are tried, as fractions of the target bank, and the durations for which they are held, in
+/// ticks.
 const PARTS: [f64; 3] = [0.0, 0.35, 0.7];
 const TICKS: [usize; 6] = [30, 60, 100, 150, 210, 300];
 /// Duration of a trial and its integration step, ticks.
 const TRIAL: usize = 600;
 const COARSE: usize = 5;
-/// Another intermediate bank replaces the one being flown if its cost is below this fraction of the present cost.
+/// Another intermediate bank replaces the present one if its cost is below this fraction of the present one's cost.
 const BETTER: f64 = 0.97;
-/// Smallest target bank and pitch-up (rad) for which an intermediate bank is considered.
+/// Smallest target bank, and smallest pitch-up from the present pitch, for which an intermediate bank is considered, rad.
 const STEEP_ENOUGH: f64 = 0.5;
 const UP_ENOUGH: f64 = 0.1;
 /// Fraction of the largest acceleration that is used for braking.
 const BRAKING: f64 = 0.7;
 
-/// How fast a path approaches its target.
+/// Limits and gains with which a path approaches its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Approach {
-    /// Rate per error close to the target, 1/s.
+    /// Ratio of the rate to the error close to the target, 1/s.
     gain: f64,
     /// Largest roll and pitch rates, rad/s.
     rates: [f64; 2],
     /// Largest roll and pitch accelerations, rad/s².
     accelerations: [f64; 2],
-    /// Fraction of the largest roll rate that remains where a steep bank takes all of the load factor.
+    /// Fraction of the largest roll rate that remains when a steep bank uses all of the load factor.
     steep: f64,
-    /// Scale of the roll error to the path, rad.
+    /// Scale of the roll error from the path in the cost, rad.
     pub roll: f64,
 }
 
 impl Approach {
-    /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder, adverse yaw
-    /// disturbs pitch, and the load-factor limit may not leave room to correct it. Such an aircraft therefore rolls
-    /// slowly, and its roll errors cost less. The values without a rudder were chosen on steps of the Skywalker X8,
-    /// those with a rudder on steps of the Aerosonde (`results/flight-quality.txt` holds other steps).
+    /// The approach of an aircraft that rolls at `full` rad/s with full aileron. Without a rudder, adverse yaw disturbs pitch,
+    /// and the load-factor limit may leave no room for a correction. Such an aircraft therefore rolls slowly, and its roll
+    /// errors cost less. The values without a rudder were chosen on steps of the Skywalker X8, the values with a rudder on
+    /// steps of the Aerosonde. `results/flight-quality.txt` contains other steps.
     pub fn of(model: &GreyBox, full: f64) -> Approach {
         if model.has_rudder() {
             let rates = [full, MOST[1]];
@@ -69,7 +69,7 @@ impl Approach {
         }
     }
 
-    /// Angle and rate of an axis `span` seconds later, on the way to an angle that is `error` away.
+    /// Angle (rad) and rate (rad/s) of an axis after `span` seconds, on the way to an angle that is `error` (rad) away.
     fn step(
         &self,
         axis: usize,
@@ -82,26 +82,26 @@ impl Approach {
         let acceleration = self.accelerations[axis];
         let braking = (2.0 * BRAKING * acceleration * error.abs()).sqrt();
         let wanted = error.signum() * (self.gain * error.abs()).min(braking);
-        // the limits may exclude zero: a bank that the load factor cannot hold
+        // the limits exclude zero at a bank that the load factor cannot hold
         let wanted = wanted.max(least).min(most);
-        // four times the outer loop's gain: critically damped
+        // a rate gain of four times the attitude gain is critically damped
         let change = (wanted - rate) * (4.0 * self.gain);
         let rate = rate + change.clamp(-acceleration, acceleration) * span;
         [angle + rate * span, rate]
     }
 }
 
-/// A point of the path.
+/// A point of the path: attitude and its rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
     /// Roll and pitch, rad.
     pub attitude: [f64; 2],
-    /// Their rates, rad/s.
+    /// Rates of roll and pitch, rad/s.
     rates: [f64; 2],
 }
 
 impl Point {
-    /// The measured attitude with its rates.
+    /// The point of the measured attitude and its rates.
     fn of(s: &State) -> Point {
         let (sin, cos) = s.roll.sin_cos();
         let turn = s.q * sin + s.r * cos;
@@ -109,7 +109,7 @@ impl Point {
         Point { attitude: [s.roll, s.pitch], rates }
     }
 
-    /// Roll, pitch and yaw rates of the body in a coordinated turn along the path, rad/s; `turn` is g / V, 1/s.
+    /// Rates p, q, r of the body in a coordinated turn along the path, rad/s. `turn` is g / V, 1/s.
     fn body_rates(&self, turn: f64) -> [f64; 3] {
         let [roll, pitch] = self.attitude;
         let (sin, cos) = roll.clamp(-STEEP, STEEP).sin_cos();
@@ -119,12 +119,12 @@ impl Point {
     }
 }
 
-/// An intermediate bank: the target bank is delayed where it would take the load factor that the pitch-up needs.
+/// An intermediate bank. The target bank is delayed if it would use the load factor that the pitch-up needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct First {
-    /// The bank as a fraction of the target's.
+    /// The intermediate bank as a fraction of the target bank.
     part: f64,
-    /// Ticks for which it is flown.
+    /// Number of ticks for which it is still flown.
     ticks: usize,
 }
 
@@ -136,24 +136,24 @@ impl First {
         First { ticks: self.ticks.saturating_sub(1), ..self }
     }
 
-    /// The bank to go to after `tick` ticks.
+    /// The commanded bank after `tick` ticks, rad.
     fn bank(self, tick: usize, target: f64) -> f64 {
         if tick < self.ticks { self.part * target } else { target }
     }
 }
 
-/// Conditions that a path must meet.
+/// Target and limits of a path.
 struct Task<'a> {
     /// g / V, 1/s.
     turn: f64,
-    /// Roll and pitch, rad.
+    /// Target roll and pitch, rad.
     target: [f64; 2],
     load: [f64; 2],
     approach: &'a Approach,
 }
 
 impl Task<'_> {
-    /// The point `span` seconds later on the way to `bank` and the target's pitch.
+    /// The point `span` seconds later on the way to `bank` (rad) and the target pitch.
     fn step(&self, from: &Point, bank: f64, span: f64) -> Point {
         let Point { attitude: [roll, pitch], rates: [rolling, pitching] } = *from;
         let approach = self.approach;
@@ -182,8 +182,7 @@ impl Task<'_> {
         sum
     }
 
-    /// The intermediate bank with the smallest integral of the error. The one being flown is replaced only by a
-    /// clearly better one.
+    /// The intermediate bank with the smallest cost. It replaces the present one only if its cost is clearly smaller.
     fn choose(&self, from: &Point, flown: First) -> First {
         let [bank, pitch] = self.target;
         if bank.abs() < STEEP_ENOUGH || pitch - from.attitude[1] < UP_ENOUGH {
@@ -229,22 +228,22 @@ impl Course {
         self.first = First::NONE;
     }
 
-    /// The point after `step` steps.
+    /// The point of the path after `step` steps.
     pub fn at(&self, step: usize) -> &Point {
         &self.points[step]
     }
 
-    /// Roll, pitch and yaw rates of the body on the path after `step` steps, rad/s.
+    /// Rates p, q, r of the body on the path after `step` steps, rad/s.
     pub fn turning(&self, step: usize) -> [f64; 3] {
         self.turning[step]
     }
 
-    /// The target itself (roll and pitch, rad) in place of a path.
+    /// Replaces the path by the constant `target` (roll and pitch, rad).
     pub fn stay(&mut self, target: [f64; 2]) {
         self.points.fill(Point { attitude: target, rates: [0.0; 2] });
     }
 
-    /// The path from `seen` to `target` (roll and pitch, rad) within the load factors `load`.
+    /// Computes the path from `seen` to `target` (roll and pitch, rad) within the load factors `load` (minimum, maximum).
     pub fn towards(&mut self, seen: &State, target: [f64; 2], load: [f64; 2], approach: &Approach) {
         let mut now = self.begin(seen);
         let task = Task { turn: G0 / seen.airspeed.max(1.0), target, load, approach };
@@ -259,7 +258,7 @@ impl Course {
         }
     }
 
-    /// The point at which the path continues: at most [`AHEAD`] from the aircraft in each axis.
+    /// The point at which the path continues, at most [`AHEAD`] from the aircraft in each axis.
     fn begin(&self, seen: &State) -> Point {
         let here = Point::of(seen);
         let Some(mut now) = self.next else { return here };
@@ -274,7 +273,7 @@ impl Course {
     }
 }
 
-/// The angle within half a turn, rad.
+/// The angle `x` wrapped to −π..π, rad.
 pub(super) fn wrapped(x: f64) -> f64 {
     (x + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0
 }
@@ -291,7 +290,7 @@ mod tests {
         roll: 0.1,
     };
 
-    /// Follows a path exactly for `ticks`, with the point of each tick.
+    /// The points of a path that the aircraft follows exactly for `ticks` ticks.
     fn follow(target: [f64; 2], load: [f64; 2], ticks: usize) -> Vec<Point> {
         let mut course = Course::new();
         let mut state = State { airspeed: 20.0, ..State::NEUTRAL };
@@ -339,7 +338,7 @@ mod tests {
         let first = steep.choose(&dive, First::NONE);
         assert!(first.ticks > 0 && first.part < 1.0, "{first:?}");
         assert!(steep.cost(&dive, first) < BETTER * steep.cost(&dive, First::NONE));
-        // the bank being flown is kept, and a bank that takes little load factor is not delayed
+        // the present bank is kept, and a bank that uses little load factor is not delayed
         assert_eq!(steep.choose(&dive, first), first);
         assert_eq!(task([0.3, 0.49]).choose(&dive, First::NONE), First::NONE);
     }

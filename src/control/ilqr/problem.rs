@@ -17,11 +17,11 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::inputs::InputMemory;
 use greylag_physics::{Command, Controls, State};
 
-/// States: those of eq. (4), then for aileron and elevator the deflection now and one step ago with the
-/// two last commanded deflections, rad.
+/// Number of states: the eight of eq. (4), then four for aileron and four for elevator. These four are the deflection now and
+/// one step ago, and the last two commanded deflections, rad.
 pub(super) const STATES: usize = 16;
 
-/// Indices of the deflections, each followed by its filter's other states.
+/// Indices of the deflections of aileron and elevator in the state. The other three states of each filter follow.
 pub(super) const SURFACES: [usize; 2] = [8, 12];
 
 /// A matrix over the states.
@@ -29,8 +29,7 @@ pub(super) type Square = SMatrix<f64, STATES, STATES>;
 /// A vector over the states.
 pub(super) type Vector = SVector<f64, STATES>;
 
-/// Incidence (rad) above which it costs where the envelope sets no limit, and the excess that costs as much as the
-/// other scales.
+/// Angle of attack above which it adds to the cost if the envelope sets no limit, and the scale of the excess, rad.
 const STALL: [f64; 2] = [0.16, 0.02];
 
 /// The optimal control problem of one tick.
@@ -39,9 +38,9 @@ pub(super) struct Problem<'a> {
     pub model: &'a GreyBox,
     pub seen: &'a Observation,
     pub goal: Goal,
-    /// Attitude to follow over the plan.
+    /// Attitude reference over the plan.
     pub course: &'a Course,
-    /// Dynamics of the path to the target; `None` if the plan follows the target itself.
+    /// Dynamics of the path to the target. `None` if the plan follows the target itself.
     pub approach: Option<&'a Approach>,
     /// Constant throttle over the plan, 0..1.
     pub throttle: f64,
@@ -51,7 +50,7 @@ pub(super) struct Problem<'a> {
     /// Constant disturbance added to the model's state rate, per second.
     pub disturbance: State,
     pub settings: &'a Settings,
-    /// Limits from which load factor, incidence and sideslip cost.
+    /// Limits beyond which load factor, angle of attack and sideslip add to the cost. `None` for a cost without them.
     pub bounds: Option<Bounds>,
 }
 
@@ -150,7 +149,7 @@ impl Problem<'_> {
         self.fly_with(out, |step, _| plan[step]).1
     }
 
-    /// Simulates the commands of `choose`, which sees the trajectory so far; returns the plan and its cost.
+    /// Simulates the commands of `choose`, whose argument is the trajectory so far. Returns the plan and its cost.
     pub fn fly_with(
         &self,
         out: &mut Trajectory,
@@ -159,7 +158,7 @@ impl Problem<'_> {
         self.fly_choosing(out, |step, _, trajectory| choose(step, trajectory))
     }
 
-    /// Simulates the LQI's commands; returns its plan and cost.
+    /// Simulates the LQI's commands. Returns their plan and its cost.
     pub fn follow(&self, ahead: &Ahead, out: &mut Trajectory) -> ([Surfaces; STEPS], f64) {
         let figures = &self.model.airframe.actuators;
         let mut reference = ahead.reference();
@@ -170,7 +169,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Simulates the policy's commands; returns its plan and cost.
+    /// Simulates the policy's commands. Returns their plan and its cost.
     pub fn follow_policy(
         &self,
         actor: &Actor,
@@ -212,7 +211,7 @@ impl Problem<'_> {
         (plan, cost)
     }
 
-    /// Cost of each state component with its index in the state.
+    /// Cost of each state component, with the component's index in the state.
     fn costs(&self, s: &State, step: usize) -> [(usize, Cost); 7] {
         let [mut p, mut q, mut r, _, beta] = self.goal.steady;
         let point = self.course.at(step);
@@ -244,7 +243,7 @@ impl Problem<'_> {
         self.costs(state, step).iter().map(|(_, cost)| cost.value).sum()
     }
 
-    /// Cost of the load factor between two states.
+    /// Cost of the load factor in the step from one state to the next.
     fn load(&self, from: &State, to: &State) -> Cost {
         match (&self.bounds, &self.settings.envelope) {
             (Some(bounds), Some(barrier)) => {
@@ -254,8 +253,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Gradient and curvature of the load-factor cost of a step with respect to the state before it, given the
-    /// transition; `None` where it costs nothing.
+    /// Cost of the load factor in a step, and the gradient of the load factor with respect to the state before the step.
+    /// `transition` is the step's linear transition. `None` if the cost is zero.
     pub fn load_terms(
         &self,
         trajectory: &Trajectory,
@@ -276,7 +275,7 @@ impl Problem<'_> {
         Some((cost, slope))
     }
 
-    /// Gradient and curvature of the state cost after `step` steps.
+    /// Gradient of the state cost after `step` steps, and the diagonal of its curvature.
     pub fn stage_terms(&self, trajectory: &Trajectory, step: usize) -> (Vector, Vector) {
         let (mut slope, mut curvature) = (Vector::zeros(), Vector::zeros());
         let weight = if step == STEPS { self.settings.last } else { 1.0 };
@@ -287,20 +286,20 @@ impl Problem<'_> {
         (slope, curvature)
     }
 
-    /// Indices in the state `x` of the last commanded surfaces, with the deflection (rad) of full command on their
-    /// present side.
+    /// Index in the state `x` of the last commanded deflection of each surface, and the deflection (rad) of full command on
+    /// the side of this deflection.
     pub fn last_commands(&self, x: &Vector) -> [(usize, f64); 2] {
         let figures = &self.model.airframe.actuators;
         let travels = [figures.aileron.travel, figures.elevator.travel];
         std::array::from_fn(|i| (SURFACES[i] + 2, travels[i].slope(x[SURFACES[i] + 2])))
     }
 
-    /// Weight of a squared change of the command.
+    /// Weight of the squared change of a command from one step to the next.
     pub fn move_weight(&self) -> f64 {
         1.0 / (self.settings.moves * self.settings.moves)
     }
 
-    /// One step, linear about the trajectory.
+    /// One step of the aircraft and its actuators, linear about the trajectory.
     pub fn linear(&self, trajectory: &Trajectory, step: usize) -> Transition {
         let figures = &self.model.airframe.actuators;
         let (state, controls) = (&trajectory.states[step], &trajectory.controls[step]);

@@ -1,34 +1,34 @@
-//! Settings of iLQR: cost scales and starting points.
+//! Settings of iLQR: cost scales, the reference, iterations and starting points.
 
-/// Cost scales by Bryson's rule (errors of these sizes cost the same), and the number of iterations per tick.
+/// Settings of iLQR. The cost scales follow Bryson's rule: an error of the size of its scale has the same cost in every term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Attitude error scale, rad.
     pub attitude: f64,
-    /// Attitude error beyond which the cost grows linearly (pseudo-Huber), rad; `None` keeps it quadratic.
+    /// Attitude error beyond which the cost grows linearly (pseudo-Huber), rad. `None` keeps the cost quadratic.
     pub far: Option<f64>,
-    /// Scale of body rates relative to the steady turn, rad/s.
+    /// Scale of the difference of the body rates from the reference, rad/s.
     pub rate: f64,
-    /// Scale of sideslip relative to the steady turn, rad.
+    /// Scale of the difference of sideslip from the steady turn, rad.
     pub sideslip: f64,
-    /// Scale of a change of the command, as a fraction of the largest deflection.
+    /// Scale of the change of a command from one step to the next, as a fraction of full command.
     pub moves: f64,
-    /// Weight of the terminal state as a multiple of a stage.
+    /// Weight of the terminal state's cost as a multiple of the other steps' weight.
     pub last: f64,
-    /// Soft limits on load factor, incidence and sideslip; `None` leaves them out.
+    /// Soft limits on load factor, angle of attack and sideslip. `None` omits them.
     pub envelope: Option<Barrier>,
     /// Reference that the plan follows.
     pub towards: Towards,
-    /// Iterations per tick.
+    /// Number of iterations per tick.
     pub iterations: usize,
-    /// Starting points other than the last plan and the LQI's.
+    /// Starting points in addition to the last plan and the LQI's commands.
     pub start: Start,
 }
 
-/// Soft limits: scales of the excess over the envelope.
+/// Soft limits of the envelope: where they begin, and the scales of the excess.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Barrier {
-    /// Fraction of the limit from which it costs.
+    /// Fraction of the envelope's limit above which a quantity adds to the cost.
     pub part: f64,
     /// Scale of the load-factor excess, g.
     pub load: f64,
@@ -38,27 +38,27 @@ pub struct Barrier {
     pub sideslip: f64,
 }
 
-/// Starting points other than the last plan and the LQI's.
+/// Starting points in addition to the last plan and the LQI's commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
     /// No further starting point.
     Own,
-    /// The policy's simulated flight, where there is a policy.
+    /// The policy's simulated flight, if there is a policy.
     Policy,
 }
 
 /// Reference that the plan follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Towards {
-    /// The target itself, at once.
+    /// The target itself from the first step on.
     Target,
-    /// A path to the target within the rates and the load factor that the aircraft can fly.
+    /// A path to the target within the rates and the load factors that the aircraft can fly.
     Path,
 }
 
 impl Settings {
-    /// Settings of `ilqr`. Among a few variants, flown on every seventh target, they settle as fast as any and are
-    /// the steadiest in moderate turbulence.
+    /// Settings of the controller `ilqr`. Several variants were flown on every seventh target. These settings settle as fast as
+    /// any of them and are the steadiest in moderate turbulence.
     pub const PLAIN: Settings = Settings {
         attitude: 0.05,
         far: None,

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, SMatrix, Vector2};
 use super::problem::{Problem, STATES, Square, Trajectory, Vector};
 use super::{STEPS, Surfaces};
 
-/// Feedback gain of the commands on the state deviation.
+/// Feedback gain from the state deviation to the commands.
 type Gain = SMatrix<f64, 2, STATES>;
 
 /// Step lengths of the line search, largest first.
@@ -38,8 +38,8 @@ impl Solver {
         std::mem::swap(&mut self.spare, trajectory);
     }
 
-    /// The best of the line search from `plan`, which costs `cost` along `trajectory`, with its cost; `plan` if no
-    /// step improves it. `trajectory` becomes that of the result.
+    /// One iteration from `plan`, whose cost along `trajectory` is `cost`. Returns the first plan of the line search with a
+    /// lower cost, and this cost. Without such a plan it returns `plan`. `trajectory` becomes the result's trajectory.
     pub fn iterate(
         &mut self,
         problem: &Problem,
@@ -64,7 +64,7 @@ impl Solver {
         (plan, cost)
     }
 
-    /// Backward pass: fills gains and feed-forward changes; `None` if a value is not finite.
+    /// Backward pass: computes the gains and feed-forward changes. `None` if a value is not finite.
     fn back(
         &mut self,
         problem: &Problem,
@@ -87,7 +87,7 @@ impl Solver {
                 q_x += n * cost.slope;
                 q_xx.ger(cost.curvature, &n, &n, 1.0);
             }
-            // the cost of the change from the last command, which is among the states
+            // cost of the change from the last command, which is one of the states
             let x = trajectory.at(step);
             for (c, (at, unit)) in problem.last_commands(&x).into_iter().enumerate() {
                 let moved = plan[step][c] - x[at] / unit;
@@ -129,8 +129,8 @@ fn reduced(q_xx: Square, q_uu: &Matrix2<f64>, q_ux: &Gain, gain: &Gain) -> Squar
     value
 }
 
-/// Box-constrained minimiser within −1..1 and its feedback gain, zero for a command at its limit (Tassa et al. 2014;
-/// with two commands all active sets can be tried).
+/// Minimiser of the quadratic cost with the commands limited to −1..1, and its feedback gain, which is zero for a command at
+/// its limit (Tassa et al. 2014). With two commands all active sets are tried. `None` if a value is not finite.
 fn limited(
     slope: &Vector2<f64>,
     curvature: &Matrix2<f64>,
@@ -181,7 +181,7 @@ mod tests {
         assert!((reduced(q_xx, &q_uu, &q_ux, &gain) - sum).amax() < 1e-12);
     }
 
-    /// The change that costs least within the limits, found by a grid.
+    /// The reference is the change of lowest cost within the limits on a grid.
     #[test]
     fn limits_are_kept_at_the_least_cost() {
         let curvature = Matrix2::new(2.0, 0.6, 0.6, 1.0);

@@ -1,40 +1,42 @@
-//! The linear transition of a step, with products that leave out its zeros.
+//! The linear transition of a step, with products that omit its zeros.
 //!
-//! Half of the states are those of the actuators' filters, whose rows hold at most four entries: the products of the backward pass
-//! take a third of the operations of dense ones.
+//! Half of the states belong to the actuators' filters, whose rows have at most four entries. The products of the backward
+//! pass therefore take a third of the operations of dense products.
 
 use super::problem::{STATES, SURFACES, Square, Vector};
 use greylag_physics::servos::Surface;
 use nalgebra::{SMatrix, SVector};
 
-/// A product with a transition: a matrix of columns over the states.
+/// A matrix whose columns have one entry per state.
 pub(super) type Columns<const N: usize> = SMatrix<f64, STATES, N>;
 
-/// δx₊ = A δx + B δu: the aircraft's eight states follow their Jacobian, the other eight the filters of aileron and elevator.
+/// The transition δx₊ = A δx + B δu. The aircraft's eight states follow their Jacobian. The other eight states are those of the
+/// filters of aileron and elevator.
 #[derive(Clone, Debug)]
 pub(super) struct Transition {
-    /// Jacobian of the aircraft's states by themselves, then by the deflections of aileron and elevator.
+    /// Jacobian of the aircraft's states with respect to themselves, then to the deflections of aileron and elevator.
     pub aircraft: SMatrix<f64, 8, 10>,
     pub filters: [Filter; 2],
 }
 
-/// The linear filter of an actuator.
+/// The linear filter of a surface's actuator.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filter {
-    /// Deflection after the step by deflection, last deflection, last command and the one before.
+    /// Derivatives of the deflection after the step with respect to the filter's states: the deflection, the previous
+    /// deflection, the last commanded deflection and the one before it.
     own: [f64; 4],
-    /// Deflection after the step by the command, rad.
+    /// Derivative of the deflection after the step with respect to the command, rad.
     gain: f64,
     /// Deflection of full command, rad.
     unit: f64,
 }
 
 impl Filter {
-    /// The filter, linear about the deflection after the step and the commanded deflection, rad.
+    /// The filter of the surface `of`, linear about the deflection after the step and the commanded deflection (rad).
     pub fn new(of: &Surface, deflection: f64, commanded: f64) -> Filter {
         let [b0, a1, a2] = of.filter;
         let unit = of.travel.slope(commanded);
-        // a surface at its stop stays there
+        // a surface at its travel limit stays there
         if of.travel.reaches(deflection) {
             Filter { own: [-a1, -a2, 2.0 * b0, b0], gain: b0 * unit, unit }
         } else {
@@ -92,7 +94,7 @@ impl Transition {
         out
     }
 
-    /// Adds the row of an aircraft's state, `by` times.
+    /// Adds `by` times the row of A for the aircraft's state `row` to `to`.
     pub fn add_row(&self, row: usize, by: f64, to: &mut Vector) {
         let of: SVector<f64, 10> = self.aircraft.row(row).transpose();
         for i in 0..8 {
@@ -112,7 +114,7 @@ impl Transition {
 mod tests {
     use super::*;
 
-    /// A and B with all their zeros.
+    /// A and B as dense matrices.
     fn dense(of: &Transition) -> (Square, Columns<2>) {
         let (mut a, mut b) = (Square::zeros(), Columns::<2>::zeros());
         a.fixed_view_mut::<8, 8>(0, 0).copy_from(&of.aircraft.fixed_columns::<8>(0));

@@ -1,4 +1,4 @@
-//! The LQI's control law over the coming steps, evaluated for many simulated aircraft in lanes.
+//! The LQI's control law over the coming steps, for many simulated aircraft at once, one per vector lane.
 
 use super::design::{RUDDER_STATES, STATES};
 use super::{AIRSPEED_KP, PITCH_RATE, ROLL_RATE, ROUNDING};
@@ -9,41 +9,41 @@ use greylag_physics::airframe::Incidence;
 use greylag_physics::servos::ActuatorFigures;
 use greylag_physics::{ActuatorState, Airframe, Command, State};
 
-/// The gain of one flight condition and its steady state.
+/// The gain of one flight condition and the steady state to which it regulates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Law {
-    /// Gain rows of aileron and elevator.
+    /// Gain rows of aileron and elevator, rad per unit of each state.
     gain: [[f64; STATES]; 2],
-    /// p q r α β of the steady condition, rad/s and rad.
+    /// p q r α β of the steady state, rad/s and rad.
     steady: [f64; 5],
-    /// Aileron and elevator that hold it, rad.
+    /// Deflections of aileron and elevator in the steady state, rad.
     deflection: [f64; 2],
-    /// Throttle that holds it, 0..1.
+    /// Throttle in the steady state, 0..1.
     throttle: f64,
-    /// The rudder's law, for an aircraft with a rudder.
+    /// The rudder's law. `None` for an aircraft without a rudder.
     rudder: Option<RudderLaw>,
 }
 
 /// The rudder's part of the gain of one flight condition.
 #[derive(Clone, Copy, Debug)]
 struct RudderLaw {
-    /// Gains of aileron and elevator on the rudder's states.
+    /// Gains of aileron and elevator on the rudder's filter states.
     coupling: [[f64; RUDDER_STATES]; 2],
-    /// Gain row of the rudder.
+    /// Gain row of the rudder on the states other than its filter states.
     row: [f64; STATES],
     own: [f64; RUDDER_STATES],
-    /// Rudder that holds the condition, rad.
+    /// Deflection of the rudder in the steady state, rad.
     deflection: f64,
 }
 
-/// Figures that convert deflections to commands, with the sign of the elevator.
+/// Properties that convert deflections to commands, and the angle of attack above which the law pushes the nose down.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfaces {
     pub figures: ActuatorFigures,
     pub incidence: Incidence,
 }
 
-/// Reference and integrator states of the law, rad and rad s.
+/// Reference and integrator states of the law.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inner<R> {
     /// Reference roll and pitch, rad.
@@ -68,7 +68,7 @@ impl Law {
         rudder: None,
     };
 
-    /// Commands of aileron, elevator and rudder, not limited.
+    /// Commands of aileron, elevator and rudder, without limits.
     #[inline(always)]
     pub(super) fn surfaces<R: Real>(
         &self,
@@ -128,7 +128,7 @@ impl Law {
         [ailerons.command(u[0]), elevators.command(u[1]), rudder]
     }
 
-    /// Gains of the aileron on the reference roll and of the elevator on the reference pitch, rad/rad.
+    /// Gains from the reference roll to the aileron and from the reference pitch to the elevator, rad/rad.
     pub(super) fn by_reference(&self) -> [f64; 2] {
         [self.gain[0][0], self.gain[1][1]]
     }
@@ -139,7 +139,8 @@ impl Law {
 }
 
 impl RudderLaw {
-    /// The rudder's deflection (rad) about `held`; its states' contribution to aileron and elevator is added to `u`.
+    /// The rudder's deflection (rad), where `held` is the steady one. Adds the contribution of the rudder's filter states to
+    /// the deflections `u` of aileron and elevator.
     #[inline(always)]
     fn act<R: Real>(&self, held: R, x: &[R; STATES], y: &[R; RUDDER_STATES], u: &mut [R; 2]) -> R {
         let mut yaw = held;
@@ -178,11 +179,11 @@ impl From<Entry> for Law {
     }
 }
 
-/// Steps for which one gain is held.
+/// Number of steps for which one gain is held.
 pub(super) const HOLD: usize = 5;
 
-/// The part of the LQI's future that does not depend on the simulated aircraft: the gains scheduled along the
-/// reference, at the tick's airspeed, with constant integrators.
+/// The part of the LQI's prediction that does not depend on the simulated aircraft. The gains are scheduled along the
+/// reference at the tick's airspeed. The integrators are constant.
 #[derive(Clone, Debug)]
 pub(crate) struct Ahead {
     pub(super) laws: Vec<Law>,
@@ -195,7 +196,7 @@ pub(crate) struct Ahead {
 }
 
 impl Ahead {
-    /// Allocates `steps` steps for an aircraft.
+    /// Allocates memory for `steps` steps of an aircraft.
     pub(crate) fn new(steps: usize, airframe: &Airframe) -> Ahead {
         Ahead {
             laws: vec![Law::NONE; steps.div_ceil(HOLD)],
@@ -208,7 +209,7 @@ impl Ahead {
         }
     }
 
-    /// Number of steps ahead.
+    /// Number of steps of the prediction.
     #[inline(always)]
     pub(crate) fn steps(&self) -> usize {
         self.steps
@@ -219,7 +220,7 @@ impl Ahead {
         self.inner.reference
     }
 
-    /// The command at `step` for a simulated aircraft; advances its `reference` (rad).
+    /// The command at `step` for a simulated aircraft. Advances its `reference` (rad).
     #[inline(always)]
     pub(crate) fn command<R: Real>(
         &self,

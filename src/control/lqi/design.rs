@@ -6,11 +6,11 @@ use super::riccati;
 use greylag_model::{GreyBox, Linear, STEP, Trim, linearise};
 use greylag_physics::servos::Surface;
 
-/// States of the design: φ θ p q r α β, then for aileron and elevator the deflection now and one
-/// step ago with the two last commanded deflections, then ∫φ and ∫θ.
+/// Number of states of the design: φ θ p q r α β, then four for aileron and four for elevator, then ∫φ and ∫θ. The four are
+/// the deflection now and one step ago, and the last two commanded deflections.
 pub(super) const STATES: usize = 17;
 
-/// Additional states of a design with a rudder: its deflection now and one step ago, and the two last commanded
+/// Number of additional states of a design with a rudder: its deflection now and one step ago, and its last two commanded
 /// deflections.
 pub(super) const RUDDER_STATES: usize = 4;
 pub(super) const ALL: usize = STATES + RUDDER_STATES;
@@ -18,18 +18,18 @@ pub(super) const ALL: usize = STATES + RUDDER_STATES;
 /// The LQI gain at one flight condition.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gain {
-    /// Rows aileron and elevator (rad).
+    /// Gain rows of aileron and elevator, rad per unit of each state.
     pub surfaces: SMatrix<f64, 2, STATES>,
-    /// The rudder's part, for an aircraft with a rudder.
+    /// The rudder's part. `None` for an aircraft without a rudder.
     pub rudder: Option<RudderGain>,
 }
 
 /// The rudder's part of the gain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RudderGain {
-    /// Gains of aileron and elevator on the rudder's states.
+    /// Gains of aileron and elevator on the rudder's filter states.
     pub coupling: SMatrix<f64, 2, RUDDER_STATES>,
-    /// Gains of the rudder on all states but its own, then on its own.
+    /// Gains of the rudder on the other states, then on its filter states.
     pub row: RowSVector<f64, STATES>,
     pub own: RowSVector<f64, RUDDER_STATES>,
 }
@@ -45,7 +45,7 @@ impl Gain {
         Gain { surfaces: SMatrix::zeros(), rudder }
     }
 
-    /// Adds `other`, scaled by `part`.
+    /// Adds `other` multiplied by `part`.
     pub fn add(&mut self, other: &Gain, part: f64) {
         self.surfaces += other.surfaces * part;
         if let (Some(rudder), Some(other)) = (&mut self.rudder, &other.rudder) {
@@ -56,18 +56,18 @@ impl Gain {
     }
 }
 
-/// Indices of φ θ p q r α β in the state of eq. (4): airspeed is a scheduling variable, not fed back.
+/// Indices of φ θ p q r α β in the state of eq. (4). Airspeed is a scheduling variable and is not fed back.
 const ATTITUDE_STATES: [usize; 7] = [0, 1, 3, 4, 5, 6, 7];
 
-/// Cost scales by Bryson's rule: the weight of each term is one over the square of its field, so that a larger value
-/// gives a softer loop.
+/// Cost scales by Bryson's rule. The weight of each term is one over the square of its scale. A larger scale therefore gives
+/// a softer loop.
 ///
-/// Tuned on the `jsbsim` model by the settled error over the target file; the result is not sensitive to them.
+/// The scales were tuned on the `jsbsim` model by the settled error over the target file, which is not sensitive to them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
     /// Attitude error scale, rad.
     pub attitude: f64,
-    /// Integrated attitude error, rad s.
+    /// Scale of the integrated attitude error, rad s.
     pub integral: f64,
     /// Body rate scale, rad/s.
     pub rate: f64,
@@ -75,7 +75,7 @@ pub struct Weights {
     pub sideslip: f64,
     /// Sideslip scale with a rudder, rad.
     pub sideslip_by_rudder: f64,
-    /// Scale of the commanded deflection relative to trim, rad.
+    /// Scale of the deviation of the commanded deflection from trim, rad.
     pub deflection: f64,
 }
 
@@ -89,14 +89,14 @@ impl Weights {
         sideslip_by_rudder: 0.03,
         deflection: 0.3,
     };
-    /// Weights of softer loops with more delay margin: 104 ms in pitch where the default has 46, and 78 where it has
-    /// 32 (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Even softer weights (0.15, 0.1, 0.15)
-    /// have 200 ms.
+    /// Weights of softer loops with a larger delay margin. In pitch the margin is 104 ms where the default has 46 ms, and 78 ms
+    /// where the default has 32 ms (`examples/delay_margin.rs`, behind ArduPlane's filter and sampling). Still softer weights
+    /// (0.15, 0.1, 0.15) have 200 ms.
     pub const DAMPED: Weights =
         Weights { attitude: 0.08, integral: 0.05, deflection: 0.2, ..Weights::DEFAULT };
 }
 
-/// The gain at `trim`; `None` if the model cannot be stabilised there.
+/// The gain at `trim` and `altitude` (m). `None` if the model cannot be stabilised at this trim.
 pub(super) fn design(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Gain> {
     Some(match loops(model, trim, altitude, w)? {
         Loops::Two(_, _, k) => Gain { surfaces: k, rudder: None },
@@ -124,7 +124,7 @@ pub(super) enum Loops {
     Three(SMatrix<f64, ALL, ALL>, SMatrix<f64, ALL, 3>, SMatrix<f64, 3, ALL>),
 }
 
-/// Linear system and gain at `trim`; `None` if the model cannot be stabilised there.
+/// Linear system and gain at `trim` and `altitude` (m). `None` if the model cannot be stabilised at this trim.
 pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) -> Option<Loops> {
     let linear = linearise(model, trim, altitude);
     let figures = &model.airframe.actuators;
@@ -142,10 +142,10 @@ pub(super) fn loops(model: &GreyBox, trim: &Trim, altitude: f64, w: &Weights) ->
     }
 }
 
-/// A surface of the design: its column in the linear model, the index of its states, its actuator filter.
+/// A surface of the design: its column in the linear model, the index of its first state, and its actuator filter.
 type Actuated<'a> = (usize, usize, &'a Surface);
 
-/// Solves the design of N states and M `surfaces`.
+/// Designs the gain for N states and M `surfaces`. `None` if the system cannot be stabilised.
 fn solve<const N: usize, const M: usize>(
     linear: &Linear,
     surfaces: [Actuated; M],
@@ -164,7 +164,7 @@ fn solve<const N: usize, const M: usize>(
     Some((a, b, k))
 }
 
-/// Attitude dynamics, actuator filters and integrators as one linear system.
+/// Attitude dynamics, actuator filters and integrators as one discrete linear system.
 fn augmented<const N: usize, const M: usize>(
     linear: &Linear,
     surfaces: [Actuated; M],

@@ -8,7 +8,7 @@ use greylag_model::{GreyBox, Trim};
 use greylag_physics::State;
 use greylag_physics::airframe::{Envelope, Incidence};
 
-/// Equally spaced grid values of one scheduling variable.
+/// Equally spaced grid values of one scheduling variable, in its unit.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     first: f64,
@@ -16,14 +16,15 @@ struct Axis {
     count: usize,
 }
 
-/// Number of designs over airspeed.
+/// Number of airspeeds in the grid.
 const AIRSPEEDS: usize = 20;
-/// Grid spacing over roll and pitch, degrees.
+/// Grid spacing of roll and pitch, degrees.
 const SPACING_DEG: f64 = 10.0;
-/// The grid's last interval, degrees: there is no steady turn at 90°.
+/// Largest angle of the grid, in spacings (80°): there is no steady turn at 90°.
 const STEEPEST: f64 = 8.0;
 
-/// Airspeed in m/s, roll in rad, pitch in rad: the envelope with a margin, in whole spacings.
+/// Grid over airspeed (m/s), roll and pitch (rad). It extends beyond the envelope: the angles to whole spacings, the airspeeds
+/// by a margin.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     airspeed: Axis,
@@ -55,20 +56,20 @@ impl Grid {
     }
 }
 
-/// The schedule's value at a point.
+/// The schedule's value at a point: steady state and gain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    /// φ θ p q r α β of the steady condition, rad and rad/s.
+    /// φ θ p q r α β of the steady state, rad and rad/s.
     pub steady: [f64; 7],
-    /// Aileron, elevator and rudder that hold it, rad.
+    /// Deflections of aileron, elevator and rudder in the steady state, rad.
     pub deflection: [f64; 3],
-    /// Throttle that holds it, 0..1.
+    /// Throttle in the steady state, 0..1.
     pub throttle: f64,
     /// The gain at this point.
     pub gain: Gain,
 }
 
-/// Grid entries, airspeed varying slowest, with the minimum airspeeds of each attitude.
+/// Grid entries, with airspeed as the slowest index, and the minimum airspeeds of each attitude.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
     grid: Grid,
@@ -80,9 +81,9 @@ pub(super) struct Schedule {
 }
 
 impl Axis {
-    /// An angle's grid, from `low` to `high` spacings.
+    /// The grid of an angle, from `low` to `high` in spacings.
     fn attitude(low: f64, high: f64) -> Axis {
-        // 30° at a time, so that those angles are exact
+        // in units of 30°, in which multiples of 30° are exact
         let first = low / 3.0 * std::f64::consts::FRAC_PI_6;
         Axis { first, step: std::f64::consts::PI / 18.0, count: (high - low) as usize + 1 }
     }
@@ -91,7 +92,7 @@ impl Axis {
         self.first + self.step * index as f64
     }
 
-    /// The lower neighbour of `x` and the weight of the upper one, clamped at the ends.
+    /// The index of the grid value below `x`, and the weight of the grid value above it. Clamped to the grid's ends.
     fn place(self, x: f64) -> (usize, f64) {
         let place = ((x - self.first) / self.step).clamp(0.0, (self.count - 1) as f64);
         let low = (place as usize).min(self.count - 2);
@@ -102,7 +103,7 @@ impl Axis {
 impl Schedule {
     /// Designs the whole grid from `model`, on all cores.
     ///
-    /// A grid point without a trim takes the design of the next higher airspeed.
+    /// A grid point without a trim or gain takes the design of the next higher airspeed, or of the highest with a design.
     pub(super) fn new(model: &GreyBox, weights: &Weights) -> Result<Schedule, SetupError> {
         let grid = Grid::over(&model.airframe.envelope);
         let all = (0..grid.attitudes()).into_par_iter();
@@ -125,7 +126,7 @@ impl Schedule {
         Ok(Schedule { grid, entries, comfortable, tolerable })
     }
 
-    /// The entry at `airspeed` (m/s), `roll` and `pitch` (rad), linear between grid points.
+    /// The entry at `airspeed` (m/s), `roll` and `pitch` (rad), by trilinear interpolation between grid points.
     pub(super) fn at(&self, airspeed: f64, roll: f64, pitch: f64) -> Entry {
         let Grid { airspeed: speeds, roll: rolls, pitch: pitches } = self.grid;
         let places = [speeds.place(airspeed), rolls.place(roll), pitches.place(pitch)];
@@ -153,12 +154,12 @@ impl Schedule {
         sum
     }
 
-    /// The minimum airspeed (m/s) of an attitude with a margin before the stall.
+    /// The minimum airspeed (m/s) of an attitude (rad) with a margin before the stall.
     pub(super) fn comfortable_airspeed(&self, roll: f64, pitch: f64) -> f64 {
         self.over_attitude(&self.comfortable, roll, pitch)
     }
 
-    /// The fraction (0..=1) of `roll` that `airspeed` (m/s) allows at `pitch`.
+    /// The fraction (0..=1) of `roll` (rad) that `airspeed` (m/s) allows at `pitch` (rad).
     pub(super) fn tolerable_part(&self, airspeed: f64, roll: f64, pitch: f64) -> f64 {
         let allowed =
             |part: f64| self.over_attitude(&self.tolerable, part * roll, pitch) <= airspeed;
@@ -183,8 +184,8 @@ impl Schedule {
     }
 }
 
-/// The lowest airspeed (m/s) of a column whose incidence is at most `alpha` (rad), linear between designs; the grid's
-/// highest if there is none.
+/// The lowest airspeed (m/s) of a column at which the angle of attack is at most `alpha` (rad), linear between designs. If no
+/// design meets the limit, the result is the grid's highest airspeed.
 fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
     let airspeeds = grid.airspeed;
     let needs = |k: usize| column[k].map(|entry| entry.steady[5]);
@@ -199,7 +200,7 @@ fn slowest(column: &[Option<Entry>], grid: &Grid, alpha: f64) -> f64 {
     }
 }
 
-/// The designs of one attitude over airspeed; `None` where the design fails.
+/// The designs of one attitude over airspeed. `None` where a design fails.
 fn column(model: &GreyBox, grid: &Grid, index: usize, weights: &Weights) -> Vec<Option<Entry>> {
     let (roll, pitch) = grid.attitude(index);
     let altitude = model.airframe.reference.altitude;
@@ -224,7 +225,7 @@ fn column(model: &GreyBox, grid: &Grid, index: usize, weights: &Weights) -> Vec<
         .collect()
 }
 
-/// The design at airspeed `k`, else the next one above, else the highest.
+/// The design at airspeed `k`, or at the next higher airspeed with a design, or at the highest one with a design.
 fn nearest(column: &[Option<Entry>], k: usize) -> Option<Entry> {
     column[k..].iter().flatten().next().or_else(|| column.iter().flatten().last()).copied()
 }

@@ -9,30 +9,30 @@ use super::Weights;
 use super::design::{ALL, Loops, STATES, loops};
 use greylag_model::{GreyBox, STEP, Trim, TrimError};
 
-/// Number of frequencies of the loop transfer function, from [`LOWEST`] to half the sampling frequency.
+/// Number of frequencies at which the loop transfer function is evaluated, from [`LOWEST`] to half the sampling frequency.
 const FREQUENCIES: usize = 1500;
 /// Lowest frequency evaluated, rad/s.
 const LOWEST: f64 = 0.05;
 
-/// Stability margins of one loop, the others closed.
+/// Stability margins of one loop with the other loops closed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoopMargins {
     /// The surface at which the loop is opened.
     pub surface: &'static str,
-    /// Gain factors between which the loop stays stable; infinite without an upper limit.
+    /// Lower and upper gain factors between which the loop stays stable. The upper one is infinite if there is no limit.
     pub gain: [f64; 2],
-    /// Phase margin, rad.
+    /// Phase margin, rad. It is π if the loop gain never crosses 1.
     pub phase: f64,
-    /// Delay margin, s.
+    /// Delay margin, s. It is infinite if the loop gain never crosses 1.
     pub delay: f64,
-    /// Highest gain crossover frequency, rad/s.
+    /// Highest gain crossover frequency, rad/s. It is zero if the loop gain never crosses 1.
     pub crossover: f64,
 }
 
-/// Margins could not be computed.
+/// Reason why the margins could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MarginsError {
-    /// There is no trim at this flight condition.
+    /// The flight condition has no trim.
     #[error(transparent)]
     Trim(#[from] TrimError),
     /// No gain stabilises the flight condition.
@@ -47,11 +47,12 @@ pub enum MarginsError {
     },
 }
 
-/// The margins of `model`'s LQI loops in straight flight at `airspeed` (m/s): aileron, elevator, rudder.
+/// The margins of `model`'s LQI loops in straight flight at `airspeed` (m/s) and at the model's reference altitude. The order
+/// is aileron, elevator and, if there is one, rudder.
 ///
 /// # Errors
 ///
-/// If the model has no straight-flight trim there, or cannot be stabilised.
+/// If the model has no straight-flight trim at this airspeed, or no gain stabilises it there.
 pub fn margins(
     model: &GreyBox,
     airspeed: f64,
@@ -75,7 +76,7 @@ fn each<const N: usize, const M: usize>(
     (0..M).map(|i| of_loop(names[i], &ratio(a, b, k, i))).collect()
 }
 
-/// The loop transfer function over frequency (rad/s), opened at input `broken`.
+/// The loop transfer function at each frequency (rad/s), with the loop opened at input `broken`.
 fn ratio<const N: usize, const M: usize>(
     a: &SMatrix<f64, N, N>,
     b: &SMatrix<f64, N, M>,
@@ -104,7 +105,7 @@ fn ratio<const N: usize, const M: usize>(
     (0..FREQUENCIES).filter_map(at).collect()
 }
 
-/// The margins of a loop from its sampled transfer function, interpolated linearly.
+/// The margins of a loop from its sampled transfer function, with linear interpolation between samples.
 fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins {
     let mut margins = LoopMargins {
         surface,
@@ -133,7 +134,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
             }
         }
     }
-    // at half the sampling frequency it is real
+    // at half the sampling frequency the transfer function is real
     if let Some((_, last)) = ratio.last().filter(|(_, last)| last.re < 0.0) {
         margins.note_gain(-1.0 / last.re);
     }
@@ -141,7 +142,7 @@ fn of_loop(surface: &'static str, ratio: &[(f64, Complex<f64>)]) -> LoopMargins 
 }
 
 impl LoopMargins {
-    /// Records a gain margin: multiplied by `factor`, the loop passes through −1.
+    /// Records a gain margin. With the gain multiplied by `factor`, the loop transfer function passes through −1.
     fn note_gain(&mut self, factor: f64) {
         let [least, most] = &mut self.gain;
         if factor < 1.0 { *least = least.max(factor) } else { *most = most.min(factor) }
@@ -155,7 +156,7 @@ mod tests {
 
     #[test]
     fn an_integrator_with_delay_has_the_margins_of_the_textbook() {
-        // L = k h z / (z (z − 1)) is k/s with half a step of delay by the hold and one by the state
+        // L = k h z / (z (z − 1)) is k/s with half a step of delay from the hold and one step from the state
         let (h, k) = (STEP, 5.0);
         let a = Matrix2::new(1.0, h, 0.0, 0.0);
         let found = &each(&a, &Vector2::new(0.0, 1.0), &RowVector2::new(k, 0.0))[0];

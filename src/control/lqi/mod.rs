@@ -1,4 +1,4 @@
-//! LQI: linear-quadratic attitude control with integral action, scheduled over the envelope.
+//! LQI: linear-quadratic attitude control with integral action, with gains scheduled over the envelope.
 
 mod gain_schedule;
 mod margins;
@@ -18,24 +18,24 @@ use greylag_model::{GreyBox, STEP};
 use greylag_physics::Command;
 pub use margins::{LoopMargins, MarginsError, margins};
 
-/// Largest rate of the roll reference, rad/s: command steps become ramps that the surfaces can follow, so that the
-/// integrators see small errors.
+/// Largest rate of the roll reference, rad/s. The limit turns command steps into ramps that the surfaces can follow, which
+/// keeps the integrated errors small.
 const ROLL_RATE: f64 = 0.8;
 /// Largest rate of the pitch reference, rad/s.
 const PITCH_RATE: f64 = 0.5;
 /// Time constant of the filter that rounds the ramps, s.
 const ROUNDING: f64 = 0.35;
-/// Proportional gain of airspeed to throttle, s/m.
+/// Proportional gain from the airspeed error to the throttle, s/m.
 const AIRSPEED_KP: f64 = 0.3;
-/// Integral gain of airspeed to throttle, 1/m.
+/// Integral gain from the airspeed error to the throttle, 1/m.
 const AIRSPEED_KI: f64 = 0.05;
 
-/// The steady state that the law regulates to.
+/// The steady state to which the law regulates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Goal {
-    /// Reference roll and pitch, rad, limited by the airspeed.
+    /// Target roll and pitch, rad, with the roll reduced where the airspeed requires it.
     pub attitude: [f64; 2],
-    /// p q r α β of the steady flight there, rad/s and rad.
+    /// p q r α β of the steady flight at this attitude, rad/s and rad.
     pub steady: [f64; 5],
 }
 
@@ -51,29 +51,29 @@ pub struct Lqi {
     last: Option<Given>,
 }
 
-/// Parts of a command, from which the integrals are corrected if another command was flown.
+/// Parts of the last command. The reference and the integrals are corrected with them if another command was flown.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// Roll and pitch of the aircraft, rad.
     attitude: [f64; 2],
     /// Last change of the integrals, rad s.
     added: [f64; 2],
-    /// Gains of the aileron on the reference roll and of the elevator on the reference pitch, rad/rad.
+    /// Gains from the reference roll to the aileron and from the reference pitch to the elevator, rad/rad.
     by_reference: [f64; 2],
 }
 
 impl Lqi {
-    /// Designs the controller for `model` over its envelope with a margin. With a rudder the sideslip is held at
-    /// zero; without one a turn has the sideslip of its equilibrium.
+    /// Designs the controller for `model` over its envelope with a margin. With a rudder the sideslip is held at zero. A turn
+    /// without a rudder has the sideslip of its equilibrium.
     ///
     /// # Errors
     ///
-    /// If the model cannot be trimmed or stabilised at some attitude at any airspeed.
+    /// If there is an attitude of the envelope at which the model cannot be trimmed or stabilised at any airspeed.
     pub fn new(model: &GreyBox) -> Result<Lqi, SetupError> {
         Lqi::weighted("lqi", model, &Weights::DEFAULT)
     }
 
-    /// Designs with other weights, under its own name.
+    /// Designs the controller with `weights` and registers it under `name`.
     ///
     /// # Errors
     ///
@@ -94,7 +94,7 @@ impl Lqi {
         })
     }
 
-    /// Advances the reference towards the target and returns it.
+    /// Advances the reference towards the target and returns it (roll and pitch, rad).
     fn follow(&mut self, seen: &Observation, target: &Target) -> [f64; 2] {
         let mut reference = self.reference.unwrap_or([seen.state.roll, seen.state.pitch]);
         let wanted = self.wanted(seen, target);
@@ -108,26 +108,25 @@ impl Lqi {
         reference
     }
 
-    /// The attitude that the reference moves to: below the airspeed that the commanded bank needs, the bank is
-    /// reduced.
+    /// The attitude (rad) to which the reference moves. Below the airspeed that the commanded bank needs, the bank is reduced.
     fn wanted(&self, seen: &Observation, target: &Target) -> [f64; 2] {
         let part = self.schedule.tolerable_part(seen.state.airspeed, target.roll, target.pitch);
         [part * target.roll, target.pitch]
     }
 
-    /// The airspeed to hold (m/s): the target's, or the minimum of the attitude if that is higher.
+    /// The airspeed to be held (m/s): the target airspeed, or the attitude's minimum airspeed if it is higher.
     fn airspeed(&self, target: &Target) -> f64 {
         self.schedule.comfortable_airspeed(target.roll, target.pitch).max(target.airspeed)
     }
 
-    /// The steady state to regulate to from `seen`.
+    /// The steady state for `target` at the airspeed of `seen`.
     pub(crate) fn goal(&self, seen: &Observation, target: &Target) -> Goal {
         let attitude @ [roll, pitch] = self.wanted(seen, target);
         let [_, _, steady @ ..] = self.schedule.at(seen.state.airspeed, roll, pitch).steady;
         Goal { attitude, steady }
     }
 
-    /// Writes the LQI's law over the coming steps from `seen` into `ahead`.
+    /// Writes the LQI's law for the coming steps from `seen` into `ahead`.
     pub(crate) fn look_ahead(&self, seen: &Observation, target: &Target, ahead: &mut Ahead) {
         let mut follower = self.clone();
         let now = [seen.state.roll, seen.state.pitch];
@@ -145,8 +144,8 @@ impl Lqi {
         }
     }
 
-    /// Takes over after another controller has flown: the reference starts at the present attitude, the integrators
-    /// keep the values in `before`.
+    /// Takes over after another controller has flown. The reference starts at the present attitude. The integrators keep
+    /// their values in `before`.
     pub(crate) fn hand_over(&mut self, before: &Lqi, seen: &Observation) {
         self.integral = before.integral;
         self.reference = Some([seen.state.roll, seen.state.pitch]);
@@ -179,9 +178,9 @@ impl Controller for Lqi {
         self.last = None;
     }
 
-    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987): the reference moves back to
-    /// the value that would have given the command flown, but not past the aircraft's attitude, and the last
-    /// increment of the integral is undone.
+    /// Anti-windup by conditioning (Hanus, Kinnaert and Henrotte, Automatica 23, 1987). The reference moves back to the value
+    /// that would have given the flown command, but not past the aircraft's attitude. The last increment of the integral is
+    /// undone.
     fn overruled(&mut self, by: &Overruled) {
         let (Some(last), Some(reference)) = (self.last.take(), &mut self.reference) else { return };
         let Overruled { wanted, flown } = by;
@@ -209,7 +208,7 @@ impl Controller for Lqi {
         let raw =
             law.surfaces(&inner, &seen.state, &seen.actuators, &seen.previous, &self.surfaces);
         let error = [seen.state.roll - roll, seen.state.pitch - pitch];
-        // conditional integration: an axis whose surface is at its stop does not wind up
+        // conditional integration: the integral of an axis does not wind up while its command is saturated
         let added: [f64; 2] = std::array::from_fn(|axis| {
             let free = raw[axis].abs() < 1.0 && error[axis].is_finite();
             if free { error[axis] * STEP } else { 0.0 }

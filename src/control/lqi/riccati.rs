@@ -1,12 +1,12 @@
-//! The discrete algebraic Riccati equation, by structured doubling.
+//! Solution of the discrete algebraic Riccati equation by structured doubling.
 
 use nalgebra::{DMatrix, SMatrix};
 
-/// The gain K of u = −K x that minimises Σ xᵀqx + uᵀru under x₊ = ax + bu; `None` if the doubling does not converge
-/// (the pair cannot be stabilised).
+/// The gain K of u = −K x that minimises Σ xᵀqx + uᵀru under x₊ = ax + bu. `None` if the doubling does not converge, because
+/// the pair cannot be stabilised.
 ///
-/// E. Chu, H. Fan, W. Lin, C. Wang, "Structure-preserving algorithms for periodic discrete-time algebraic Riccati
-/// equations", Int. J. Control 77 (2004): each iteration doubles the horizon.
+/// Each iteration doubles the horizon: E. Chu, H. Fan, W. Lin, C. Wang, "Structure-preserving algorithms for periodic
+/// discrete-time algebraic Riccati equations", Int. J. Control 77 (2004).
 pub(super) fn gain<const N: usize, const M: usize>(
     a: &SMatrix<f64, N, N>,
     b: &SMatrix<f64, N, M>,

@@ -1,4 +1,4 @@
-//! A policy's folder: `actor.safetensors` and, for planners, `critic1.safetensors`, `critic2.safetensors`.
+//! The files of a policy folder: `actor.safetensors` and, for planners, `critic1.safetensors` and `critic2.safetensors`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use greylag_model::weights;
 use greylag_num::Dense;
 use greylag_physics::Airframe;
 
-/// The files of a policy folder, the actor last: its presence implies the others.
+/// The files of a policy folder. The actor is written last: its presence shows that the files before it are complete.
 const FILES: [&str; 3] = ["critic1.safetensors", "critic2.safetensors", "actor.safetensors"];
 
 /// Index of the actor in [`FILES`].
@@ -24,19 +24,19 @@ const ACTOR: usize = 2;
 pub struct Origin {
     /// Schema of the file header: [`Origin::SCHEMA`].
     pub schema: String,
-    /// Fingerprint of the airframe it was trained for, see [`fingerprint`].
+    /// Fingerprint of the airframe for which the policy was trained, see [`fingerprint`].
     pub airframe: String,
-    /// Name of the model it was trained in, or `jsbsim`.
+    /// Name of the model in which the policy was trained, or `jsbsim`.
     pub model: String,
-    /// SHA-256 of that model's files, hexadecimal; empty for JSBSim.
+    /// SHA-256 of that model's files, hexadecimal. Empty for JSBSim.
     pub model_sha256: String,
     /// Random seed of the training run.
     pub seed: u64,
-    /// Environment steps of the training run.
+    /// Number of environment steps of the training run.
     pub steps: u64,
-    /// Evaluation at the end of training; `None` if there was none.
+    /// Evaluation at the end of training. `None` if there was no evaluation.
     pub evaluation: Option<Evaluated>,
-    /// The program that trained it, with its version.
+    /// Name and version of the program that trained the policy.
     pub program: String,
 }
 
@@ -54,7 +54,7 @@ pub struct Evaluated {
     pub divergence_rate: f64,
 }
 
-/// A policy folder cannot be used.
+/// Reason why a policy folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
     /// A file cannot be read.
@@ -80,7 +80,7 @@ pub enum AgentError {
         path: PathBuf,
         /// Name of the airframe to be flown.
         airframe: String,
-        /// The model that the policy was trained in.
+        /// Name of the model in which the policy was trained.
         model: String,
     },
     /// The files come from different training runs.
@@ -97,11 +97,11 @@ impl Origin {
 }
 
 impl Agent {
-    /// The files of a policy folder in the order in which they are to be written, each with its name.
+    /// The files of a policy folder as names and contents, in the order in which they must be written.
     ///
     /// # Errors
     ///
-    /// The serialisation error of safetensors.
+    /// If safetensors cannot serialise a network.
     pub fn to_files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SafeTensorError> {
         let critics = self.critics.iter().flat_map(|both| both.iter().map(Critic::network));
         let first = if self.critics.is_some() { 0 } else { ACTOR };
@@ -113,11 +113,11 @@ impl Agent {
             .collect()
     }
 
-    /// Loads the policy in `folder` for `airframe`: its actor, and both critics unless neither exists.
+    /// Loads the policy in `folder` for `airframe`. The critics are optional, but if one exists, both must.
     ///
     /// # Errors
     ///
-    /// A file is missing, invalid, or of another airframe or training run.
+    /// If a file is missing or invalid, or belongs to another airframe or training run.
     pub fn load(folder: &Path, airframe: &Airframe) -> Result<Agent, AgentError> {
         let alone = FILES[..ACTOR].iter().all(|name| !folder.join(name).exists());
         let (actor, origin) = read(&folder.join(FILES[ACTOR]))?;
@@ -145,7 +145,7 @@ impl Agent {
     }
 }
 
-/// The network of a file with its provenance.
+/// The network of a file and its provenance.
 fn read(path: &Path) -> Result<(Dense, Origin), AgentError> {
     let bytes = std::fs::read(path).map_err(|why| AgentError::Read { path: path.into(), why })?;
     let content = |why: String| AgentError::Content { path: path.into(), why };

@@ -1,6 +1,6 @@
 //! A trained policy: its observation, networks, files, and the controller that flies it.
 //!
-//! Section IV-B of \[GSFM26\]. Training lives in `learn` and is not needed to fly.
+//! The policy is that of section IV-B of \[GSFM26\]. The training is in `learn` and is not needed in flight.
 
 mod file;
 mod networks;
@@ -21,9 +21,9 @@ use greylag_physics::Command;
 pub struct Agent {
     /// The actor network π.
     pub actor: Arc<Actor>,
-    /// The twin critics Q1 and Q2; not needed to fly the policy alone.
+    /// The two critics Q1 and Q2. `None` if the folder has none. Without critics only the actor can fly.
     pub critics: Option<Arc<[Critic; 2]>>,
-    /// Provenance stored in its files.
+    /// Provenance stored in the policy's files.
     pub origin: Origin,
 }
 
@@ -87,7 +87,7 @@ mod tests {
         let there = observe(&seen.state, &seen.actuators, &target);
         let expected: Command = command(actor.act(&mut Units::new(0.0), &there));
         let given = policy.command(&seen, &target);
-        // single against double precision over sums of 300 terms
+        // tolerance of single precision for sums of 300 terms
         assert!((given.aileron - expected.aileron).abs() < 1e-5);
         assert!((given.elevator - expected.elevator).abs() < 1e-5);
         assert!((given.throttle - expected.throttle).abs() < 1e-5);

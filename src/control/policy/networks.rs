@@ -5,13 +5,13 @@ use greylag_num::dense::Units;
 use greylag_num::{Dense, Lanes, Real};
 use greylag_physics::Command;
 
-/// Components of an action: aileron, elevator and throttle, each in −1..1 (eq. 29 of \[GSFM26\]).
+/// Number of components of an action: aileron, elevator and throttle, each −1..1 (eq. 29 of \[GSFM26\]).
 pub const ACTIONS: usize = 3;
 
-/// Number of aircraft in a block.
+/// Number of aircraft in a block, one per vector lane.
 const WIDTH: usize = 16;
 
-/// A network has the wrong shape for a policy.
+/// A network whose shape does not fit a policy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what} takes a network of {inputs} inputs and {outputs} outputs, not {found:?}{why}")]
 pub struct ShapeError {
@@ -22,13 +22,13 @@ pub struct ShapeError {
     why: &'static str,
 }
 
-/// The actor π: from an observation to an action.
+/// The actor network π, which maps an observation to an action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actor {
     network: Dense,
 }
 
-/// A critic Q: from an observation and an action to the expected return.
+/// A critic network Q, which maps an observation and an action to the expected return.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Critic {
     network: Dense,
@@ -53,7 +53,7 @@ fn check(
     Err(ShapeError { what, inputs, outputs, found: found.into(), why })
 }
 
-/// The command of an action; throttle = (a + 1)/2. A policy does not command the rudder.
+/// The command of an action, with throttle = (a + 1)/2. The rudder is neutral, because a policy does not command it.
 #[inline(always)]
 pub fn command<R: Real>([aileron, elevator, thrust]: [R; ACTIONS]) -> Command<R> {
     let throttle = (thrust + R::from_f64(1.0)).scale(0.5);
@@ -61,11 +61,11 @@ pub fn command<R: Real>([aileron, elevator, thrust]: [R; ACTIONS]) -> Command<R>
 }
 
 impl Actor {
-    /// The actor of a network; tanh is applied after its last layer.
+    /// The actor with `network`, whose outputs pass through tanh.
     ///
     /// # Errors
     ///
-    /// If the number of inputs or outputs differs.
+    /// If the network does not have `OBSERVATIONS` inputs and `ACTIONS` outputs.
     pub fn new(network: Dense) -> Result<Actor, ShapeError> {
         check("an actor", OBSERVATIONS, ACTIONS, network).map(|network| Actor { network })
     }
@@ -75,20 +75,20 @@ impl Actor {
         &self.network
     }
 
-    /// The network for training. The caller keeps its weights finite.
+    /// The network for training. The caller must keep its weights finite.
     pub fn network_mut(&mut self) -> &mut Dense {
         &mut self.network
     }
 
-    /// The action, in lanes or double precision.
+    /// The actions (−1..1) for observations in vector lanes or double precision.
     #[inline(always)]
     pub fn act<R: Real>(&self, units: &mut Units<R>, observed: &[R; OBSERVATIONS]) -> [R; ACTIONS] {
         let answer = self.network.evaluate_in(units, observed);
         [answer[0].tanh(), answer[1].tanh(), answer[2].tanh()]
     }
 
-    /// The action of a single observation, in the processor's widest vectors; no operation is fused or reordered, so
-    /// that all instruction sets agree to the bit.
+    /// The action for a single observation, with the processor's widest vector instructions. Operations are neither fused nor
+    /// reordered. The results of all instruction sets are therefore bit-identical.
     pub fn act_one(
         &self,
         units: &mut Units<f32>,
@@ -101,15 +101,15 @@ impl Actor {
                 return unsafe { self.act_avx512(units, observed) };
             }
             if is_x86_feature_detected!("avx2") {
-                // SAFETY: as above
+                // SAFETY: the processor has the feature
                 return unsafe { self.act_avx2(units, observed) };
             }
         }
         self.act_baseline(units, observed)
     }
 
-    /// The actions of a block of aircraft. In 256 bits even where there are 512: with the wider ones the
-    /// compiler leaves this kernel scalar (measured: 1180 against 40 µs for two layers of 300).
+    /// The actions of a block of aircraft. The vectors have 256 bits even if the processor has 512, because with 512 bits the
+    /// compiler does not vectorise this kernel (measured for two layers of 300: 1180 µs instead of 40 µs).
     pub fn act_block(
         &self,
         units: &mut Units<Lanes<WIDTH>>,
@@ -153,11 +153,11 @@ impl Actor {
 }
 
 impl Critic {
-    /// The critic of a network.
+    /// The critic with `network`.
     ///
     /// # Errors
     ///
-    /// If the number of inputs or outputs differs.
+    /// If the network does not have `OBSERVATIONS` + `ACTIONS` inputs and one output.
     pub fn new(network: Dense) -> Result<Critic, ShapeError> {
         check("a critic", OBSERVATIONS + ACTIONS, 1, network).map(|network| Critic { network })
     }
@@ -167,7 +167,7 @@ impl Critic {
         &self.network
     }
 
-    /// The discounted return expected after `action`, in units of the reward of eq. (30).
+    /// The expected discounted return after `action`, in units of the reward of eq. (30).
     #[inline(always)]
     pub fn value<R: Real>(
         &self,

@@ -1,4 +1,4 @@
-//! Observation of a policy: the fifteen numbers of eq. (28) of \[GSFM26\] with the airspeed error, of order one.
+//! Observation of a policy: the fifteen numbers of eq. (28) of \[GSFM26\] and the airspeed error, scaled to order one.
 
 use crate::Target;
 use greylag_num::Real;
@@ -7,18 +7,18 @@ use greylag_physics::{ActuatorState, State};
 /// Number of components of an observation.
 pub const OBSERVATIONS: usize = 16;
 
-/// Scale of each component, in the order of [`observe`], in rad, m/s and rad/s: brisk flight, full deflection and the
-/// initial error of a hard target are of order one.
+/// Scale of each component in the order of [`observe`], in rad, m/s, rad/s and throttle (0..1). With it brisk flight, full
+/// deflection and the initial error of a hard target are of order one.
 pub const UNIT: [f64; OBSERVATIONS] =
     [1.0, 0.5, 4.0, 2.0, 1.0, 1.0, 0.2, 0.2, 0.5, 10.0, 0.5, 10.0, 0.5, 0.5, 0.25, 4.0];
 
-/// The observation in lanes, double precision or dual numbers: the state φ θ V p q r α β, the actuators δa δ̇a δe δ̇e
-/// δt, then the errors φ* − φ, θ* − θ and V_a* − V_a.
+/// The scaled observation, in vector lanes, double precision or dual numbers. The order is the state φ θ V p q r α β, the
+/// actuators δa δ̇a δe δ̇e δt, then the errors φ* − φ, θ* − θ and V_a* − V_a.
 ///
-/// Departs from the paper, which observes φ* and θ* themselves. With φ and θ in the observation the information is
-/// the same; the error is what must vanish, and so has its own scale. Airspeed is relative to 16.67 m/s, throttle to
-/// one half. The paper commands one airspeed in every episode and does not observe it; such a policy flies that
-/// airspeed whatever is commanded.
+/// The paper observes φ* and θ* instead of the errors. The information is the same, because φ and θ are observed too. The
+/// error has its own scale, because it must vanish. Airspeed is relative to 16.67 m/s, throttle to one half. The paper
+/// commands the same airspeed in every episode and does not observe it. A policy trained in this way flies that airspeed
+/// at any airspeed command.
 #[inline(always)]
 pub fn observe<R: Real>(
     state: &State<R>,

@@ -1,32 +1,32 @@
-//! Envelope limits of an aircraft, and the time spent outside each.
+//! Envelope limits of an aircraft, and the time that a flight spends outside each limit.
 
 use serde::Serialize;
 
 use super::{Moment, Track};
 use greylag_physics::Airframe;
 
-/// Transient excess of load factor and angle of attack that is accepted: a twentieth of the limit.
+/// Accepted transient excess of load factor and angle of attack, as a fraction of the limit.
 pub const TRANSIENT: f64 = 0.05;
 
 /// Tolerance for rounding of a command's rate, as a fraction of the limit.
 const ROUNDING: f64 = 1e-9;
 
-/// Limits that a flight is measured against; infinite where the airframe file states none.
+/// Limits against which a flight is measured. A limit that the airframe file does not state is infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
     /// Largest |bank|, degrees.
     pub bank_deg: f64,
-    /// Least and largest pitch, degrees.
+    /// Smallest and largest pitch, degrees.
     pub pitch_deg: [f64; 2],
-    /// Least and largest load factor.
+    /// Smallest and largest load factor.
     pub load_factor: [f64; 2],
     /// Angle of attack at which the wing stalls, degrees.
     pub stall_deg: f64,
-    /// Largest |sideslip| in degrees.
+    /// Largest |sideslip|, degrees.
     pub sideslip_deg: f64,
-    /// Least and largest airspeed, m/s.
+    /// Smallest and largest airspeed, m/s.
     pub airspeed_mps: [f64; 2],
-    /// Fastest change of a surface command, in the command's unit a second.
+    /// Fastest change of a surface command (−1..1), 1/s.
     pub slew_per_s: f64,
 }
 
@@ -49,14 +49,14 @@ pub struct OutsideS {
     pub slow: f64,
     /// Time above the largest airspeed, s.
     pub fast: f64,
-    /// Time with a surface command faster than its slew limit, s.
+    /// Time in which a surface command changes faster than its slew limit, s.
     pub slew: f64,
     /// Time outside any of the limits, s.
     pub any: f64,
 }
 
 impl OutsideS {
-    /// Names of the limits that were exceeded, with the time outside each, s.
+    /// Names of the exceeded limits, each with the time outside it, s.
     pub fn passed(&self) -> Vec<(&'static str, f64)> {
         let all = [
             ("bank", self.bank),
@@ -88,7 +88,8 @@ impl Limits {
         }
     }
 
-    /// Whether the extremes of a flight stay within the limits of load factor and angle of attack plus [`TRANSIENT`].
+    /// Whether the extremes of a flight stay within the limits of load factor and angle of attack (degrees) plus [`TRANSIENT`].
+    /// Only the upper limit of the angle of attack counts.
     pub fn kept(&self, load_factor: [f64; 2], alpha_deg: [f64; 2]) -> bool {
         let room = |limit: f64| limit.abs() * TRANSIENT;
         let [least, most] = self.load_factor;
@@ -98,7 +99,7 @@ impl Limits {
             || alpha_deg[1] > self.stall_deg + room(self.stall_deg))
     }
 
-    /// Time outside each limit, s, every tick weighted with its duration.
+    /// Time outside each limit, s. Each sample counts with the time to the next one.
     pub(super) fn outside(&self, track: &Track) -> OutsideS {
         let mut total = OutsideS::default();
         for (moment, before, length) in track.ticks() {
@@ -116,7 +117,7 @@ impl Limits {
         total
     }
 
-    /// Whether a sample lies outside each limit, in the order of [`OutsideS::each`].
+    /// Whether a sample with surface rate `slew` (1/s) lies outside each limit, in the order of [`OutsideS::each`].
     fn beyond(&self, m: &Moment, slew: f64) -> [bool; 9] {
         let [roll, pitch] = m.attitude.map(f64::to_degrees);
         [
@@ -154,7 +155,7 @@ impl OutsideS {
         self.any += seconds(beyond.contains(&true));
     }
 
-    /// The sum over two flights.
+    /// The sum of the times of two flights.
     pub fn plus(mut self, mut other: OutsideS) -> OutsideS {
         self.each().into_iter().zip(other.each()).for_each(|(total, more)| *total += *more);
         self.any += other.any;

@@ -1,4 +1,4 @@
-//! The quality measures by name, with units and definitions, as tables, pages and JSON show them.
+//! The quality measures with the names, units and definitions used in tables, pages and JSON.
 
 use super::Quality;
 
@@ -9,17 +9,17 @@ pub struct Measure {
     pub id: &'static str,
     /// Title in a table.
     pub title: &'static str,
-    /// Unit; empty if dimensionless.
+    /// Unit. Empty if the measure is dimensionless.
     pub unit: &'static str,
-    /// Definition, with its source.
+    /// Definition and its source.
     pub definition: &'static str,
-    /// Direction in which the measure is worse.
+    /// Direction in which the measure gets worse.
     pub worse: Worse,
     /// Reads the value from a [`Quality`].
     pub get: fn(&Quality) -> f64,
 }
 
-/// Direction in which a measure is worse.
+/// Direction in which a measure gets worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worse {
     /// The larger value is worse.
@@ -29,7 +29,7 @@ pub enum Worse {
 }
 
 impl Measure {
-    /// The worst of `values`; NaN if it is empty.
+    /// The worst of `values`. NaN if there are none.
     pub fn worst(&self, values: &[f64]) -> f64 {
         let pick = match self.worse {
             Worse::More => f64::max,
@@ -39,14 +39,14 @@ impl Measure {
     }
 }
 
-/// The measure with this JSON key.
+/// The measure with this JSON key. `None` if there is no such measure.
 pub fn measure(id: &str) -> Option<&'static Measure> {
     MEASURES.iter().find(|m| m.id == id)
 }
 
 macro_rules! measures {
     ($($id:ident, $title:literal, $unit:literal, $worse:ident, $get:expr, $definition:literal;)*) => {
-        /// All measures, the main ones first.
+        /// All measures, with the main ones first.
         pub const MEASURES: &[Measure] = &[$(Measure {
             id: stringify!($id), title: $title, unit: $unit, definition: $definition,
             worse: Worse::$worse, get: $get,
@@ -57,7 +57,7 @@ macro_rules! measures {
 measures! {
     error_integral_deg_s, "integral of error", "° s", More, |q| q.error_integral_deg_s,
         "Trapezoidal integral of |roll error| + |pitch error| from the moment the target is set (integral of absolute \
-         error, Graham and Lathrop 1953). A lost aircraft is off by 180° in both for the time that was left.";
+         error, Graham and Lathrop 1953). A lost aircraft is off by 180° in both for the remaining time.";
     to_one_deg_s, "to 1°", "s", More, |q| q.to_one_deg_s,
         "Time after which roll and pitch both stay within 1° of the target; the whole flight if they never do.";
     to_five_percent_s, "to 5 % of the step", "s", More, |q| q.to_five_percent_s,
@@ -71,7 +71,7 @@ measures! {
         "Largest −f_z / 9.80665 m/s², f_z the specific force along body z at the centre of gravity (CS-23.321). Limit: \
          load_factor_max of the airframe file.";
     load_factor_min, "load factor, least", "", Less, |q| q.load_factor[0],
-        "Least of the same. Limit: load_factor_min, where the file states one.";
+        "Smallest load factor. Limit: load_factor_min, where the file states one.";
     alpha_max_deg, "angle of attack, largest", "°", More, |q| q.alpha_deg[1],
         "Largest angle of attack relative to the air. Limit: stall_rad of the airframe file, where it states one.";
     alpha_min_deg, "angle of attack, least", "°", Less, |q| q.alpha_deg[0],
@@ -79,16 +79,16 @@ measures! {
     sideslip_max_deg, "sideslip, largest", "°", More, |q| q.sideslip_deg,
         "Largest |sideslip|. Limit: sideslip_max_deg, where the file states one.";
     airspeed_rms_mps, "airspeed held, rms", "m/s", More, |q| q.airspeed_rms_mps,
-        "Root mean square of the true airspeed less the one wanted.";
+        "Root mean square of the true airspeed minus the target.";
     airspeed_min_mps, "airspeed, least", "m/s", Less, |q| q.airspeed_mps[0],
         "Least true airspeed. Limit: airspeed_min_mps.";
     surface_travel, "surface travel", "", More, |q| q.travel.surfaces(),
         "Sum of |changes| of the aileron, elevator and rudder commands, each −1..1 (total variation of the input, \
          Skogestad 2003).";
-    aileron_travel, "aileron travel", "", More, |q| q.travel.aileron, "Of the aileron alone.";
-    elevator_travel, "elevator travel", "", More, |q| q.travel.elevator, "Of the elevator alone.";
-    rudder_travel, "rudder travel", "", More, |q| q.travel.rudder, "Of the rudder alone.";
-    throttle_travel, "throttle travel", "", More, |q| q.travel.throttle, "Of the throttle, 0..1.";
+    aileron_travel, "aileron travel", "", More, |q| q.travel.aileron, "Total variation of the aileron command.";
+    elevator_travel, "elevator travel", "", More, |q| q.travel.elevator, "Total variation of the elevator command.";
+    rudder_travel, "rudder travel", "", More, |q| q.travel.rudder, "Total variation of the rudder command.";
+    throttle_travel, "throttle travel", "", More, |q| q.travel.throttle, "Total variation of the throttle command, 0..1.";
     surface_mean_square_rate, "surfaces' mean square rate", "1/s²", More,
         |q| q.mean_square_rate.surfaces(),
         "Mean of (change / tick)² of the surface commands, added up.";

@@ -1,8 +1,7 @@
-//! Quality of an attitude manoeuvre, in numbers.
+//! Quality measures of an attitude manoeuvre.
 //!
-//! A [`Track`] holds what was measured and commanded; [`Track::quality`] evaluates it; [`MEASURES`] names each
-//! measure with its unit, definition and source. The module is pure: simulated and recorded flights are measured
-//! alike.
+//! A [`Track`] contains the measurements and commands of a flight. [`Track::quality`] computes the measures. [`MEASURES`]
+//! gives each measure's unit, definition and source. Simulated and recorded flights are measured in the same way.
 
 mod limits;
 mod measures;
@@ -21,13 +20,13 @@ pub const REACHED_DEG: f64 = 1.0;
 /// Settling band as a fraction of the step.
 const BAND: f64 = 0.05;
 
-/// Overshoot, as a fraction of the step, that still counts as small.
+/// Overshoot that counts as small, as a fraction of the step.
 const LITTLE: f64 = 0.03;
 
-/// Error charged for the remaining time after a loss of the aircraft, degrees of roll and pitch together.
+/// Error that counts for the remaining time after a loss of the aircraft, degrees, sum of roll and pitch.
 const LOST_DEG: f64 = 360.0;
 
-/// One sample of a flight. Unknown values are NaN and left out of the measures.
+/// One sample of a flight. Unknown values are NaN, which the measures ignore.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     /// Time of the sample, s.
@@ -40,8 +39,8 @@ pub struct Moment {
     pub alpha: f64,
     /// Sideslip angle β, rad.
     pub beta: f64,
-    /// Load factor: the specific force along body z, upwards, divided by the standard gravity (CS-23.321: the
-    /// aerodynamic force normal to the longitudinal axis divided by the weight); 1 in level flight.
+    /// Load factor: the specific force along body z, positive upwards, divided by standard gravity. It is 1 in level flight.
+    /// CS-23.321 defines it as the aerodynamic force normal to the longitudinal axis divided by the weight.
     pub load_factor: f64,
     /// The command given at this time.
     pub command: Command,
@@ -66,13 +65,13 @@ impl Moment {
 /// A flight towards one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Samples in time order, from the one at which the target was set.
+    /// Samples in time order. The first one is at the time at which the target was set.
     pub moments: Vec<Moment>,
     /// The commanded attitude and airspeed.
     pub target: Target,
-    /// The command in force before the first sample; `None` at the start of a flight.
+    /// The command before the first sample. `None` at the start of a flight.
     pub before: Option<Command>,
-    /// Remaining time when the aircraft was lost, s; 0 if it was not lost.
+    /// Time that remained when the aircraft was lost, s. Zero if it was not lost.
     pub lost_s: f64,
 }
 
@@ -99,24 +98,24 @@ impl PerControl {
         }
     }
 
-    /// Sum over aileron, elevator and rudder; NaN values are left out.
+    /// Sum over aileron, elevator and rudder without NaN values. NaN if all three are NaN.
     pub fn surfaces(&self) -> f64 {
         total([self.aileron, self.elevator, self.rudder].into_iter())
     }
 }
 
-/// The measures of a [`Track`], defined in [`MEASURES`]. NaN where a value is unknown.
+/// The measures of a [`Track`], defined in [`MEASURES`]. An unknown value is NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
     /// Step of roll and pitch from the start to the target, degrees.
     pub step_deg: [f64; 2],
     /// Integral of |roll error| + |pitch error|, ° s.
     pub error_integral_deg_s: f64,
-    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s; the whole duration if they never
-    /// do.
+    /// Time after which roll and pitch stay within [`REACHED_DEG`] of the target, s. The whole duration if they never stay
+    /// within it.
     pub to_one_deg_s: f64,
-    /// Time after which the combined roll and pitch error stays within 5 % of the step, s; the whole duration if it
-    /// never does.
+    /// Time after which the combined roll and pitch error stays within 5 % of the step, s. The whole duration if it never
+    /// stays within it.
     pub to_five_percent_s: f64,
     /// Overshoot of roll and pitch, degrees.
     pub overshoot_deg: [f64; 2],
@@ -124,7 +123,7 @@ pub struct Quality {
     pub load_factor: [f64; 2],
     /// Smallest and largest angle of attack, degrees.
     pub alpha_deg: [f64; 2],
-    /// Largest |sideslip| in degrees.
+    /// Largest |sideslip|, degrees.
     pub sideslip_deg: f64,
     /// Root mean square of the airspeed error, m/s.
     pub airspeed_rms_mps: f64,
@@ -134,20 +133,21 @@ pub struct Quality {
     pub travel: PerControl,
     /// Mean square of each command's rate, 1/s².
     pub mean_square_rate: PerControl,
-    /// Fraction of the ticks with each command at a stop.
+    /// Fraction of the ticks at which each command is saturated.
     pub saturated: PerControl,
-    /// Fraction of the ticks with any surface at a stop.
+    /// Fraction of the ticks at which any surface command is saturated.
     pub surface_saturated: f64,
     /// Time outside each limit, s.
     pub outside_s: OutsideS,
-    /// Whether load factor and angle of attack stayed within their limits plus [`TRANSIENT`].
+    /// Whether load factor and angle of attack stayed within their limits plus [`TRANSIENT`]. False if the aircraft was lost.
     pub kept: bool,
     /// Whether the aircraft was lost.
     pub lost: bool,
 }
 
 impl Quality {
-    /// Whether roll and pitch overshoot by at most 1° or 3 % of their step, whichever is more.
+    /// Whether roll and pitch overshoot by at most 1° or 3 % of their step, whichever is larger. False if the aircraft was
+    /// lost.
     pub fn overshoots_little(&self) -> bool {
         let little = |step: f64, over: f64| over <= (LITTLE * step.abs()).max(REACHED_DEG);
         !self.lost
@@ -156,7 +156,7 @@ impl Quality {
 }
 
 impl Track {
-    /// Measures the flight against the limits of its aircraft.
+    /// Computes the measures of the flight with the limits of its aircraft.
     pub fn quality(&self, limits: &Limits) -> Quality {
         let errors: Vec<[f64; 2]> = self.errors();
         let first = errors.first().copied().unwrap_or([f64::NAN; 2]);
@@ -212,7 +212,8 @@ impl Track {
         total(parts.map(|(pair, (_, _, length))| 0.5 * length * (size(&pair[0]) + size(&pair[1]))))
     }
 
-    /// Time from the first sample to the last one at which `size` of the error exceeds `band`, s.
+    /// Time from the first sample to the last one at which `size` of the error exceeds `band`, plus the time that remained
+    /// when the aircraft was lost, s.
     fn stays(&self, errors: &[[f64; 2]], size: impl Fn(&[f64; 2]) -> f64, band: f64) -> f64 {
         let Some(start) = self.moments.first().map(|m| m.time_s) else {
             return if self.lost_s > 0.0 { self.lost_s } else { f64::NAN };
@@ -221,7 +222,7 @@ impl Track {
         away.map_or(0.0, |k| self.moments[k].time_s - start) + self.lost_s
     }
 
-    /// Every sample but the last, which only ends the flight: with the command before it and its duration, s.
+    /// Every sample except the last, with the previous command and the time to the next sample, s.
     fn ticks(&self) -> impl Iterator<Item = (&Moment, Option<&Command>, f64)> {
         let before = std::iter::once(self.before.as_ref());
         let before = before.chain(self.moments.iter().map(|m| Some(&m.command)));
@@ -229,7 +230,7 @@ impl Track {
         pairs.map(|(pair, before)| (&pair[0], before, pair[1].time_s - pair[0].time_s))
     }
 
-    /// Changes of a command, each with its duration, s.
+    /// Changes of a command, each with the time to the next sample, s.
     fn changes(&self, of: fn(&Command) -> f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let changed = move |(m, before, length): (&Moment, Option<&Command>, f64)| {
             before.map(|old| (of(&m.command) - of(old), length))
@@ -237,42 +238,42 @@ impl Track {
         self.ticks().filter_map(changed).filter(|(by, _)| by.is_finite())
     }
 
-    /// Mean over the ticks of a value of each command.
+    /// Mean of `of` the command over the ticks.
     fn share(&self, of: impl Fn(&Command) -> f64) -> f64 {
         mean(self.ticks().map(|(m, ..)| of(&m.command)))
     }
 }
 
-/// 1 for a command at or beyond its stop, else 0; NaN for NaN.
+/// 1 if |`command`| is at or above `most`, else 0. NaN for NaN.
 fn stop(command: f64, most: f64) -> f64 {
     if command.is_nan() { f64::NAN } else { f64::from(u8::from(command.abs() >= most)) }
 }
 
-/// Roll and pitch (rad) minus their commands, degrees, wrapped to ±180°.
+/// Roll and pitch (rad) minus the target's, degrees, wrapped to ±180°.
 pub fn attitude_error_deg([roll, pitch]: [f64; 2], target: &Target) -> [f64; 2] {
     let wrap = |x: f64| (x + 180.0).rem_euclid(360.0) - 180.0;
     [wrap((roll - target.roll).to_degrees()), wrap((pitch - target.pitch).to_degrees())]
 }
 
-/// Largest excursion of the error past zero, in the direction of the step; the largest |error| where there is no
-/// step.
+/// Largest excursion of the error past zero in the direction of the step. Without a step, the largest |error|. NaN for no
+/// errors.
 fn overshoot(mut errors: impl Iterator<Item = f64>) -> f64 {
     let Some(first) = errors.next() else { return f64::NAN };
     let beyond = |e: f64| if first == 0.0 { e.abs() } else { -first.signum() * e };
     errors.map(beyond).filter(|e| e.is_finite()).fold(0.0, f64::max)
 }
 
-/// Minimum and maximum, ignoring NaN; NaN if there is none.
+/// Minimum and maximum without NaN values. NaN if all values are NaN.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::NAN; 2], |[least, most], x| [least.min(x), most.max(x)])
 }
 
-/// Sum, ignoring NaN; NaN if there is none.
+/// Sum of the finite values. NaN if there are none.
 fn total(values: impl Iterator<Item = f64>) -> f64 {
     values.filter(|x| x.is_finite()).fold(f64::NAN, |sum, x| if sum.is_nan() { x } else { sum + x })
 }
 
-/// Mean, ignoring NaN; NaN if there is none.
+/// Mean of the finite values. NaN if there are none.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) =
         values.filter(|x| x.is_finite()).fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));

@@ -16,7 +16,7 @@ const LIMITS: Limits = Limits {
     slew_per_s: 20.0,
 };
 
-/// Level flight at the airspeed wanted, from which each test departs.
+/// Level flight at the target airspeed, which each test modifies.
 fn level(time_s: f64) -> Moment {
     Moment {
         time_s,
@@ -29,7 +29,7 @@ fn level(time_s: f64) -> Moment {
     }
 }
 
-/// `seconds` of flight at 100 Hz towards a roll and pitch in degrees.
+/// `seconds` of flight at 100 Hz with a target of roll and pitch in degrees.
 fn track(seconds: f64, [roll, pitch]: [f64; 2], moment: impl Fn(f64) -> Moment) -> Track {
     let count = (seconds / STEP).round() as usize;
     let target = Target { roll: roll.to_radians(), pitch: pitch.to_radians(), airspeed: 20.0 };
@@ -37,7 +37,7 @@ fn track(seconds: f64, [roll, pitch]: [f64; 2], moment: impl Fn(f64) -> Moment) 
     Track { moments, target, before: None, lost_s: 0.0 }
 }
 
-/// A first-order approach to a roll of 40°, time constant 0.5 s: integral, times and overshoot have closed forms.
+/// A first-order approach to a roll of 40° with a time constant of 0.5 s has integral, times and overshoot in closed form.
 #[test]
 fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let tau = 0.5;
@@ -45,16 +45,16 @@ fn an_exponential_approach_has_the_integral_and_times_of_its_formula() {
     let flight =
         track(8.0, [40.0, 0.0], |t| Moment { attitude: [roll(t).to_radians(), 0.0], ..level(t) });
     let q = flight.quality(&LIMITS);
-    // ∫ 40 e^(−t/τ) = 40 τ; the trapezoids of 0.01 s add (dt/τ)²/12 of it
+    // ∫ 40 e^(−t/τ) = 40 τ, to which trapezoids of 0.01 s add the fraction (dt/τ)²/12
     assert!((q.error_integral_deg_s - 20.0).abs() < 20.0 * 4e-5, "{q:?}");
-    // to the last tick outside: within one tick of τ ln(40/1) and τ ln(20)
+    // the time ends at the last tick outside the band, within one tick of τ ln(40/1) and τ ln(20)
     assert!((q.to_one_deg_s - tau * 40f64.ln()).abs() <= STEP);
     assert!((q.to_five_percent_s - tau * 20f64.ln()).abs() <= STEP);
     assert_eq!(q.overshoot_deg, [0.0, 0.0]);
     assert!((q.step_deg[0] - 40.0).abs() < 1e-9 && q.step_deg[1].abs() < 1e-9);
 }
 
-/// A second-order step of damping ζ overshoots by exp(−πζ/√(1 − ζ²)) of the step, whichever way it goes.
+/// A second-order step of damping ζ overshoots by exp(−πζ/√(1 − ζ²)) of the step, in either direction.
 #[test]
 fn a_second_order_step_overshoots_as_its_damping_says() {
     let (zeta, omega) = (0.4_f64, 4.0);
@@ -69,7 +69,7 @@ fn a_second_order_step_overshoots_as_its_damping_says() {
     });
     let expected = (-std::f64::consts::PI * zeta / damped).exp();
     let q = flight.quality(&LIMITS);
-    // the peak is flat: a tick beside it is off by (ωd dt)²/8 of the overshoot
+    // near the peak, a sample up to half a tick away is low by at most (ωd dt)²/8 of the overshoot
     assert!((q.overshoot_deg[0] / 50.0 - expected).abs() < 3e-4 * expected, "{q:?}");
     assert!((q.overshoot_deg[1] / 20.0 - expected).abs() < 3e-4 * expected, "{q:?}");
 }
@@ -81,7 +81,7 @@ fn an_error_that_only_shrinks_from_the_other_side_is_no_overshoot() {
         ..level(t)
     });
     assert_eq!(flight.quality(&LIMITS).overshoot_deg[1], 0.0);
-    // without a step every departure is one
+    // without a step every excursion is an overshoot
     let still = track(1.0, [0.0, 0.0], |t| Moment { attitude: [0.0, -0.1 * t], ..level(t) });
     assert!((still.quality(&LIMITS).overshoot_deg[1] - 0.1_f64.to_degrees()).abs() < 1e-9);
 }
@@ -118,7 +118,7 @@ fn a_sine_of_a_surface_travels_four_amplitudes_a_period() {
     assert_eq!([q.surface_saturated, q.saturated.throttle], [0.0; 2]);
 }
 
-/// The command's jump at a new target counts if the flight had started before it.
+/// The change from the command before a new target counts if there was such a command.
 #[test]
 fn the_first_change_counts_from_the_command_before() {
     let command = Command { aileron: 0.5, ..Command::IDLE };
@@ -126,11 +126,11 @@ fn the_first_change_counts_from_the_command_before() {
     assert_eq!(flight.quality(&LIMITS).travel.aileron, 0.0);
     let after = Track { before: Some(Command::IDLE), ..flight }.quality(&LIMITS);
     assert_eq!(after.travel.aileron, 0.5);
-    // 0.5 in a tick of 0.01 s is 50 a second
+    // 0.5 in a tick of 0.01 s is 50 per second
     assert!((after.outside_s.slew - STEP).abs() < 1e-9);
 }
 
-/// A load factor of 1 + 2 sin is above 2 for a third of each period, and below −1 never.
+/// A load factor of 1 + 2 sin exceeds 2 for a third of each period and never falls below −1.
 #[test]
 fn seconds_outside_are_those_of_the_sine_above_the_limit() {
     let flight = track(12.0, [0.0; 2], |t| {

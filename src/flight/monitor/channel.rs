@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A component of specific force or angular acceleration.
+/// A component of specific force (m/s²) or angular acceleration (rad/s²) in body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Specific force along body x.
@@ -32,7 +32,7 @@ impl Channel {
 }
 
 impl Channel {
-    /// Index of the plane in which one cause acts: 0 longitudinal, 1 lateral.
+    /// Index of the channel's plane of motion: 0 longitudinal, 1 lateral.
     pub(super) fn plane(self) -> usize {
         match self {
             Channel::Forward | Channel::Normal | Channel::Pitch => 0,
@@ -54,13 +54,13 @@ impl fmt::Display for Channel {
     }
 }
 
-/// A channel has left its band.
+/// A warning that a residual has left its band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Warning {
-    /// The channel that deviates most.
+    /// The channel whose residual is largest relative to its band.
     pub channel: Channel,
-    /// Its residual divided by the half width of its band, signed and dimensionless; outside −1..1 is outside the
-    /// band.
+    /// Residual divided by the half width of its band, signed and dimensionless. Beyond −1..1 the residual is outside
+    /// the band.
     pub share: f64,
     /// Whether the residual is correlated with the deflection of the channel's surface.
     pub follows_surface: bool,
@@ -73,7 +73,7 @@ impl Warning {
             (Channel::Roll, true) => "an aileron that sticks or moves less than commanded",
             (Channel::Pitch, true) => "an elevator that sticks or moves less than commanded",
             (Channel::Yaw, true) => "a rudder that sticks or moves less than commanded",
-            // z points down: a positive residual is too little lift.
+            // z points down: a positive residual means too little lift.
             (Channel::Normal, _) if self.share > 0.0 => {
                 "ice on the wing, a heavier load, a wrong airspeed or incidence"
             }
@@ -98,6 +98,9 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Warning { channel, share, .. } = self;
         let (share, suspect) = (share.abs(), self.suspect());
-        write!(f, "{channel} is not the model's ({share:.1} times its band): suspect {suspect}")
+        write!(
+            f,
+            "{channel} deviates from the model ({share:.1} times its band): suspect {suspect}"
+        )
     }
 }

@@ -1,10 +1,11 @@
-//! The model monitor compares measured accelerations in flight with the model's predictions.
+//! The model monitor compares accelerations measured in flight with the model's predictions.
 //!
-//! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at the measured
-//! state and surfaces. Its band is two standard deviations of the prediction. These follow from the standard deviations of the
-//! model's coefficients (15 % where its file states none) and of the measured inputs, which include gusts where no vanes measure
-//! the incidence. A channel outside its band for 2 s is reported once, and again only after it has been well inside for 5 s.
-//! Deviations in the same plane within 20 s are attributed to the same cause and not reported again.
+//! For each channel (specific force or angular acceleration) the residual is the measurement minus the prediction at
+//! the measured state and surfaces. The band is two standard deviations of the prediction. This standard deviation
+//! combines those of the model's coefficients (15 % if the model file states none) and those of the measured inputs.
+//! Without incidence vanes, gusts are included. A channel outside its band for 2 s is reported once. It is reported
+//! again only after its residual has stayed below 0.7 of the half width for 5 s. Deviations in the same plane within 20
+//! s are attributed to one cause and not reported again.
 //!
 //! No command depends on the monitor.
 
@@ -24,17 +25,18 @@ use greylag_physics::{State, Time};
 const STEPS_S: std::ops::RangeInclusive<f64> = 0.002..=0.05;
 /// Deviations in one plane within this time are attributed to one cause, s.
 const ONE_CAUSE_S: f64 = 20.0;
-/// Fraction of the envelope's smallest airspeed below which the monitor makes no comparison.
+/// Fraction of the envelope's smallest airspeed below which nothing is compared.
 const SLOWEST: f64 = 0.8;
 
 /// Measurement and prediction of one channel: m/s² for specific forces, rad/s² for angular accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compared {
-    /// Measured value: forces at the sample, angular accelerations as means over the preceding step.
+    /// Measured value. Specific forces are values at the sample, angular accelerations are means over the preceding
+    /// step.
     pub measured: f64,
-    /// Value predicted by the model.
+    /// Value predicted by the model, m/s² or rad/s².
     pub predicted: f64,
-    /// Half width of the band about the prediction: two standard deviations.
+    /// Half width of the band about the prediction, two standard deviations, in the same unit.
     pub band: f64,
 }
 
@@ -44,7 +46,7 @@ pub struct Monitor {
     predictor: Predictor,
     slowest: f64,
     last: Option<Seen>,
-    /// Channels compared at the last state: older residuals are not reported as present.
+    /// Whether each channel was compared at the last state. Residuals of the other channels are unknown.
     compared: [bool; 6],
     /// Measured and predicted values at the last comparison.
     values: [[f64; 2]; 6],
@@ -77,8 +79,8 @@ impl Monitor {
         }
     }
 
-    /// Takes a state; returns the channel that deviates most, if a deviation is to be reported. A state that is
-    /// unusable or follows a gap restarts the differencing. It does not allocate.
+    /// Compares a state with its prediction. Returns a warning for the channel that deviates most, if a deviation is to
+    /// be reported. Differencing restarts after a gap and after an unusable state. The function allocates no memory.
     pub fn see(&mut self, frame: &Telemetry) -> Option<Warning> {
         self.compared = [false; 6];
         if frame.faults != Faults::NONE
@@ -99,20 +101,21 @@ impl Monitor {
         self.due(now.time)
     }
 
-    /// Clears the state, as when another pilot takes control.
+    /// Clears residuals and earlier reports, for instance when another pilot takes control.
     pub fn forget(&mut self) {
         (self.last, self.compared) = (None, [false; 6]);
         self.watches = [Watch::default(); 6];
         self.reported = [None; 2];
     }
 
-    /// Residuals divided by the half widths of their bands (two standard deviations), in the order of
-    /// [`Channel::ALL`]; dimensionless, outside −1..1 is outside the band, NaN when unknown.
+    /// Residuals divided by the half widths of their bands (two standard deviations), dimensionless, in the order of
+    /// [`Channel::ALL`]. Beyond −1..1 a residual is outside its band. NaN if the residual is unknown.
     pub fn shares(&self) -> Six {
         std::array::from_fn(|k| if self.compared[k] { self.watches[k].share() } else { f64::NAN })
     }
 
-    /// The channels of the last state, in the order of [`Channel::ALL`]; `None` where nothing could be compared.
+    /// Measurements and predictions at the last state, in the order of [`Channel::ALL`]; `None` for a channel that
+    /// could not be compared.
     pub fn channels(&self) -> [Option<Compared>; 6] {
         std::array::from_fn(|k| {
             let [measured, predicted] = self.values[k];
@@ -139,7 +142,7 @@ impl Monitor {
             frame.actuators.rudder,
         ];
         for (k, watch) in self.watches.iter_mut().enumerate() {
-            // Differenced rates are means over the step; forces are values at its end.
+            // Differenced rates are means over the step. Specific forces are values at its end.
             let expected =
                 if k < 3 { predicted[k] } else { 0.5 * (predicted[k] + before.predicted[k]) };
             let residual = measured[k] - expected;
@@ -186,8 +189,9 @@ mod tests {
         .unwrap()
     }
 
-    /// Warnings of the monitor in a flight of the model `truth`. `commanded` gives the reported surfaces from time, state
-    /// and trim; `acting` gives the surfaces that act on the aircraft from the reported ones and the trim.
+    /// Warnings of the monitor, with their times (s), in a flight of the model `truth`. `commanded` returns the
+    /// reported surfaces from time, state and trim. `acting` returns the surfaces that act on the aircraft from the
+    /// reported surfaces and the trim.
     fn warnings(
         seconds: f64,
         truth: &GreyBox,
@@ -263,7 +267,7 @@ mod tests {
             assert!(truth.set_coefficient(name, value), "{name}");
             truth
         };
-        // Cm0 by −0.08 moves the neutral pitch by 10°: 6 cm of the centre of gravity.
+        // Cm0 from 0.0227 to −0.08 changes the trim pitch, as a shift of the centre of gravity does.
         let found = warnings(30.0, &changed("pitch_linear.Cm0", -0.08), flown, |r, _| r);
         assert!(found.iter().any(|(at, w)| w.channel == Channel::Pitch && *at < 10.0), "{found:?}");
         let found = warnings(30.0, &changed("drag_table.k", 3.0), flown, |r, _| r);

@@ -1,4 +1,4 @@
-//! Predicted accelerations with their standard deviations.
+//! Predicted accelerations with their variances.
 
 use greylag_link::vehicle::Telemetry;
 use greylag_model::GreyBox;
@@ -6,19 +6,20 @@ use greylag_physics::Channel as Part;
 use greylag_physics::rigid_body::{RigidBody, acceleration_of, gravity_in_body};
 use greylag_physics::{AirData, Controls, State};
 
-/// Specific force (m/s², body x, y, z), then angular acceleration (rad/s², about x, y, z).
+/// Specific force along body x, y, z (m/s²), then angular acceleration about body x, y, z (rad/s²).
 pub type Six = [f64; 6];
 
-/// Standard deviations of the model's inputs: relative airspeed, surfaces (rad), throttle; typical of a pitot tube
-/// and servos of small aircraft. Those of α and β come with the state.
+/// Standard deviations of the model's inputs: airspeed (relative), surfaces (rad), throttle (0..1). The values are
+/// typical of a pitot tube and servos of small aircraft. The standard deviations of α and β come with the state.
 const AIRSPEED_SD: f64 = 0.02;
 const SURFACE_SD: f64 = 0.3 * DEGREE;
 const THROTTLE_SD: f64 = 0.02;
-/// Gust intensity (m/s) and scale (m) for the rotation of the air, which no sensor measures: σ_p of MIL-F-8785C is
-/// 1.9 σ_w / √(L b).
+/// Gust intensity (m/s) and scale length (m) for the rotation of the air, which no sensor measures. σ_p of MIL-F-8785C
+/// is 1.9 σ_w / √(L b).
 const GUSTS_MPS: f64 = 1.5;
 const GUST_SCALE_M: f64 = 533.0;
-/// Largest step of the finite differences in α and β, rad: the step of a whole gust would end beyond the stall, where lift drops.
+/// Largest step of the finite differences in α and β, rad. A step by the standard deviation of a gust could end beyond
+/// the stall, where lift drops.
 const INCIDENCE_STEP: f64 = 2.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -40,7 +41,7 @@ struct Asked {
     altitude: f64,
 }
 
-/// Adds one standard deviation to one uncertain input.
+/// Adds one standard deviation to one uncertain input of the model.
 type Change = fn(&mut Asked, &Deviations);
 
 /// Standard deviations that vary in flight.
@@ -66,7 +67,7 @@ const CHANGES: [Change; 10] = [
 ];
 
 impl Predictor {
-    /// A predictor with the standard deviations that `model` states.
+    /// A predictor with the standard deviations of the coefficients of `model`.
     pub fn new(model: GreyBox) -> Self {
         let widths = model.coefficients().iter().map(greylag_model::Named::width).collect();
         let span = model.airframe.geometry.span;
@@ -74,13 +75,13 @@ impl Predictor {
         Predictor { model, widths, air_rotation }
     }
 
-    /// The accelerations at `frame`.
+    /// The predicted accelerations at `frame`, m/s² and rad/s².
     pub fn mean(&self, frame: &Telemetry) -> Six {
         self.accelerations(&Asked::at(frame))
     }
 
-    /// Variance of the accelerations at `frame`: from the standard deviations of the coefficients and of the measured
-    /// inputs.
+    /// Variance of the predicted accelerations `mean` at `frame`, m²/s⁴ and rad²/s⁴. It combines the standard
+    /// deviations of the coefficients and of the measured inputs.
     pub fn variance(&self, frame: &Telemetry, mean: &Six) -> Six {
         let asked = Asked::at(frame);
         let mut variance = self.of_coefficients(&asked);
@@ -130,7 +131,7 @@ impl Asked {
     }
 }
 
-/// Variances of accelerations from those of independent forces (N²) and moments (N² m²). Sideslip is neglected.
+/// Variances of accelerations from the variances of independent forces (N²) and moments (N² m²). Sideslip is neglected.
 fn to_accelerations(parts: &[f64; 7], body: &RigidBody, air: &AirData) -> Six {
     let of = |part: Part| parts[part as usize];
     let (sin2, cos2) = (air.sin_alpha.powi(2), air.cos_alpha.powi(2));

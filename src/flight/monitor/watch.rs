@@ -1,9 +1,9 @@
-//! Monitor of one channel: size and duration of its residual outside the band.
+//! Monitor of one channel: size of its residual relative to the band, and duration outside the band.
 
 /// Time constant of the residual's low-pass, s: five samples of differenced gyro signals.
 const SMOOTHED_S: f64 = 0.1;
-/// Averaging time of the root mean squares of residual and band, s, so that an oscillating residual counts like a
-/// constant one.
+/// Averaging time of the root mean squares of residual and band, s. An oscillating residual then counts like a constant
+/// residual of the same root mean square.
 const EFFECTIVE_S: f64 = 0.5;
 /// Averaging time of the correlation of surface and residual, s.
 const COMPARED_S: f64 = 3.0;
@@ -11,10 +11,11 @@ const COMPARED_S: f64 = 3.0;
 const BAND: f64 = 2.0;
 /// Time outside the band after which a deviation is reported, s.
 const OUTSIDE_S: f64 = 2.0;
-/// A deviation is reported again only after the residual was below this fraction of the band for this time, s.
+/// Condition for a further report: the residual stays below this fraction of the band for this time, s.
 const QUIET: f64 = 0.7;
 const QUIET_S: f64 = 5.0;
-/// Correlation above which a residual follows a surface, and the smallest surface movement that shows it, rad.
+/// Correlation above which a residual follows a surface, and the smallest standard deviation of the surface for the
+/// test, rad.
 const FOLLOWS: f64 = 0.8;
 const MOVES: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -40,8 +41,8 @@ struct Follows {
 }
 
 impl Watch {
-    /// Updates the monitor with the residual of a step of `dt` (s), the variance of its prediction, and the deflection (rad)
-    /// of the channel's surface.
+    /// Updates the monitor with the residual of a step of `dt` (s). `variance` is the variance of the prediction in the
+    /// square of the residual's unit. `surface` is the deflection (rad) of the channel's surface.
     pub fn see(&mut self, residual: f64, variance: f64, surface: f64, dt: f64) {
         let towards = |from: &mut f64, to: f64, time: f64| *from += (to - *from) * dt / (time + dt);
         towards(&mut self.residual, residual, SMOOTHED_S);
@@ -54,8 +55,8 @@ impl Watch {
         self.departed &= self.quiet_s < QUIET_S;
     }
 
-    /// The residual divided by the half width of its band, signed and dimensionless: beyond −1..1 it is outside the
-    /// band. NaN before the first residual.
+    /// The residual divided by the half width of its band, signed and dimensionless. Beyond −1..1 the residual is
+    /// outside the band. NaN before the first residual.
     pub fn share(&self) -> f64 {
         (self.power.sqrt() / self.band()).copysign(self.residual)
     }
@@ -83,7 +84,7 @@ impl Watch {
 
 impl Follows {
     fn see(&mut self, surface: f64, residual: f64, dt: f64) {
-        // arithmetic means at first, so that the initial value has no extra weight
+        // a growing average at first: the initial value gets no extra weight
         self.seen_s += dt;
         let weight = dt / self.seen_s.min(COMPARED_S);
         let towards = |from: &mut f64, to: f64| *from += (to - *from) * weight;
@@ -94,7 +95,7 @@ impl Follows {
         towards(&mut self.product, surface * residual);
     }
 
-    /// The correlation; `None` while the surface does not move.
+    /// The correlation; `None` while the surface hardly moves or the residual is constant.
     fn correlation(&self) -> Option<f64> {
         let spread = |k: usize| (self.square[k] - self.mean[k].powi(2)).max(0.0).sqrt();
         let moves = spread(0) >= MOVES && spread(1) > 0.0;
@@ -109,7 +110,8 @@ mod tests {
 
     const DT: f64 = 0.01;
 
-    /// Times of the reported deviations, s, for a residual as a function of time. Its standard deviation is 1, the band ±2.
+    /// Times of the reported deviations, s, for a residual as a function of time. The standard deviation is 1 and the
+    /// band ±2.
     fn departures(seconds: f64, residual: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut watch, mut times) = (Watch::default(), Vec::new());
         for i in 0..(seconds / DT) as usize {
@@ -126,7 +128,7 @@ mod tests {
     #[test]
     fn a_residual_outside_its_band_departs_after_two_seconds_and_once() {
         let times = departures(60.0, |_| 3.0);
-        // 2 s outside, after the filters have come from 0 to the band, two thirds of the way.
+        // The filters first rise to the band, two thirds of the step. Then 2 s outside the band pass.
         assert!(times.len() == 1 && (2.2..3.0).contains(&times[0]), "{times:?}");
         assert_eq!(departures(60.0, |_| 1.8), [0.0; 0], "inside");
         let burst = |t: f64| if (10.0..11.0).contains(&t) { 6.0 } else { 0.0 };
@@ -137,7 +139,7 @@ mod tests {
     fn a_residual_that_swings_about_zero_is_outside_all_the_same() {
         let times = departures(20.0, |t| 5.0 * (TAU * 0.5 * t).sin());
         assert_eq!(times.len(), 1, "{times:?}");
-        // Noise of a gyro's differences, ten times the band from sample to sample.
+        // Differenced gyro noise, ten times the band and alternating from sample to sample.
         let noise = |t: f64| if (t / DT).round() as i64 % 2 == 0 { 20.0 } else { -20.0 };
         assert_eq!(departures(20.0, noise), [0.0; 0]);
     }

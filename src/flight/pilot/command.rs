@@ -1,4 +1,4 @@
-//! Selection of the command: planned, fallback, held, or level trim.
+//! Selection of the command: planned, fallback, held or level trim.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 
@@ -8,19 +8,20 @@ use greylag_link::autopilot::Severity;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, Time};
 
-/// Factor on the deviation of a controller's deflections from their mean after an oscillation. It divides the loop
-/// gain at the oscillation frequency, and so multiplies the delay margin by about as much.
+/// After an oscillation, deflections deviate from their running mean by this fraction only. The loop gain at the
+/// oscillation frequency falls by the same factor, and the delay margin grows by about its inverse.
 const REDUCED_GAIN: f64 = 1.0 / 3.0;
-/// Time constant of that mean, s: a limit cycle of 1 to 8 Hz averages out, the deflections of a turn remain.
+/// Time constant of the running mean of the deflections, s. A limit cycle of 1 to 8 Hz averages out. The deflections of
+/// a turn remain.
 const MEAN_S: f64 = 0.5;
 /// Duration of the reduced gain after an oscillation, s.
 const REDUCED_S: f64 = 5.0;
-/// Bank above which the aircraft is upset, and below which it has recovered, rad. Near inverted flight, up elevator
-/// pulls the nose down: the wings are levelled first. No envelope allows such a bank.
+/// Bank above which the aircraft is upset, and bank below which it has recovered, rad. Near inverted flight, up
+/// elevator lowers the nose, so the wings are levelled first. No envelope allows a bank of 90°.
 const UPSET: [f64; 2] = [FRAC_PI_2, FRAC_PI_3];
 
 impl Pilot {
-    /// Reduces the gain from `time` on, because the loop about `axis` has oscillated for `lasted_s`, s.
+    /// Reduces the gain from `time` on. The loop about `axis` has oscillated for `lasted_s` seconds.
     pub(super) fn reduce_gain(&mut self, axis: Axis, lasted_s: f64, time: Time) {
         self.oscillated = Some(time);
         let axis = match axis {
@@ -33,7 +34,7 @@ impl Pilot {
         self.texts.say(Severity::Error, words);
     }
 
-    /// `command`, or recovery roll where the aircraft is upset.
+    /// `command`, or the recovery roll to level wings while the aircraft is upset.
     fn upright(&mut self, command: Command, roll: f64) -> Command {
         if self.by_attitude {
             return command;
@@ -128,7 +129,7 @@ impl Pilot {
         (self.level_command(), Source::Level)
     }
 
-    /// The command while the state is unusable.
+    /// The command while the state is unusable: the last command for a short time, then level trim.
     pub(super) fn without_state(&self) -> (Command, Source) {
         let short = self.estimate.usable_within(self.clock, self.config.state_hold_s);
         if short && !self.vehicle_lost {

@@ -1,27 +1,27 @@
-//! Settings of the pilot: envelope, timeouts, slew limits, trim of straight flight.
+//! Settings of the pilot: envelope, timeouts, slew limits, and the trim of straight flight.
 //!
-//! "Level trim" abbreviates [`Trim::straight`] with level wings: level flight, or the descent at idle throttle where
-//! no throttle holds level flight.
+//! "Level trim" stands for [`Trim::straight`] with level wings. It is level flight, or a descent at idle throttle at
+//! airspeeds at which no throttle holds level flight.
 
 use super::polarity::Answers;
 use greylag_model::{GreyBox, Trim, TrimError};
 use greylag_physics::airframe::Envelope;
 
-/// Airspeed between two rows of the trim table, m/s: pitch errs by less than 0.1° between them.
+/// Airspeed step between two rows of the trim table, m/s. Interpolated pitch has an error below 0.1°.
 const TRIM_SPACING: f64 = 1.0;
 
-/// The pilot's settings. Fields have their units in their names, since parameters and files show them.
+/// The pilot's settings. The field names contain the units, because parameters and files show these names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Flight envelope from the airframe file.
     pub envelope: Envelope,
-    /// Age of the last setpoint (or stick input) at which its mode ends, s.
+    /// Timeout of setpoints and stick inputs, s. The pilot then changes to HOLD.
     pub offboard_loss_s: f64,
-    /// Age of the last fresh state at which the vehicle link counts as lost, s.
+    /// Timeout of fresh states, s. The vehicle link then counts as lost.
     pub vehicle_loss_s: f64,
-    /// Longest gap in usable states over which the last command is held, s.
+    /// Longest gap in usable states during which the last command is held, s.
     pub state_hold_s: f64,
-    /// Slew limit of the throttle command, in units of 0..1 per second.
+    /// Slew limit of the throttle command (0..1), 1/s.
     pub throttle_slew_per_s: f64,
     /// Source of the throttle in OFFBOARD.
     pub thrust_source: ThrustSource,
@@ -29,10 +29,10 @@ pub struct Config {
     pub arm_tilt_max_deg: f64,
     /// Airspeed above which disarming needs force, m/s.
     pub disarm_airspeed_max_mps: f64,
-    /// Trim of straight flight with level wings ([`Trim::straight`]): level, or a glide at idle throttle; by rising
-    /// airspeed.
+    /// Trim of straight flight with level wings ([`Trim::straight`]), by rising airspeed. Rows without level trim are
+    /// glides at idle throttle.
     pub trim: Vec<TrimPoint>,
-    /// Modelled responses to the surfaces, for the check of their signs; `None` to skip it.
+    /// Modelled responses to the surfaces for the sign check; `None` omits the check.
     pub answers: Option<Answers>,
 }
 
@@ -41,7 +41,7 @@ pub struct Config {
 pub enum ThrustSource {
     /// The controller's throttle, which holds the cruise airspeed.
     Cruise,
-    /// The setpoint's thrust, where it has one.
+    /// The setpoint's thrust, 0..1; the controller's throttle if the setpoint has no thrust.
     Setpoint,
 }
 
@@ -50,7 +50,7 @@ pub enum ThrustSource {
 pub struct TrimPoint {
     /// True airspeed V_a, m/s.
     pub airspeed_mps: f64,
-    /// Pitch, degrees: the angle of attack in level flight, smaller in a glide.
+    /// Pitch angle, degrees. It equals the angle of attack in level flight and is smaller in a glide.
     pub pitch_deg: f64,
     /// Elevator command as a fraction, −1..1.
     pub elevator: f64,
@@ -59,11 +59,12 @@ pub struct TrimPoint {
 }
 
 impl Config {
-    /// Settings for the aircraft of `model`: its envelope and its trim of straight flight.
+    /// Settings for the aircraft of `model`, with its envelope and its trim of straight flight.
     ///
     /// # Errors
     ///
-    /// If the model has no trim at the cruise airspeed, level or in a glide, or an error of [`Config::check`].
+    /// If the model has no trim at the cruise airspeed, level or in a glide, or if [`Config::check`] finds an invalid
+    /// setting.
     pub fn for_model(model: &GreyBox) -> Result<Self, ConfigError> {
         let envelope = model.airframe.envelope;
         let row = |airspeed: f64| trim_row(model, airspeed);
@@ -78,20 +79,20 @@ impl Config {
         Ok(config)
     }
 
-    /// Default settings with an envelope and the rows of a trim table.
+    /// Default settings with an envelope and a trim table.
     pub fn new(envelope: Envelope, trim: Vec<TrimPoint>) -> Self {
         Config {
             envelope,
             offboard_loss_s: 1.0,
             vehicle_loss_s: 0.5,
-            // Five frames: longer than the jitter of a link, shorter than a wrong aileron needs
-            // to roll the aircraft far.
+            // Five frames: longer than the jitter of a link, and too short for a wrong aileron to roll the aircraft
+            // far.
             state_hold_s: 0.05,
-            // Full travel in 0.2 s, the lag of the motor: a faster command would not change the thrust.
+            // Full travel in 0.2 s, the time constant of the motor: a faster command would not change the thrust.
             throttle_slew_per_s: 5.0,
             thrust_source: ThrustSource::Cruise,
             arm_tilt_max_deg: 60.0,
-            // Below every airspeed at which a fixed-wing aircraft of this class flies.
+            // Below the flying speed of every fixed-wing aircraft of this class.
             disarm_airspeed_max_mps: 8.0,
             trim,
             answers: None,
@@ -100,7 +101,7 @@ impl Config {
 }
 
 fn trim_row(model: &GreyBox, airspeed: f64) -> Result<TrimPoint, TrimError> {
-    // trim depends on equivalent airspeed; at a given true airspeed it changes by 5 % per 1000 m of altitude
+    // trim depends on equivalent airspeed, which changes by 5 % per 1000 m of altitude at a given true airspeed
     let trim = Trim::straight(model, airspeed, model.airframe.reference.altitude)?;
     let command = model.airframe.actuators.command(&trim.controls);
     Ok(TrimPoint {
@@ -145,11 +146,11 @@ pub enum ConfigError {
 }
 
 impl Config {
-    /// Checks ranges and order.
+    /// Checks that all settings are in range, that their bounds are in order, and that the trim table is valid.
     ///
     /// # Errors
     ///
-    /// The first setting outside its range, or the first contradictory pair.
+    /// The first setting outside its range, the first contradictory pair, or an invalid trim table.
     pub fn check(&self) -> Result<(), ConfigError> {
         for (name, value, low, high) in self.ranges() {
             if !(value >= low && value <= high) {
@@ -205,7 +206,7 @@ impl Config {
         ]
     }
 
-    /// Trim of straight flight at an airspeed (m/s): linear between the rows, constant outside.
+    /// Trim of straight flight at a true airspeed (m/s): linear between the rows of the table, constant outside.
     pub fn trim_at(&self, airspeed_mps: f64) -> TrimPoint {
         let (first, last) = (self.trim[0], self.trim[self.trim.len() - 1]);
         if airspeed_mps <= first.airspeed_mps {
@@ -263,7 +264,7 @@ mod tests {
     #[test]
     fn trim_is_that_of_the_simulator() {
         let full = model().airframe.actuators.elevator.travel.most;
-        // The three rows measured in JSBSim; the tolerance of 0.05° is half of the table's spacing error.
+        // Three rows measured in JSBSim. The tolerance of 0.05° is half of the table's interpolation error.
         for (airspeed, pitch, deflection, throttle) in [
             (16.67, 2.283, 0.01855, 0.118),
             (20.0, 0.858, 0.0688, 0.185),
@@ -316,7 +317,7 @@ mod tests {
         let check = |trim: Vec<TrimPoint>| Config { trim, ..x8() }.check();
         assert_eq!(check(vec![good]), Ok(()));
         assert_eq!(check(vec![good, good]), Err(ConfigError::Trim));
-        // The ends of what is allowed are good, a little more is not.
+        // The bounds are accepted. Values beyond them are rejected.
         let edge = TrimPoint { pitch_deg: -30.0, elevator: 1.0, throttle: 1.0, ..good };
         assert_eq!(check(vec![edge]), Ok(()));
         for bad in [

@@ -13,9 +13,9 @@ pub struct Request {
     pub observation: Observation,
     /// Target, already limited to the envelope.
     pub target: Target,
-    /// The controller's last command, if the envelope limiter changed it.
+    /// The controller's last command, if the envelope limiter changed it; otherwise `None`.
     pub overruled: Option<Overruled>,
-    /// Set on engagement: the planner must reset its internal state.
+    /// Whether the planner is being engaged and must reset its internal state.
     pub engage: bool,
 }
 
@@ -23,7 +23,7 @@ pub struct Request {
 const SEED: u64 = 0;
 
 impl Request {
-    /// The command of `controller` for this request.
+    /// The command of `controller` for this request. On engagement the controller is reset first.
     pub fn ask(&self, controller: &mut dyn Controller) -> Command {
         if self.engage {
             controller.reset(SEED);
@@ -35,10 +35,10 @@ impl Request {
     }
 }
 
-/// Reply to the request.
+/// Outcome of a planning request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Plan {
-    /// The planner's command, in time; it need not be finite or in range.
+    /// The planner's command arrived in time. It need not be finite or in range.
     Ready(Command),
     /// The planner's command did not arrive in time.
     Late,
@@ -53,24 +53,24 @@ pub enum Plan {
 pub enum Source {
     /// The planner's own command.
     Planned,
-    /// The fallback controller's command, because the plan was late.
+    /// The fallback controller's command, because the plan was late or the planner was busy.
     Late,
-    /// The fallback controller's command, because there was no finite plan.
+    /// The fallback controller's command, because no planner is active or its command was not finite.
     Fallback,
-    /// The last command, held over a short gap in the state.
+    /// The last command, held over a short gap in usable states.
     Held,
-    /// Level trim, because the state is unusable.
+    /// Level trim, because the state is unusable or the fallback's command is not finite.
     Level,
-    /// Pilot sticks, directly.
+    /// The pilot's stick positions as surface and throttle commands.
     Sticks,
-    /// The check of signs: level trim with small pulses.
+    /// Level trim with the small pulses of the sign check.
     Check,
     /// Disarmed: all outputs are zero.
     Disarmed,
 }
 
 impl Source {
-    /// Name in recordings.
+    /// Name of the origin in recordings.
     pub fn name(self) -> &'static str {
         match self {
             Source::Planned => "planned",
@@ -88,28 +88,28 @@ impl Source {
 /// The pilot's decision of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision {
-    /// Time of the state frame that is answered, vehicle clock.
+    /// Vehicle time of the state frame to which the decision responds.
     pub time: Time,
-    /// Actuator command: finite and in range. Armed, it is within the slew limit of the last one; disarmed, it is
-    /// [`Command::IDLE`] immediately.
+    /// Actuator command, finite and in range. While armed, it differs from the last command by at most the slew limit.
+    /// While disarmed, it is [`Command::IDLE`].
     pub command: Command,
     /// Origin of the command.
     pub source: Source,
-    /// Whether the outputs are live.
+    /// Whether the actuator outputs are enabled.
     pub armed: bool,
     /// The active mode.
     pub mode: Mode,
-    /// The target after envelope limits; roll and pitch are NaN under sticks or disarmed.
+    /// The target after envelope limits. Roll and pitch are NaN in stick control and while disarmed.
     pub target: Target,
     /// Whether a failsafe is active.
     pub failsafe: bool,
-    /// Fault found by the sign check or the oscillation guard since arming.
+    /// Fault found by the sign check or the oscillation guard since arming; `None` without a fault.
     pub refused: Option<Fault>,
 }
 
 impl Decision {
-    /// The demand on the vehicle. A real controller gets control back when the state is unusable or a failsafe is
-    /// active: it has sensors of its own.
+    /// The demand on the vehicle. A fault returns control to a real flight controller, which has its own sensors.
+    /// Faults are an unusable state, an active failsafe, and what the sign check or the oscillation guard found.
     pub fn demand(&self) -> Demand {
         let fault = match (self.source, self.failsafe) {
             (Source::Level, _) => Some(Fault::State),

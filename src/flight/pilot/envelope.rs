@@ -1,4 +1,4 @@
-//! Envelope limiter applied to every command, whatever its origin.
+//! Envelope limiter for the commands of the controller, the fallback and a flight-test schedule.
 
 use super::{Pilot, due};
 use greylag_control::Observation;
@@ -7,19 +7,21 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::Command;
 
 impl Pilot {
-    /// Limits every command to the envelope with the predictions of `limiter`. While attitudes are commanded to a flight
-    /// controller, only that controller's own protection applies.
+    /// Limits commands to the envelope with the predictions of `limiter`. Stick inputs, held commands and level trim
+    /// are not limited. While attitudes are commanded to a flight controller, only that controller's own protection
+    /// applies.
     pub fn protect_with(&mut self, mut limiter: EnvelopeLimiter) {
         limiter.keep_to(&self.config.envelope);
         self.envelope = Some(limiter);
     }
 
-    /// The envelope limiter, if commands are limited.
+    /// The envelope limiter; `None` if commands are not limited.
     pub fn protection(&self) -> Option<&EnvelopeLimiter> {
         self.envelope.as_ref()
     }
 
-    /// The command nearest to `command` inside the envelope.
+    /// The command nearest to `command` inside the envelope; `command` without a limiter or while attitudes are
+    /// commanded.
     pub(super) fn inside_envelope(&mut self, command: Command, seen: &Observation) -> Command {
         let Some(limiter) = self.envelope.as_mut().filter(|_| !self.by_attitude) else {
             return command;

@@ -6,7 +6,7 @@ use super::telemetry::{defect, repeats};
 use greylag_link::vehicle::Telemetry;
 use greylag_physics::Time;
 
-/// Largest step back of vehicle time that is not a restart. Reordered frames step back by one or two cycles.
+/// Largest step back of vehicle time that is not a restart. Reordered frames step back by one or two cycles only.
 pub(super) const RESTART: Duration = Duration::from_secs(1);
 
 /// Usability of a frame.
@@ -14,15 +14,15 @@ pub(super) const RESTART: Duration = Duration::from_secs(1);
 pub(super) enum Frame {
     /// A new, usable state.
     Usable,
-    /// A state equal bit by bit to the previous one: usable for a while, but not fresh.
+    /// A state equal bit by bit to the previous state. It is usable for a short time, but not fresh.
     Frozen,
-    /// Not newer than the last frame: its command was decided already.
+    /// A frame not newer than the last frame, for which a command was already decided.
     Repeated,
     /// The state is unusable, for this reason.
     Defective(&'static str),
 }
 
-/// The newest usable frame with its arrival time (pilot's clock).
+/// The newest usable frame with its arrival time in vehicle time.
 #[derive(Debug, Default)]
 pub(super) struct Estimate {
     last: Option<Telemetry>,
@@ -33,7 +33,7 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// Takes a frame at `now`.
+    /// Registers a frame that arrived at `now`, and returns its usability.
     pub(super) fn take(&mut self, now: Time, frame: &Telemetry) -> Frame {
         if self.newest.is_some_and(|newest| frame.time <= newest) {
             return Frame::Repeated;
@@ -53,26 +53,26 @@ impl Estimate {
         Frame::Usable
     }
 
-    /// Whether `frame` is older than the newest by more than reordering explains.
+    /// Whether `frame` is older than the newest frame by more than 1 s, which reordering cannot explain.
     pub(super) fn restarted(&self, frame: &Telemetry) -> bool {
         self.newest.is_some_and(|newest| newest.since(frame.time) > RESTART)
     }
 
-    /// Counts the state as fresh at `now`, as when it is constant for a known reason.
+    /// Counts an unchanged state as fresh at `now`, if it is constant for a known reason.
     pub(super) fn refresh(&mut self, now: Time) {
         if self.usable_at.is_some() {
             self.fresh_at = Some(now);
         }
     }
 
-    /// Excludes the stall `missed` from all ages.
+    /// Excludes `missed`, a stall of this computer, from the ages of the state.
     pub(super) fn excuse(&mut self, missed: Duration) {
         for at in [&mut self.usable_at, &mut self.fresh_at].into_iter().flatten() {
             *at = at.plus(missed);
         }
     }
 
-    /// Whether the last usable frame equals the one before.
+    /// Whether the last usable frame equals the frame before it.
     pub(super) fn is_frozen(&self) -> bool {
         self.frozen
     }
@@ -86,7 +86,7 @@ impl Estimate {
         within(self.usable_at, now, limit_s)
     }
 
-    /// Whether a fresh state arrived within `limit_s` before `now`; `None` before the first.
+    /// Whether a fresh state arrived within `limit_s` before `now`; `None` before the first fresh state.
     pub(super) fn fresh_within(&self, now: Time, limit_s: f64) -> Option<bool> {
         self.fresh_at.map(|_| within(self.fresh_at, now, limit_s))
     }
@@ -94,6 +94,6 @@ impl Estimate {
 
 /// Whether `then` lies at most `limit_s` before `now`.
 pub(super) fn within(then: Option<Time>, now: Time, limit_s: f64) -> bool {
-    // half a microsecond of tolerance: the limit itself counts as within
+    // half a microsecond of tolerance, because the limit itself still counts
     then.is_some_and(|then| now.since(then).as_secs_f64() <= limit_s + 5e-7)
 }

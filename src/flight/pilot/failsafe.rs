@@ -1,4 +1,4 @@
-//! Loss and recovery of vehicle, setpoints, sticks and the vehicle's clock.
+//! Detects loss and recovery of the vehicle link, loss of setpoints and sticks, and restarts of the vehicle's clock.
 
 use std::time::Duration;
 
@@ -8,20 +8,21 @@ use super::{Complaints, Pilot};
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Change of a command to which a flying aircraft responds visibly within a fifth of a second, in units of 0..1:
-/// 0.005 of aileron rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), above the resolution of any sensor.
+/// Largest change of a command that may leave the state unchanged, as a fraction of full deflection. An aileron change
+/// of 0.005 rolls the X8 at 0.85 °/s (Clδa δa / Clp · 2V/b), above the resolution of any sensor.
 const UNFELT_TRAVEL: f64 = 0.005;
 
-/// Time after which constant sensor values under changing commands count as frozen, s: an aircraft at its largest
-/// roll rate rolls by 20° meanwhile, and real sensors do not repeat bit by bit.
+/// Time after which constant sensor values under changing commands count as frozen, s. In this time an aircraft at its
+/// largest roll rate rolls by 20°. Real sensors do not repeat bit by bit.
 const FROZEN_LOSS_S: f64 = 0.2;
 
-/// Time for which a recovered vehicle link must persist before it is reported, s; equal to the timeout of its loss.
+/// Time for which a recovered vehicle link must persist before the recovery is reported, s. It equals the default
+/// timeout of the vehicle link.
 const STEADY_S: f64 = 0.5;
 
 impl Pilot {
-    /// Accepts constant sensor values while no command changes: the vehicle waits for its launch, or a simulator
-    /// without noise has settled.
+    /// Accepts constant sensor values while no command changes. The vehicle may wait for its launch, or a simulator
+    /// without noise may have settled.
     pub(super) fn excuse_stillness(&mut self, quality: Frame, now: Time) {
         let (was, is) = (self.last_moved, self.in_force);
         let moves =
@@ -35,7 +36,7 @@ impl Pilot {
         }
     }
 
-    /// Whether the state is fresh; `None` before the first.
+    /// Whether the state is fresh; `None` before the first fresh state.
     pub(super) fn state_fresh(&self) -> Option<bool> {
         let limit = match self.estimate.is_frozen() {
             true => self.config.vehicle_loss_s.min(FROZEN_LOSS_S),
@@ -44,8 +45,8 @@ impl Pilot {
         self.estimate.fresh_within(self.clock, limit)
     }
 
-    /// Excludes `missed`, a stall of this computer, from the ages of state, setpoints and sticks: the next state is
-    /// flown as before the stall.
+    /// Excludes `missed`, a stall of this computer, from the ages of state, setpoints and sticks. The next state is
+    /// treated as if there had been no stall.
     pub fn excuse(&mut self, missed: Duration) {
         self.estimate.excuse(missed);
         let later = |at: &mut Time| *at = at.plus(missed);
@@ -54,8 +55,8 @@ impl Pilot {
         self.vehicle_back.iter_mut().for_each(later);
     }
 
-    /// Detects the loss of the vehicle, and reports its recovery once it has persisted: an intermittent link is one
-    /// loss.
+    /// Detects the loss of the vehicle, and reports the recovery once it has persisted. An intermittent link counts as
+    /// one loss.
     pub(super) fn watch_vehicle(&mut self) {
         if self.state_fresh() == Some(false) && !self.vehicle_lost {
             self.lose_vehicle();
@@ -108,10 +109,10 @@ impl Pilot {
         }
     }
 
-    /// Resets after a restart of the vehicle's clock: earlier states and times are invalid.
+    /// Resets the pilot after a restart of the vehicle's clock, because earlier states and times are invalid.
     pub(super) fn restart(&mut self) {
         if self.estimate.last().is_some() {
-            self.texts.say(Severity::Warning, "vehicle clock went back: vehicle restarted?");
+            self.texts.say(Severity::Warning, "vehicle clock jumped back: vehicle restarted?");
         }
         self.estimate = Estimate::default();
         self.setpoint = None;

@@ -1,4 +1,4 @@
-//! Envelope and slew limits of targets and commands.
+//! Limits of targets (envelope) and of commands (slew rate, airspeed protection).
 
 use super::config::Config;
 use greylag_control::Target;
@@ -6,21 +6,21 @@ use greylag_physics::Command;
 
 /// Time between two ticks of the control loop, s.
 pub const TICK_S: f64 = 0.01;
-/// Airspeed margin over which pitch protection fades in, m/s.
+/// Range of airspeed over which pitch protection fades in, m/s.
 const PROTECTION_BAND: f64 = 2.0;
-/// Largest pitch below the minimum airspeed, rad: clearly nose down, not a dive.
+/// Upper pitch limit at the minimum airspeed and below, rad: clearly nose down, not a dive.
 const RECOVERY_PITCH: f64 = -5.0 * DEGREE;
-/// Smallest pitch above the maximum airspeed, rad: clearly nose up, not a climb.
+/// Lower pitch limit at the maximum airspeed and above, rad: clearly nose up, not a climb.
 const ARREST_PITCH: f64 = 5.0 * DEGREE;
-/// Load factor available at the minimum airspeed. That airspeed is about 1.41 times the stall speed (13 and 9.2 m/s
-/// for the X8), so that the lift allows a load factor of 2; a margin of 1.2 on the stall speed in a turn leaves 2 / 1.2².
+/// Load factor available at the minimum airspeed. This airspeed is about 1.41 times the stall speed (13 and 9.2 m/s for
+/// the X8): the lift allows a load factor of 2. A margin of 1.2 on the stall speed in a turn reduces it to 2 / 1.2².
 const LOAD_AT_MINIMUM: f64 = 2.0 / 1.44;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Limits in SI units and radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest |bank|, rad.
+    /// Largest magnitude of the bank, rad.
     pub bank_max: f64,
     /// Largest pitch angle, rad.
     pub pitch_max: f64,
@@ -30,11 +30,11 @@ pub struct Limits {
     pub airspeed_min: f64,
     /// Largest true airspeed, m/s.
     pub airspeed_max: f64,
-    /// Largest load factor of a level turn.
+    /// Largest load factor of a level turn, dimensionless.
     pub load_max: f64,
-    /// Largest change of a surface command per tick.
+    /// Largest change of a surface command (−1..1) per tick.
     pub surface_step: f64,
-    /// Largest change of the throttle command per tick.
+    /// Largest change of the throttle command (0..1) per tick.
     pub throttle_step: f64,
 }
 
@@ -55,15 +55,15 @@ impl From<&Config> for Limits {
 }
 
 impl Limits {
-    /// The bank limit of a level turn at `airspeed` (m/s), rad: the load factor 1/cos φ stays below the limit and
-    /// below the available lift, which grows as V².
+    /// The bank limit of a level turn at the true airspeed `airspeed` (m/s), rad. The load factor 1/cos φ stays below
+    /// the limit and below the available lift, which grows as V².
     pub fn bank_limit(&self, airspeed: f64) -> f64 {
         let lift = LOAD_AT_MINIMUM * (airspeed / self.airspeed_min).powi(2);
         let load = lift.min(self.load_max).max(1.0);
         (1.0 / load).acos().min(self.bank_max)
     }
 
-    /// Smallest and largest pitch that may be commanded at `airspeed` (m/s), rad.
+    /// Smallest and largest pitch that may be commanded at the true airspeed `airspeed` (m/s), rad.
     pub fn pitch_limits(&self, airspeed: f64) -> (f64, f64) {
         let slow = ((airspeed - self.airspeed_min) / PROTECTION_BAND).clamp(0.0, 1.0);
         let fast = ((self.airspeed_max - airspeed) / PROTECTION_BAND).clamp(0.0, 1.0);
@@ -72,7 +72,7 @@ impl Limits {
         (least, most)
     }
 
-    /// `target` limited to the envelope at `airspeed` (m/s).
+    /// `target` limited to the envelope at the true airspeed `airspeed` (m/s).
     pub fn limit(&self, target: Target, airspeed: f64) -> Target {
         let bank = self.bank_limit(airspeed);
         let (least, most) = self.pitch_limits(airspeed);
@@ -83,7 +83,7 @@ impl Limits {
         }
     }
 
-    /// The throttle after airspeed protection.
+    /// The throttle (0..1) after airspeed protection: full below the minimum airspeed, idle above the maximum.
     pub fn protect(&self, throttle: f64, airspeed: f64) -> f64 {
         if airspeed < self.airspeed_min {
             1.0
@@ -94,7 +94,7 @@ impl Limits {
         }
     }
 
-    /// `wanted` limited to its range and to the slew limit of a tick from `last`.
+    /// `wanted`, limited to its range and to a change of one slew step from `last`.
     pub fn slew(&self, last: Command, wanted: Command) -> Command {
         let wanted = wanted.clamped();
         let near = |from: f64, to: f64, step: f64| to.clamp(from - step, from + step);
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_hardest_target_of_the_paper_passes_unchanged_at_the_start_airspeed() {
-        // 60° and 30° at 16.67 m/s: load 2.0 needed, 1.389 (16.67 / 13)² = 2.28 available.
+        // 60° and 30° at 16.67 m/s: a load factor of 2.0 is needed, 1.389 (16.67 / 13)² = 2.28 is available.
         assert_eq!(x8().limit(wish(60.0, 30.0), 16.67), wish(60.0, 30.0));
     }
 
@@ -142,15 +142,15 @@ mod tests {
 
     #[test]
     fn bank_shrinks_with_the_lift_that_is_left() {
-        // At 13 m/s the load may be 1.389: acos(1 / 1.389) = 43.95°.
+        // At 13 m/s the load factor may be 1.389: acos(1 / 1.389) = 43.95°.
         assert!((x8().bank_limit(13.0).to_degrees() - 43.95).abs() < 0.01);
-        // Below 13 / sqrt(1.389) = 11.03 m/s there is lift for level flight only.
+        // Below 13 / sqrt(1.389) = 11.03 m/s the lift suffices for level flight only.
         assert_eq!(x8().bank_limit(11.0), 0.0);
     }
 
     #[test]
     fn the_load_limit_binds_where_the_bank_limit_is_wide() {
-        // 1 / cos 80° is 5.8; a load of 2.2 allows acos(1 / 2.2) = 62.96°.
+        // 1 / cos 80° is 5.8. A load factor of 2.2 allows acos(1 / 2.2) = 62.96°.
         let envelope = Limits { bank_max: 80f64.to_radians(), ..x8() };
         assert!((envelope.bank_limit(40.0).to_degrees() - 62.96).abs() < 0.01);
     }
@@ -160,7 +160,7 @@ mod tests {
         let e = x8();
         assert!((e.limit(wish(0.0, 20.0), 12.9).pitch.to_degrees() + 5.0).abs() < 1e-9);
         assert_eq!(e.protect(0.2, 12.9), 1.0);
-        // Protection has faded out 2 m/s above the minimum, so that flight at 15 m/s is free.
+        // 2 m/s above the minimum the protection has faded out: pitch is free at 15 m/s.
         assert_eq!(e.limit(wish(0.0, 30.0), 15.0).pitch, 30f64.to_radians());
         assert_eq!(e.protect(0.2, 13.1), 0.2);
     }
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn full_travel_takes_ten_ticks() {
-        // 2.0 of travel in 0.1 s is 0.2 a tick.
+        // The travel of 2.0 in 0.1 s is 0.2 per tick.
         let e = x8();
         let mut now = Command { aileron: -1.0, elevator: 1.0, ..Command::IDLE };
         let wanted = Command { aileron: 1e30, elevator: -5.0, throttle: 2.0, rudder: 0.0 };
@@ -185,7 +185,7 @@ mod tests {
         }
         now = e.slew(now, wanted);
         assert!((now.aileron - 1.0).abs() < 1e-9 && (now.elevator + 1.0).abs() < 1e-9);
-        // The throttle takes 20 ticks: 0.5 after ten.
+        // The throttle takes 20 ticks for full travel: 0.5 after ten.
         assert!((now.throttle - 0.5).abs() < 1e-9);
     }
 
@@ -194,7 +194,7 @@ mod tests {
         let e = x8();
         let pitch =
             |wanted: f64, airspeed: f64| e.limit(wish(0.0, wanted), airspeed).pitch.to_degrees();
-        // Between −5° and 30° halfway and at a quarter; between 5° and −30° likewise.
+        // Halfway and at a quarter of the band: between −5° and 30° when slow, between 5° and −30° when fast.
         for (wanted, airspeed, limited) in [
             (90.0, 14.0, 12.5),
             (90.0, 13.5, 3.75),

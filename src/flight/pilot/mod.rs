@@ -1,7 +1,7 @@
-//! The pilot: from telemetry, time and requests to one command per tick.
+//! The pilot turns telemetry, time and requests into one command per tick.
 //!
-//! A tick uses no socket, clock, lock or `Result`, so that a recording can be replayed: the same
-//! calls give the same commands to the bit. [`Pilot`] describes the order of calls.
+//! A tick uses no socket, clock, lock or `Result`. A recording can therefore be replayed: the same calls give the same
+//! commands to the bit. [`Pilot`] describes the order of calls.
 //!
 //! ```text
 //! planned command ─► fallback controller ─► command held 50 ms ─► wings level at trim constants
@@ -62,9 +62,8 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 /// - requests of clients: the trait [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
 /// - vehicle: [`Pilot::engaged`] when a real controller has given control authority.
 ///
-/// Rule of time: `now` is vehicle time and does not decrease; a clock that jumps back is taken for a restart of the
-/// vehicle, after which all earlier states are dropped. The pilot reads no clock: the same calls give the same
-/// commands to the bit.
+/// All times are vehicle time and must not decrease. A clock that jumps back by more than 1 s counts as a restart of
+/// the vehicle; the pilot then drops all earlier states.
 pub struct Pilot {
     config: Config,
     limits: Limits,
@@ -72,9 +71,9 @@ pub struct Pilot {
     fallback: Box<dyn Controller>,
     estimate: Estimate,
     texts: Texts,
-    /// Present vehicle time, also between states.
+    /// Present vehicle time, which also advances between states.
     clock: Time,
-    /// Time of the state that is answered.
+    /// Vehicle time of the state to which the pilot responds.
     answering: Time,
     armed: bool,
     mode: Mode,
@@ -82,19 +81,19 @@ pub struct Pilot {
     sticks: Option<(Time, Sticks)>,
     setpoint_lost: bool,
     vehicle_lost: bool,
-    /// Whether a loss was reported and its end was not.
+    /// Whether a loss of the vehicle was reported and its recovery was not.
     loss_reported: bool,
-    /// When the vehicle link last recovered.
+    /// Vehicle time at which the vehicle link last recovered.
     vehicle_back: Option<Time>,
-    /// Since when airspeed and altitude are missing.
+    /// Vehicle time since which airspeed and altitude are missing.
     air_late: Option<Time>,
-    /// The setpoint whose limitation was reported: roll and pitch, rad.
+    /// Roll and pitch (rad) of the setpoint whose limitation was reported.
     cut: Option<[f64; 2]>,
-    /// The last command.
+    /// The last command, after slew limits.
     in_force: Command,
-    /// The command before it; repeated states do not count.
+    /// The command before the last command. Repeated states are not counted.
     before: Command,
-    /// The last command when the state last changed.
+    /// The command in force when the state last changed.
     last_moved: Command,
     source: Source,
     target: Target,
@@ -104,27 +103,27 @@ pub struct Pilot {
     complaints: Complaints,
     load: f64,
     programme: Option<Programme>,
-    /// The check of the surfaces' signs, where there is one.
+    /// The sign check of the surfaces, if enabled.
     check: Option<Check>,
     /// The guard against oscillations.
     oscillation: Oscillation,
     /// Whether a flight controller can take control back.
     hands_back: bool,
-    /// Whether a controller is commanded attitudes, so that our surface commands do not act.
+    /// Whether a flight controller is commanded attitudes. Surface commands then have no effect.
     by_attitude: bool,
-    /// Time of the last oscillation: the gain is reduced for a while after it.
+    /// Time of the last oscillation. The gain is reduced for a while after an oscillation.
     oscillated: Option<Time>,
     /// Low-pass of the controller's commands, and the time of its last update.
     mean: Option<(Time, Command)>,
-    /// Whether recovery from an upset is active.
+    /// Whether the recovery from an upset is active.
     upset: bool,
-    /// Fault found by the sign check or the oscillation guard since arming.
+    /// Fault found by the sign check or the oscillation guard since arming; `None` without a fault.
     refused: Option<Fault>,
-    /// The model monitor, where there is one.
+    /// The model monitor, if set.
     monitor: Option<Monitor>,
-    /// The envelope limiter, where there is a model for its predictions.
+    /// The envelope limiter, if set.
     envelope: Option<EnvelopeLimiter>,
-    /// The last command of a controller, if a limit or check changed it before it was flown.
+    /// The last command of a controller, if the envelope limiter changed it; otherwise `None`.
     overruled: Option<Overruled>,
 }
 
@@ -140,11 +139,11 @@ enum Pending {
 }
 
 impl Pilot {
-    /// A pilot, disarmed and in HOLD, with settings `config` and the controller `fallback`.
+    /// A pilot with the settings `config` and the fallback controller `fallback`. It starts disarmed and in HOLD.
     ///
     /// # Errors
     ///
-    /// What [`Config::check`] finds.
+    /// The error of [`Config::check`] if a setting is invalid.
     pub fn new(config: Config, fallback: Box<dyn Controller>) -> Result<Self, ConfigError> {
         config.check()?;
         let nobody = Target {
@@ -196,14 +195,14 @@ impl Pilot {
         })
     }
 
-    /// Flies `schedule` in OFFBOARD instead of the client's attitudes, starting at each entry into the mode. The
-    /// client still has to send setpoints: without them the offboard timeout applies.
+    /// Flies `schedule` in OFFBOARD instead of the client's attitudes. The schedule starts at each entry into the mode.
+    /// The client must still send setpoints. Otherwise the offboard timeout applies.
     pub fn follow(&mut self, schedule: Schedule) {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Configures the pilot for `vehicle`: where surface commands pass through a controller's channels, their signs
-    /// are checked; where attitudes are commanded, surface checks and oscillation reports are off.
+    /// Configures the pilot for `vehicle`. If surface commands pass through a controller's channels, their signs are
+    /// checked. If attitudes are commanded, sign checks and the oscillation guard are off.
     pub fn take_on(&mut self, vehicle: &Vehicle) {
         self.by_attitude = !vehicle.flies_surfaces();
         if vehicle.has_channels() {
@@ -211,14 +210,14 @@ impl Pilot {
         }
     }
 
-    /// Enables the check of surface signs at every engagement. Control is returned to the controller when they are
-    /// wrong or the loop oscillates persistently. Without modelled responses in the settings no signs are checked.
+    /// Enables the check of surface signs at every engagement. Control is returned to the flight controller if a sign
+    /// is wrong or the loop oscillates persistently. Without modelled responses in the settings no signs are checked.
     pub fn check_signs(&mut self) {
         self.hands_back = true;
         self.check = self.config.answers.clone().map(Check::new);
     }
 
-    /// Takes note that the vehicle's controller has given control authority.
+    /// Registers that the flight controller has given control authority, and starts the sign check.
     pub fn engaged(&mut self, now: Time) {
         self.advance(now);
         (self.oscillation, self.oscillated, self.mean) = (Oscillation::default(), None, None);
@@ -227,8 +226,8 @@ impl Pilot {
         }
     }
 
-    /// Advances time to `now` and checks the timeouts of setpoints, sticks and vehicle. Call it also while no frames
-    /// arrive. A clock that jumps back is a restart of the vehicle.
+    /// Advances time to `now` and checks the timeouts of setpoints, sticks and vehicle. It must also be called while no
+    /// frames arrive. A clock that jumps back by more than 1 s counts as a restart of the vehicle.
     pub fn advance(&mut self, now: Time) {
         if self.clock.since(now) > RESTART {
             self.restart();
@@ -238,8 +237,8 @@ impl Pilot {
         self.watch_client();
     }
 
-    /// First phase of a tick: takes a state frame that arrived at `now`; returns the request to a planner, if there
-    /// is one.
+    /// First phase of a tick: processes a state frame that arrived at `now`. Returns the request to a planner; `None`
+    /// if no plan is needed.
     pub fn observe(&mut self, now: Time, frame: &Telemetry) -> Option<Request> {
         if self.estimate.restarted(frame) {
             self.restart();
@@ -269,7 +268,7 @@ impl Pilot {
         }
     }
 
-    /// Second phase of a tick: the decision on the frame last observed.
+    /// Second phase of a tick: the decision for the frame last observed.
     pub fn decide(&mut self, plan: Plan) -> Decision {
         let (wanted, source) = match self.pending {
             Pending::Disarmed => (Command::IDLE, Source::Disarmed),
@@ -297,8 +296,8 @@ impl Pilot {
         self.decision()
     }
 
-    /// Checks the flown commands for an oscillation and reduces the gain for a while. If it recurs soon and there is
-    /// a controller, control is returned.
+    /// Checks the flown commands for an oscillation and reduces the gain for a while. If an oscillation recurs within
+    /// 20 s and a flight controller can take over, control is returned to the flight controller.
     fn guard(&mut self) {
         let Pending::Fly { seen, .. } = &self.pending else { return };
         if self.by_attitude {
@@ -320,7 +319,7 @@ impl Pilot {
         self.load = load;
     }
 
-    /// Sends a text from outside the pilot to the ground stations.
+    /// Sends a text of another part of the program to the ground stations.
     pub fn send_text(&mut self, severity: Severity, words: &str) {
         self.texts.say(severity, words);
     }
@@ -341,7 +340,7 @@ impl Pilot {
         self.armed && (self.setpoint_lost || self.vehicle_lost)
     }
 
-    /// Resets the controllers, so that the next one starts from the last command.
+    /// Disengages planner and fallback. Each is reset at its next engagement.
     fn forget_controllers(&mut self) {
         self.planner_engaged = false;
         self.fallback_engaged = false;
@@ -380,7 +379,7 @@ impl Pilot {
         self.target = self.limits.limit(wish, frame.state.airspeed);
         self.report_limits(&wish);
         let Telemetry { time, mut state, actuators, altitude, .. } = frame;
-        // Noise of a sensor at rest may be negative.
+        // Sensor noise at zero airspeed may be negative.
         state.airspeed = state.airspeed.max(0.0);
         Pending::Fly {
             seen: Observation {

@@ -1,4 +1,4 @@
-//! Arming, modes and parameters: requests of clients to the pilot.
+//! Requests of clients to the pilot: arming, modes, setpoints and parameters.
 
 use super::estimate::within;
 use super::{Pilot, Source, parameters};
@@ -8,7 +8,7 @@ use greylag_link::autopilot::{
 };
 use greylag_physics::{ActuatorState, Command, Time};
 
-/// Name of a mode in ground stations.
+/// Name of a mode, as ground stations show it.
 pub fn mode_name(mode: Mode) -> &'static str {
     match mode {
         Mode::Manual => "MANUAL",
@@ -24,7 +24,7 @@ fn rejected(words: impl Into<String>) -> Verdict {
 }
 
 impl Pilot {
-    /// Why arming is refused, if it is.
+    /// Reason for which arming is refused; `None` if arming is allowed.
     fn arming_obstacle(&self) -> Option<String> {
         if !self.vehicle_alive() {
             return Some("no fresh state from the vehicle".into());
@@ -43,7 +43,7 @@ impl Pilot {
         None
     }
 
-    /// Why `mode` is refused, if it is.
+    /// Reason for which `mode` is refused; `None` if it is allowed.
     fn mode_obstacle(&self, mode: Mode) -> Option<String> {
         match mode {
             Mode::Offboard if !self.armed => Some("OFFBOARD refused: arm first".into()),
@@ -93,7 +93,7 @@ impl Autopilot for Pilot {
         if let Some(check) = &mut self.check {
             check.await_authority();
         }
-        // until now the aircraft may have been stationary
+        // the state may have been constant before arming: its age counts from now on
         self.estimate.refresh(now);
         self.texts.say(Severity::Notice, format!("armed, {}", mode_name(self.mode)));
         Verdict::Accepted
@@ -140,7 +140,7 @@ impl Autopilot for Pilot {
 
     fn attitude_setpoint(&mut self, now: Time, setpoint: AttitudeSetpoint) {
         self.advance(now);
-        // the client side guarantees finite numbers; this check does not depend on it
+        // the pilot does not rely on the link for finite setpoints
         if setpoint.roll.is_finite() && setpoint.pitch.is_finite() {
             let thrust = setpoint.thrust.filter(|x| x.is_finite());
             self.setpoint = Some((now, AttitudeSetpoint { thrust, ..setpoint }));

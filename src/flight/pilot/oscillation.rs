@@ -1,44 +1,45 @@
 //! The oscillation guard detects a limit cycle of the loop through a surface at its limits.
 //!
 //! A loop with more delay than its margin can enter a limit cycle that the surface's slew limit sustains. The X8,
-//! commanded through ArduPlane's channels, oscillated at 2.6 Hz, q to 228 °/s, for 50 s, with every state fresh and
-//! every command in range. The signature is a rate that changes sign repeatedly with the command at its limit, or
-//! sweeping over half of its travel, in each half period. A manoeuvre shows this once or twice; turbulence does not
-//! move a command this far.
+//! commanded through ArduPlane's channels, oscillated for 50 s at 2.6 Hz with pitch rates up to 228 °/s. Every state
+//! was fresh and every command was in range. The guard looks for a rate that changes sign repeatedly. In each half
+//! period the command must be at its limit, or sweep over half of its travel. A manoeuvre shows this once or twice.
+//! Turbulence does not move a command this far.
 
 use super::limits::TICK_S;
 use greylag_link::vehicle::Axis;
 use greylag_physics::{Command, State, Time};
 
-/// Time constant of the high-pass on the rate, s: the pitch rate of a steady turn is removed.
+/// Time constant of the high-pass on the rate, s. The high-pass removes the pitch rate of a steady turn.
 const SLOW_S: f64 = 0.5;
-/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics, faster is structure or noise.
+/// Range of half periods, s: 1 to 8 Hz. Slower motion is flight dynamics. Faster motion is structural vibration or
+/// noise.
 const HALF_SWING_S: [f64; 2] = [0.06, 0.5];
-/// Smallest peak of a half period, rad/s (23 °/s): three times that in light turbulence, a quarter of the mildest
-/// limit cycle observed (pitch 4° rms at 2.6 Hz is 90 °/s).
+/// Smallest peak rate of a half period, rad/s (23 °/s). It is three times the peak in light turbulence and a quarter of
+/// the mildest observed limit cycle (pitch 4° rms at 2.6 Hz is 90 °/s).
 const PEAK: f64 = 0.4;
-/// Dead band of the rate's sign, rad/s (3 °/s): ten times the noise of a gyro.
+/// Dead band for the sign of the rate, rad/s (3 °/s): ten times the noise of a gyro.
 const NO_SIGN: f64 = 0.05;
-/// Smallest fraction of a half period with the command at its slew limit or stop: a fifth, with tolerance for
-/// rounding of sums.
+/// Smallest fraction of a half period with the command at its slew limit or stop: a fifth, less a tolerance for
+/// rounding.
 const LIMITED: f64 = 0.2 - 1e-6;
-/// Sweep of the command in a half period that also counts: half of the travel from −1 to 1. With a delay of 60 ms the
-/// half periods of a limit cycle hardly reach the limits.
+/// Sweep of the command that qualifies a half period without the limit: half of the travel from −1 to 1. With a delay
+/// of 60 ms a limit cycle hardly reaches the limits.
 const SWEPT: f64 = 1.0;
-/// Consecutive half periods, and their total duration in s, that count as an oscillation. A step between ±60° has
-/// three.
+/// Number of consecutive half periods, and their total duration in s, that count as an oscillation. A step between ±60°
+/// has three half periods.
 const SWINGS: u32 = 4;
 const LONG_S: f64 = 0.6;
-/// Fraction of a step or of full travel that counts as the limit.
+/// Fraction of the slew limit or of full travel above which a command is at its limit.
 const ALL: f64 = 0.999;
 
 /// Detector of one axis.
 #[derive(Clone, Copy, Debug)]
 struct Swings {
     mean: Option<f64>,
-    /// Sign of the present half period, 0 before the first.
+    /// Sign of the rate in the present half period; 0 before the first.
     sign: f64,
-    /// Duration of the present half period, and its part with the command at a limit, s.
+    /// Duration of the present half period, and the part of it with the command at a limit, s.
     lasts: f64,
     limited: f64,
     peak: f64,
@@ -49,7 +50,7 @@ struct Swings {
     row_s: f64,
 }
 
-/// The empty range of commands.
+/// The empty range: no command yet.
 const NONE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 impl Default for Swings {
@@ -67,9 +68,9 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// Takes a tick: its time and state, the commands before and after it, and the largest change of a surface per
-    /// tick. Returns the oscillating axis, if any, and the duration, s. Durations are measured by time, not by ticks,
-    /// since an overloaded processor skips ticks.
+    /// Processes a tick: its time and state, the commands before and after it, and the largest change of a surface per
+    /// tick. Returns the oscillating axis and the duration of the oscillation, s; `None` without an oscillation.
+    /// Durations are measured by time, not by ticks, because an overloaded processor skips ticks.
     pub(super) fn see(
         &mut self,
         time: Time,
@@ -92,7 +93,7 @@ impl Oscillation {
 }
 
 impl Swings {
-    /// Duration of the oscillation, s, if there is one.
+    /// Duration of the oscillation, s; `None` without an oscillation.
     fn see(&mut self, passed: f64, rate: f64, command: f64, limited: bool) -> Option<f64> {
         if !rate.is_finite() {
             return None;
@@ -111,7 +112,7 @@ impl Swings {
         (self.row >= SWINGS && self.row_s >= LONG_S).then_some(self.row_s)
     }
 
-    /// Evaluates a half period at its end.
+    /// Evaluates a half period when it ends.
     fn close(&mut self) {
         let is_swing = (HALF_SWING_S[0]..=HALF_SWING_S[1]).contains(&self.lasts)
             && self.peak >= PEAK
@@ -130,10 +131,11 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Largest change in a tick at the X8's 20 /s.
+    /// Largest change of a command in a tick at the X8's slew limit of 20 /s.
     const STEP: f64 = 0.2;
 
-    /// When the guard trips, s, on a pitch rate and an elevator that is wanted, both of time (s).
+    /// Time at which the guard trips, s, for a pitch rate (rad/s) and an elevator command before slew limits, as
+    /// functions of time (s).
     fn trips(seconds: f64, rate: impl Fn(f64) -> f64, wanted: impl Fn(f64) -> f64) -> Option<f64> {
         let mut guard = Oscillation::default();
         let mut before = Command::IDLE;
@@ -156,13 +158,13 @@ mod tests {
 
     #[test]
     fn the_limit_cycle_that_was_recorded_is_found_within_a_second() {
-        // 2.6 Hz, q to 228 °/s, the elevator between its stops; in a turn with a q of its own too.
+        // 2.6 Hz, q up to 228 °/s, the elevator between its stops; also in a turn with a constant pitch rate.
         for turn in [0.0, 0.7] {
             let q = |t: f64| turn + 3.98 * (TAU * 2.6 * t).sin();
             let at = trips(5.0, q, |t| -10.0 * (TAU * 2.6 * t + 0.5).sin()).unwrap();
             assert!((0.6..1.2).contains(&at), "{at}");
         }
-        // The mildest: pitch 4° rms, the elevator by 0.4 to and fro.
+        // The mildest observed limit cycle: pitch 4° rms. The elevator alternates between ±0.2, then between ±0.4.
         let q = |t: f64| 1.6 * (TAU * 2.6 * t).sin();
         let mild = |t: f64| 0.2 * (TAU * 2.6 * t).sin().signum();
         assert_eq!(trips(5.0, q, mild), None, "two ticks of twenty are no limit");
@@ -172,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_swing_over_half_of_the_travel_is_found_without_the_limit() {
-        // the elevator changes by at most 0.15 a tick, where 0.2 is allowed, and reaches at most 0.8
+        // The elevator changes by at most 0.15 per tick (the limit is 0.2) and reaches at most 0.8.
         let q = |t: f64| 2.5 * (TAU * 3.0 * t).sin();
         let elevator = |part: f64| move |t: f64| -part * (TAU * 3.0 * t + 0.6).sin();
         let at = trips(5.0, q, elevator(0.8)).unwrap();
@@ -182,7 +184,7 @@ mod tests {
 
     #[test]
     fn a_free_swing_with_the_command_inside_its_limits_is_flight() {
-        // A phugoid, a short period that dies out, and a fast one that is small.
+        // A phugoid, a damped short-period oscillation, and a fast oscillation of small amplitude.
         assert_eq!(trips(60.0, |t| 0.3 * (TAU * 0.1 * t).sin(), |_| 0.1), None);
         assert_eq!(trips(60.0, |t| 2.0 * (-t).exp() * (TAU * 2.0 * t).sin(), |_| 0.1), None);
         assert_eq!(trips(60.0, |t| 0.1 * (TAU * 6.0 * t).sin(), |t| 9.0 * (40.0 * t).sin()), None);
@@ -190,14 +192,14 @@ mod tests {
 
     #[test]
     fn steps_of_a_second_with_the_surface_at_its_stops_are_manoeuvres() {
-        // Full elevator one way, then the other, twice a second: a swing of 1 s is no oscillation.
+        // Full elevator in alternating directions at 0.8 Hz: a half period of 0.63 s is too long for an oscillation.
         let q = |t: f64| 3.0 * (TAU * 0.8 * t).sin();
         assert_eq!(trips(30.0, q, |t| 10.0 * (TAU * 0.8 * t).sin()), None);
     }
 
     #[test]
     fn a_fast_swing_is_not_said_before_its_time_has_passed() {
-        // Four half swings of 7 Hz take 0.29 s.
+        // Four half periods of 7 Hz take 0.29 s, less than the required 0.6 s.
         let swing = |t: f64| (TAU * 7.0 * t).sin();
         let at = trips(5.0, |t| 4.0 * swing(t), |t| -10.0 * swing(t + 0.02)).unwrap();
         assert!((0.6..1.2).contains(&at), "{at}");

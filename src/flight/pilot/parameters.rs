@@ -1,12 +1,12 @@
-//! The parameter table of clients: names, ranges and their settings.
+//! The parameters that clients can read and set, and the settings behind them.
 
 use super::config::{Config, ThrustSource};
 use greylag_link::autopilot::{Parameter, ParameterValue, Verdict};
 
-/// A real parameter: name, getter, setter.
+/// A parameter with a real value: name, getter and setter.
 type Real = (&'static str, fn(&Config) -> f64, fn(&mut Config, f64));
 
-/// The real parameters in index order. Names have at most 16 characters.
+/// The real parameters in the order of their indices. Names have at most 16 characters.
 const REALS: [Real; 12] = [
     ("GL_OFFB_LOSS_S", |c| c.offboard_loss_s, |c, x| c.offboard_loss_s = x),
     ("GL_VEH_LOSS_S", |c| c.vehicle_loss_s, |c, x| c.vehicle_loss_s = x),
@@ -25,11 +25,11 @@ const REALS: [Real; 12] = [
     ("GL_SLEW_THR", |c| c.throttle_slew_per_s, |c, x| c.throttle_slew_per_s = x),
     ("GL_DISARM_MPS", |c| c.disarm_airspeed_max_mps, |c, x| c.disarm_airspeed_max_mps = x),
 ];
-/// Index of GL_THRUST_SRC: 0 holds the cruise airspeed, 1 takes the setpoint's thrust.
+/// Index of GL_THRUST_SRC: 0 selects the controller's throttle for the cruise airspeed, 1 the setpoint's thrust.
 const THRUST_SOURCE: usize = REALS.len();
-/// Index of SYSID_THISMAV, which ground stations read: constant.
+/// Index of SYSID_THISMAV, a constant that ground stations read.
 const SYSTEM_ID: usize = REALS.len() + 1;
-/// The system id of the autopilot identity.
+/// System id of the autopilot as clients see it.
 const AUTOPILOT_SYSTEM: i32 = 1;
 
 /// The parameter table of `config`.
@@ -51,7 +51,7 @@ pub(super) fn table(config: &Config) -> Vec<Parameter> {
 ///
 /// # Errors
 ///
-/// The verdict of a refusal.
+/// The verdict for the client if the index or the type is unknown, or if the resulting settings are invalid.
 pub(super) fn changed(
     config: &Config,
     index: usize,
@@ -144,7 +144,7 @@ mod tests {
         assert!(changed(&config, SYSTEM_ID, ParameterValue::Int(7)).is_err());
         assert!(changed(&config, THRUST_SOURCE, ParameterValue::Real(1.0)).is_err());
         assert!(changed(&config, 999, ParameterValue::Real(1.0)).is_err());
-        // Cruise must stay above the minimum airspeed, or HOLD would fly in the protection.
+        // Cruise must stay above the minimum airspeed. Otherwise the airspeed protection would act in HOLD.
         assert!(changed(&config, 5, ParameterValue::Real(12.0)).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! The pilot during the check of signs, from arming to its verdict.
+//! The pilot during the sign check, from arming to the verdict.
 
 use super::estimate::Frame;
 use super::polarity::Verdict;
@@ -7,7 +7,8 @@ use greylag_link::autopilot::Severity;
 use greylag_physics::{Command, Time};
 
 impl Pilot {
-    /// Passes the state to the check of signs, if it is active; the pending decision while it lasts.
+    /// Passes the state to the sign check. Returns the pending decision during the check and after a fault; otherwise
+    /// `None`.
     pub(super) fn check_polarity(&mut self, quality: Frame) -> Option<Pending> {
         if self.refused.is_none() && !self.check.as_ref()?.is_open() {
             return None;
@@ -35,13 +36,13 @@ impl Pilot {
         open.then_some(Pending::Check { time: frame.time, airspeed })
     }
 
-    /// The command during the check.
+    /// The command during the check: level trim, with pulses once control authority is given.
     pub(super) fn check_command(&self, time: Time, airspeed: f64) -> Command {
         let pulsed = self.check.as_ref().and_then(|check| check.command(time));
         pulsed.unwrap_or_else(|| self.level_at(airspeed))
     }
 
-    /// Level trim at an airspeed, m/s.
+    /// Level-trim command at an airspeed, m/s, after airspeed protection of the throttle.
     fn level_at(&self, airspeed: f64) -> Command {
         let trim = self.config.trim_at(airspeed);
         let throttle = self.limits.protect(trim.throttle, airspeed);

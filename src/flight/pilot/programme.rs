@@ -1,4 +1,4 @@
-//! The flight-test schedule flown in OFFBOARD, if there is one.
+//! The flight-test schedule, if one is flown in OFFBOARD.
 
 use super::texts::Texts;
 use greylag_control::Target;
@@ -14,8 +14,8 @@ enum Stage {
     Over,
 }
 
-/// A schedule under the pilot: it supplies targets as a client does and adds its excitation to the command; envelope,
-/// slew limits, airspeed protection and failsafes apply after it.
+/// A schedule under the pilot. It supplies targets as a client does and adds its excitation to the command. Envelope,
+/// slew limits, airspeed protection and failsafes apply afterwards.
 #[derive(Debug)]
 pub(super) struct Programme {
     name: String,
@@ -31,13 +31,13 @@ impl Programme {
         Programme { name, overlay: Overlay::new(schedule), demand: None, stage: Stage::Waiting }
     }
 
-    /// Returns to the start, as when OFFBOARD ends.
+    /// Returns to the start of the schedule, for instance when OFFBOARD ends.
     pub(super) fn stop(&mut self) {
         self.overlay.reset();
         (self.demand, self.stage) = (None, Stage::Waiting);
     }
 
-    /// The target at `now`; the first call starts the schedule.
+    /// The target at `now`. The first call starts the schedule.
     pub(super) fn wish(&mut self, now: Time, texts: &mut Texts) -> Target {
         let demand = self.overlay.demand(now);
         let over = self.overlay.is_over(now);
@@ -50,7 +50,7 @@ impl Programme {
         demand.target
     }
 
-    /// The command plus the excitation of the last target, if it is active.
+    /// `own` plus the excitation of the last target; `own` without an active target.
     pub(super) fn excite(&mut self, own: Command) -> Command {
         match self.demand.take() {
             Some(demand) => self.overlay.command(&demand, own),

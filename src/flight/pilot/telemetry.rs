@@ -1,9 +1,9 @@
-//! Checks of the usability of a state frame.
+//! Checks whether a state frame is usable.
 
 use greylag_link::vehicle::limits;
 use greylag_link::vehicle::{Faults, Telemetry};
 
-/// Faults that make a state unusable. Specific force is only recorded.
+/// Faults that make a state unusable for control. Control does not use the specific force.
 const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ATTITUDE, "attitude"),
     (Faults::RATES, "body rates"),
@@ -13,10 +13,11 @@ const STATE_FAULTS: [(Faults, &str); 6] = [
     (Faults::ACTUATORS, "actuators"),
 ];
 
-/// Temporary reason: after a gap the first airspeed arrives later.
+/// Temporary reason: after a gap in telemetry the first airspeed arrives later.
 pub(super) const LATE_AIR: &str = "airspeed and altitude are late";
 
-/// Why this frame is unusable, if it is: a fault found by the link, or a value that is not finite or implausible.
+/// Reason for which a frame is unusable: a fault found by the link, or a value that is not finite or implausible.
+/// `None` for a usable frame.
 pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
     let found = STATE_FAULTS.iter().find(|(fault, _)| frame.faults.contains(*fault));
     found.map(|(_, name)| *name).or_else(|| implausible(frame))
@@ -25,7 +26,7 @@ pub(super) fn defect(frame: &Telemetry) -> Option<&'static str> {
 fn implausible(frame: &Telemetry) -> Option<&'static str> {
     let (s, z) = (&frame.state, &frame.actuators);
     let actuators = [z.aileron, z.aileron_rate, z.elevator, z.elevator_rate, z.throttle];
-    // Comparisons with NaN are false, so these also refuse what is not finite.
+    // Comparisons with NaN are false: values that are not finite are refused as well.
     if !(s.roll.abs() <= HALF_TURN && s.pitch.abs() <= HALF_TURN / 2.0) {
         Some("attitude")
     } else if !limits::rates([s.p, s.q, s.r]) {
@@ -41,7 +42,7 @@ fn implausible(frame: &Telemetry) -> Option<&'static str> {
     }
 }
 
-/// Whether every measured value equals that of `earlier` bit by bit: a frozen sensor.
+/// Whether every sensor value equals that of `earlier` bit by bit, which indicates a frozen sensor.
 pub(super) fn repeats(frame: &Telemetry, earlier: &Telemetry) -> bool {
     let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
     same(&frame.state.to_array(), &earlier.state.to_array())
@@ -120,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_edge_of_the_plausible_is_still_flown() {
-        // inverted in a spin near a gyroscope's full scale: plausible, and the pilot is needed most
+        // inverted in a spin near a gyroscope's full scale: plausible, and a usable state is then essential
         let mut frame = good();
         frame.state.roll = -std::f64::consts::PI;
         frame.state.p = 34.9;

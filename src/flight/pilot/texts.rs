@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 
 use greylag_link::autopilot::{Severity, Text};
 
-/// Capacity: an hour without a client must not exhaust the memory.
+/// Capacity in texts. It bounds the memory while no client is connected.
 const CAPACITY: usize = 32;
 
-/// A queue of texts; when full, the oldest is dropped.
+/// A queue of texts. When it is full, the oldest text is dropped.
 #[derive(Debug, Default)]
 pub(super) struct Texts {
     waiting: VecDeque<Text>,

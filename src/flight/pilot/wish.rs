@@ -1,15 +1,15 @@
-//! The target of a tick before envelope limits: of the schedule, of the mode, or level.
+//! The target of a tick before envelope limits: from the schedule, from the mode, or level.
 
 use super::{Pilot, ThrustSource, due};
 use greylag_control::Target;
 use greylag_link::autopilot::{Mode, Severity};
 use greylag_physics::Time;
 
-/// Smallest reduction of an attitude by the envelope that is reported, rad.
+/// Smallest reduction of a commanded angle by the envelope that is reported, rad.
 const REPORTED_CUT: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 impl Pilot {
-    /// The target of the schedule, if one is active at `now`.
+    /// The target of the schedule, if one is active at `now`. The throttle is left to the controller.
     pub(super) fn scheduled_wish(&mut self, now: Time) -> Option<(Target, Option<f64>)> {
         let programme = self.programme.as_mut()?;
         if self.mode == Mode::Offboard && self.setpoint.is_some() {
@@ -19,7 +19,7 @@ impl Pilot {
         None
     }
 
-    /// The target of the mode before envelope limits, with the throttle if the mode sets it.
+    /// The target of the mode before envelope limits, with the throttle (0..1) if the mode sets it.
     pub(super) fn wish(&self) -> (Target, Option<f64>) {
         let airspeed = self.config.envelope.airspeed_cruise_mps;
         match (self.mode, self.setpoint, self.sticks) {
@@ -29,7 +29,8 @@ impl Pilot {
                 (Target { roll: s.roll, pitch: s.pitch, airspeed }, throttle)
             }
             (Mode::Stabilized, _, Some((_, s))) => {
-                // a stick forward is nose down; each half of its travel is scaled to its own limit
+                // stick forward (positive) lowers the nose; each half of the travel is scaled to the pitch limit in its
+                // direction
                 let pitch = if s.pitch > 0.0 {
                     s.pitch * self.limits.pitch_min
                 } else {
@@ -41,7 +42,7 @@ impl Pilot {
         }
     }
 
-    /// Reports that the envelope limits a client's attitude; once per setpoint, within the rate limit.
+    /// Reports that the envelope limits a client's attitude: once per setpoint, and at most once in 5 s.
     pub(super) fn report_limits(&mut self, wish: &Target) {
         let cut = |wanted: f64, flown: f64| (wanted - flown).abs() > REPORTED_CUT;
         let (roll, pitch) = (cut(wish.roll, self.target.roll), cut(wish.pitch, self.target.pitch));

@@ -1,4 +1,4 @@
-//! Calls of the pilot as lines of `flight.calls`: with the vehicle's frames, all its inputs.
+//! Calls of the pilot as lines of `flight.calls`. Calls and vehicle frames together are all inputs of the pilot.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,7 +11,7 @@ use greylag_physics::{Command, Time};
 /// The first line of the file.
 pub const HEADER: &str = "greylag-calls 1";
 
-/// Reply to a planning request.
+/// Recorded reply to a planning request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Planned {
     /// A command arrived in time.
@@ -24,28 +24,28 @@ pub enum Planned {
     None,
 }
 
-/// One call. Numbers are written so that they are read back to the bit.
+/// One call of the pilot. Its numbers are written so that they can be read back to the bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Call {
-    /// Time was advanced.
+    /// Vehicle time was advanced to this time.
     Advance(Time),
-    /// This computer had stalled for this long.
+    /// This computer had stalled for this time.
     Excuse(Duration),
-    /// The state of this time was observed, with this plan and this command.
+    /// The state of this vehicle time was observed. The planner's reply and the resulting command follow.
     Tick(Time, Planned, Command),
-    /// Arming was requested, with or without force.
+    /// Arming was requested at this vehicle time. The flag is set if it was forced.
     Arm(Time, bool),
-    /// Disarming was requested, with or without force.
+    /// Disarming was requested at this vehicle time. The flag is set if it was forced.
     Disarm(Time, bool),
-    /// The controller gave control authority.
+    /// The flight controller gave control authority.
     Engaged(Time),
-    /// A mode was requested.
+    /// A mode was requested at this vehicle time.
     Mode(Time, Mode),
-    /// A setpoint was received.
+    /// An attitude setpoint was received at this vehicle time.
     Setpoint(Time, AttitudeSetpoint),
-    /// Stick positions were received.
+    /// Stick positions were received at this vehicle time.
     Sticks(Time, Sticks),
-    /// A parameter was set.
+    /// The parameter with this index was set to this value.
     Parameter(usize, ParameterValue),
 }
 
@@ -100,13 +100,13 @@ impl fmt::Display for Words<'_> {
     }
 }
 
-/// Whether two commands are equal bit by bit.
+/// Whether two commands are equal bit by bit; 0 and −0 differ.
 pub fn same(a: &Command, b: &Command) -> bool {
     let bits = |c: &Command| [c.aileron, c.elevator, c.throttle, c.rudder].map(f64::to_bits);
     bits(a) == bits(b)
 }
 
-/// A line is not a valid call.
+/// Error for a line that is not a valid call.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no call of the pilot; the file is damaged, or of a newer program")]
 pub struct CallError(String);

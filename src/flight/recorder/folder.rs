@@ -1,4 +1,4 @@
-//! The folder of a recording; existing ones are never overwritten.
+//! The folder of a recording. Existing recordings are never overwritten.
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Destination of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A new folder in this one, numbered after the highest present: `0001`, `0002` …
+    /// A new folder inside this folder, with the number after the highest present: `0001`, `0002` …
     Numbered(PathBuf),
     /// Exactly this folder, which must not exist yet.
     Exactly(PathBuf),
@@ -33,7 +33,7 @@ pub enum RecordError {
 }
 
 impl Place {
-    /// Creates the folder.
+    /// Creates the folder and returns its path.
     pub(super) fn create(&self) -> Result<PathBuf, RecordError> {
         match self {
             Place::Numbered(root) => numbered(root),
@@ -65,14 +65,14 @@ fn numbered(root: &Path) -> Result<PathBuf, RecordError> {
         let path = root.join(format!("{next:04}"));
         match fs::create_dir(&path) {
             Ok(()) => return Ok(path),
-            // Another program took the number meanwhile.
+            // Another program has created this folder in the meantime.
             Err(error) if error.kind() == ErrorKind::AlreadyExists && next < u32::MAX => {}
             Err(error) => return Err(failure(&path, error)),
         }
     }
 }
 
-/// Creates a new file in the folder.
+/// Creates a new file in the folder. Fails if the file exists.
 pub(super) fn create(folder: &Path, name: &str) -> Result<File, RecordError> {
     let path = folder.join(name);
     File::create_new(&path).map_err(|source| failure(&path, source))

@@ -1,7 +1,7 @@
-//! The recorder: a thread that writes `flight.csv`, `flight.tlog`, `flight.calls`.
+//! The recorder: a thread that writes the files `flight.csv`, `flight.tlog` and `flight.calls`.
 //!
-//! The control thread queues entries and never waits: entries that do not fit are dropped and counted. A failing disk
-//! ends the file concerned and is reported once; the flight continues.
+//! The control thread queues entries and never waits. Entries that do not fit are dropped and counted. An error of the
+//! disk closes the file concerned and is reported once. The flight continues.
 
 pub mod call;
 mod folder;
@@ -23,7 +23,7 @@ use queue::Queue;
 
 /// Capacity of the queue: four seconds of a 100 Hz loop with its traffic.
 const QUEUE: usize = 4096;
-/// Longest time before written entries are flushed.
+/// Longest time between the writing of an entry and its flush to the disk.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
 /// An entry of the queue.
@@ -58,7 +58,7 @@ impl Recorder {
     ///
     /// # Errors
     ///
-    /// If the folder exists already, or a file cannot be created.
+    /// If the folder exists already, or a file or the thread cannot be created.
     pub fn start(place: &Place) -> Result<Self, RecordError> {
         let folder = place.create()?;
         let csv = folder::create(&folder, "flight.csv")?;
@@ -68,7 +68,7 @@ impl Recorder {
             .map_err(|source| RecordError::File { path: folder, source })
     }
 
-    /// A recorder with three writers instead of the files of `folder`.
+    /// A recorder with three given writers instead of files in `folder`.
     ///
     /// # Errors
     ///
@@ -95,27 +95,27 @@ impl Recorder {
         self.queue.hand_over(Entry::Row(Box::new(row)));
     }
 
-    /// Records a datagram, or whole frames of a stream, sent or received at `unix_us` (µs since 1970).
+    /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970).
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
         self.queue.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }
 
-    /// Records a call of the pilot.
+    /// Records a call of the pilot in `flight.calls`.
     pub fn call(&self, call: Call) {
         self.queue.hand_over(Entry::Call(call));
     }
 
-    /// The oldest error that was not returned yet; each file fails at most once.
+    /// The oldest error that was not returned yet, as text; `None` without a new error. Each file fails at most once.
     pub fn trouble(&self) -> Option<String> {
         self.troubles.try_recv().ok()
     }
 
-    /// Entries dropped because the queue was full.
+    /// Number of entries dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped()
     }
 
-    /// Writes the queued entries, closes the files and returns the counters.
+    /// Writes the queued entries, closes the files and returns the counters of the recording.
     pub fn finish(mut self) -> Written {
         self.close()
     }
@@ -140,7 +140,7 @@ struct File<W> {
 }
 
 impl<W> File<W> {
-    /// Runs `work` on the file; `false` if it has failed, now or earlier.
+    /// Runs `work` on the file. Returns `false` if the file has failed, now or earlier.
     fn attempt(&mut self, work: impl FnOnce(&mut W) -> std::io::Result<()>) -> bool {
         let Some(out) = &mut self.out else {
             return false;
@@ -361,7 +361,7 @@ mod tests {
         let stuck = || Stuck { hangs: Duration::from_secs(1) };
         let recorder = Recorder::over(PathBuf::from("nowhere"), stuck(), stuck(), stuck()).unwrap();
         let before = Instant::now();
-        // Twice the queue: nearly the half cannot be taken while the disk sleeps.
+        // Twice the capacity of the queue: nearly half of the rows are dropped while the disk hangs.
         (0..2 * QUEUE as u64).for_each(|i| recorder.row(row(i)));
         assert!(before.elapsed() < Duration::from_millis(500), "{:?}", before.elapsed());
         assert!(recorder.dropped() > QUEUE as u64 / 2, "{}", recorder.dropped());

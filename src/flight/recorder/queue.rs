@@ -1,8 +1,8 @@
-//! A queue to a thread that never blocks the sender: entries that do not fit are dropped and counted.
+//! A queue to a thread that never blocks the sender. Entries that do not fit are dropped and counted.
 
 use crate::threads::{AtomicU64, Builder, JoinHandle, Ordering, Receiver, Sender, bounded};
 
-/// The sending end of a queue of `E` to a thread that returns a `W`.
+/// Sending end of a queue of entries `E`. The receiving thread returns a `W` when the queue is closed.
 #[derive(Debug)]
 pub struct Queue<E, W> {
     entries: Option<Sender<E>>,
@@ -11,11 +11,12 @@ pub struct Queue<E, W> {
 }
 
 impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
-    /// A queue of `size` entries to a thread called `name`, which runs `work` until the queue is closed and empty.
+    /// A queue of `size` entries to a new thread called `name`. The thread runs `work` until the queue is closed and
+    /// empty.
     ///
     /// # Errors
     ///
-    /// The thread cannot be started.
+    /// If the thread cannot be started.
     pub fn start(
         name: &str,
         size: usize,
@@ -39,8 +40,8 @@ impl<E: Send + 'static, W: Default + Send + 'static> Queue<E, W> {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Closes the queue, waits for the thread and returns its result; the default if the thread has panicked or was
-    /// closed before.
+    /// Closes the queue, waits for the thread and returns its result. Returns the default value if the thread has
+    /// panicked or the queue was closed before.
     pub fn close(&mut self) -> W {
         self.entries = None;
         self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! A tick as a row of `flight.csv`.
+//! One tick as a row of `flight.csv`.
 
 use std::io::Write;
 
@@ -17,12 +17,13 @@ pub struct Row {
     pub decision: Decision,
     /// Time from the arrival of the state frame to the sending of the command, µs.
     pub latency_us: f64,
-    /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; NaN when unknown.
+    /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; dimensionless, NaN if
+    /// unknown.
     pub residuals: [f64; 6],
 }
 
 impl Row {
-    /// The columns in addition to those of the log format.
+    /// Names of the columns in addition to those of the log format.
     pub const EXTRA: [&'static str; 12] = [
         "airspeed_target_mps",
         "mode",
@@ -44,8 +45,8 @@ impl Row {
         Row { sample: sample(state, decision), decision: *decision, latency_us, residuals }
     }
 
-    /// The row without surfaces, for a controller that is commanded attitudes: the companion's surface commands were
-    /// not sent, and the actuator state is unknown. The throttle is sent.
+    /// Removes the surfaces from the row, for a controller that is commanded attitudes. The companion's surface
+    /// commands were not sent, and the actuator state is unknown. The throttle command was sent and is kept.
     pub fn without_surfaces(mut self) -> Self {
         let sample = &mut self.sample;
         for column in [
@@ -92,11 +93,11 @@ impl Row {
 
 fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let (s, z, c) = (&state.state, &state.actuators, &decision.command);
-    // a part with a fault holds its last valid value; in a log it is missing
+    // a part with a fault holds its last valid value, which a log omits
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
-    // An aircraft without a rudder has no column of it.
+    // Without a rudder both values are zero. The rudder columns then stay empty.
     let rudder =
         if (z.rudder, c.rudder) == (0.0, 0.0) { [f64::NAN; 2] } else { [z.rudder, c.rudder] };
     Sample {

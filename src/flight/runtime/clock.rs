@@ -1,4 +1,4 @@
-//! Vehicle time between two state frames, extrapolated by the host's monotonic clock.
+//! Vehicle time between two state frames, extrapolated with the host's monotonic clock.
 
 use std::time::{Duration, Instant};
 
@@ -7,18 +7,19 @@ use greylag_physics::Time;
 /// Advance of vehicle time between frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Real time: between frames vehicle time advances with the host's clock, while the link is polled.
+    /// Real time: between frames, vehicle time advances with the host's clock while the link is polled.
     RealTime,
-    /// Lockstep: vehicle time stands between frames, until the vehicle has been silent for [`PATIENCE`]. A flight
-    /// then does not depend on the speed of the machine.
+    /// Lockstep: vehicle time is constant between frames, until the vehicle has been silent for [`PATIENCE`]. The
+    /// result of a flight does not depend on the speed of the machine.
     Lockstep,
 }
 
-/// Silence after which a vehicle in lockstep no longer counts as computing: the shim repeats an unanswered frame
-/// after one second.
+/// Silence after which a vehicle in lockstep no longer counts as computing. The shim repeats an unanswered frame after
+/// 1 s.
 pub const PATIENCE: Duration = Duration::from_millis(1200);
 
-/// Largest interval between two polls that counts as silence: a companion that stalled did not listen meanwhile.
+/// Longest part of an interval between two polls that counts as silence. During a stall the companion does not poll the
+/// link.
 const LISTENED: Duration = Duration::from_millis(100);
 
 /// Maps host time to vehicle time.
@@ -27,7 +28,7 @@ pub(super) struct Clock {
     pace: Pace,
     /// Time of the newest state.
     anchor: Option<Time>,
-    /// Silence since the anchor while the link was polled, and the last poll.
+    /// Silence since the anchor while the link was polled, and the time of the last poll.
     listened: (Duration, Option<Instant>),
 }
 
@@ -47,7 +48,7 @@ impl Clock {
         self.listened = (Duration::ZERO, Some(arrived));
     }
 
-    /// Notes a poll of the link at `host`.
+    /// Records a poll of the link at `host`.
     pub(super) fn listen(&mut self, host: Instant) {
         self.listened = (self.silence(host), Some(host));
     }
@@ -80,7 +81,7 @@ mod tests {
         let start = Instant::now();
         let time = |ms: u64| Time::from_micros(1000 * ms);
         let later = |ms: u64| start + Duration::from_millis(ms);
-        // One second in which the link was polled, then four in which it was not.
+        // The link is polled for one second, then not polled for four seconds.
         for (pace, after_a_second, after_five) in
             [(Pace::RealTime, 6000, 6100), (Pace::Lockstep, 5000, 5000)]
         {
@@ -96,9 +97,9 @@ mod tests {
         for look in 1..=170 {
             clock.listen(later(10 * look));
         }
-        // Half a second beyond the patience the pilot finds the link lost.
+        // Half a second after the patience has ended, vehicle time is half a second ahead: the link counts as lost.
         assert_eq!(clock.at(later(1700)), time(5500));
-        // A companion that stalled for five seconds did not observe five seconds of silence.
+        // In a stall of five seconds the companion did not observe five seconds of silence.
         assert_eq!(clock.at(later(6700)), time(5600));
         clock.set(later(6700), time(5010));
         assert_eq!(clock.at(later(9000)), time(5010));

@@ -1,4 +1,4 @@
-//! The control thread: a loop that answers state frames, then serves clients.
+//! The control thread: a loop that first responds to state frames and then serves clients.
 
 mod clients;
 mod vehicle;
@@ -31,21 +31,21 @@ use greylag_physics::Time;
 const POLL: Duration = Duration::from_millis(10);
 /// Period of the control loop.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Silence at the start after which a missing vehicle is reported.
+/// Time without any state after the start after which a missing vehicle is reported.
 const NO_VEHICLE: Duration = Duration::from_secs(2);
-/// Weight of the newest tick in the reported load.
+/// Weight of the newest tick in the low-pass of the reported load.
 const LOAD_WEIGHT: f64 = 0.02;
-/// Identity of the autopilot towards clients.
+/// Ids of the autopilot in messages to clients.
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// Wait for a live state after a stall, and the age up to which a state counts as live.
+/// Longest wait for a live state after a stall, and the largest age of a live state.
 const CATCH_UP: Duration = Duration::from_millis(50);
-/// Time for the network thread to deliver queued packets after a stall.
+/// Longest wait for the network thread to deliver queued packets after a stall.
 const HAND_OVER: Duration = Duration::from_secs(2);
 /// Interval of queries to the scheduler.
 const WAITED: Duration = Duration::from_secs(1);
 
-/// Origin of a packet.
+/// A received packet with its origin.
 enum Arrived {
     Vehicle(Arrival),
     Client(Arrival),
@@ -66,7 +66,7 @@ pub(super) struct Control {
     clock: Clock,
     timing: Timing,
     attention: Attention,
-    /// The scheduler's last counters, and when to query again.
+    /// The scheduler's last counters, and the time of the next query.
     waited: Waited,
     next_waited: Instant,
     reports: Reports,
@@ -150,7 +150,7 @@ impl Control {
         self.duration.is_some_and(|duration| self.started.elapsed() >= duration)
     }
 
-    /// Handles one packet, the vehicle's before a client's, or waits for one until `until`.
+    /// Handles one packet, or waits for a packet until `until`. Packets of the vehicle come before packets of clients.
     fn take_one(&mut self, until: Instant) {
         let wait = until.saturating_duration_since(Instant::now());
         let arrived = select_biased! {
@@ -162,7 +162,7 @@ impl Control {
         match arrived {
             Some(Arrived::Vehicle(arrival)) => self.take_vehicles(Some(arrival), resumed),
             Some(Arrived::Client(arrival)) => {
-                // setpoints are dated by the vehicle's clock, which stood still during the stall
+                // setpoints are stamped with vehicle time, which did not advance during the stall
                 if resumed.is_some() {
                     self.take_vehicles(None, resumed);
                 }
@@ -173,14 +173,14 @@ impl Control {
         }
     }
 
-    /// Detects a stall of this computer, waits until the network thread has delivered the packets of that time, and excludes
-    /// the stall from all timeouts. After a stall, returns the vehicle time from which states are live and no
-    /// longer history.
+    /// Detects a stall of this computer, waits until the network thread has delivered the packets of that time, and
+    /// excludes the stall from all timeouts. Returns the vehicle time from which states are live; `None` without a
+    /// stall.
     fn excuse_stall(&mut self) -> Option<Time> {
         let host = Instant::now();
         let (behind, since) = self.attention.look(host, self.ports.rounds())?;
         let before = self.clock.at(since);
-        // the first round may have started before the stall; the second has polled every socket
+        // the first round may have started before the end of the stall: only the second surely polls every socket
         let handed_over = self.ports.rounds() + 2;
         while self.ports.rounds() < handed_over && host.elapsed() < HAND_OVER {
             std::thread::sleep(CYCLE / 5);
@@ -206,7 +206,7 @@ impl Control {
         Some(before.plus(missed.saturating_sub(CATCH_UP)))
     }
 
-    /// Reports a link condition to the ground stations and as an event.
+    /// Reports a condition of a link to the ground stations.
     fn remark(&mut self, remark: &Remark) {
         self.pilot.send_text(Severity::Warning, &remark.to_string());
     }
@@ -257,7 +257,7 @@ impl Control {
     }
 
     fn say(&self, event: Event) {
-        // there may be no reader of the events; control does not wait
+        // the control thread does not wait for a reader of the events
         let _ = self.events.try_send(event);
     }
 

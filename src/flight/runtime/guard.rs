@@ -10,20 +10,20 @@ use greylag_link::signing::{Key, KeyError, Signer, SigningCounts, StampError, St
 /// Signing options of a flight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Signing {
-    /// Path of the key file; the timestamp is stored beside it.
+    /// Path of the key file. The signing timestamp is stored next to the key.
     pub key: PathBuf,
     /// Whether the vehicle's link is signed.
     pub vehicle: VehicleLink,
-    /// Client links that are declared local: frames are not signed there.
+    /// Client links that are declared local. Their frames are neither signed nor checked.
     pub local: Vec<Address>,
 }
 
 /// Signing of the vehicle's link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VehicleLink {
-    /// Signatures are required.
+    /// Frames are signed, and frames without a valid signature are refused.
     Signed,
-    /// No signatures.
+    /// Frames are neither signed nor checked.
     Open,
 }
 
@@ -38,7 +38,7 @@ pub enum SigningError {
     Stamp(#[from] StampError),
 }
 
-/// The signer with the numbers of its links.
+/// The signer with the numbers of the signed links.
 pub(super) struct Guard {
     signer: Signer,
     file: StampFile,
@@ -46,7 +46,7 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Reads key and timestamp. Link 0 is the vehicle's, the clients' links follow.
+    /// Reads key and timestamp. Link 0 is the vehicle's link. The clients' links are numbered from 1.
     pub(super) fn open(signing: &Signing, options: &FlightOptions) -> Result<Self, SigningError> {
         let key = Key::load(&signing.key)?;
         let (file, stamp) = StampFile::open(&signing.key)?;
@@ -59,7 +59,8 @@ impl Guard {
         Ok(Guard { signer: Signer::new(key, stamp), file, links })
     }
 
-    /// The signed form of `bytes` that leave on `link`.
+    /// Signs the frames in `bytes`, which are sent on `link` at `unix_us` (µs since 1970). Bytes of unsigned links stay
+    /// unchanged.
     pub(super) fn sign(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
         if !self.links.contains(&link) {
             return bytes;
@@ -69,7 +70,8 @@ impl Guard {
         signed
     }
 
-    /// The authenticated frames of `bytes` that arrived on `link`.
+    /// The authenticated frames of `bytes`, which arrived on `link` at `unix_us` (µs since 1970). All bytes of unsigned
+    /// links are returned.
     pub(super) fn believed(&mut self, unix_us: u64, link: LinkId, bytes: Vec<u8>) -> Vec<u8> {
         if !self.links.contains(&link) {
             return bytes;

@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-/// Delay of a thread that counts as a stall: ten cycles.
+/// Delay of a thread above which it counts as stalled: ten cycles.
 const LATE: Duration = Duration::from_millis(100);
-/// Longest interval between two checks of a running thread: one per cycle at least.
+/// Longest interval between two checks of a running thread: at least one check per cycle.
 const USUAL: Duration = Duration::from_millis(10);
-/// Least time between two reports.
+/// Least time between two stall reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(5);
-/// Fraction of a stall in which the thread was runnable, above which the cause is other load.
+/// Fraction of a stall in which the thread was runnable. Above it, other load is the cause.
 const BUSY: f64 = 0.5;
 
 /// The thread that stalled.
@@ -20,12 +20,12 @@ pub(super) enum Behind {
     Network,
 }
 
-/// Stall detector of the threads that listen.
+/// Stall detector of the control and network threads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attention {
     /// Last check by the control thread.
     looked: Instant,
-    /// Rounds of the network thread, and when they last increased.
+    /// Rounds of the network thread, and the time of their last increase.
     network: (u64, Instant),
 }
 
@@ -34,8 +34,8 @@ impl Attention {
         Attention { looked: host, network: (0, host) }
     }
 
-    /// Checks at `host`, with the rounds of the network thread. On a stall, returns the thread and the time since
-    /// which it did not listen.
+    /// Checks at `host`, with the number of rounds of the network thread. On a stall, returns the thread and the time
+    /// since which it did not poll.
     pub(super) fn look(&mut self, host: Instant, rounds: u64) -> Option<(Behind, Instant)> {
         let looked = std::mem::replace(&mut self.looked, host);
         if rounds != self.network.0 {
@@ -49,13 +49,13 @@ impl Attention {
         }
     }
 
-    /// Restarts after a stall: both threads listen again at `host`.
+    /// Restarts the detector after a stall, at the time `host` at which both threads poll again.
     pub(super) fn resume(&mut self, host: Instant, rounds: u64) {
         *self = Attention { looked: host, network: (rounds, host) };
     }
 }
 
-/// Length of the stall from `since` to `host`, without the usual interval.
+/// Length of the stall from `since` to `host`, less the longest interval between two regular checks.
 pub(super) fn lateness(since: Instant, host: Instant) -> Duration {
     host.saturating_duration_since(since).saturating_sub(USUAL)
 }
@@ -63,7 +63,7 @@ pub(super) fn lateness(since: Instant, host: Instant) -> Duration {
 /// Cause of a stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// The thread was runnable, and other work had the processor.
+    /// The thread was runnable, but other work used the processor.
     Busy,
     /// The thread was suspended.
     Stopped,
@@ -76,7 +76,7 @@ pub(super) enum Cause {
 pub(super) struct Waited(Option<Duration>);
 
 impl Waited {
-    /// Reads the counters; unknown where the system has none.
+    /// Reads the counters. The time is unknown if the system has no such counters.
     pub(super) fn now() -> Self {
         let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
         Waited(
@@ -86,7 +86,7 @@ impl Waited {
         )
     }
 
-    /// Cause of a stall of `missed`, from the counters before and after it.
+    /// Cause of a stall of length `missed`, from the counters before the stall (`self`) and after it (`now`).
     pub(super) fn cause(self, now: Waited, missed: Duration) -> Cause {
         match (self.0, now.0) {
             (Some(before), Some(after)) => {
@@ -98,17 +98,17 @@ impl Waited {
     }
 }
 
-/// Rate limit of stall reports: immediate, or summed over five seconds after a recent one.
+/// Rate limit of stall reports. A report is immediate, or sums up the stalls of the 5 s after the last report.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reports {
     /// Time of the last report.
     reported: Option<Instant>,
-    /// Number of stalls since then, and the longest.
+    /// Number of stalls since the last report, and the longest of them.
     unreported: (u32, Duration),
 }
 
 impl Reports {
-    /// Adds a stall that ended at `host`; the report due immediately, if any.
+    /// Adds a stall that ended at `host`. Returns the immediate report; `None` if a report was made recently.
     pub(super) fn note(&mut self, host: Instant, missed: Duration, cause: Cause) -> Option<String> {
         if self
             .reported
@@ -118,7 +118,7 @@ impl Reports {
             return None;
         }
         self.reported = Some(host);
-        let late = format!("this computer was late by {:.1} s", missed.as_secs_f64());
+        let late = format!("this computer stalled for {:.1} s", missed.as_secs_f64());
         Some(match cause {
             Cause::Busy => format!("{late}: {}", busy()),
             Cause::Stopped => format!("{late}: the program was stopped, or the machine suspended"),
@@ -126,7 +126,7 @@ impl Reports {
         })
     }
 
-    /// The report due at `host` on stalls not yet reported.
+    /// The report due at `host` on the stalls not yet reported; `None` if no report is due.
     pub(super) fn due(&mut self, host: Instant) -> Option<String> {
         let (times, longest) = self.unreported;
         let waits = self
@@ -138,20 +138,20 @@ impl Reports {
         (self.reported, self.unreported) = (Some(host), (0, Duration::ZERO));
         let longest = longest.as_secs_f64();
         Some(format!(
-            "this computer was late {times} times more, by {longest:.1} s at most: {}",
+            "this computer stalled {times} times more, for at most {longest:.1} s: {}",
             busy()
         ))
     }
 }
 
-/// Text on the load of the processors by other work.
+/// Text on the processor load by other work.
 fn busy() -> String {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let load = std::fs::read_to_string("/proc/loadavg").ok();
     let load = load.as_deref().and_then(|words| words.split(' ').next());
     let load =
         load.map_or(String::new(), |load| format!(" (load {load}, processors {processors})"));
-    format!("other work has its processors{load}")
+    format!("other load on its processors{load}")
 }
 
 #[cfg(test)]
@@ -200,7 +200,7 @@ mod tests {
         let mut reports = Reports::default();
         let first = reports.note(at(0), ms(1200), Cause::Stopped).unwrap();
         assert!(
-            first.starts_with("this computer was late by 1.2 s: the program was stopped"),
+            first.starts_with("this computer stalled for 1.2 s: the program was stopped"),
             "{first}"
         );
         let more: Vec<_> =
@@ -209,7 +209,7 @@ mod tests {
         assert_eq!(reports.due(at(4900)), None);
         let rest = reports.due(at(5000)).unwrap();
         assert!(
-            rest.starts_with("this computer was late 49 times more, by 0.1 s at most"),
+            rest.starts_with("this computer stalled 49 times more, for at most 0.1 s"),
             "{rest}"
         );
         assert_eq!(reports.due(at(20_000)), None);

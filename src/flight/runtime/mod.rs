@@ -1,12 +1,12 @@
-//! The runtime: threads, clocks, channels around the pilot.
+//! The runtime: threads, clocks and channels around the pilot.
 //!
 //! ```text
 //! network thread ── vehicle channel ─► control thread ── bounded queue ─► recorder thread
 //!                ── client channel ──►   │    ▲
 //!                ◄── frames to send ─────┘    └─ one plan a tick ─ planner thread (slow controllers)
 //! ```
-//! The control thread owns the pilot, the vehicle's session, the client server. It serves the
-//! vehicle first: a client's packet is looked at only when no state frame waits.
+//! The control thread owns the pilot, the vehicle's session and the client server. The vehicle has priority: a client's
+//! packet is processed only when no state frame is queued.
 
 mod clock;
 mod control;
@@ -48,7 +48,7 @@ use greylag_physics::servos::Travels;
 use planner::{Planner, Threaded};
 use ports::Ports;
 
-/// Capacity of the event queue; further events are dropped.
+/// Capacity of the event queue. Further events are dropped.
 const EVENTS: usize = 1024;
 
 /// Options of a flight.
@@ -58,47 +58,48 @@ pub struct FlightOptions {
     pub vehicle: Address,
     /// Link addresses for clients.
     pub clients: Vec<Address>,
-    /// Destination of the recording; `None` for no recording.
+    /// Destination of the recording; `None` without a recording.
     pub record: Option<Place>,
     /// Real time or lockstep.
     pub pace: Pace,
-    /// Duration after which the flight ends by itself.
+    /// Duration after which the flight ends by itself; `None` without a limit.
     pub duration: Option<Duration>,
-    /// Time after the arrival of a state frame at which a plan is late.
+    /// Time from the arrival of a state frame after which its plan is late.
     pub plan_deadline: Duration,
-    /// Travel of the airframe's surfaces.
+    /// Travels of the airframe's surfaces.
     pub travels: Travels,
-    /// Surfaces and motors of the airframe, where it names them: the `sitl` profile also sends their commands.
+    /// Surfaces and motors of the airframe, to which the `sitl` profile also sends commands; `None` if the airframe
+    /// does not name them.
     pub mixer: Option<Mixer>,
-    /// Profile of a real flight controller; `None` is the simulator's shim.
+    /// Profile of a real flight controller; `None` for the simulator's shim.
     pub controller: Option<Profile>,
-    /// Delay margin of the loop through a real controller's surfaces, where known.
+    /// Delay margin of the loop through a real controller's surfaces; `None` if it is unknown.
     pub delay_margin: Option<Duration>,
-    /// Message signing of the links; `None` for none.
+    /// Message signing of the links; `None` for unsigned links.
     pub signing: Option<Signing>,
 }
 
 impl FlightOptions {
-    /// Default deadline of a planner: a cycle of 10 ms less the time for the rest of the loop and the link.
+    /// Default deadline of a planner: a cycle of 10 ms, less the time for the rest of the loop and the link.
     pub const PLAN_DEADLINE: Duration = Duration::from_millis(8);
 }
 
 /// Pilot and controller of a flight.
 pub struct Companion {
-    /// The pilot, which decides.
+    /// The pilot, which decides on the command of each tick.
     pub pilot: Pilot,
     /// The controller, which computes the command of each tick.
     pub controller: Box<dyn Controller>,
-    /// Where the controller runs.
+    /// Thread on which the controller runs.
     pub placement: Placement,
 }
 
 /// Thread that a controller runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placement {
-    /// The control thread: for controllers that need microseconds.
+    /// The control thread, for controllers that compute for microseconds.
     Loop,
-    /// Its own thread with a deadline: for planners.
+    /// A separate thread with a deadline, for planners.
     Thread,
 }
 
@@ -126,7 +127,7 @@ pub enum Event {
     Text(Text),
     /// The first state of the vehicle was received.
     VehicleFound(PeerId),
-    /// Nothing was received from a vehicle since the start.
+    /// No state of a vehicle was received in the first 2 s.
     NoVehicle,
 }
 
@@ -138,20 +139,20 @@ pub struct Flight {
     pub vehicle: Option<SocketAddr>,
     /// The bound addresses of the clients' links, in the order of the options.
     pub clients: Vec<Option<SocketAddr>>,
-    /// Folder of the recording.
+    /// Folder of the recording; `None` without a recording.
     pub recording: Option<std::path::PathBuf>,
-    /// Rounds of the control thread, at least one per 10 ms while it lives.
+    /// Rounds of the control thread, about one per 10 ms while the thread runs.
     pub rounds: Arc<AtomicU64>,
     thread: JoinHandle<Summary>,
 }
 
 impl Flight {
-    /// Opens the links and the recording, then flies on its own thread until `stop` is set or the duration is over.
-    /// When this returns, either all are open or none.
+    /// Opens the links and the recording. The flight then runs on a new thread until `stop` is set or the duration is
+    /// over. After an error no link stays open.
     ///
     /// # Errors
     ///
-    /// The first link or file that cannot be opened.
+    /// The first link, file or thread that cannot be opened or started.
     pub fn start(
         options: &FlightOptions,
         companion: Companion,

@@ -1,4 +1,4 @@
-//! The planner of a tick: a controller in the loop, or one on its own thread.
+//! The planner of a tick: a controller in the control loop or on a separate thread.
 
 mod threaded;
 
@@ -10,14 +10,14 @@ pub(super) use threaded::Threaded;
 
 /// The controller of the flight and where it runs.
 pub(super) enum Planner {
-    /// Fast enough to be called in the loop.
+    /// A controller that is fast enough for the control loop.
     Inline(Box<dyn Controller>),
-    /// Slow: on its own thread, its plan used at its tick or not at all.
+    /// A slow controller on a separate thread. Its plan is used at the tick of its request or not at all.
     Threaded(Threaded),
 }
 
 impl Planner {
-    /// The plan for `request`, waited for until `deadline` after `arrived` at most.
+    /// The plan for `request`, whose state arrived at `arrived`. The wait ends at the planner's deadline.
     pub(super) fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         match self {
             Planner::Inline(controller) => Plan::Ready(request.ask(controller.as_mut())),
@@ -48,8 +48,7 @@ mod tests {
         Request { observation, target, overruled: None, engage }
     }
 
-    /// A controller whose first plans wait until they are let go. Its throttle counts its engagements, its
-    /// aileron its plans.
+    /// A controller whose first plans wait for a release. Its throttle counts its engagements, its aileron its plans.
     #[derive(Clone)]
     struct Held {
         begun: Sender<()>,
@@ -87,7 +86,7 @@ mod tests {
     }
 
     impl Bench {
-        /// `waits`: whether each plan waits, in order.
+        /// `waits` holds, for each plan in order, whether the plan waits for a release.
         fn new(pace: Pace, waits: &[bool]) -> Bench {
             let ((begun, started), (go, gate)) = (bounded(9), bounded(9));
             let waits = waits.iter().rev().copied().collect();
@@ -102,13 +101,13 @@ mod tests {
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        /// A plan that is not waited for.
+        /// A plan with a deadline of 5 ms, which a waiting controller misses.
         fn too_late(&mut self, engage: bool) -> Plan {
             self.planner.deadline = Duration::from_millis(5);
             self.planner.plan(&any_request(engage), Instant::now())
         }
 
-        /// Waits for late plans.
+        /// Waits until `plans` late plans have arrived.
         fn done(&self, plans: usize) {
             while self.planner.plans.len() < plans {
                 std::thread::sleep(Duration::from_millis(1));
@@ -135,7 +134,7 @@ mod tests {
         let mut bench = Bench::new(Pace::RealTime, &[true]);
         assert_eq!(bench.too_late(true), Plan::Late);
         bench.begun.recv().unwrap();
-        // This one waits in the queue, the next finds the queue full.
+        // This request waits in the queue. The next request finds the queue full.
         assert_eq!(bench.too_late(false), Plan::Late);
         assert_eq!(bench.too_late(true), Plan::Busy);
         bench.go.send(()).unwrap();

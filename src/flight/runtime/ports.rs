@@ -1,4 +1,4 @@
-//! The links of a flight by number.
+//! The links of a flight, with their arrival queues and signatures.
 
 use std::net::SocketAddr;
 
@@ -10,9 +10,9 @@ use greylag_link::peer::{LinkId, PeerId};
 use greylag_link::signing::SigningCounts;
 use greylag_link::transport::{Arrival, Link, Network, Packet};
 
-/// Capacity of the vehicle's queue: two seconds, longer than the control thread may stall.
+/// Capacity of the vehicle's queue: 2 s, longer than the control thread may stall.
 const VEHICLE_QUEUE: usize = 256;
-/// Capacity of the clients' queue; a flood loses the rest.
+/// Capacity of the clients' queue. Further packets are dropped.
 const CLIENT_QUEUE: usize = 512;
 
 /// The open links with the channels of their arrivals.
@@ -22,12 +22,12 @@ pub(super) struct Ports {
     guard: Option<Guard>,
     pub(super) from_vehicle: Receiver<Arrival>,
     pub(super) from_clients: Receiver<Arrival>,
-    // Dropped last: it closes the sockets.
+    // Must be dropped last, because dropping it closes the sockets.
     network: Network,
 }
 
 impl Ports {
-    /// Opens all links, or none.
+    /// Opens all links. After an error none stays open.
     pub(super) fn open(options: &FlightOptions) -> Result<Self, FlightError> {
         let guard = options.signing.as_ref().map(|s| Guard::open(s, options)).transpose()?;
         let mut network = Network::start()?;
@@ -52,12 +52,12 @@ impl Ports {
         self.clients.iter().map(Link::local).collect()
     }
 
-    /// Rounds of the network thread.
+    /// Number of rounds of the network thread.
     pub(super) fn rounds(&self) -> u64 {
         self.network.rounds()
     }
 
-    /// The vehicle's peer, when it may be sent to before it has sent anything.
+    /// The vehicle's peer, if its address is known before its first packet.
     pub(super) fn vehicle_target(&self) -> Option<PeerId> {
         self.vehicle.target()
     }
@@ -68,7 +68,7 @@ impl Ports {
         self.vehicle.send(peer, frames);
     }
 
-    /// Sends a frame to a client on the link it was received from.
+    /// Sends a frame to a client on the client's link.
     pub(super) fn send_to_client(&mut self, unix_us: u64, peer: PeerId, frame: Vec<u8>) {
         let frame = self.signed(unix_us, peer.link, frame);
         if let Some(link) = self.clients.iter().find(|link| link.id() == peer.link)
@@ -85,7 +85,7 @@ impl Ports {
         }
     }
 
-    /// Removes unauthenticated frames from a packet.
+    /// Removes frames without a valid signature from a packet.
     pub(super) fn sift(&mut self, unix_us: u64, packet: &mut Packet) {
         if let Some(guard) = &mut self.guard {
             let bytes = std::mem::take(&mut packet.bytes);
@@ -93,7 +93,7 @@ impl Ports {
         }
     }
 
-    /// Signing counters, where links are signed.
+    /// Signing counters; `None` without signing.
     pub(super) fn signing(&self) -> Option<SigningCounts> {
         self.guard.as_ref().map(Guard::counts)
     }

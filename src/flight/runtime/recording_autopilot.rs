@@ -1,4 +1,4 @@
-//! The pilot as seen by clients; records each call and reports each text as an event.
+//! The pilot's interface for clients, which records each call and reports each text as an event.
 
 use super::Event;
 use crate::pilot::Pilot;
@@ -9,7 +9,7 @@ use greylag_link::autopilot::{
 use greylag_link::vehicle::Vehicle;
 use greylag_physics::Time;
 
-/// Forwards all calls to the pilot; each text for the ground stations also becomes an event.
+/// Passes all calls to the pilot. Each text for the ground stations also becomes an event.
 pub(super) struct RecordingAutopilot<'a, F: FnMut(Event)> {
     pub(super) pilot: &'a mut Pilot,
     pub(super) vehicle: &'a Vehicle,
@@ -27,7 +27,7 @@ impl<F: FnMut(Event)> RecordingAutopilot<'_, F> {
 
 impl<F: FnMut(Event)> Autopilot for RecordingAutopilot<'_, F> {
     fn arm(&mut self, now: Time, force: bool) -> Verdict {
-        // conditions of the controller are not pre-arm checks: a forced command does not skip them
+        // force skips pre-arm checks only, not the conditions of the flight controller
         match self.vehicle.obstacle() {
             Some(obstacle) => Verdict::Rejected(format!("arming refused: {obstacle}")),
             None => {

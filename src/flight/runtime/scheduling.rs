@@ -6,25 +6,25 @@ use std::time::{Duration, Instant};
 
 use super::timing::Histogram;
 
-/// Real-time priority, 1..99: above most, below the kernel's own (50 where interrupts have threads).
+/// Real-time priority, 1..99: above most threads, below the kernel's interrupt threads, which have 50.
 const PRIORITY: i32 = 40;
-/// Period of the measurement.
+/// Period of the wake-up measurement.
 const CYCLE: Duration = Duration::from_millis(10);
-/// Limits of the wake-up latency: one wake-up in a hundred may exceed the first, none the second. A plan has 8 ms of
-/// a cycle of 10 ms.
+/// Limits of the wake-up latency. One wake-up in a hundred may exceed the first limit, none the second. A plan has 8 ms
+/// of a cycle of 10 ms.
 const LATE: (Duration, Duration) = (Duration::from_millis(2), Duration::from_millis(5));
 
-/// Puts this thread, and all that it starts, into the scheduling class SCHED_FIFO: it runs before all threads outside
-/// it.
+/// Puts this thread, and all threads that it starts, into the scheduling class SCHED_FIFO. A thread of this class runs
+/// before all threads of the default class.
 ///
 /// # Errors
 ///
-/// If the system does not permit it, or has no such class.
+/// If the system does not permit real-time scheduling, or has no such class.
 pub fn take_real_time() -> io::Result<()> {
     #[cfg(target_os = "linux")]
     {
         let parameters = libc::sched_param { sched_priority: PRIORITY };
-        // SAFETY: the call reads the structure, which lives to its end, and changes this thread alone.
+        // SAFETY: the call reads the structure, which outlives the call, and changes this thread only.
         let result =
             unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
         if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
@@ -40,7 +40,7 @@ pub struct Punctuality {
 }
 
 impl Punctuality {
-    /// Measures for `length`, on the calling thread.
+    /// Measures the wake-up latency of the calling thread for `length`.
     pub fn measure(length: Duration) -> Self {
         let mut late = Histogram::default();
         let start = Instant::now();
@@ -61,13 +61,13 @@ impl Punctuality {
         self.late.note(late);
     }
 
-    /// Whether the latency suffices for flight.
+    /// Whether the latency suffices for flight: at most 2 ms for 99 % of the wake-ups, and at most 5 ms for all.
     pub fn is_good(&self) -> bool {
         let us = |limit: Duration| limit.as_secs_f64() * 1e6;
         self.late.quantile_us(0.99) <= us(LATE.0) && self.late.max_us() <= us(LATE.1)
     }
 
-    /// Remedies on this computer, each a sentence.
+    /// Remedies for a high latency on this computer, one sentence each. Empty if the latency suffices.
     pub fn advice(&self, class: Class) -> Vec<String> {
         if self.is_good() {
             return Vec::new();
@@ -111,7 +111,7 @@ fn load() -> String {
         .map_or_else(String::new, |load| format!(" (load {load} on {processors} processors)"))
 }
 
-/// The processor's frequency governor, if it saves power.
+/// Advice on the processor's frequency governor, if it saves power.
 fn governor() -> Option<String> {
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor";
     let governor = std::fs::read_to_string(path).ok()?;

@@ -1,9 +1,9 @@
-//! Timestamps of recorded packets: the time of day at the start plus a monotonic clock.
+//! Timestamps of recorded packets: time of day at the start plus the time of a monotonic clock.
 
 use std::time::{Instant, SystemTime};
 
-/// Timestamps of one recording. Changes of the time of day in flight have no effect, so that a replay sees the same
-/// ages; timestamps of successive packets differ, which keeps packets apart.
+/// Timestamps of one recording. Changes of the time of day in flight have no effect: a replay sees the same ages.
+/// Timestamps of successive packets differ, which separates the packets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stamps {
     started: Instant,
@@ -50,7 +50,7 @@ mod tests {
         let us = |us| started + Duration::from_micros(us);
         let first = stamps.of(us(1000));
         assert_eq!(stamps.of(us(301_000)) - first, 300_000);
-        // a reply sent in the microsecond of the next arrival
+        // a reply is sent in the same microsecond as the next arrival
         let [one, two] = [us(400_000), us(400_000)].map(|at| stamps.of(at));
         assert_eq!(two - one, 1);
         assert!(first.abs_diff(unix_us()) < 10_000_000);

@@ -20,17 +20,17 @@ pub struct Summary {
     pub vehicle: VehicleCounts,
     /// Counters of client traffic.
     pub clients: ClientCounts,
-    /// Signing counters, where links are signed.
+    /// Signing counters; `None` without signing.
     pub signing: Option<SigningCounts>,
     /// Timing of the control loop.
     pub timing: Timing,
-    /// Path of the recording and its counters.
+    /// Path of the recording and its counters; `None` without a recording.
     pub recording: Option<(PathBuf, Written)>,
 }
 
 impl Summary {
-    /// Writes `summary.txt` into the recording's folder. The folder was new, so that nothing is overwritten; a
-    /// failing disk was reported already.
+    /// Writes `summary.txt` into the recording's folder. An existing file is not overwritten. Errors are ignored,
+    /// because a failing disk has been reported already.
     pub(super) fn save(&self) {
         if let Some((folder, _)) = &self.recording
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))
@@ -72,7 +72,7 @@ impl fmt::Display for Summary {
         if t.stalls > 0 {
             writeln!(
                 f,
-                "this computer was late {} times, by {:.1} s at most; {} states overtaken by newer ones",
+                "this computer stalled {} times, for at most {:.1} s; {} states overtaken by newer ones",
                 t.stalls,
                 t.longest_stall.as_secs_f64(),
                 t.overtaken

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-/// Durations up to this many microseconds are kept to the microsecond.
+/// Longest duration that is resolved to 1 µs, µs. All longer durations share one bucket.
 const RESOLVED_US: usize = 50_000;
 
-/// A histogram of durations, of fixed size.
+/// A histogram of durations with a fixed size.
 #[derive(Clone, Debug)]
 pub struct Histogram {
     buckets: Box<[u32]>,
@@ -33,12 +33,12 @@ impl Histogram {
         self.count
     }
 
-    /// Largest of the durations, µs.
+    /// Largest of the durations, µs; 0 without durations.
     pub fn max_us(&self) -> f64 {
         self.max_us
     }
 
-    /// The quantile (0..1) of the durations, µs, rounded up to the microsecond; NaN without any.
+    /// The quantile `share` (0..1) of the durations, µs, rounded up to the microsecond; NaN without durations.
     pub fn quantile_us(&self, share: f64) -> f64 {
         let rank = ((share * self.count as f64).ceil() as u64).max(1);
         let mut seen = 0;
@@ -55,16 +55,16 @@ impl Histogram {
 /// The timing of a flight.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
-    /// From the arrival of a state frame to the sending of its command.
+    /// Time from the arrival of a state frame to the sending of its command.
     pub latency: Histogram,
-    /// Between the arrivals of two state frames.
+    /// Time between the arrivals of two state frames.
     pub interval: Histogram,
-    /// Missed cycles: in real time those with a latency above 10 ms; in lockstep, where vehicle time waits for the
-    /// reply, those whose state was sent again.
+    /// Number of missed cycles. In real time these are ticks with a latency above 10 ms. In lockstep vehicle time waits
+    /// for the reply. Missed cycles are then states that were sent again.
     pub missed: u64,
-    /// Ticks without a plan in time: it came after its deadline, or the planner was busy with an earlier request.
+    /// Number of ticks without a plan in time: the plan was late, or the planner was busy with an earlier request.
     pub late_plans: u64,
-    /// States not answered because newer ones had arrived.
+    /// Number of states without a reply because newer states had arrived.
     pub overtaken: u64,
     /// Number of stalls of more than 0.1 s.
     pub stalls: u64,
@@ -73,7 +73,8 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Why this computer was too slow for real time, in one sentence with the remedy; `None` if it was not.
+    /// Reason for which this computer was too slow for real time, in one sentence with the remedy; `None` if it was
+    /// fast enough.
     pub fn trouble(&self) -> Option<String> {
         let cycles = self.latency.count().max(1) as f64;
         let missed = self.missed as f64 / cycles;
@@ -90,7 +91,7 @@ impl Timing {
     }
 }
 
-/// Fraction of late cycles above which the computer counts as too slow.
+/// Fraction of late cycles from which on the computer counts as too slow.
 const TOO_MANY: f64 = 0.02;
 
 #[cfg(test)]
@@ -103,7 +104,7 @@ mod tests {
         for us in 0..1000 {
             histogram.note(Duration::from_micros(us));
         }
-        // Of 0, 1 … 999 µs a half do not exceed 499 µs: reported as the bucket's end.
+        // Half of the durations 0, 1 … 999 µs do not exceed 499 µs. The end of this bucket is 500 µs.
         assert_eq!(histogram.quantile_us(0.5), 500.0);
         assert_eq!(histogram.quantile_us(0.99), 990.0);
         assert_eq!(histogram.quantile_us(1.0), 999.0);

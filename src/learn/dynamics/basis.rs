@@ -1,4 +1,4 @@
-//! Coordinates of the trainable coefficients in which each has the same effect on the rates.
+//! Coordinates of the trainable coefficients. A unit of each coordinate has the same effect on the state rates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,30 +13,30 @@ use greylag_physics::{Channel, State, Wrench};
 
 /// The name under which the product of inertia is trainable.
 ///
-/// No other inertia is: scaling moments and inertias, or forces and mass, together changes nothing, so that no data
-/// could separate them from the coefficients.
+/// No other inertia is trainable. Scaling moments and inertias together, or forces and mass together, changes no
+/// motion. Therefore no data can separate them from the coefficients.
 pub const JXZ: &str = "rigid_body.jxz_kgm2";
 
 /// Number of samples that determine the coordinates.
 const SAMPLES: usize = 4096;
 
-/// Squared relative strength below which a direction counts as unidentifiable.
+/// Eigenvalue, relative to the largest one, up to which a direction counts as unidentifiable.
 const UNSEEN: f64 = 1e-9;
 
 /// θ_p = θ_p0 + T η: η has as many entries as there are identifiable directions.
 ///
-/// Adam scales every parameter separately, along the given axes. Coefficients differ a thousandfold in
-/// size and are correlated (aileron power with roll damping), so that the axes are chosen by their
-/// effect on the rates over the flights: ∂(F_p/x_c)/∂η has unit covariance.
+/// Adam scales every parameter separately, along the given axes. Coefficients differ a thousandfold in size and are
+/// correlated (aileron power with roll damping). Therefore the axes are chosen by their effect on the rates over the
+/// flights: ∂(F_p/x_c)/∂η has unit covariance.
 #[derive(Clone, Debug)]
 pub struct Basis {
-    /// Places in the model's list, the list's length standing for Jxz.
+    /// Indices of the coefficients in the model's list. The length of the list is the index of Jxz.
     pub places: Vec<usize>,
     /// Initial coefficients θ_p0.
     start: DVector<f64>,
-    /// Physically possible ranges, where there are bounds.
+    /// Physically possible ranges; `None` without bounds.
     bounds: Vec<Option<(f64, f64)>>,
-    /// 1/σ² of θ_p0 as a prior where the model's file states σ, else zero.
+    /// Prior information 1/σ² on θ_p0; zero if the model's file states no σ.
     information: DVector<f64>,
     /// The transformation T.
     turn: DMatrix<f64>,
@@ -59,7 +59,7 @@ pub enum TrainableError {
     },
     /// An effect depends on the altitude.
     #[error(
-        "model {model} has the effect {effect}, which goes with the altitude, and the rollouts that are learned from do not know it: leave it out of the prior"
+        "model {model} has the effect {effect}, which depends on the altitude; the rollouts for training do not include the altitude: leave the effect out of the prior"
     )]
     Effect {
         /// Name of the model.
@@ -69,7 +69,7 @@ pub enum TrainableError {
     },
 }
 
-/// Whether a model's slopes can be computed for training.
+/// Checks that the slopes of `model` can be computed for training.
 ///
 /// # Errors
 ///
@@ -86,14 +86,14 @@ pub fn check(model: &GreyBox) -> Result<(), TrainableError> {
     }
 }
 
-/// Names of all trainable coefficients of `model`: those that forces and moments are linear in, and Jxz.
+/// Names of all trainable coefficients of `model`: Jxz, and the coefficients in which forces and moments are linear.
 pub fn trainable(model: &GreyBox) -> Vec<String> {
     let mut names = vec![JXZ.to_owned()];
     for about in model.effects() {
         let Some(kind) = Kind::from_id(about.id) else { continue };
         let count = about.coefficients.len();
         for (k, c) in about.coefficients[..count - about.shape].iter().enumerate() {
-            // an effect on inertia is not a force
+            // a coefficient that changes the mass or inertia is excluded
             let one: Vec<f64> = (0..count).map(|i| if i == k { 0.1 } else { 0.0 }).collect();
             let (mut body, mut still) = (*model.bare_body(), *model.bare_body());
             kind.change(&one, &mut body);
@@ -106,7 +106,7 @@ pub fn trainable(model: &GreyBox) -> Vec<String> {
     names
 }
 
-/// Present values: the coefficients, then Jxz.
+/// Present values of the coefficients of `model`, then Jxz (kg m²).
 pub fn values(model: &GreyBox) -> Vec<f64> {
     let coefficients = model.coefficients().iter().map(|c| c.value);
     coefficients.chain([model.bare_body().jxz]).collect()
@@ -185,7 +185,8 @@ impl Basis {
         (0..self.len()).map(|k| of(k).sum()).collect()
     }
 
-    /// Prior information on the coordinates from the stated standard deviations: Tᵀ Σ⁻¹ T, zero where none is stated.
+    /// Prior information on the coordinates from the stated standard deviations: Tᵀ Σ⁻¹ T. A coefficient without a
+    /// stated standard deviation contributes zero.
     pub fn prior_information(&self) -> DMatrix<f64> {
         let weighed = DMatrix::from_diagonal(&self.information) * &self.turn;
         self.turn.transpose() * weighed
@@ -200,7 +201,7 @@ impl Basis {
             match values.get_mut(*place) {
                 Some(value) => *value = bounds.map_or(*theta, |(low, high)| theta.clamp(low, high)),
                 None => {
-                    // jx jz must exceed its square
+                    // jx jz must exceed jxz²
                     let most = 0.99 * (body.jx * body.jz).sqrt();
                     body.jxz = theta.clamp(-most, most);
                 }
@@ -256,7 +257,7 @@ pub(crate) fn rate_of(model: &GreyBox, state: &State, air: &AirData, wrench: &Wr
     let none = State { p: 0.0, q: 0.0, r: 0.0, ..*state };
     let force = rigid_body::body_force(wrench, air, model.axes);
     let moment = [4, 5, 6].map(|c| wrench.get(Channel::ALL[c]));
-    // at rest the gyroscopic terms vanish and the spin is linear in the moment
+    // without rotation the gyroscopic terms vanish and the angular acceleration is linear in the moment
     let spin = rigid_body::angular_acceleration(&model.body, &none, moment);
     let push = force.map(|f| f / model.body.mass);
     let rate = rigid_body::state_rate(state, air, push, spin).to_array();
@@ -281,7 +282,7 @@ fn whiten(gram: &DMatrix<f64>) -> (DMatrix<f64>, Vec<usize>) {
     let turn = DMatrix::from_fn(n, seen.len(), |i, k| {
         unit(i) * eigen.eigenvectors[(i, seen[k])] / eigen.eigenvalues[seen[k]].sqrt()
     });
-    // more than half of the coefficient's direction lies in what is not seen
+    // more than half of the coefficient's direction is unidentifiable
     let lost = |i: &usize| {
         let kept: f64 = seen.iter().map(|k| eigen.eigenvectors[(*i, *k)].powi(2)).sum();
         kept < 0.5

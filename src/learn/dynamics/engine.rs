@@ -12,14 +12,14 @@ use crate::dynamics::windows::{Track, Window};
 /// Arithmetic of an engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Blocks of single-precision lanes. Where no multiply-add is fused (x86 from before 2013) it is
-    /// [`Double`](Arithmetic::Double).
+    /// Blocks of single-precision lanes. Processors without fused multiply-add (x86 from before 2013) use
+    /// [`Double`](Arithmetic::Double) instead.
     Lanes,
     /// One rollout at a time in double precision: slow, for tests.
     Double,
 }
 
-/// Computes losses and gradients of minibatches. It allocates only when it is built.
+/// Computes losses and gradients of minibatches. Memory is allocated only by `new`.
 #[derive(Clone, Debug)]
 pub struct Engine(Kind);
 
@@ -35,7 +35,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// In the processor's widest vectors; `None` where multiply-add is not fused.
+    /// The kind with the processor's widest vectors; `None` without fused multiply-add.
     #[cfg_attr(
         not(any(target_arch = "x86_64", target_arch = "aarch64")),
         expect(unused_variables, reason = "elsewhere no multiply-add is known to be fused")
@@ -65,7 +65,7 @@ impl Engine {
         Engine(lanes.unwrap_or_else(double))
     }
 
-    /// The loss of `windows` of `steps` steps, with its gradient; the same to the bit on any number of
+    /// The loss of `windows` of `steps` steps, with its gradient. The result is the same to the bit on any number of
     /// cores.
     ///
     /// # Panics

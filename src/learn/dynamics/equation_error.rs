@@ -1,15 +1,17 @@
 //! Initial coefficients of the prior by equation error, before any rollout.
 //!
-//! F_p is linear in what is trained, so that over a short window the change of the measured state less the integral
-//! of F_p along the measured path is a linear regression. It finds quickly what a gradient through rollouts finds
-//! slowly: a fast mode (the roll damping) settles within a rollout, after which only ratios of coefficients are
+//! F_p is linear in the trained coefficients. Over a short window, the change of the measured state less the integral
+//! of F_p along the measured path therefore gives a linear regression. A gradient through rollouts converges more
+//! slowly. A fast mode (the roll damping) settles within a rollout, and after that only ratios of coefficients are
 //! identifiable. The paper starts from the prior as given.
 //!
-//! Coefficients whose file states a standard deviation have it as a prior, so that poorly identifiable ones stay near
-//! their value. Others are estimated from the flights alone, and all stay within their physically possible ranges.
+//! A standard deviation in the model's file is the prior of its coefficient. Poorly identifiable coefficients then stay
+//! near their value. Other coefficients are estimated from the flights alone. All stay within their physically possible
+//! ranges.
 //!
-//! Errors over the flow angles of forces without trained coefficients, which the residual is to learn, are fitted as
-//! nuisance terms and dropped: otherwise too small a drag would be compensated by too little thrust.
+//! Forces without trained coefficients can have errors over the flow angles, which the residual is to learn. These
+//! errors are fitted as nuisance terms and dropped. Otherwise too small a drag would be compensated by too little
+//! thrust.
 
 use std::ops::{AddAssign, SubAssign};
 
@@ -22,7 +24,7 @@ use greylag_model::{GreyBox, Integrator, STEP};
 use greylag_num::statistics::correlation_length;
 use greylag_physics::{Channel, Controls, State, Wrench};
 
-/// Steps of a window: noise of the states is divided by it, slow effects remain visible.
+/// Steps of 10 ms of a window. The noise of the states is divided by this number, and slow effects remain visible.
 const STEPS: usize = 5;
 
 /// Largest number of windows used.
@@ -31,10 +33,11 @@ const WINDOWS: usize = 20_000;
 /// Number of iterations: Jxz makes the regression slightly nonlinear, and the weights depend on the residuals.
 const PASSES: usize = 12;
 
-/// Where Tukey's weights end, in robust standard deviations: 95 % efficient on normal errors.
+/// Error at which Tukey's weight becomes zero, in robust standard deviations. The estimate is 95 % efficient on normal
+/// errors.
 const REACH: f64 = 4.685;
 
-/// Fraction of a channel's magnitude below which an error counts as zero: integration error of the path.
+/// Smallest robust standard deviation, as a fraction of a channel's RMS slope: the integration error of the path.
 const FLOOR: f64 = 1e-3;
 
 /// Rates that depend on forces and moments: airspeed, p, q, r, alpha, beta.
@@ -55,7 +58,7 @@ pub(super) enum Weighting {
     Alike,
 }
 
-/// A window or a sample: each channel's error in units of x_c, and the slopes of the prediction.
+/// Regression row of a window or a sample: each channel's error in units of x_c, and the slopes of the prediction.
 pub(super) struct Row {
     pub error: [f64; 6],
     /// Slopes over the coordinates, then over the nuisance terms.
@@ -63,7 +66,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The row after a step of the fitted parameters.
+    /// Updates the error after a step of the fitted parameters.
     pub fn advance(&mut self, step: &DVector<f64>) {
         for (slopes, step) in self.slopes.iter().zip(step.iter()) {
             self.error.iter_mut().zip(slopes).for_each(|(error, slope)| *error -= slope * step);
@@ -76,12 +79,12 @@ pub(super) struct Fit<'a> {
     pub basis: &'a Basis,
     /// The forces with nuisance terms: those on which no trained coefficient acts.
     along: Vec<Channel>,
-    /// Their nuisance coefficients, [`TERMS`] per force.
+    /// Nuisance coefficients of these forces, [`TERMS`] per force.
     lacking: Vec<f64>,
 }
 
-/// The coordinates at which `prior` fits `tracks` best; windows that it cannot fit (a stall outside its structure)
-/// have little or no weight.
+/// The coordinates η at which `prior` fits `tracks` best. Windows that `prior` cannot fit (a stall outside its
+/// structure) have little or no weight.
 pub fn coordinates(prior: &GreyBox, basis: &Basis, tracks: &[Track]) -> Vec<f64> {
     if basis.is_empty() {
         return Vec::new();
@@ -188,7 +191,8 @@ impl<'a> Fit<'a> {
 
 /// Weight of point `k` of a window in the integral of a channel's rate, in steps.
 ///
-/// JSBSim moves p, q and r by the rate at a step's start; all else is trapezoidal to second order.
+/// JSBSim integrates p, q and r with the rate at the start of a step. All other channels follow the trapezoidal rule to
+/// second order.
 fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     let spin = (3..6).contains(&channel);
     match (integrator, spin, k) {
@@ -199,8 +203,8 @@ fn quadrature(integrator: Integrator, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// The weighted least-squares step of the fitted parameters; `known` is the information of a prior on the first of
-/// them, and their distance from it.
+/// The weighted least-squares step of the fitted parameters. `known` is the prior information on the first parameters,
+/// and their deviation from the prior mean. `None` if the normal equations cannot be solved.
 pub(super) fn solve(
     rows: &[Row],
     count: usize,
@@ -216,7 +220,7 @@ pub(super) fn solve(
         let moved = rows.iter().map(|r| r.slopes.iter().map(|s| s[i] * s[i]).sum::<f64>());
         let size = (moved.sum::<f64>() / rows.len() as f64).sqrt();
         let deviation = (1.4826 * *median).max(FLOOR * size).max(f64::MIN_POSITIVE);
-        // beside a prior, redundant windows count once
+        // with a prior, the weight of correlated windows is divided by their correlation length
         let said_by = match known {
             Some((information, _)) if information.iter().any(|x| *x != 0.0) => {
                 let errors = rows.iter().map(|r| r.error[i].clamp(-deviation, deviation));
@@ -245,7 +249,7 @@ pub(super) fn solve(
     }
     let size: f64 = normal.diagonal().iter().copied().fold(0.0, f64::max);
     for k in 0..count {
-        // a direction without information stays
+        // a small diagonal term leaves directions without information unchanged
         normal[(k, k)] += 1e-12 * size;
     }
     normal.cholesky().map(|c| c.solve(&right))

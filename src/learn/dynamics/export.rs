@@ -7,7 +7,7 @@ use crate::dynamics::basis::JXZ;
 use greylag_model::residual::{Origin, fingerprint};
 use greylag_model::{GreyBox, Integrator};
 
-/// Why a model cannot be written.
+/// A model cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// A file cannot be read or written.
@@ -30,11 +30,11 @@ pub enum ExportError {
     },
 }
 
-/// File names in a model folder.
+/// File name of the model in its folder.
 pub const MODEL: &str = "model.toml";
-/// Copy of the airframe, so that the folder is self-contained.
+/// File name of the copy of the airframe. The copy makes the folder self-contained.
 pub const AIRFRAME: &str = "airframe.toml";
-/// The residual network.
+/// File name of the residual network.
 pub const RESIDUAL: &str = "residual.safetensors";
 
 /// Texts written into a model file.
@@ -51,7 +51,7 @@ pub struct Text<'a> {
 ///
 /// # Errors
 ///
-/// If a file cannot be read or written.
+/// If a file cannot be read or written, or the prior's file has changed since it was read.
 pub fn save(
     model: &GreyBox,
     prior: &Path,

@@ -1,7 +1,7 @@
 //! Functions of a pass, each compiled once per instruction set.
 //!
-//! The prior is by far the largest part, so that it is called and not inlined: its callers are compiled for the same
-//! instructions, and two integration schemes share one copy of its value, its slopes and its coefficients' slopes.
+//! The prior is by far the largest part and is called instead of inlined. Its callers are compiled for the same
+//! instructions. Two integration schemes share one copy of its value, its slopes and the slopes over its coefficients.
 
 use crate::dynamics::packet::Packet;
 use crate::dynamics::prior::{At, PriorOutputs, Slopes};
@@ -65,7 +65,7 @@ pub struct In512(());
 
 #[cfg(target_arch = "x86_64")]
 impl In256 {
-    /// The instruction set, if this processor supports it.
+    /// The instruction set; `None` if this processor does not support it.
     pub fn detect() -> Option<In256> {
         let there = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         there.then_some(In256(()))
@@ -74,7 +74,7 @@ impl In256 {
 
 #[cfg(target_arch = "x86_64")]
 impl In512 {
-    /// The instruction set, if this processor supports it.
+    /// The instruction set; `None` if this processor does not support it.
     pub fn detect() -> Option<In512> {
         is_x86_feature_detected!("avx512f").then_some(In512(()))
     }

@@ -40,7 +40,7 @@ pub struct Loss {
     pub learned: f64,
     /// The whole objective, eq. (24).
     pub objective: f64,
-    /// Rollouts left out because a state was not finite.
+    /// Number of rollouts omitted because a state was not finite.
     pub lost: usize,
 }
 
@@ -49,7 +49,7 @@ impl Objective {
     pub fn of(&self, sums: &Sums, points: f64) -> (Loss, SumSlopes) {
         let prediction = sums.error / points;
         let [prior, learned] = [sums.prior, sums.learned].map(|s| (s / points).sqrt());
-        // at zero the norm has no slope; none is as good as any
+        // the norm is not differentiable at zero; its slope is set to zero
         let per = |norm: f64| if norm > 0.0 { 1.0 / (2.0 * norm * points) } else { 0.0 };
         let weight = 1.0 / self.lambda;
         let (penalty, of_learned, of_prior) = match self.penalty {
@@ -100,7 +100,7 @@ struct Work<R> {
     trace: Trace<R>,
     gradient: Gradient,
     sums: Sums,
-    /// Number of rollouts that count.
+    /// Number of rollouts with finite states.
     good: usize,
 }
 
@@ -135,7 +135,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
 
     /// The loss of `windows` with its gradient.
     ///
-    /// Blocks are summed in order, so that the result does not depend on the number of cores.
+    /// Blocks are summed in order. The result therefore does not depend on the number of cores.
     ///
     /// # Panics
     ///
@@ -215,7 +215,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Minibatch<S> {
 }
 
 impl<R: Packet> Work<R> {
-    /// Integrates the block; rollouts whose state is not finite are removed and the rest integrated again.
+    /// Integrates the block. Rollouts with a state that is not finite are removed, and the others are integrated again.
     fn fly(
         &mut self,
         subject: &Subject,

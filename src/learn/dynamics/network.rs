@@ -5,14 +5,14 @@ use greylag_model::residual::{INPUTS, OUTPUTS};
 use greylag_num::dense::{Layer, rectify};
 use greylag_num::{Dense, Real};
 
-/// Inputs and outputs of a tile of a weight matrix whose gradient is summed in registers.
+/// Number of inputs and of outputs of a tile of a weight matrix whose gradient is summed in registers.
 const TILE: usize = 4;
 
 /// A network prepared for both passes.
 #[derive(Clone, Debug)]
 pub struct Passes {
     network: Dense,
-    /// The weights of each layer as `[out, in]`, with as many zeros as it has inputs.
+    /// For each layer: the weights as `[out, in]`, and a zero bias for each input.
     transposed: Vec<(Vec<f32>, Vec<f32>)>,
 }
 
@@ -60,7 +60,7 @@ impl Passes {
         self.network.sizes()[1..].iter().sum()
     }
 
-    /// The network's output; `trace` receives the activations.
+    /// The network's output. `trace` receives the activations.
     #[inline(always)]
     pub fn forward<R: Real>(&self, input: [R; INPUTS], trace: &mut [R]) -> [R; OUTPUTS] {
         let mut output = [R::zero(); OUTPUTS];
@@ -81,8 +81,8 @@ impl Passes {
         output
     }
 
-    /// Slopes over the inputs, from those over the outputs; `slopes` receives those of all units before
-    /// rectification.
+    /// Slopes over the inputs, from the slopes `output` over the outputs. `slopes` receives the slopes over all units
+    /// before rectification.
     #[inline(always)]
     pub fn backward<R: Real>(
         &self,
@@ -114,7 +114,8 @@ impl Passes {
         input
     }
 
-    /// Adds the contributions of `points` points, whose traces and slopes are consecutive, to `gradient`.
+    /// Adds the contributions of several points to `gradient`. `traces` and `slopes` hold the data of one point after
+    /// another.
     #[inline(always)]
     pub fn gather<R: Packet>(&self, traces: &[R], slopes: &[R], gradient: &mut [f64]) {
         let sizes = self.network.sizes();

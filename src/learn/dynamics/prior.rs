@@ -7,7 +7,7 @@ use greylag_physics::effects::{Needs, Terms};
 use greylag_physics::rigid_body::{self, Vector};
 use greylag_physics::{AirData, Channel, Controls, State, Wrench};
 
-/// Altitude for the airflow, m: far from the ground. The air density is an input.
+/// Altitude for the airflow, m: infinite, without ground effect. The air density is a separate input.
 pub const ALOFT: f64 = f64::INFINITY;
 
 /// Outputs of the prior at a point.
@@ -50,8 +50,8 @@ impl<R: Real> At<R> {
         AirData::new(&self.state, self.density, ALOFT, &model.airframe.geometry)
     }
 
-    /// Outputs of `model`'s prior: with `WHOLE` all of its effects, else those that depend on the point alone, in
-    /// code without the others.
+    /// Outputs of the prior of `model`. With `WHOLE` all effects are included. Otherwise only effects that depend on
+    /// the point alone are included, in code without the others.
     #[inline(always)]
     pub fn ask<const WHOLE: bool>(&self, model: &GreyBox) -> PriorOutputs<R> {
         let air = self.air(model);
@@ -64,7 +64,7 @@ impl<R: Real> At<R> {
         PriorOutputs { acceleration, spin, rate }
     }
 
-    /// The slope over the state.
+    /// The slopes of the loss over the state.
     #[inline(always)]
     pub fn slope<const WHOLE: bool>(&self, model: &GreyBox, slopes: &Slopes<R>) -> [R; 8] {
         transposed(&self.state.to_array(), &Asked::<R, WHOLE> { model, at: self, slopes })
@@ -99,7 +99,8 @@ impl<R: Real, const WHOLE: bool> Sloped<R, 8> for Asked<'_, R, WHOLE> {
 
 /// A function of `N` inputs, with slopes over its outputs.
 ///
-/// A trait and not a closure, because its method can be forced to inline: vector instructions end at a call.
+/// This is a trait instead of a closure because its method can be forced to inline. A call would end the vector
+/// instructions.
 pub trait Sloped<R: Real, const N: usize> {
     /// Σ over outputs of slope times derivative, in the two directions that the inputs mark.
     fn part(&self, inputs: [Dual<2, R>; N]) -> [R; 2];
@@ -113,8 +114,8 @@ pub fn fixed<R: Real>(x: R) -> Dual<2, R> {
 
 /// Σ of slopes times derivatives with respect to each of `inputs`, two at a time.
 ///
-/// Two at a time and not all at once, because the compiler inlines the whole prior for each
-/// direction, and because the network costs far more.
+/// The derivatives are computed two at a time because the compiler inlines the whole prior for each direction. The
+/// network costs far more.
 #[inline(always)]
 pub fn transposed<R: Real, const N: usize>(
     inputs: &[R; N],
@@ -151,9 +152,10 @@ pub fn add<R: Real>(sum: &mut [R; 2], out: &Dual<2, R>, slope: R) {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes over the coefficients, then over Jxz, the last of `sums`.
+    /// Adds the slopes over the coefficients to `sums`, and the slope over Jxz to the last entry.
     ///
-    /// Exact for effects that are linear in these coefficients; without `WHOLE` they must depend on the point alone.
+    /// The slopes are exact for effects that are linear in their coefficients. Without `WHOLE` all effects must depend
+    /// on the point alone.
     #[inline(always)]
     pub fn coefficients<const WHOLE: bool>(
         &self,
@@ -191,11 +193,11 @@ impl<R: Packet> At<R> {
 }
 
 impl<R: Packet> At<R> {
-    /// Adds the slopes over the coefficients of all effects, given those over forces and moments, `wrench`; returns the
-    /// moments.
+    /// Adds the slopes over the coefficients of all effects, from the slopes `wrench` over forces and moments. Returns
+    /// the moments.
     ///
-    /// The other effects depend on three sums over the effects of the point alone (as they are, with centred surfaces,
-    /// and at rest): the slopes over these sums propagate to the coefficients of the latter.
+    /// Dependent effects use three sums over the independent effects: as they are, with centred surfaces, and at rest.
+    /// The slopes over these sums propagate to the coefficients of the independent effects.
     #[inline(always)]
     fn whole(
         &self,
@@ -206,7 +208,7 @@ impl<R: Packet> At<R> {
     ) -> Vector<R> {
         let made = model.independent_sums(&self.state, &self.controls, air);
         let mut back = [Wrench::zero(); 3];
-        // the sums' channels, then the other effects' coefficients, two at a time
+        // the channels of the sums, then the coefficients of the dependent effects, two at a time
         let mut own = model.dependent_coefficients();
         let (mut first, mut more) = (0, true);
         while more {
@@ -276,7 +278,8 @@ impl<R: Packet> At<R> {
 /// Channels of the three sums of [`GreyBox::independent_sums`].
 const CHANNELS_OF_SUMS: usize = 21;
 
-/// Perturbation of each of two directions: a channel of the three sums, counted on, or the coefficient of a place.
+/// Perturbation in each of two directions: a channel of the three sums, numbered consecutively, or the coefficient at
+/// an index.
 struct Moves {
     channels: [Option<usize>; 2],
     places: [Option<usize>; 2],

@@ -1,10 +1,10 @@
 //! Joint training by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973).
 //!
-//! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual the
-//! best coefficients leave no part of it in the span of ∂F_p/∂θ: a linear regression of the residual on these slopes,
-//! over the samples of the flights. The gradient of the rollouts approaches the same condition in the mean square,
-//! where a stall outside the prior's structure dominates the residual and biases the coefficients; Tukey's weights
-//! exclude it.
+//! Prior and residual are learned together, and the prior is linear in its coefficients. For a given residual, the best
+//! coefficients leave no part of the residual in the span of ∂F_p/∂θ. They follow from a linear regression of the
+//! residual on these slopes, over the samples of the flights. The gradient of the rollouts approaches the same
+//! condition in the mean square. There a stall outside the prior's structure dominates the residual and biases the
+//! coefficients. Tukey's weights exclude the stall.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -20,7 +20,8 @@ const SAMPLES: usize = 8192;
 /// Number of reweighting iterations.
 const PASSES: usize = 8;
 
-/// Least-squares step of the coordinates of `basis` that moves into `prior` the part of `residual` in its span.
+/// Step of the coordinates of `basis` that moves the part of `residual` in the span of `prior` into `prior`. `None` if
+/// the regression has no finite solution.
 pub(super) fn step(
     prior: &GreyBox,
     residual: &Residual,

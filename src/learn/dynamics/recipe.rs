@@ -37,9 +37,9 @@ impl Criterion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// Those of the prior, as in the paper.
+    /// The values of the prior, as in the paper.
     AsGiven,
-    /// Those of a robust regression on short windows.
+    /// Estimates of a robust regression on short windows.
     EquationError,
 }
 
@@ -47,7 +47,7 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Joint {
-    /// By the gradient of the rollouts, at [`Recipe::prior_rate`]: the paper's.
+    /// By the gradient of the rollouts, at the learning rate [`Recipe::prior_rate`], as in the paper.
     #[default]
     Gradient,
     /// By robust variable projection: the part of the residual in the prior's span moves into its coefficients.
@@ -68,33 +68,33 @@ impl Joint {
 pub struct Recipe {
     /// Units of the hidden layers of the residual.
     pub hidden: Vec<usize>,
-    /// Rollout lengths n, in steps: each has an equal share of the updates in turn.
+    /// Rollout lengths n, steps of 10 ms. Each length has an equal share of the updates, in this order.
     pub steps: Vec<usize>,
     /// Number of rollouts in a minibatch.
     pub batch: usize,
     /// Total number of updates.
     pub updates: u64,
-    /// Initial learning rate; cosine schedule.
+    /// Initial learning rate. A cosine schedule reduces it to the fraction `rate_end`.
     pub rate: f64,
     /// Final fraction of the learning rate.
     pub rate_end: f64,
-    /// Initial learning rate of the prior's coordinates; 0 freezes them. Trained coordinates minimise the mean square of the
-    /// residual, so that an effect outside of the prior's structure, such as stall, biases them.
+    /// Initial learning rate of the prior's coordinates; 0 freezes them. Training minimises the mean square of the
+    /// residual. An effect outside the prior's structure, for example stall, therefore biases the coordinates.
     pub prior_rate: f64,
     /// Initial values of the trained coefficients.
     pub start: Start,
-    /// Method of training them.
+    /// Method of training the prior's coefficients.
     #[serde(default, skip_serializing_if = "Joint::is_gradient")]
     pub joint: Joint,
     /// λ0 of eq. (24).
     pub lambda: f64,
-    /// τ of eq. (24), the growth of λ per update.
+    /// τ of eq. (24). λ grows by τ times the relative prediction loss in each update.
     pub tau: f64,
     /// Variant of the training objective.
     pub criterion: Criterion,
-    /// Weights each rollout by 1/(e² + floor²), e being the prior's error at its end relative to the root mean square
-    /// over the rollouts: the residual is then as accurate where the prior errs little as where it errs most, as in a
-    /// stall. `None` weights all equally, as in the paper.
+    /// Weights each rollout by 1/(e² + floor²). e is the prior's error at the end of the rollout, relative to the RMS
+    /// over the rollouts. The residual is then equally accurate where the prior has small errors and where it has large
+    /// errors (stall). `None` weights all rollouts equally, as in the paper.
     pub floor: Option<f64>,
     /// Full names of the trained coefficients of the prior; empty for a frozen prior.
     pub trainable: Vec<String>,
@@ -125,7 +125,7 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// Description of the first invalid setting, if there is one.
+    /// Description of the first invalid setting; `None` if all are valid.
     pub fn fault(&self) -> Option<&'static str> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if self.steps.is_empty() || self.steps.iter().any(|n| !(1..=500).contains(n)) {

@@ -1,8 +1,8 @@
 //! Resamples a flight with a longer sample time to the model's step.
 //!
 //! States are interpolated by cubics through four samples (Catmull–Rom), controls linearly. A reconstructed path is
-//! smooth, so that a cubic errs by a few parts in a thousand at 25 Hz; at 10 Hz the fastest motions of a small
-//! aircraft lie between the samples.
+//! smooth. At 25 Hz a cubic has an error of a few parts in a thousand. At 10 Hz the fastest motions of a small aircraft
+//! lie between the samples.
 
 use greylag_model::STEP;
 use greylag_physics::{Controls, State};
@@ -42,7 +42,8 @@ fn at(rows: &[Row], place: f64) -> Row {
     (State::from_array(state), controls, altitude)
 }
 
-/// The cubic through the two middle ones of four values, its slopes there those of their neighbours.
+/// The cubic through the two middle values, at the fraction `x` of the way between them. Its slopes there are central
+/// differences.
 fn cubic([a, b, c, d]: [f64; 4], x: f64) -> f64 {
     let (first, last) = (0.5 * (c - a), 0.5 * (d - b));
     let bend = c - b;
@@ -62,7 +63,7 @@ mod tests {
         (state, Controls { aileron: 0.1 * time, ..Controls::default() }, 600.0 + time)
     }
 
-    /// A motion of 5 rad/s, twice the short period of a small aircraft, seen 25 times a second.
+    /// A motion of 5 rad/s, twice the short period of a small aircraft, sampled at 25 Hz.
     #[test]
     fn a_smooth_motion_is_found_between_the_samples() {
         let rows: Vec<Row> = (0..100).map(|k| row(0.04 * k as f64)).collect();

@@ -25,7 +25,7 @@ pub struct ResidualMap {
     pub channels: Vec<Share>,
     /// The mean of each channel's F_a/x_c (1/s) over a regime variable.
     pub curves: Vec<Curve>,
-    /// ‖F_a‖ (1/s) over α and β.
+    /// RMS of ‖F_a/x_c‖ (1/s) over α and β.
     pub map: Vec<Cell>,
 }
 
@@ -38,7 +38,8 @@ pub struct Share {
     pub prior: f64,
     /// Root mean square of F_a/x_c, 1/s.
     pub learned: f64,
-    /// The regime variable with its strongest bin, and the bin's edges.
+    /// Regime variable of the bin with the strongest residual, and the bin's edges (degrees, m/s). `None` without a
+    /// bin.
     pub strongest: Option<(&'static str, [f64; 2])>,
 }
 
@@ -49,7 +50,7 @@ pub struct Curve {
     pub channel: &'static str,
     /// Name of the variable.
     pub over: &'static str,
-    /// Bin centre, mean of F_a/x_c, its root mean square; bins of few samples are left out.
+    /// For each bin: centre (degrees, m/s), mean and RMS of F_a/x_c (1/s). Bins of fewer than 20 samples are omitted.
     pub points: Vec<[f64; 3]>,
 }
 
@@ -60,7 +61,7 @@ pub struct Cell {
     pub alpha_deg: f64,
     /// Angle of sideslip at the centre, degrees.
     pub beta_deg: f64,
-    /// Norm ‖F_a‖ in 1/s.
+    /// RMS of ‖F_a/x_c‖ in the cell, 1/s.
     pub norm: f64,
     /// Number of samples in the cell.
     pub samples: usize,
@@ -80,7 +81,7 @@ fn regime(state: &State) -> [f64; 3] {
 /// A sample: its regime, F_p/x_c and F_a/x_c.
 type Row = ([f64; 3], [f64; 8], [f64; 8]);
 
-/// The residual map of `model` over `tracks`; `None` if it has none or there is no sample.
+/// The residual map of `model` over `tracks`; `None` if `model` has no residual or there is no usable sample.
 pub fn residual_map(model: &GreyBox, tracks: &[Track]) -> Option<ResidualMap> {
     let residual = model.residual.as_ref()?;
     let mut bare = model.clone();
@@ -152,8 +153,7 @@ fn curve(rows: &[Row], channel: usize, variable: usize) -> Curve {
     Curve { channel: CHANNELS[channel], over, points }
 }
 
-/// The variable and the bin's edges at which a channel's residual deviates most from its mean over the variable's
-/// bins.
+/// The variable and the edges of the bin whose RMS residual is largest relative to the mean over the variable's bins.
 fn strongest(curves: &[Curve]) -> Option<(&'static str, [f64; 2])> {
     let mut best: Option<(f64, &str, [f64; 2])> = None;
     for (curve, (over, [low, high])) in curves.iter().zip(REGIMES) {

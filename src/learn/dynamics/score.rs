@@ -16,14 +16,13 @@ const BOUND: f64 = 1.0;
 pub struct Horizon {
     /// Horizon in steps.
     pub steps: usize,
-    /// Number of runs that long.
+    /// Number of runs of this length.
     pub runs: usize,
-    /// Root mean square over runs of the error, itself the root mean square over the states of
-    /// (ŝ − s)/x_c; a run counts 1 at most.
+    /// RMS error over the runs. The error of a run is the RMS over the states of (ŝ − s)/x_c, limited to 1.
     pub rms: f64,
-    /// Median over runs of the same error.
+    /// Median error over the runs.
     pub median: f64,
-    /// Fraction of the runs that reached the bound.
+    /// Fraction of the runs whose error reached the limit of 1.
     pub lost: f64,
 }
 

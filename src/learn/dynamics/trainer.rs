@@ -32,7 +32,7 @@ const PATIENCE: u64 = 20;
 
 /// Interval between projections, updates.
 const PROJECT_EVERY: u64 = 500;
-/// Fraction of the updates after which projections end, so that the residual adapts to the final coefficients.
+/// Fraction of the updates after which projections end. The residual then adapts to the final coefficients.
 const PROJECT_UNTIL: f64 = 0.75;
 
 /// Ids of the random streams.
@@ -63,7 +63,8 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// If recipe, prior and data are incompatible.
+    /// If the recipe is invalid, a coefficient cannot be trained, the flights are too short, or the prior diverges on
+    /// most rollouts.
     pub fn new(recipe: Recipe, prior: &GreyBox, tracks: Vec<Track>) -> Result<Trainer, TrainError> {
         if let Some(fault) = recipe.fault() {
             return Err(TrainError::Recipe(fault));
@@ -89,8 +90,8 @@ impl Trainer {
         let arithmetic = Arithmetic::Lanes;
         let engine = Engine::new(&subject, recipe.batch, longest, arithmetic);
         let count = subject.network.network().parameters().len();
-        // what the residual has to learn is what this prior leaves, which may be much less than the
-        // prior as given: measured by that one, all of it would be less than the penalty
+        // The residual learns the error of this prior, which may be much smaller than that of the prior as given. With
+        // the error of the latter as divisor, the whole prediction loss would be smaller than the penalty.
         basis.apply(&mut subject.prior, &coordinates);
         let begun = subject.prior.clone();
         let stage = Stage::new(&subject, &recipe, &tracks, recipe.steps_at(0))?;
@@ -111,11 +112,11 @@ impl Trainer {
         })
     }
 
-    /// Resumes from `checkpoint` of the same training: the result equals an uninterrupted one to the bit.
+    /// Resumes from `checkpoint` of the same training. The result equals that of an uninterrupted training to the bit.
     ///
     /// # Errors
     ///
-    /// If it belongs to another recipe, prior or data.
+    /// If the checkpoint belongs to another recipe, prior or data.
     pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<(), TrainError> {
         checkpoint.fits(&self.identity(), self.adam.mean.len(), self.coordinates.len())?;
         self.subject.network.update(|p| p.copy_from_slice(&checkpoint.network));
@@ -205,7 +206,7 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// None for a network that was trained here.
+    /// No error occurs for a network of this trainer.
     pub fn model(&self) -> Result<GreyBox, TrainError> {
         let mut model = self.subject.prior.clone();
         let network = self.subject.network.network().clone();
@@ -218,11 +219,11 @@ impl Trainer {
         Ok(model)
     }
 
-    /// Makes up to `count` updates; returns their means.
+    /// Makes up to `count` updates and returns their mean progress.
     ///
     /// # Errors
     ///
-    /// If the loss is not finite.
+    /// If more than 20 consecutive updates fail, or the data is too short for a new rollout length.
     pub fn run(&mut self, count: u64) -> Result<Progress, TrainError> {
         let mut sum = Progress::default();
         let (mut made, mut failed) = (0.0_f64, 0);
@@ -261,7 +262,7 @@ impl Trainer {
         })
     }
 
-    /// Moves the part of the residual in the prior's span into its coefficients, when it is due.
+    /// Moves the part of the residual in the prior's span into the prior's coefficients, if a projection is due.
     fn project(&mut self) -> Result<(), TrainError> {
         let weighting = match self.recipe.joint {
             Joint::Gradient => return Ok(()),
@@ -284,7 +285,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// One update; `None` if the gradient is not finite.
+    /// One update. `None` if the gradient is not finite or more than half of the rollouts are lost.
     fn one(&mut self) -> Result<Option<(Loss, f64)>, TrainError> {
         let steps = self.recipe.steps_at(self.update);
         if steps != self.stage.steps {

@@ -23,8 +23,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// A track of `samples` (state, measured controls, altitude in m); effective controls and air density follow from
-    /// `model`.
+    /// A track of `samples` (state, measured controls, altitude in m). The effective controls and the air density
+    /// follow from `model`.
     pub fn new(model: &GreyBox, samples: impl Iterator<Item = (State, Controls, f64)>) -> Track {
         let mut track = Track::default();
         let mut memory: Option<InputMemory> = None;
@@ -54,7 +54,7 @@ impl Track {
         Track::new(model, rows)
     }
 
-    /// The samples before `at`, and those from it on.
+    /// Splits the track into the samples before `at` and the samples from `at` on.
     pub fn split(&self, at: usize) -> [Track; 2] {
         let part = |range: std::ops::Range<usize>| Track {
             states: self.states[range.clone()].to_vec(),
@@ -65,7 +65,7 @@ impl Track {
         [part(0..at), part(at..self.states.len())]
     }
 
-    /// Starts of rollouts of `steps` steps: one sample is kept before, `steps` after.
+    /// Possible starts of rollouts of `steps` steps. A start has one sample before it and `steps` samples after it.
     pub fn starts(&self, steps: usize) -> std::ops::Range<usize> {
         1..self.states.len().saturating_sub(steps).max(1)
     }
@@ -74,29 +74,29 @@ impl Track {
 /// The start of a rollout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// Number of the track.
+    /// Index of the track.
     pub track: u32,
-    /// The sample's number in it, 1 at least.
+    /// Index of the start sample in the track, at least 1.
     pub start: u32,
     /// Weight in the loss; 1 in the paper.
     pub weight: f64,
 }
 
-/// Largest |pitch| for training, rad: Euler angles are singular near the vertical.
+/// Magnitude of pitch below which samples are used for training, rad. Euler angles are singular near the vertical.
 const STEEPEST: f64 = 1.4;
 /// Airspeed below which flow angles are undefined, m/s.
 const SLOWEST: f64 = 5.0;
 
-/// Whether the eight variables describe the flight there.
+/// Whether the state is finite, away from the vertical, and fast enough for defined flow angles.
 pub(crate) fn regular(state: &State) -> bool {
     state.is_finite() && state.pitch.abs() < STEEPEST && state.airspeed > SLOWEST
 }
 
-/// Every window of `steps` steps, in order, in which the aircraft flies and is not near the vertical.
+/// Every window of `steps` steps, in order, in which all samples are regular (not near the vertical, fast enough).
 pub fn windows(tracks: &[Track], steps: usize) -> Vec<Window> {
     let mut all = Vec::new();
     for (track, t) in tracks.iter().enumerate() {
-        // regular samples up to each one
+        // number of consecutive regular samples up to each sample
         let mut run = 0;
         let runs: Vec<usize> = t
             .states
@@ -136,11 +136,12 @@ pub fn hash(tracks: &[Track]) -> String {
 }
 
 impl<R: Packet> Recorded<R> {
-    /// Loads the windows of a block, `steps` long; lanes beyond `windows` repeat the first with weight zero.
+    /// Loads the windows of a block, each `steps` long. Lanes beyond `windows` repeat the first window with weight
+    /// zero.
     ///
     /// # Panics
     ///
-    /// If there is no window, or more than lanes.
+    /// If `windows` is empty or has more entries than there are lanes.
     pub fn fill(&mut self, tracks: &[Track], windows: &[Window], steps: usize) {
         assert!((1..=R::WIDTH).contains(&windows.len()), "a window for each lane");
         let of = |lane: usize| windows.get(lane).unwrap_or(&windows[0]);

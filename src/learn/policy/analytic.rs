@@ -1,10 +1,10 @@
 //! The analytic policy gradient: the gradient of the reward through the model, over short windows.
 //!
-//! The short-horizon actor-critic of Xu et al. (2022) without its critic: the windows are longer than
-//! the aircraft's response, so that rewards after them matter little. The model's derivatives are finite
-//! differences between the lanes of one block: the point itself in the first, one variable perturbed in
-//! each of the others. The actuator states are reconstructed from the five observed values and the last
-//! commands, which is exact except for the first step off a stop.
+//! This is the short-horizon actor-critic of Xu et al. (2022) without its critic. The windows are longer than the
+//! aircraft's response, and rewards after them matter little. The model's derivatives are finite differences between
+//! the lanes of one block. The first lane has the point itself, and each other lane has one perturbed variable. The
+//! actuator states are reconstructed from the five observed values and the last commands. The reconstruction is exact
+//! except for the first step off a stop.
 
 mod slopes;
 
@@ -34,16 +34,17 @@ pub struct AnalyticRecipe {
     pub episode: usize,
     /// Total number of updates.
     pub updates: u64,
-    /// Initial learning rate; it falls with a cosine to a hundredth.
+    /// Initial learning rate. A cosine schedule reduces it to a hundredth.
     pub rate: f64,
-    /// Error of roll and pitch (rad) below which the reward is smoothed: it is not differentiable at zero.
+    /// Error of roll and pitch (rad) and of airspeed (m/s) below which the reward is smoothed. The reward is not
+    /// differentiable at zero error.
     pub rounding: f64,
     /// Weight (≥ 0) of the squared change of the command per step, in units of the action, in the objective.
     pub effort: f64,
-    /// Fraction of the targets in the hard corners.
+    /// Fraction of the targets in the hard corners, 0..1.
     pub corners: f64,
-    /// Models, drawn from the widths of the coefficients, over which the aircraft are spread (domain randomisation);
-    /// none: the model itself.
+    /// Number of models drawn from the standard deviations of the coefficients, over which the aircraft are distributed
+    /// (domain randomisation). 0 means the model itself.
     #[serde(default, skip_serializing_if = "is_none")]
     pub draws: u64,
     /// Seed of all random numbers.
@@ -94,7 +95,7 @@ pub struct AnalyticProgress {
 /// State of a training.
 pub struct AnalyticTrainer {
     recipe: AnalyticRecipe,
-    /// The models of the aircraft, in turn.
+    /// The models, which the aircraft use in turn.
     models: Vec<GreyBox>,
     device: Device,
     actor: Mlp,
@@ -133,7 +134,7 @@ impl AnalyticTrainer {
             Stratified::new(recipe.seed, 0, recipe.corners).at_airspeeds_of(&model.airframe);
         let instances = (0..recipe.instances)
             .map(|k| {
-                // episode ends are spread over time, so that no window holds all starts
+                // Episode ends are spread over time. Otherwise one window would hold all starts.
                 let left = recipe.episode * (k + 1) / recipe.instances;
                 Instance { aircraft: neutral, target: targets.next_target(), left }
             })
@@ -160,7 +161,7 @@ impl AnalyticTrainer {
     ///
     /// # Errors
     ///
-    /// If they are not.
+    /// If the layers differ.
     pub fn starting_from(mut self, actor: &Actor) -> Result<Self, DenseError> {
         let sizes = actor.network().sizes();
         if sizes != self.actor.sizes() {
@@ -181,7 +182,7 @@ impl AnalyticTrainer {
         Actor::new(self.actor.to_dense()?).map_err(|_| DenseError::Sizes(sizes))
     }
 
-    /// One window of every aircraft and one update.
+    /// Simulates one window of every aircraft and updates the actor once.
     ///
     /// # Errors
     ///
@@ -192,7 +193,7 @@ impl AnalyticTrainer {
         let mut seen = vec![[0.0_f32; OBSERVATIONS]; count * window];
         let mut steps: Vec<Option<Step>> = Vec::with_capacity(count * window);
         let mut reward = 0.0;
-        // forward: step after step; the instances of a step are shared by the cores
+        // Forward pass, step by step. The instances of a step are distributed over the cores.
         let mut flown = Vec::with_capacity(count);
         for t in 0..window {
             let fly = |units: &mut Units<f32>, (k, instance): (usize, &Instance)| {
@@ -209,7 +210,7 @@ impl AnalyticTrainer {
                 .with_min_len(8)
                 .map_init(|| Units::new(0.0), fly)
                 .collect_into_vec(&mut flown);
-            // the order of targets and sums is that of one core
+            // targets and sums keep the order of a single core
             for (k, (observed, (next, step, earned))) in flown.drain(..).enumerate() {
                 seen[t * count + k] = observed;
                 reward += earned / (count * window) as f64;
@@ -222,7 +223,7 @@ impl AnalyticTrainer {
         Ok(AnalyticProgress { update: self.update, reward, lost: self.lost })
     }
 
-    /// Advances an aircraft to its next step; `false` if its episode ended there.
+    /// Advances an aircraft to its next step. Returns `false` if its episode ended there.
     fn advance(&mut self, k: usize, next: Aircraft) -> bool {
         let State { pitch, airspeed, alpha, beta, p, q, r, .. } = next.state;
         let inside = pitch.abs() < 1.4
@@ -254,7 +255,7 @@ impl AnalyticTrainer {
             let mut of_action = vec![0.0_f32; count * ACTIONS];
             let mut before = vec![[0.0_f32; NUMBERS]; count];
             for (k, step) in steps[range.clone()].iter().enumerate() {
-                // what follows the end of an episode is another one's
+                // the steps after the end of an episode belong to another episode
                 let Some(step) = step else { continue };
                 let mut sum = [0.0_f32; INPUTS];
                 for ((row, behind), reward) in step.next.iter().zip(behind[k]).zip(step.reward) {
@@ -264,7 +265,7 @@ impl AnalyticTrainer {
                 of_action[k * ACTIONS..][..ACTIONS].copy_from_slice(&sum[NUMBERS..]);
             }
             slopes[t * count * ACTIONS..][..count * ACTIONS].copy_from_slice(&of_action);
-            // through the actor: what it saw then decided what it did
+            // through the actor: its action depends on the observation
             let rows =
                 self.rows(seen[range].as_flattened(), OBSERVATIONS).autodiff().require_grad();
             let weights = self.rows(&of_action, ACTIONS).autodiff();

@@ -29,11 +29,11 @@ struct Header {
 }
 
 impl PolicyStanding {
-    /// Writes the file `path` atomically; a reader sees the old version or the new one.
+    /// Writes the file `path` atomically. A reader sees either the old version or the new one.
     ///
     /// # Errors
     ///
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointError> {
         let bytes =
             to_bytes(self).map_err(|why| CheckpointError::Content { path: path.into(), why })?;

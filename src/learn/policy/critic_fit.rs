@@ -1,10 +1,9 @@
 //! Twin critics of a fixed actor, learned from the returns of its simulated flights.
 //!
-//! They are critics for a search, which values states off the actor's own path. Therefore each flight starts with
-//! random actions for some steps; then the actor flies, and each state on its way is valued by the rewards from
-//! there, with the critic's own value of the last state: TD(1) over a window, eq. (11) of \[GSFM26\] for a fixed
-//! actor. The loss is relative to the return: near the target returns are small, and so are the differences that a
-//! search must resolve.
+//! The critics serve a search, which evaluates states off the actor's path. Therefore each flight starts with random
+//! actions for some steps. Then the actor flies. The value of a state on its path is the return of the rewards from
+//! there, with the critic's value of the last state: TD(1) over a window, eq. (11) of \[GSFM26\] for a fixed actor. The
+//! loss is relative to the return. Near the target, returns are small and a search must resolve small differences.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;
@@ -27,14 +26,14 @@ const UPDATE: u64 = 42;
 
 /// Inputs of a critic.
 const INPUTS: usize = OBSERVATIONS + ACTIONS;
-/// Numbers stored per step: a critic's inputs, the rewards over the rest of the window, and the discount of what
-/// follows it, with the inputs there.
+/// Numbers stored per step: a critic's inputs, the return over the rest of the window, the discount of the value at the
+/// end of the window, and a critic's inputs at that end.
 const ROW: usize = INPUTS + 2 + INPUTS;
 
-/// Return (of the reward of eq. 30) below which errors are absolute.
+/// Return, in units of the reward of eq. (30), below which errors count as absolute instead of relative.
 const SMALL: f32 = 0.1;
 
-/// Settings of learning critics.
+/// Settings of the training of critics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValuationRecipe {
     /// Units of a critic's hidden layers.
@@ -43,19 +42,19 @@ pub struct ValuationRecipe {
     pub updates: u64,
     /// Rows per minibatch.
     pub batch: usize,
-    /// Initial learning rate; it falls with a cosine to a hundredth.
+    /// Initial learning rate. A cosine schedule reduces it to a hundredth.
     pub rate: f64,
     /// Number of simulated aircraft.
     pub instances: usize,
     /// Largest number of steps with random actions before the actor flies.
     pub burst: u64,
-    /// Number of steps that it flies.
+    /// Number of steps that the actor flies.
     pub window: usize,
-    /// Windows after which all episodes are reset with other targets.
+    /// Number of windows after which all episodes are reset with other targets.
     pub windows: u64,
-    /// Updates between windows.
+    /// Number of updates between windows.
     pub between: u64,
-    /// Capacity of the memory, steps.
+    /// Capacity of the replay buffer, steps.
     pub remembered: usize,
     /// Discount factor γ per step.
     pub discount: f64,
@@ -86,7 +85,7 @@ impl Default for ValuationRecipe {
 #[derive(Debug, thiserror::Error)]
 pub enum ValuationError {
     /// The loss is not finite.
-    #[error("the loss of the critics is no longer a number after {0} updates; lower --rate")]
+    #[error("the loss of the critics is not finite after {0} updates; lower --rate")]
     Loss(u64),
     /// A network cannot be used.
     #[error("the critics: {0}")]
@@ -104,13 +103,13 @@ pub enum ValuationError {
 pub struct ValuationProgress {
     /// Number of updates made.
     pub updates: u64,
-    /// Root of the mean square of the critics' relative errors.
+    /// RMS relative error of the critics.
     pub error: f64,
     /// Number of steps flown.
     pub steps: u64,
 }
 
-/// State of learning critics.
+/// State of the training of critics.
 pub struct Valuation<W> {
     recipe: ValuationRecipe,
     world: W,
@@ -126,7 +125,7 @@ pub struct Valuation<W> {
 }
 
 impl<W: World> Valuation<W> {
-    /// Starts learning critics of `actor` in `world`, whose instances are the recipe's.
+    /// Starts learning critics of `actor` in `world`, whose number of aircraft must be the recipe's.
     ///
     /// # Errors
     ///
@@ -155,7 +154,7 @@ impl<W: World> Valuation<W> {
         })
     }
 
-    /// Makes `updates` further updates, up to the recipe's.
+    /// Makes up to `updates` further updates, within the recipe's total.
     ///
     /// # Errors
     ///
@@ -202,7 +201,7 @@ impl<W: World> Valuation<W> {
         Ok([critic(&self.critics[0])?, critic(&self.critics[1])?])
     }
 
-    /// One window of a block: random actions, each held for some steps, then the actor's.
+    /// Flies one window of a block: random actions, each held for some steps, then the actor's actions.
     fn fly(&mut self, block: usize) -> Result<(), ValuationError> {
         let mut rng = stream::stream(self.recipe.seed, &[FLY, self.flown, block as u64]);
         let count = WIDTH.min(self.world.instances() - block * WIDTH);
@@ -217,7 +216,7 @@ impl<W: World> Valuation<W> {
         let mut way = Vec::with_capacity(self.recipe.window);
         for step in 0..self.recipe.window {
             let observed = self.world.observe(block);
-            // the first action of the window is arbitrary, the others are the actor's
+            // the first action of the window is random, the others are the actor's
             if step > 0 {
                 action = self.actor.act_block(&mut self.units, &observed);
             }
@@ -233,7 +232,7 @@ impl<W: World> Valuation<W> {
         Ok(())
     }
 
-    /// Returns along a lane's path, from its end to its start; each end of an episode on it is an end.
+    /// Stores the returns along a lane's path, from its end to its start. A return ends with its episode.
     fn remember(
         &mut self,
         lane: usize,
@@ -245,7 +244,7 @@ impl<W: World> Valuation<W> {
         let worst = -(task.roll_cap + task.pitch_cap + task.airspeed_cap) as f32;
         let of = |numbers: &[Block; INPUTS]| numbers.map(|x| x.0[lane]);
         let (mut earned, mut weight, mut end) = (0.0, 1.0, of(beyond));
-        // the value after a time limit is unknown: no earlier step is stored
+        // the value after a time limit is unknown, and the steps before it are not stored
         let mut known = true;
         for (at, stepped) in way.iter().rev() {
             match stepped.ended[lane] {
@@ -254,7 +253,7 @@ impl<W: World> Valuation<W> {
                         (stepped.reward.0[lane] + discount * earned, discount * weight)
                 }
                 Ended::Time => known = false,
-                // a lost aircraft has the smallest reward for ever
+                // a lost aircraft has the smallest reward in all further steps
                 Ended::Lost => {
                     (earned, weight, known) = (worst / (1.0 - discount), 0.0, true);
                     end = of(at);
@@ -282,7 +281,7 @@ impl<W: World> Valuation<W> {
         self.next = (self.next + 1) % self.recipe.remembered;
     }
 
-    /// One update of both critics; returns the mean square of their relative errors.
+    /// Makes one update of both critics. Returns the mean square of their relative errors.
     fn update(&mut self) -> Result<f64, ValuationError> {
         let mut rng = stream::stream(self.recipe.seed, &[UPDATE, self.updates]);
         let batch = self.recipe.batch;

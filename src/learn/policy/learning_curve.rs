@@ -13,10 +13,10 @@ pub const CURVE: &str = "curve.csv";
 /// Column names.
 pub const COLUMNS: &str =
     "steps,updates,seconds,easy_deg,hard_deg,divergence_rate,loss,reward,episodes,lost";
-/// Fraction of the way from the first to the smallest error that defines the knee.
+/// Fraction of the reduction from the first to the smallest error that defines the knee.
 const KNEE: f64 = 0.9;
 
-/// One evaluation; unmeasured values are NaN.
+/// One evaluation. Values that were not measured are NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// Environment steps so far, all aircraft together.
@@ -33,7 +33,7 @@ pub struct CurvePoint {
     pub divergence_rate: f64,
     /// Mean loss of the critics.
     pub loss: f64,
-    /// Mean reward of a step of the training; with TD3 as in `PolicyProgress::reward`.
+    /// Mean reward per training step. TD3 counts it as `PolicyProgress::reward` does.
     pub reward: f64,
     /// Number of episodes started.
     pub episodes: u64,
@@ -42,7 +42,7 @@ pub struct CurvePoint {
 }
 
 impl CurvePoint {
-    /// Its row of the table.
+    /// The point as a row of the table.
     pub fn line(&self) -> String {
         format!(
             "{},{},{:.0},{:.3},{:.3},{:.3},{:.4},{:.5},{},{}",
@@ -59,7 +59,8 @@ impl CurvePoint {
         )
     }
 
-    /// Sum of both errors, by which the best point is chosen; the negative reward where there is no evaluation.
+    /// Sum of both errors, degrees, or the negative reward if there is no evaluation. The best point has the smallest
+    /// value.
     pub fn badness(&self) -> f64 {
         let error = self.easy_deg + self.hard_deg;
         if error.is_nan() { -self.reward } else { error }
@@ -84,12 +85,13 @@ pub fn read(path: &Path) -> Result<Vec<CurvePoint>, CurveError> {
     rows.map_err(|source| CurveError { path: path.display().to_string(), source })
 }
 
-/// Index of the best point; the last among equal ones.
+/// Index of the best point, the last one of equal points. `None` without points.
 pub fn best(points: &[CurvePoint]) -> Option<usize> {
     (0..points.len()).rev().min_by(|a, b| points[*a].badness().total_cmp(&points[*b].badness()))
 }
 
-/// The knee: the first point after nine tenths of the way from the first error to the smallest.
+/// The knee of the curve: the first point with nine tenths of the reduction from the first error to the smallest.
+/// `None` without points.
 pub fn knee(points: &[CurvePoint]) -> Option<&CurvePoint> {
     let (first, best) = (points.first()?.badness(), points[best(points)?].badness());
     points.iter().find(|p| p.badness() <= first - KNEE * (first - best))
@@ -106,8 +108,8 @@ pub struct Spread {
     pub high: Vec<f64>,
 }
 
-/// The spread over `curves` of the quantity `get`, at each of the values `at` of the quantity `over`,
-/// interpolated linearly; NaN where a curve has not begun or has ended.
+/// The spread over `curves` of the quantity `get`, at each of the values `at` of the quantity `over`. Each curve is
+/// interpolated linearly. The spread is NaN where a curve has not begun or has ended.
 pub fn spread(
     curves: &[&[CurvePoint]],
     over: impl Fn(&CurvePoint) -> f64,
@@ -144,7 +146,8 @@ pub struct CurveFile {
 }
 
 impl CurveFile {
-    /// The curve in `path` up to `steps`, to be continued; a new one if there is none.
+    /// Opens the curve in `path` to continue it after `steps`. Later points are removed. A new curve is started if
+    /// there is no file.
     ///
     /// # Errors
     ///

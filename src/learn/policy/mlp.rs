@@ -14,9 +14,9 @@ pub struct Mlp {
 
 /// Adam for one network, in one pass over each of its tensors.
 ///
-/// burn's own makes a dozen passes, each with a new allocation, which at the sizes of Table VII takes a tenth
-/// of an update of TD3. The operations are burn's in burn's order, so that the results are equal to the bit,
-/// which a test checks.
+/// burn's Adam makes a dozen passes, each with a new allocation. At the layer sizes of Table VII of \[GSFM26\] they
+/// take a tenth of a TD3 update. This code uses burn's operations in burn's order. A test checks that the results are
+/// equal to the bit.
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     rate: f64,
@@ -35,7 +35,7 @@ struct Moment {
 /// Constants of a step, common to all parameters.
 struct Pace {
     rate: f32,
-    /// Bias correction of the mean over that of the root of the square.
+    /// Bias correction of the mean divided by that of the root of the mean square.
     ahead: f32,
     epsilon: f32,
 }
@@ -48,9 +48,9 @@ const EPSILON: f32 = 1e-8;
 pub struct Moments {
     /// Number of steps made.
     pub steps: u64,
-    /// Running means of the gradient; `None` before the first step.
+    /// Running means of the gradient; empty before the first step.
     pub mean: Vec<f32>,
-    /// Running means of the squared gradient.
+    /// Running means of the squared gradient; empty before the first step.
     pub square: Vec<f32>,
 }
 
@@ -128,7 +128,7 @@ impl Mlp {
     }
 }
 
-/// A tensor after `change` has combined its numbers with those of another of the same shape.
+/// `tensor` after `change` has updated its numbers from those of `other`, a tensor of the same shape.
 fn changed<const D: usize>(
     tensor: Tensor<D>,
     other: Tensor<D>,
@@ -150,7 +150,7 @@ fn append<const D: usize>(all: &mut Vec<f32>, tensor: Tensor<D>) {
 }
 
 impl Optimiser {
-    /// Adam for `network` at learning rate `rate`; ε is 1e-8, not burn's 1e-5.
+    /// Adam for `network` at the learning rate `rate`. ε is 1e-8 instead of burn's 1e-5.
     pub fn new(network: &Mlp, rate: f64) -> Optimiser {
         let zeros = |n: usize| Moment { mean: vec![0.0; n], square: vec![0.0; n] };
         let layers = network.sizes.windows(2).map(|s| [zeros(s[0] * s[1]), zeros(s[1])]);
@@ -161,7 +161,7 @@ impl Optimiser {
     pub fn step(&mut self, network: &mut Mlp, followed: Mlp, gradients: &mut Gradients) {
         self.steps += 1;
         let pace = Pace::of(self.steps, self.rate);
-        // the copy shares the parameters' memory: with it gone they are moved where they are
+        // The copy shares the parameters' memory. Once the copy is dropped, the parameters are updated in place.
         let slopes: Vec<_> = followed
             .layers
             .into_iter()
@@ -194,7 +194,7 @@ impl Optimiser {
         }
     }
 
-    /// Restores `moments`; `false` if they belong to another network.
+    /// Restores `moments`. Returns `false` if they belong to another network.
     pub fn remember(&mut self, moments: Moments) -> bool {
         if moments.steps == 0 {
             return moments.mean.is_empty() && moments.square.is_empty();

@@ -15,11 +15,11 @@ pub struct Transition {
     pub reward: f32,
     /// Next observation, o'.
     pub next: [f32; OBSERVATIONS],
-    /// 1 where the next state is bootstrapped, 0 where the aircraft was lost (terminal).
+    /// 1 if the next state is bootstrapped, 0 if the aircraft was lost (terminal).
     pub goes_on: f32,
 }
 
-/// Length of a transition.
+/// Numbers per transition.
 const NUMBERS: usize = 2 * OBSERVATIONS + ACTIONS + 2;
 
 /// A minibatch, row after row.
@@ -54,8 +54,8 @@ impl Replay {
         Replay { capacity, numbers: Vec::new(), added: 0 }
     }
 
-    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added); `None` if they are of
-    /// another capacity.
+    /// The buffer with the contents [`numbers`](Replay::numbers) and [`added`](Replay::added); `None` if their count
+    /// does not fit the capacity.
     pub fn restore(capacity: usize, numbers: Vec<f32>, added: u64) -> Option<Replay> {
         let held = (capacity as u64).min(added) as usize;
         (numbers.len() == held * NUMBERS).then_some(Replay { capacity, numbers, added })

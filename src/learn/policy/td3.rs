@@ -3,9 +3,9 @@
 //! Departures from the paper:
 //! - Observations are scaled, and contain the errors instead of the targets
 //!   ([`greylag_control::policy::observe`]): the information is the same.
-//! - Leaving the model's validity limits is terminal, with the smallest reward for ever,
-//!   −(κ_φ + κ_θ + κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next
-//!   state is bootstrapped. The paper specifies neither.
+//! - Leaving the model's validity limits is terminal, with the smallest reward in all further steps,
+//!   −(κ_φ + κ_θ + κ_v)/(1 − γ). The time limit of an episode truncates it: the value of the next state is
+//!   bootstrapped. The paper specifies neither.
 //! - The actor's last layer is initialised near zero: neutral surfaces and half throttle.
 
 use burn::tensor::{Device, Tensor, TensorData};
@@ -37,7 +37,7 @@ pub struct Hyperparameters {
     pub delay: u64,
     /// Standard deviation of the target policy's smoothing noise, σ.
     pub smoothing: f64,
-    /// Clipping limit of that noise, c.
+    /// Clipping limit of the smoothing noise, c.
     pub smoothing_clip: f64,
     /// Standard deviation of the exploration noise.
     pub exploration: f64,
@@ -88,13 +88,13 @@ pub struct Losses {
     pub critics: f32,
 }
 
-/// State of a [`Td3`]: for actor, first and second critic the parameters, those of the target network, and the
-/// optimiser's moments.
+/// State of a [`Td3`]. For the actor and both critics it has the parameters of the network, those of the target
+/// network, and the optimiser's moments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
     /// Number of updates made.
     pub updates: u64,
-    /// State of the networks.
+    /// State of actor, first critic and second critic: network, target network, moments.
     pub networks: [(Vec<f32>, Vec<f32>, Moments); 3],
 }
 
@@ -133,7 +133,7 @@ impl Td3 {
         })
     }
 
-    /// One update from `batch`, eq. (1) to (3); `rng` draws the smoothing noise.
+    /// One update from `batch`, eqs. (1) to (3). `rng` draws the smoothing noise.
     pub fn update(&mut self, batch: &Batch, rng: &mut impl Rng) -> Losses {
         let rows = |numbers: &[f32], width: usize| -> Tensor<2> {
             let data = TensorData::new(numbers.to_vec(), [batch.size, width]);
@@ -236,7 +236,7 @@ impl Td3 {
     ///
     /// # Errors
     ///
-    /// If it belongs to other networks.
+    /// If `standing` belongs to networks of other sizes.
     pub fn resume(&mut self, standing: Standing) -> Result<(), DenseError> {
         let Standing { updates, networks } = standing;
         let [actor, critic] = [self.settings.actor_sizes(), self.settings.critic_sizes()];

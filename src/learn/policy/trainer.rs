@@ -1,4 +1,4 @@
-//! Training of a policy: TD3 in an environment, with the same number of updates per step in each.
+//! Training of a policy with TD3 in any environment, with one update per environment step.
 
 use std::sync::Arc;
 
@@ -31,14 +31,14 @@ pub struct PolicyRecipe {
     pub steps: u64,
     /// Warm-up steps with random actions and without updates.
     pub warmup: u64,
-    /// Capacity of the replay buffer.
+    /// Capacity of the replay buffer, transitions.
     pub replay: usize,
     /// Number of simulated aircraft.
     pub instances: usize,
-    /// Fraction of the targets in the hard corners.
+    /// Fraction of the targets in the hard corners, 0..1.
     pub corners: f64,
-    /// Steps between checkpoints; all episodes are reset there, so that a resumed training equals an uninterrupted
-    /// one.
+    /// Steps between checkpoints. All episodes are reset at a checkpoint. A resumed training therefore equals an
+    /// uninterrupted one.
     pub checkpoint: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -63,9 +63,7 @@ impl Default for PolicyRecipe {
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
     /// The loss is not finite.
-    #[error(
-        "the loss of the critics is no longer a number after {0} steps; lower the learning rates"
-    )]
+    #[error("the loss of the critics is not finite after {0} steps; lower the learning rates")]
     Loss(u64),
     /// A network cannot be used.
     #[error("the networks: {0}")]
@@ -107,8 +105,8 @@ pub struct PolicyProgress {
     pub updates: u64,
     /// Mean loss of the critics; NaN before the first update.
     pub loss: f64,
-    /// Mean reward per step. A step that loses the aircraft counts as the smallest of a single step here (−1.1, see
-    /// `Task::worst`), while the critics learn from its cost for ever (−110, `Task::of_loss`).
+    /// Mean reward per step. A step that loses the aircraft counts here as the smallest reward of a single step (−1.1,
+    /// `Task::worst`). The critics learn its sum over all further steps (−110, `Task::of_loss`).
     pub reward: f64,
     /// Number of episodes started.
     pub episodes: u64,
@@ -123,9 +121,9 @@ pub struct PolicyStanding {
     pub identity: String,
     /// Number of steps made.
     pub steps: u64,
-    /// Number of targets given.
+    /// Number of targets drawn.
     pub targets: u64,
-    /// Number of transitions ever added.
+    /// Number of transitions ever added to the replay buffer.
     pub remembered: u64,
     /// Contents of the replay buffer.
     pub replay: Vec<f32>,
@@ -134,7 +132,8 @@ pub struct PolicyStanding {
 }
 
 impl<W: World> PolicyTrainer<W> {
-    /// A training in `world`, whose instances are the recipe's; `identity` distinguishes it from others.
+    /// A training in `world`, whose number of aircraft must be the recipe's. `identity` distinguishes the training from
+    /// others.
     ///
     /// # Errors
     ///
@@ -157,7 +156,7 @@ impl<W: World> PolicyTrainer<W> {
         })
     }
 
-    /// Trains for about `steps` further steps, up to the recipe's; stops at every checkpoint.
+    /// Trains for about `steps` further steps, within the recipe's total. Stops at every checkpoint.
     ///
     /// # Errors
     ///
@@ -193,7 +192,7 @@ impl<W: World> PolicyTrainer<W> {
         stretch(before) != stretch(self.steps)
     }
 
-    /// One step of every aircraft, then as many updates.
+    /// Makes one step of every aircraft, then as many updates as there are aircraft.
     fn advance(&mut self) -> Result<(), PolicyError> {
         let mut rng = stream::stream(self.recipe.seed, &[ACT, self.steps]);
         let instances = self.world.instances();
@@ -222,7 +221,7 @@ impl<W: World> PolicyTrainer<W> {
         Ok(())
     }
 
-    /// Random actions in the warm-up, then the actor's with noise.
+    /// Random actions in the warm-up, then the actor's actions with exploration noise.
     fn explore(&mut self, observed: &[Block; OBSERVATIONS], rng: &mut Stream) -> [Block; ACTIONS] {
         if self.steps < self.recipe.warmup {
             let mut action = [Block::zero(); ACTIONS];
@@ -288,7 +287,7 @@ impl<W: World> PolicyTrainer<W> {
         Ok(Arc::new([Critic::new(one)?, Critic::new(two)?]))
     }
 
-    /// State for a checkpoint; valid only at one.
+    /// State for a checkpoint. The state is valid only while `at_checkpoint` is true.
     pub fn standing(&self) -> PolicyStanding {
         PolicyStanding {
             identity: self.identity.clone(),
@@ -304,7 +303,7 @@ impl<W: World> PolicyTrainer<W> {
     ///
     /// # Errors
     ///
-    /// If it was another training.
+    /// If the checkpoint belongs to another training.
     pub fn resume(&mut self, standing: PolicyStanding) -> Result<(), PolicyError> {
         if standing.identity != self.identity {
             return Err(PolicyError::Other);
@@ -315,7 +314,7 @@ impl<W: World> PolicyTrainer<W> {
         self.td3.resume(standing.td3)?;
         self.actor = Actor::new(self.td3.actor()?)?;
         self.steps = standing.steps;
-        // the first targets of the new episodes were given before the checkpoint was written
+        // the first targets of the restarted episodes were drawn before the checkpoint was written
         let begun = self.world.instances() as u64;
         Ok(self.world.restart(standing.targets.saturating_sub(begun))?)
     }

@@ -1,4 +1,4 @@
-//! The command protocol: every command addressed to this component is acknowledged, unknown ones included.
+//! The command protocol: every command for this component is acknowledged, including unknown commands.
 
 use super::{Clients, Now};
 use crate::autopilot::{Autopilot, Mode, Verdict};
@@ -9,7 +9,7 @@ use crate::wire::mode::{self, ModeRequest};
 use crate::wire::request::CommandRequest;
 use crate::wire::telemetry;
 
-/// Value of param2 that forces arming or disarming.
+/// Value of parameter 2 that forces arming or disarming.
 const FORCE: f64 = 21196.0;
 const HEARTBEAT: u32 = 0;
 const AUTOPILOT_VERSION: u32 = 148;
@@ -17,11 +17,11 @@ const HOME_POSITION: u32 = 242;
 const MESSAGE_INTERVAL: u32 = 244;
 const PROTOCOL_VERSION: u32 = 300;
 const AVAILABLE_MODES: u32 = 435;
-/// Commands with a side effect: NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE, COMPONENT_ARM_DISARM. The others
-/// are queries, which may be repeated.
+/// Commands with a side effect: NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH, DO_SET_MODE, COMPONENT_ARM_DISARM. All other
+/// supported commands may be repeated without harm.
 const CHANGING: [u16; 4] = [17, 20, 176, 400];
 
-/// Result of a command: the acknowledgement, then optional messages and an optional reason.
+/// Result of a command: the acknowledgement, requested messages, and the reason for a refusal.
 struct Outcome {
     result: CommandResult,
     messages: Vec<Message>,
@@ -60,15 +60,15 @@ impl Outcome {
     }
 }
 
-/// A message id in a float parameter.
+/// A message id from a float parameter; `None` unless it is an integer below 2²⁴.
 fn message_number(parameter: f64) -> Option<u32> {
     (parameter.fract() == 0.0 && (0.0..16_777_216.0).contains(&parameter))
         .then_some(parameter as u32)
 }
 
 impl Clients {
-    /// Acknowledges a command. A retransmission (its confirmation counts up) of one that was carried out gets the
-    /// same result and is not carried out again.
+    /// Carries out a command and acknowledges it. A retransmission has a confirmation above 0. If the command was
+    /// already carried out, a retransmission gets the same result and has no further effect.
     pub(super) fn command(
         &mut self,
         now: Now,
@@ -82,7 +82,7 @@ impl Clients {
             return;
         }
         let outcome = self.carry_out(now, at, &command, autopilot);
-        // a refused command had no effect and may be retried
+        // a refused command had no effect and may be sent again
         if outcome.result == CommandResult::Accepted && CHANGING.contains(&command.number) {
             self.sessions[at].remember(now.host, command, outcome.result);
         }
@@ -93,8 +93,8 @@ impl Clients {
         }
     }
 
-    /// Sends a requested message. PROTOCOL_VERSION is sent in MAVLink 2 even to a peer that has only sent MAVLink 1:
-    /// this is how MAVLink 2 is negotiated.
+    /// Sends a requested message. PROTOCOL_VERSION is sent in MAVLink 2 even to a peer that has only sent MAVLink 1,
+    /// because MAVLink 2 is negotiated by this message.
     fn send_requested(&mut self, at: usize, message: &Message) {
         match message.id() {
             PROTOCOL_VERSION => {
@@ -104,7 +104,7 @@ impl Clients {
         }
     }
 
-    /// Carries out a command. Only the parameters that it defines are read: the others are often NaN.
+    /// Carries out a command. Parameters that the command does not define are not read, because they are often NaN.
     fn carry_out(
         &mut self,
         now: Now,
@@ -181,7 +181,7 @@ impl Clients {
         }
     }
 
-    /// Interval in µs; −1 when the message is off, 0 when it is not available.
+    /// Interval of message `id` in µs; −1 if it is off, 0 if it is not available.
     fn interval_us(&self, at: usize, id: u32) -> i32 {
         match (id, telemetry::position(id)) {
             (HEARTBEAT, _) => 1_000_000,

@@ -13,15 +13,15 @@ const SUMMARY: Duration = Duration::from_secs(10);
 pub struct ClientCounts {
     /// MAVLink frames, valid and invalid.
     pub frames: FrameCounts,
-    /// Frames with this program's own ids.
+    /// Frames with the ids of this program itself.
     pub echoes: u64,
     /// Requests addressed to another system or component.
     pub for_others: u64,
-    /// Frames from new peers while all sessions were taken.
+    /// Frames from new peers while all sessions were in use.
     pub turned_away: u64,
     /// Setpoints and stick positions that were invalid or of an unsupported kind.
     pub refused_setpoints: u64,
-    /// Setpoints and stick positions from a peer without control authority.
+    /// Setpoints and stick positions from a peer while another peer has control authority.
     pub contested_setpoints: u64,
     /// Commands with an unsupported number.
     pub unknown_commands: u64,
@@ -30,7 +30,7 @@ pub struct ClientCounts {
 }
 
 impl Clients {
-    /// Logs one line when frames were unusable, at a bounded rate.
+    /// Logs one line after unusable frames, at most every 10 s.
     pub(super) fn summarise(&mut self, now: Now) {
         let c = self.counts;
         let bad = c.frames.bad() + c.refused_setpoints + c.contested_setpoints + c.turned_away;

@@ -1,8 +1,8 @@
-//! A bounded queue of frames to be sent by the owner of the sockets.
+//! A bounded queue of outgoing frames, which the owner of the sockets sends.
 
 use crate::peer::PeerId;
 
-/// Capacity in frames; a caller that drains after every call stays far below.
+/// Capacity in frames. A caller that drains after every call stays far below.
 const CAPACITY: usize = 4096;
 
 /// A bounded queue: frames that do not fit are dropped and counted.

@@ -6,15 +6,15 @@ use crate::framing::Source;
 use crate::wire::answer::{self, ParameterFault};
 use crate::wire::request::{ParameterKey, ParameterName};
 
-/// 2²⁴: all integers up to it are exact in a 32-bit float.
+/// Largest integer up to which all integers are exact in a 32-bit float: 2²⁴.
 const EXACT: f32 = 16_777_216.0;
 
 fn find(table: &[Parameter], name: ParameterName) -> Option<usize> {
     table.iter().position(|parameter| parameter.name.as_bytes() == name.bytes())
 }
 
-/// The value converted to the table's type. An integer sent as REAL32 is accepted for an INT32, because pymavlink's
-/// `param_set_send` sends REAL32 by default.
+/// The value converted to the table's type; `None` if the types do not match. An integer sent as REAL32 is accepted for
+/// an INT32, because pymavlink's `param_set_send` sends REAL32 by default.
 fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<ParameterValue> {
     match (table, sent?) {
         (ParameterValue::Real(_), value @ ParameterValue::Real(_)) => Some(value),
@@ -29,8 +29,8 @@ fn matched(table: ParameterValue, sent: Option<ParameterValue>) -> Option<Parame
 }
 
 impl Clients {
-    /// Sends the next parameters to every peer that requested the list, a few per call, so that a slow link does not
-    /// drop the rest.
+    /// Sends the next parameters to every peer that requested the list. Only a few are sent per call, because a slow
+    /// link would drop the rest.
     pub(super) fn list_parameters(&mut self, now: Now, table: &[Parameter]) {
         for session in &mut self.sessions {
             for index in session.parameters_due(now.host, table.len()) {
@@ -69,8 +69,8 @@ impl Clients {
         self.reply(at, &message);
     }
 
-    /// Sets a parameter. The value in force is always echoed, to everyone when it has changed; a refusal is also
-    /// reported by PARAM_ERROR and as text.
+    /// Sets a parameter. The value of an existing parameter is always sent in reply. After a change it is sent to all
+    /// peers. A refusal is also reported by PARAM_ERROR and as text.
     pub(super) fn set_parameter(
         &mut self,
         now: Now,
@@ -91,7 +91,7 @@ impl Clients {
             return;
         };
         let refusal = match matched(autopilot.parameters()[index].value, value) {
-            None => Some((ParameterFault::TypeMismatch, "its type is not the table's".to_owned())),
+            None => Some((ParameterFault::TypeMismatch, "wrong type".to_owned())),
             Some(value) => match autopilot.set_parameter(index, value) {
                 Verdict::Accepted => None,
                 Verdict::Rejected(reason) | Verdict::Denied(reason) => {

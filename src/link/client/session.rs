@@ -1,4 +1,4 @@
-//! Session of one client: MAVLink version, sequence counter, streams, parameter transfer.
+//! Session of one client: MAVLink version, sequence number, streams and parameter transfer.
 
 use std::time::Duration;
 
@@ -11,23 +11,23 @@ use crate::wire::Message;
 use crate::wire::answer::{self, CommandResult, TEXT_CHUNK};
 use crate::wire::request::CommandRequest;
 
-/// After this silence a peer's MAVLink version is determined again: another program may use its address.
+/// Silence after which a peer's MAVLink version is determined again, because another program may use its address.
 const VERSION_MEMORY: Duration = Duration::from_secs(5);
-/// Time within which a repeated command counts as a retransmission.
+/// Time within which the same command counts as a retransmission.
 const COMMAND_MEMORY: Duration = Duration::from_secs(3);
-/// Burst limit of warnings to one peer, and the interval that allows one more.
+/// Largest burst of warnings to one peer, and the interval after which one more warning is allowed.
 const COMPLAINTS: u32 = 10;
 const COMPLAINT_EVERY: Duration = Duration::from_millis(500);
-/// Parameters per call and the interval between calls: 200 per second.
+/// Parameters per call and the interval between calls: 200 parameters per second.
 const PARAMETERS_AT_ONCE: usize = 2;
 const PARAMETERS_EVERY: Duration = Duration::from_millis(10);
 
 /// Lifetime of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stay {
-    /// The session ends after a silence of the peer.
+    /// The session ends after a timeout without frames from the peer.
     WhileHeard,
-    /// The session lasts until the peer is removed: a connection, or the target of a `udpout:` link.
+    /// The session lasts until the peer is removed. This applies to connections and to the target of a `udpout:` link.
     UntilForgotten,
 }
 
@@ -45,7 +45,7 @@ pub struct Session {
     /// Message intervals of the peer's streams.
     pub streams: StreamTable,
     version: Version,
-    /// Whether `version` was observed from the peer.
+    /// Whether `version` was determined from a frame of the peer.
     spoken: bool,
     sequence: u8,
     last_command: Option<(CommandRequest, CommandResult, Duration)>,
@@ -75,8 +75,8 @@ impl Session {
         }
     }
 
-    /// Notes the version of a received frame. A peer that has sent MAVLink 2 is answered in MAVLink 2, a peer
-    /// that has only sent MAVLink 1 in MAVLink 1.
+    /// Stores the version of a received frame. A peer that has sent MAVLink 2 gets MAVLink 2. A peer that has only sent
+    /// MAVLink 1 gets MAVLink 1.
     pub fn note_frame(&mut self, host: Duration, frame: &Frame<'_>) {
         let stale = host.saturating_sub(self.heard) > VERSION_MEMORY;
         if !self.spoken || stale || frame.version == Version::V2 {
@@ -86,12 +86,12 @@ impl Session {
         self.heard = host;
     }
 
-    /// Sends a message in the peer's version; a message id that MAVLink 1 cannot carry is dropped.
+    /// Sends a message in the peer's version. A message whose id MAVLink 1 cannot carry is dropped.
     pub fn send(&mut self, message: &Message, from: Source, outbox: &mut Outbox) {
         self.send_as(self.version, message, from, outbox);
     }
 
-    /// Sends a message in a given version, as the MAVLink 2 handshake requires.
+    /// Sends a message in the version `version`, as the MAVLink 2 handshake requires.
     pub fn send_as(
         &mut self,
         version: Version,
@@ -105,7 +105,7 @@ impl Session {
         }
     }
 
-    /// Sends a text of any length: in chunks that MAVLink 2 receivers join, or as separate texts in MAVLink 1.
+    /// Sends a text of any length. MAVLink 2 receivers join its chunks. In MAVLink 1 each chunk is a separate text.
     pub fn say(
         &mut self,
         severity: Severity,
@@ -126,7 +126,7 @@ impl Session {
         lines.iter().for_each(|line| self.send(line, from, outbox));
     }
 
-    /// Whether the rate limit allows one more warning; counts it if so.
+    /// Whether the rate limit allows one more warning. If so, the warning is counted.
     pub fn may_complain(&mut self, host: Duration) -> bool {
         let earned =
             host.saturating_sub(self.next_complaint).as_millis() / COMPLAINT_EVERY.as_millis();
@@ -140,7 +140,7 @@ impl Session {
         allowed
     }
 
-    /// The result given to `command` if this is its retransmission.
+    /// The earlier result of `command` if this is a retransmission; otherwise `None`.
     pub fn answered(&self, host: Duration, command: &CommandRequest) -> Option<CommandResult> {
         let (known, result, when) = self.last_command.as_ref()?;
         let same_bits = known.params.map(f64::to_bits) == command.params.map(f64::to_bits);
@@ -148,17 +148,17 @@ impl Session {
         (again && host.saturating_sub(*when) < COMMAND_MEMORY).then_some(*result)
     }
 
-    /// Stores the result of a command for its retransmissions.
+    /// Stores the result of a command, in case the command is retransmitted.
     pub fn remember(&mut self, host: Duration, command: CommandRequest, result: CommandResult) {
         self.last_command = Some((command, result, host));
     }
 
-    /// Starts sending the parameter table.
+    /// Starts the transfer of the whole parameter table.
     pub fn list_parameters(&mut self) {
         self.listing = Some(0);
     }
 
-    /// Indices of the parameters to send now, from a table of `count`.
+    /// Indices of the parameters to be sent now, from a table of `count` parameters.
     pub fn parameters_due(&mut self, host: Duration, count: usize) -> std::ops::Range<usize> {
         let Some(next) = self.listing.filter(|_| host >= self.next_parameters) else {
             return 0..0;

@@ -1,14 +1,14 @@
-//! Control authority: setpoints are accepted from one client at a time, until its stream stops.
+//! Control authority over setpoints: one client at a time, until its stream stops.
 
 use std::time::Duration;
 
 use crate::peer::PeerId;
 
-/// Silence after which another client may take control authority. It equals the timeout that ends OFFBOARD, so that a
-/// restarted client waits no longer than the aircraft does.
+/// Silence after which another client may take control authority, equal to the timeout that ends OFFBOARD. A restarted
+/// client thus waits no longer than the aircraft.
 const RELEASE: Duration = Duration::from_secs(1);
 
-/// Holder of control authority for one kind of setpoint, so that two simultaneous streams do not alternate on the
+/// Holder of control authority for one kind of setpoint. It prevents two simultaneous streams from alternating on the
 /// surfaces.
 #[derive(Debug, Default)]
 pub struct SetpointAuthority {
@@ -16,7 +16,7 @@ pub struct SetpointAuthority {
 }
 
 impl SetpointAuthority {
-    /// Whether a setpoint from `peer` is accepted; if so, `peer` holds control authority from now on.
+    /// Whether a setpoint from `peer` is accepted. If so, `peer` holds control authority from now on.
     pub fn takes(&mut self, peer: PeerId, host: Duration) -> bool {
         match self.holder {
             Some((holder, heard)) if holder != peer && host.saturating_sub(heard) < RELEASE => {
@@ -29,7 +29,7 @@ impl SetpointAuthority {
         }
     }
 
-    /// Releases control authority held by `peer`, as when its connection is closed.
+    /// Releases the control authority of `peer`, for instance when its connection is closed.
     pub fn release(&mut self, peer: PeerId) {
         if self.holder.is_some_and(|(holder, _)| holder == peer) {
             self.holder = None;

@@ -1,10 +1,10 @@
-//! Setpoints from clients: accepted, refused or contested.
+//! Setpoints from clients, which are accepted, refused as invalid, or ignored because another client has authority.
 
 use super::{Clients, Now};
 use crate::autopilot::{AttitudeSetpoint, Autopilot, Sticks};
 use crate::wire::setpoint::SetpointFault;
 
-/// Refusal of setpoints of position, velocity or raw actuators.
+/// Text that refuses setpoints of position, velocity or raw actuators.
 pub const OTHER_SETPOINT: &str = "Setpoint refused: only attitudes (SET_ATTITUDE_TARGET) are flown";
 
 fn refusal(fault: SetpointFault) -> &'static str {
@@ -18,7 +18,8 @@ fn refusal(fault: SetpointFault) -> &'static str {
 }
 
 impl Clients {
-    /// Takes an attitude setpoint. A refused setpoint does not reach the autopilot, and does not restart its timeout.
+    /// Passes an attitude setpoint to the autopilot. A refused setpoint does not reach the autopilot and does not
+    /// restart the offboard timeout.
     pub(super) fn attitude(
         &mut self,
         now: Now,

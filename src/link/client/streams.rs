@@ -1,16 +1,17 @@
-//! Message intervals of a client's streams. Messages and default rates are in [`STREAMS`] in
-//! `link/wire/telemetry.rs`.
+//! Message intervals of a client's streams.
+//!
+//! The messages and their default rates are in [`STREAMS`] in `link/wire/telemetry.rs`.
 
 use std::time::Duration;
 
 use crate::wire::telemetry::STREAMS;
 
-/// Shortest interval: one message per control cycle.
+/// Shortest interval of a stream: one message per control cycle.
 const SHORTEST: Duration = Duration::from_millis(10);
 /// Longest interval of a stream.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// Intervals of one client, a row per entry of [`STREAMS`].
+/// Intervals of one client's streams, one row per entry of [`STREAMS`].
 #[derive(Clone, Debug)]
 pub struct StreamTable {
     rows: [Row; STREAMS.len()],
@@ -31,7 +32,7 @@ impl StreamTable {
         }
     }
 
-    /// Whether row `at` is due; its next due time is then one interval later. Missed messages are not sent later.
+    /// Whether row `at` is due. If so, its next due time is one interval later. Missed messages are not sent later.
     pub fn is_due(&mut self, at: usize, host: Duration) -> bool {
         let row = &mut self.rows[at];
         let Some(interval) = row.interval.filter(|_| host >= row.due) else {
@@ -44,13 +45,13 @@ impl StreamTable {
         true
     }
 
-    /// Interval of row `at`, µs; −1 when off.
+    /// Interval of row `at`, µs; −1 if the stream is off.
     pub fn interval_us(&self, at: usize) -> i32 {
         self.rows[at].interval.map_or(-1, |interval| interval.as_micros() as i32)
     }
 
-    /// Sets row `at` as in SET_MESSAGE_INTERVAL: µs, 0 for the default, −1 for off. The interval is clamped to the
-    /// supported range. `Err` if the value is invalid.
+    /// Sets row `at` as SET_MESSAGE_INTERVAL specifies: µs, 0 for the default, −1 for off. The interval is clamped to
+    /// 10 ms..60 s. `Err` for any other negative value and for NaN.
     pub fn set_interval(&mut self, at: usize, us: f64, host: Duration) -> Result<(), ()> {
         let interval = match us {
             -1.0 => None,
@@ -62,7 +63,8 @@ impl StreamTable {
         Ok(())
     }
 
-    /// Sets a REQUEST_DATA_STREAM group (0: every stream that is on by default) to a rate in Hz, or off.
+    /// Sets all streams of a REQUEST_DATA_STREAM group to a rate in Hz (0: their default rates), or turns them off
+    /// (`None`). Group 0 contains all streams that are on by default.
     pub fn set_group(&mut self, group: u8, rate: Option<u16>, host: Duration) {
         for (row, stream) in self.rows.iter_mut().zip(STREAMS) {
             let meant = stream.group == group || (group == 0 && stream.default_hz > 0.0);
@@ -93,7 +95,7 @@ mod tests {
     #[test]
     fn rates_are_limited_and_garbage_is_refused() {
         let mut table = StreamTable::new(Duration::ZERO);
-        // 1 µs would be a million messages a second.
+        // An interval of 1 µs would mean a million messages per second.
         table.set_interval(0, 1.0, Duration::ZERO).unwrap();
         assert_eq!(table.interval_us(0), 10_000);
         table.set_interval(0, 1e30, Duration::ZERO).unwrap();
@@ -111,7 +113,7 @@ mod tests {
     fn a_pause_is_not_caught_up() {
         let mut table = StreamTable::new(Duration::ZERO);
         assert!(table.is_due(0, Duration::ZERO));
-        // 10 Hz: after 5 s of silence one message, then the next 100 ms later.
+        // At 10 Hz, one message follows after 5 s of silence, and the next 100 ms later.
         let late = Duration::from_secs(5);
         assert!(table.is_due(0, late));
         assert!(!table.is_due(0, late + Duration::from_millis(99)));

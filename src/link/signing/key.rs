@@ -1,4 +1,4 @@
-//! The signing key, from a file readable by its owner only.
+//! The signing key, which is read from a file that only its owner can read.
 
 use std::fmt;
 use std::fs::File;
@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 /// Length of a key in bytes.
 const LENGTH: usize = 32;
-/// Largest size of a key file, bytes.
+/// Largest number of bytes that are read from a key file.
 const LONGEST: u64 = 4096;
 
 /// A secret key. `Debug` does not print it.
@@ -76,7 +76,7 @@ impl Key {
     ///
     /// # Errors
     ///
-    /// If the file exists, or cannot be written.
+    /// If the file exists or cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), KeyError> {
         let failed = |why| KeyError::Write { path: path.into(), why };
         let mut options = File::options();
@@ -96,7 +96,7 @@ impl Key {
     ///
     /// # Errors
     ///
-    /// If it cannot be read, is readable by others, or does not hold a key.
+    /// If the file cannot be read, is readable by other users, or does not hold a key.
     pub fn load(path: &Path) -> Result<Self, KeyError> {
         let failed = |why| KeyError::Read { path: path.into(), why };
         let file = File::open(path).map_err(failed)?;
@@ -133,7 +133,7 @@ fn check_mode(file: &File, path: &Path) -> Result<(), KeyError> {
     }
 }
 
-/// Systems without Unix permissions: the key file is not checked.
+/// Without Unix permissions the key file is not checked.
 #[cfg(not(unix))]
 fn check_mode(_: &File, _: &Path) -> Result<(), KeyError> {
     Ok(())
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn anything_but_64_digits_is_refused() {
-        // A digit too few, one too many, a passphrase, digits that are two bytes long.
+        // One digit too few, one too many, a passphrase, and characters of two bytes.
         for text in ["0".repeat(63), "0".repeat(65), "secret".into(), "ä".repeat(32)] {
             let (_folder, path) = file(&text, 0o600);
             assert!(matches!(Key::load(&path), Err(KeyError::Content { .. })), "{text}");

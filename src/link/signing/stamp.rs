@@ -1,4 +1,4 @@
-//! Persistent signing timestamp: stored in the key's folder, written every second by a thread.
+//! Persistent signing timestamp: a thread writes it every second to a file in the key's folder.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// Interval between writes.
 const EVERY: Duration = Duration::from_secs(1);
-/// Timestamp range that may have been used since the last write: two seconds, in units of 10 µs.
+/// Range of timestamps that may have been used since the last write: 2 s, in units of 10 µs.
 const MARGIN: u64 = 200_000;
 
 /// The timestamp cannot be stored.
@@ -42,11 +42,12 @@ pub struct StampFile {
 }
 
 impl StampFile {
-    /// Opens the timestamp file of a key file; also returns the timestamp to start from.
+    /// Opens the timestamp file of the key file `key`. Also returns the timestamp to start from, in units of 10 µs
+    /// since 2015.
     ///
     /// # Errors
     ///
-    /// If it cannot be read or written, or does not hold a timestamp.
+    /// If the file cannot be read or written, or does not hold a timestamp.
     pub fn open(key: &Path) -> Result<(Self, u64), StampError> {
         let mut name = key.as_os_str().to_owned();
         name.push(".stamp");
@@ -71,7 +72,7 @@ impl StampFile {
                 loop {
                     let ends = stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout);
                     let now = seen.load(Ordering::Relaxed);
-                    // a disk that is full for a while does no harm: the next write holds the newest timestamp
+                    // a disk that is full for a while does no harm: the next write stores the newest timestamp
                     if now != written && write(&place, now).is_ok() {
                         written = now;
                     }
@@ -94,7 +95,7 @@ impl Drop for StampFile {
     fn drop(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
-            // A panic there has been reported by its own thread.
+            // a panic of the thread has been reported by the thread
             let _ = thread.join();
         }
     }

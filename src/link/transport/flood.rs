@@ -1,28 +1,28 @@
-//! Rate limit per sender of datagrams, so that a flood loses its sender's packets only.
+//! Rate limit on each sender of datagrams: a flood loses only packets of its own sender.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// Datagrams per second that are accepted from one sender: a flight controller that sends each message by itself
-/// sends 500, a parameter list or a log at full speed 1000.
+/// Datagrams per second that are accepted from one sender. A flight controller that sends each message separately sends
+/// 500. A parameter list or a log at full speed takes 1000.
 const PER_SECOND: f64 = 4000.0;
-/// Burst in datagrams: as many as accumulate while this computer stalls for some seconds.
+/// Burst in datagrams: as many as accumulate in a stall of this computer of some seconds.
 const BURST: f64 = 1000.0;
-/// Number of senders tracked; all others share one limit.
+/// Number of senders with a separate limit. All other senders share one limit.
 const SENDERS: usize = 64;
-/// Silence after which a sender's entry is reused.
+/// Time without datagrams after which a sender's entry is reused.
 const GONE: Duration = Duration::from_secs(1);
 
 /// Token buckets of the senders.
 #[derive(Debug, Default)]
 pub(super) struct Senders {
     known: Vec<(SocketAddr, Allowance)>,
-    /// Index of the last sender, probably the next one too.
+    /// Index of the last sender, which is tried first.
     last: usize,
     strangers: Allowance,
 }
 
-/// A token bucket: tokens left and when they were counted.
+/// A token bucket: the number of tokens left, and the time of the last update.
 #[derive(Clone, Copy, Debug)]
 struct Allowance {
     left: f64,
@@ -36,7 +36,7 @@ impl Default for Allowance {
 }
 
 impl Allowance {
-    /// Takes one token at `now`, if there is one.
+    /// Takes one token at `now`; `false` if there is none.
     fn take(&mut self, now: Instant) -> bool {
         let passed =
             self.at.replace(now).map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
@@ -63,7 +63,7 @@ impl Senders {
         }
     }
 
-    /// Index of the bucket of `sender`: its own, a free one, or an expired one.
+    /// Index of the bucket of `sender`: an existing, a free or an expired one. `None` if all buckets are in use.
     fn place(&mut self, sender: SocketAddr, now: Instant) -> Option<usize> {
         let own = self.known.iter().position(|(known, _)| *known == sender);
         if own.is_some() {
@@ -95,7 +95,7 @@ mod tests {
         let start = Instant::now();
         let mut senders = Senders::default();
         let mut taken = [0; 2];
-        // Ten seconds of 40,000 datagrams a second, beside a client of 20.
+        // Ten seconds of 40,000 datagrams per second, and a client with 20 per second.
         for i in 0..400_000u64 {
             let now = start + Duration::from_micros(25 * i);
             taken[0] += u32::from(senders.may(sender(1), now));
@@ -103,7 +103,7 @@ mod tests {
                 taken[1] += u32::from(senders.may(sender(2), now));
             }
         }
-        // 4000 a second and the first burst.
+        // 4000 per second and the first burst.
         assert!((40_900..=41_000).contains(&taken[0]), "{taken:?}");
         assert_eq!(taken[1], 200);
     }
@@ -121,7 +121,7 @@ mod tests {
             taken += u32::from(senders.may(sender(2 + (i % 60_000) as u16), now));
         }
         assert_eq!(own, 200);
-        // 4000 a second and the first burst for all other senders, and one a second for each tracked place.
+        // 4000 per second and the first burst for all other senders, and one per second for each tracked place.
         assert!(taken < 41_000 + 10 * 64, "{taken}");
     }
 }

@@ -1,4 +1,4 @@
-//! Serial links: one peer, on a wire that may be disconnected at any time.
+//! Serial links: one peer on a port that may be disconnected at any time.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -14,15 +14,15 @@ use crate::peer::{self, PeerId};
 
 /// Largest number of bytes per read.
 const CHUNK: usize = 1024;
-/// An incomplete frame is dropped after this silence.
+/// Silence after which an incomplete frame is dropped.
 const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(50);
 /// Interval between attempts to reopen a port.
 const RETRY: Duration = Duration::from_millis(200);
-/// A frame that cannot be written within this time is dropped: the wire is stuck.
+/// Longest time for writing a frame. The frame is then dropped, because the port is blocked.
 const STALLED: Duration = Duration::from_secs(1);
-/// Frames that may wait behind the one being written: older ones are obsolete.
+/// Largest number of frames behind the frame that is being written. Older frames are obsolete.
 const BACKLOG: usize = 16;
-/// Bytes without a valid frame, and the least time they span, that indicate a wrong baud rate.
+/// Signs of a wrong baud rate: this many bytes without a valid frame, over at least this time.
 const NOISE: (u64, Duration) = (400, Duration::from_secs(1));
 
 /// A serial port and its baud rate.
@@ -32,7 +32,7 @@ pub(super) struct Wire {
     pub(super) baud: u32,
 }
 
-/// A serial port cannot be opened; the message names the remedy.
+/// A serial port cannot be opened. The message names the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SerialFault {
     /// The device does not exist.
@@ -51,7 +51,7 @@ pub enum SerialFault {
     Busy,
     /// The port does not support this baud rate.
     #[error(
-        "it does not work at {0} baud; give a rate that it knows, such as 921600, 115200 or 57600"
+        "it does not work at {0} baud; give a rate that it supports, such as 921600, 115200 or 57600"
     )]
     Baud(u32),
     /// The file is not a serial port.
@@ -62,7 +62,7 @@ pub enum SerialFault {
     Other(String),
 }
 
-/// Serial ports known to the system, for an error's remedy.
+/// Serial ports known to the system, for the remedy in an error.
 fn listed() -> String {
     let names: Vec<String> = tokio_serial::available_ports()
         .unwrap_or_default()
@@ -74,7 +74,7 @@ fn listed() -> String {
 }
 
 impl Wire {
-    /// Opens the serial port.
+    /// Opens the serial port at its baud rate.
     pub(super) fn open(&self) -> Result<SerialStream, SerialFault> {
         let stream = tokio_serial::new(&self.port, self.baud)
             .open_native_async()
@@ -102,7 +102,7 @@ impl Wire {
     }
 }
 
-/// Serves the port and reopens it when it is lost.
+/// Serves the port, and reopens it after a disconnection.
 pub(super) fn serve(
     port: Port,
     wire: Wire,
@@ -126,7 +126,8 @@ pub(super) fn serve(
     });
 }
 
-/// Retries until the port opens; `None` when the link has ended. Frames sent meanwhile are dropped and counted.
+/// Retries until the port opens; `None` if the link has ended. Frames to be sent in the meantime are dropped and
+/// counted.
 async fn wait_for(
     port: &Port,
     wire: &Wire,
@@ -161,7 +162,7 @@ impl NoiseDetector {
         NoiseDetector { since: Instant::now(), bytes: 0, frames: 0, reported: false }
     }
 
-    /// Counts received bytes and frames; whether a wrong baud rate is to be reported now, at most once.
+    /// Counts received bytes and frames. Returns whether a wrong baud rate is to be reported now, at most once.
     fn is_noise(&mut self, bytes: usize, frames: usize) -> bool {
         self.bytes += bytes as u64;
         self.frames += frames as u64;
@@ -175,7 +176,7 @@ impl NoiseDetector {
     }
 }
 
-/// Reads until the port is lost.
+/// Reads until the port is disconnected, and delivers complete frames.
 async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wire: &Wire) {
     let mut cutter = StreamCutter::default();
     let mut chunk = [0; CHUNK];
@@ -213,7 +214,7 @@ async fn read(port: &Port, mut stream: ReadHalf<SerialStream>, peer: PeerId, wir
     }
 }
 
-/// Writes whole frames; `true` when the link's last sender is gone, `false` when the port is lost.
+/// Writes complete frames. Returns `true` if the link's last sender is gone, `false` if the port is disconnected.
 async fn write(
     port: &Port,
     mut stream: WriteHalf<SerialStream>,
@@ -226,14 +227,14 @@ async fn write(
             count(&port.counters.outbox_full);
             frame = newer;
         }
-        // The port is not flushed: a flush waits until the last bit has left it.
+        // The port is not flushed: a flush waits until the last bit is sent.
         match timeout(STALLED, stream.write_all(&frame)).await {
             Ok(Ok(())) => count(&port.counters.sent),
             Ok(Err(_)) => {
                 count(&port.counters.send_failed);
                 return false;
             }
-            // the write is blocked: a truncated frame is on the wire, which its reader will drop
+            // the write is blocked: a truncated frame is sent, which its receiver drops
             Err(_) => count(&port.counters.send_failed),
         }
     }

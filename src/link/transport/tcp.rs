@@ -1,4 +1,4 @@
-//! TCP links: listening for several peers, or connecting to one and reconnecting.
+//! TCP links: a listener for several peers, or a connection to one peer that is reopened when it is lost.
 
 use std::collections::HashMap;
 use std::io;
@@ -17,23 +17,23 @@ use crate::framing::StreamCutter;
 
 /// Largest number of connections of a listening link.
 const MAX_CONNECTIONS: usize = 16;
-/// Frames that may wait for one connection: a slower reader loses whole frames.
+/// Largest number of queued frames for one connection. A slow reader loses whole frames.
 const QUEUE: usize = 256;
-/// Largest number of bytes per read: their frames form one packet.
+/// Largest number of bytes per read. The frames of one read form one packet.
 const CHUNK: usize = 1024;
-/// An incomplete frame is dropped after this silence.
+/// Silence after which an incomplete frame is dropped.
 const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(100);
-/// Delay after a failed `accept`, as when no file descriptors are left.
+/// Delay after a failed `accept`, for instance without free file descriptors.
 const ACCEPT_RETRY: Duration = Duration::from_millis(100);
-/// A peer that accepts no byte for this long is disconnected.
+/// Time without an accepted byte after which a peer is disconnected.
 const STALLED: Duration = Duration::from_secs(5);
-/// Interval between connection attempts, doubling from the first value to the second.
+/// Interval between connection attempts. It doubles from the first value up to the second.
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
 
 /// Open connections by the peer's address.
 type Connections = Arc<Mutex<HashMap<SocketAddr, Sender<Vec<u8>>>>>;
 
-/// Listens for peers; returns the bound address.
+/// Listens for peers. Returns the bound address.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,
@@ -69,7 +69,7 @@ pub(super) fn connect(port: Port, to: SocketAddr, outgoing: Receiver<(SocketAddr
 async fn accept(port: Port, connections: Connections, listener: TcpListener) {
     loop {
         match listener.accept().await {
-            // a connection beyond the limit is closed, which its peer notices
+            // a connection beyond the limit is closed
             Ok(_) if count_of(&connections) >= MAX_CONNECTIONS => {}
             Ok((stream, from)) => {
                 tokio::spawn(serve(port.clone(), connections.clone(), stream, from));
@@ -83,9 +83,9 @@ fn count_of(connections: &Connections) -> usize {
     connections.lock().unwrap_or_else(PoisonError::into_inner).len()
 }
 
-/// Serves one connection, reading and writing, until it ends.
+/// Serves one connection until it ends.
 async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: SocketAddr) {
-    // A command must not wait for more bytes to fill a segment; where this option fails, commands are only slower.
+    // A command must not wait for further bytes of a segment. If this option fails, commands are only slower.
     let _ = stream.set_nodelay(true);
     let (reading, writing) = stream.into_split();
     let (queue, frames) = channel(QUEUE);
@@ -99,7 +99,7 @@ async fn serve(port: Port, connections: Connections, stream: TcpStream, peer: So
     port.announce(Arrival::Closed(port.peer(peer))).await;
 }
 
-/// Reads chunks and passes on the complete frames.
+/// Reads chunks and delivers the complete frames.
 async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     let mut cutter = StreamCutter::default();
     let mut chunk = [0; CHUNK];
@@ -126,7 +126,7 @@ async fn read(port: &Port, mut stream: OwnedReadHalf, peer: SocketAddr) {
     }
 }
 
-/// Writes frames; ends when the peer stops reading.
+/// Writes frames. Ends when the peer stops reading or the connection is lost.
 async fn write(port: &Port, mut stream: OwnedWriteHalf, mut frames: Receiver<Vec<u8>>) {
     while let Some(frame) = frames.recv().await {
         match timeout(STALLED, stream.write_all(&frame)).await {

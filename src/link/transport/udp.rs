@@ -1,7 +1,7 @@
-//! UDP links: one socket, any number of peers.
+//! UDP links: one socket for any number of peers.
 //!
-//! The socket is never connected: an unreachable peer (ICMP port unreachable) does not disturb the others, and a peer
-//! may reply from another port than the one it is reached at.
+//! The socket is never connected. An unreachable peer (ICMP port unreachable) therefore does not disturb the other
+//! peers, and a peer may reply from another port than its receiving port.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -14,12 +14,12 @@ use tokio::sync::mpsc::Receiver;
 use super::flood::Senders;
 use super::{Port, count};
 
-/// Largest datagram in bytes: MAVLink senders stay within an Ethernet frame; this allows jumbo frames.
+/// Largest accepted datagram, bytes. MAVLink senders stay within an Ethernet frame. The limit allows jumbo frames.
 const MAX_DATAGRAM: usize = 9000;
-/// Delay after a socket error, so that a persistent one does not busy-loop.
+/// Delay after a socket error. It prevents a busy loop on a persistent error.
 const ERROR_DELAY: Duration = Duration::from_millis(5);
 
-/// Listens at an address and sends from it; returns the bound address.
+/// Listens at an address and sends from it. Returns the bound address.
 pub(super) fn listen(
     port: Port,
     at: SocketAddr,
@@ -28,13 +28,13 @@ pub(super) fn listen(
     serve(port, std::net::UdpSocket::bind(at)?, outgoing)
 }
 
-/// Binds a socket from which `to` can be reached.
+/// Binds a socket from which `to` can be reached. Returns the bound address.
 pub(super) fn reach(
     port: Port,
     to: SocketAddr,
     outgoing: Receiver<(SocketAddr, Vec<u8>)>,
 ) -> io::Result<SocketAddr> {
-    // A loopback address is reached from a loopback address, so that other machines cannot find the port.
+    // A socket for a loopback peer is bound to a loopback address. Other machines cannot reach the port.
     let from: SocketAddr = match (to, to.ip().is_loopback()) {
         (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),
         (SocketAddr::V4(_), false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
@@ -60,7 +60,7 @@ fn serve(
 }
 
 async fn receive(port: Port, socket: Arc<UdpSocket>) {
-    // one byte more than the largest accepted, to detect longer ones
+    // one byte more than the largest accepted datagram, to detect longer ones
     let mut buffer = vec![0; MAX_DATAGRAM + 1];
     let mut senders = Senders::default();
     loop {
@@ -75,7 +75,7 @@ async fn receive(port: Port, socket: Arc<UdpSocket>) {
     }
 }
 
-/// Ends when the link's last sender is gone.
+/// Sends queued frames. Ends when the link's last sender is gone.
 async fn send(port: Port, socket: Arc<UdpSocket>, mut outgoing: Receiver<(SocketAddr, Vec<u8>)>) {
     while let Some((to, frame)) = outgoing.recv().await {
         match socket.send_to(&frame, to).await {

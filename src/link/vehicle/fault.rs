@@ -14,22 +14,22 @@ pub enum Axis {
 /// A fault for which control authority is returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The state cannot be used.
+    /// The state cannot be used for control.
     State,
-    /// A failsafe is active.
+    /// A failsafe is active: the client's setpoints or the vehicle's state were lost.
     Lost,
-    /// The aircraft's response has the opposite sign of the model's.
+    /// The aircraft responds to the surface with the opposite sign to the model.
     Reversed(Axis),
     /// The aircraft does not respond to the surface.
     Unanswered(Axis),
     /// The signs of the surfaces could not be determined.
     SignsUnknown,
-    /// A limit cycle about this axis, with its surface at its limits.
+    /// A limit cycle about this axis with its surface at its limits.
     Oscillation(Axis),
 }
 
 impl Fault {
-    /// The text for the ground stations, with the remedy for a controller of `stack`.
+    /// The text for the ground stations, with the remedy for a flight controller of `stack`.
     pub fn words(self, stack: Stack) -> String {
         match self {
             Fault::State => "the state of the vehicle cannot be flown on".into(),
@@ -50,8 +50,8 @@ impl Fault {
                     Axis::Pitch => ("elevator", "roll"),
                 };
                 format!(
-                    "it does not answer to the {surface}: check servo, wire, mixer (one elevon \
-                     reversed makes {other} of it)"
+                    "no response to the {surface}: check servo, wire, mixer (one reversed elevon \
+                     turns it into {other})"
                 )
             }
             Fault::Oscillation(axis) => {
@@ -60,8 +60,8 @@ impl Fault {
                     Axis::Pitch => ("pitch", "elevator"),
                 };
                 format!(
-                    "it oscillates in {axis}, the {surface} at its limits: the delay is more than \
-                     its controller bears; fly --controller lqi-damped, or attitudes{}",
+                    "it oscillates in {axis}, the {surface} at its limits: the delay exceeds \
+                     the margin of its controller; fly --controller lqi-damped, or attitudes{}",
                     faster(stack)
                 )
             }
@@ -74,7 +74,7 @@ impl Fault {
     }
 }
 
-/// Settings of a `stack` that reduce the delay.
+/// Settings of `stack` that reduce the delay, as text.
 fn faster(stack: Stack) -> &'static str {
     match stack {
         Stack::Ardupilot => "; raise SCHED_LOOP_RATE and INS_GYRO_FILTER",
@@ -82,7 +82,7 @@ fn faster(stack: Stack) -> &'static str {
     }
 }
 
-/// Settings of a `stack` that can reverse an axis.
+/// Settings of `stack` that can reverse an axis.
 fn setting(axis: Axis, stack: Stack) -> &'static str {
     match (stack, axis) {
         (Stack::Ardupilot, Axis::Roll) => "RC1_REVERSED or SERVOn_REVERSED",

@@ -1,4 +1,4 @@
-//! Plausibility limits of telemetry: values outside indicate a fault of a sensor or of the link.
+//! Plausibility limits of telemetry. A value beyond its limit indicates a fault of a sensor or of the link.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -24,7 +24,7 @@ impl Faults {
     pub const SPECIFIC_FORCE: Faults = Faults(16);
     /// The actuator state is implausible.
     pub const ACTUATORS: Faults = Faults(32);
-    /// Airspeed and altitude are outdated.
+    /// Airspeed and altitude are stale.
     pub const LATE_AIR: Faults = Faults(64);
 
     const NAMES: [(Faults, &'static str); 7] = [
@@ -42,7 +42,7 @@ impl Faults {
         self.0 == 0
     }
 
-    /// Whether it contains any fault of `other`.
+    /// Whether the set contains any fault of `other`.
     pub fn contains(self, other: Faults) -> bool {
         self.0 & other.0 != 0
     }
@@ -64,32 +64,33 @@ impl fmt::Display for Faults {
     }
 }
 
-/// Plausible body rates, rad/s. The full scale of common gyroscopes, 2000 °/s, is 35 rad/s.
+/// Plausible body rates, rad/s. Common gyroscopes have a full scale of 2000 °/s, 35 rad/s.
 const RATE: RangeInclusive<f64> = -40.0..=40.0;
-/// Plausible airspeed, m/s: an aircraft of this kind never reaches 150; a little below zero is sensor noise.
+/// Plausible airspeed, m/s. An aircraft of this kind never reaches 150 m/s. Values a little below zero are sensor
+/// noise.
 const AIRSPEED: RangeInclusive<f64> = -5.0..=150.0;
 /// Plausible altitude above mean sea level, m.
 const ALTITUDE: RangeInclusive<f64> = -1000.0..=20_000.0;
-/// Plausible angle of attack and sideslip, rad: half a turn with room for rounding.
+/// Plausible angle of attack and sideslip, rad: ±180° with a tolerance for rounding.
 const INCIDENCE: RangeInclusive<f64> = -3.15..=3.15;
 /// Plausible specific force along each body axis, m/s²: 50 g.
 const FORCE: RangeInclusive<f64> = -500.0..=500.0;
-/// Plausible normalised deflection, with room for noise.
+/// Plausible normalised deflection (−1..1), with a tolerance for noise.
 const DEFLECTION: RangeInclusive<f64> = -1.5..=1.5;
-/// Plausible travel of a surface to each side, rad: more than zero, at most a right angle.
+/// Plausible travel of a surface to each side, rad: above zero, at most 90°.
 const TRAVEL: RangeInclusive<f64> = 0.001..=1.6;
-/// Plausible throttle position, with room for noise.
+/// Plausible throttle position (0..1), with a tolerance for noise.
 const THROTTLE: RangeInclusive<f64> = -0.25..=1.25;
-/// Plausible rate of the normalised deflection, 1/s: the actuator's own limit is far below.
+/// Plausible rate of the normalised deflection, 1/s. The limit of a real actuator is far below.
 const DEFLECTION_RATE: RangeInclusive<f64> = -1000.0..=1000.0;
 
-// A range does not contain NaN, so each check below is false for NaN.
+// A range does not contain NaN: each check below is false for NaN.
 
-/// Whether body rates, rad/s, are plausible.
+/// Whether the body rates p, q, r, rad/s, are plausible.
 pub fn rates(values: [f64; 3]) -> bool {
     values.iter().all(|x| RATE.contains(x))
 }
-/// Whether airspeed, m/s, and altitude, m, are plausible.
+/// Whether airspeed (m/s) and altitude (m) are plausible.
 pub fn air(airspeed: f64, altitude: f64) -> bool {
     AIRSPEED.contains(&airspeed) && ALTITUDE.contains(&altitude)
 }
@@ -97,11 +98,12 @@ pub fn air(airspeed: f64, altitude: f64) -> bool {
 pub fn incidence(alpha: f64, beta: f64) -> bool {
     INCIDENCE.contains(&alpha) && INCIDENCE.contains(&beta)
 }
-/// Whether specific force, m/s², is plausible.
+/// Whether the specific force in body axes, m/s², is plausible.
 pub fn specific_force(values: [f64; 3]) -> bool {
     values.iter().all(|x| FORCE.contains(x))
 }
-/// Whether normalised aileron, elevator, throttle, aileron rate, elevator rate, rudder and rudder rate are plausible.
+/// Whether aileron, elevator, throttle, aileron rate, elevator rate, rudder and rudder rate are plausible (normalised;
+/// rates in 1/s).
 pub fn actuators(
     [aileron, elevator, throttle, aileron_rate, elevator_rate, rudder, rudder_rate]: [f64; 7],
 ) -> bool {
@@ -109,7 +111,7 @@ pub fn actuators(
         && THROTTLE.contains(&throttle)
         && [aileron_rate, elevator_rate, rudder_rate].iter().all(|x| DEFLECTION_RATE.contains(x))
 }
-/// Whether the travel of the surfaces is plausible.
+/// Whether the travel of each surface is plausible to both sides.
 pub fn travels(travels: &Travels) -> bool {
     let Travels { aileron, elevator, rudder } = travels;
     let mut all = [Some(*aileron), Some(*elevator), *rudder].into_iter().flatten();
@@ -119,7 +121,7 @@ pub fn travels(travels: &Travels) -> bool {
 pub fn position([latitude, longitude]: [f64; 2]) -> bool {
     latitude.abs() <= 90.0 && longitude.abs() <= 180.0
 }
-/// Whether a wind velocity, m/s, is plausible.
+/// Whether a wind velocity, m/s, is plausible: at most 100 m/s in each component.
 pub fn wind(values: [f64; 3]) -> bool {
     values.iter().all(|x| x.abs() <= 100.0)
 }

@@ -1,7 +1,8 @@
-//! The `px4` and `ardupilot` profiles: a real flight controller, which has priority.
+//! The `px4` and `ardupilot` profiles: the vehicle is a real flight controller, which has priority.
 //!
-//! The controller flies until a client requests engagement; the companion then commands it through the interface of
-//! its stack, and returns control authority at the first fault. The interfaces of the stacks are in `profile`.
+//! The flight controller flies until a client requests engagement. The companion then commands it through the interface
+//! of its stack. At the first fault the companion returns control authority. The interfaces of the stacks are in
+//! `profile`.
 
 pub mod air_data;
 mod assembly;
@@ -40,13 +41,13 @@ use requests::Requests;
 use sticks::Sticks;
 use survey::Survey;
 
-/// Our component id: MAV_COMP_ID_ONBOARD_COMPUTER.
+/// Component id of the companion: MAV_COMP_ID_ONBOARD_COMPUTER.
 pub const ONBOARD: u8 = 191;
-/// The controller's component id: MAV_COMP_ID_AUTOPILOT1.
+/// Component id of the flight controller: MAV_COMP_ID_AUTOPILOT1.
 const AUTOPILOT: u8 = 1;
-/// Silence after which a controller counts as disconnected.
+/// Time without heartbeats after which a controller counts as disconnected.
 const GONE: Duration = Duration::from_secs(3);
-/// Fraction of its nominal rate below which a stream is requested again and engaging is refused.
+/// Fraction of its nominal rate below which a stream is requested again and engagement is refused.
 const ENOUGH: f64 = 0.8;
 
 /// The connected controller.
@@ -65,27 +66,29 @@ struct Controller {
 pub struct Real {
     profile: Profile,
     controller: Option<Controller>,
-    /// Another autopilot on the link, or another companion with our ids.
+    /// Another autopilot on the link, or another companion with the ids of this companion.
     intruder: Option<Source>,
-    /// Another component of the controller's system (a gimbal, a camera) that sends heartbeats, and when it last did.
+    /// Another component of the controller's system (such as a gimbal or a camera) that sends heartbeats, with the time
+    /// of the last one.
     sibling: Option<(Duration, Source)>,
     /// Host time of the last call of `due`.
     now: Duration,
     parameters: Parameters,
     survey: Survey,
     requests: Requests,
-    /// Whether the controller's frames are signed.
+    /// Whether any frame of the controller had a signature.
     signs: bool,
-    /// Whether the controller receives a radio, as observed while it flew itself.
+    /// Whether the controller receives a radio, as reported while the companion had no control authority; `None` before
+    /// the first report.
     radio: Option<bool>,
-    /// Delay margin of the loop through the surfaces, where known.
+    /// Delay margin of the loop through the surfaces; `None` if unknown.
     bears: Option<Duration>,
     assembly: Assembly,
     engagement: Engagement,
     sticks: Sticks,
     ramp: AttitudeRamp,
     trim: AttitudeTrim,
-    /// The last command sent to the actuators.
+    /// The last command that was demanded, in −1..1 (throttle 0..1).
     sent: Command,
     last_state: Option<Duration>,
     pulse: Pulse,
@@ -100,7 +103,7 @@ pub struct Real {
 }
 
 impl Real {
-    /// A connection by `profile` before any frame is received.
+    /// A connection with `profile`, before any frame is received.
     pub fn new(profile: Profile) -> Self {
         Real {
             profile,
@@ -134,19 +137,20 @@ impl Real {
     }
 
     fn say(&mut self, severity: Severity, words: String) {
-        // the queue stays bounded if nobody fetches notices
+        // the queue stays bounded even if nobody fetches notices
         if self.notices.len() < 64 {
             self.notices.push_back(Notice::Text(severity, words));
         }
     }
 
-    /// Returns control authority; completion is reported when the controller's mode shows it.
+    /// Returns control authority. Completion is reported when the controller's mode confirms it.
     fn hand_back(&mut self, reason: String) {
         self.engagement.hand_back();
         self.notices.push_back(Notice::Released(reason));
     }
 
-    /// The frames that answer the state of `time`: they command the actuators as demanded, or are empty.
+    /// The frames that reply to the state of vehicle time `time`. They command the actuators as demanded; empty if no
+    /// command is due.
     pub fn answer(&mut self, host: Duration, time: Time, demand: &Demand) -> Vec<u8> {
         let Outputs::Armed(command) = demand.outputs else {
             self.engagement.rest();
@@ -194,11 +198,12 @@ impl Real {
         self.write(&message)
     }
 
-    /// The attitude to command for `wanted` (rad): rate-limited, and trimmed while the controller flies it.
+    /// The attitude to command for `wanted` (rad): rate-limited, and with integral correction while the controller
+    /// tracks it.
     fn commanded(&mut self, time: Time, wanted: [f64; 2]) -> [f64; 2] {
         let seen = self.assembly.attitude();
         if !self.flies() {
-            // until then the aircraft's own attitude is sent
+            // until the controller flies the attitude, the aircraft's measured attitude is sent
             self.ramp.rest();
             self.trim.rest();
             return self.ramp.command(time, wanted, seen);
@@ -212,27 +217,27 @@ impl Real {
         self.notices.pop_front()
     }
 
-    /// Whether the controller's mode shows that it executes the commands.
+    /// Whether the controller's mode confirms that it executes the companion's commands.
     pub fn flies(&self) -> bool {
         self.engagement.is_engaged()
     }
 
-    /// Whether the companion has control authority, or is taking it.
+    /// Whether the companion has control authority or is requesting it.
     pub fn is_engaged(&self) -> bool {
         self.engagement.steers()
     }
 
-    /// Peer of the controller, see [`super::Vehicle::peer`].
+    /// Peer of the controller, see [`super::Vehicle::peer`]; `None` before the first heartbeat.
     pub fn peer(&self) -> Option<PeerId> {
         self.controller.map(|c| c.peer)
     }
 
-    /// System id of the controller, once received.
+    /// System id of the controller; `None` before the first heartbeat.
     pub fn system(&self) -> Option<u8> {
         self.controller.map(|c| c.system)
     }
 
-    /// The controller's MAV_AUTOPILOT, and whether it is armed.
+    /// The controller's MAV_AUTOPILOT, and whether it is armed; `None` before the first heartbeat.
     pub fn controller(&self) -> Option<(u8, bool)> {
         self.controller.map(|c| (c.autopilot, c.armed))
     }
@@ -242,7 +247,7 @@ impl Real {
         &self.survey
     }
 
-    /// Check result of each parameter.
+    /// Name, check result and text of each checked parameter.
     pub fn parameter_report(&self) -> Vec<(&'static str, Standing, String)> {
         self.parameters.report(self.system().unwrap_or(1), self.radio == Some(true))
     }
@@ -267,7 +272,7 @@ impl Real {
     }
 
     fn write(&mut self, message: &Message) -> Vec<u8> {
-        // until a controller is received its system id is assumed to be the usual one
+        // until a controller is received, its system id is assumed to be 1
         let source = Source { system: self.system().unwrap_or(1), component: ONBOARD };
         self.sequence = self.sequence.wrapping_add(1);
         message.encode(Version::V2, self.sequence, source).unwrap_or_default()

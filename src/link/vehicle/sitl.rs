@@ -1,4 +1,4 @@
-//! The `sitl` profile: five messages make a state frame, one answers it.
+//! The `sitl` profile: five messages form a state frame, which one message answers.
 
 use std::time::Duration;
 
@@ -19,11 +19,11 @@ const SHIM: u8 = 200;
 const COMPANION: u8 = 1;
 /// Time between state frames, µs.
 const PERIOD_US: u64 = 10_000;
-/// A step back of the clock by more than this is a restart, µs; less is a late datagram.
+/// Step back of the clock, µs, above which the vehicle has restarted. A smaller step back is a late datagram.
 const RESTART_US: u64 = 1_000_000;
 /// Silence after which another peer may take over the link.
 const TAKEOVER: Duration = Duration::from_secs(1);
-/// Relative tolerance between the travels of airframe and vehicle: the file has four digits.
+/// Relative tolerance between the travels of airframe and vehicle. The airframe file has four digits.
 const TRAVEL_TOLERANCE: f64 = 1e-3;
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
@@ -34,25 +34,25 @@ pub struct VehicleCounts {
     pub frames: FrameCounts,
     /// State frames delivered as new.
     pub states: u64,
-    /// State frames lost, from gaps in their times.
+    /// State frames lost, from gaps in their timestamps.
     pub lost: u64,
-    /// State frames received again.
+    /// State frames that were received again.
     pub repeated: u64,
     /// State frames that arrived after a newer one.
     pub late: u64,
-    /// State frames with a missing message.
+    /// State frames that lack a message, or whose messages have different timestamps.
     pub incomplete: u64,
     /// State frames with at least one fault.
     pub faulty: u64,
     /// Starts of the vehicle's clock, including the first.
     pub starts: u64,
-    /// MAVLink frames from other senders than the vehicle.
+    /// MAVLink frames from senders other than the vehicle.
     pub foreign: u64,
-    /// Commands that were not finite, replaced by the last finite one.
+    /// Commands that were not finite and were replaced by the last finite command.
     pub bad_commands: u64,
 }
 
-/// Messages of the state frame in reception.
+/// Messages received so far of the next state frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct Parts {
     imu: Option<(Time, [f64; 3])>,
@@ -65,15 +65,15 @@ struct Parts {
 #[derive(Clone, Debug)]
 pub struct Sitl {
     system: u8,
-    /// Deflections at full command from the airframe file.
+    /// Travels of the surfaces from the airframe file.
     travels: Travels,
-    /// Surfaces and motors of the airframe, where it names them.
+    /// Surfaces and motors of the airframe; `None` if the airframe does not name them.
     mixer: Option<Mixer>,
-    /// The vehicle's travel when it differs from the airframe's.
+    /// The vehicle's travels, if they differ from the airframe's.
     foreign_travel: Option<Travels>,
     told_foreign_travel: bool,
     parts: Parts,
-    /// The last state delivered; faulty parts of the next one keep its values.
+    /// The last delivered state. Faulty parts of the next state keep its values.
     last: Telemetry,
     peer: Option<(PeerId, Duration)>,
     last_command: Command,
@@ -83,8 +83,8 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// A connection to the vehicle with system id `system`; `travels` are those of its airframe. The vehicle
-    /// normalises positions by its own travel; if that differs, it cannot be engaged.
+    /// A connection to the vehicle with the system id `system`. `travels` are those of its airframe. The vehicle
+    /// normalises surface positions by its own travels. If these differ, the vehicle cannot be engaged.
     pub fn new(system: u8, travels: Travels) -> Self {
         let nan = f64::NAN;
         let nothing = Telemetry {
@@ -118,7 +118,7 @@ impl Sitl {
         }
     }
 
-    /// Also sends the individual commands of the airframe's surfaces and motors, after the four controls.
+    /// Also sends the commands of the individual surfaces and motors, after the four controls.
     pub fn with_mixer(self, mixer: Option<Mixer>) -> Self {
         Sitl { mixer, ..self }
     }
@@ -144,8 +144,8 @@ impl Sitl {
         self.counts.frames.add(counts);
     }
 
-    /// Whether the frame is the vehicle's: the right ids, from the peer that owns the link. This keeps the states of
-    /// two simultaneous shims apart.
+    /// Whether the frame is from the vehicle: it has the right ids and comes from the present peer of the link. This
+    /// keeps the states of two simultaneous shims apart.
     fn is_vehicle(&mut self, host: Duration, peer: PeerId, frame: &Frame<'_>) -> bool {
         if frame.source != (Source { system: self.system, component: SHIM }) {
             return false;
@@ -188,7 +188,7 @@ impl Sitl {
         None
     }
 
-    /// Assembles a state frame; nothing when messages are missing or of different times.
+    /// Assembles a state frame. Returns `None` if messages are missing or have different timestamps.
     fn complete(
         &mut self,
         parts: Parts,
@@ -203,7 +203,7 @@ impl Sitl {
             self.counts.incomplete += 1;
             return None;
         };
-        // Rounded to a millisecond either way.
+        // Both sides round to a millisecond.
         let off_ms = boot_ms.wrapping_sub((time.as_micros() / 1000) as u32);
         if time_b != time || time_c != time || !matches!(off_ms, 0 | 1 | u32::MAX) {
             self.counts.incomplete += 1;
@@ -226,7 +226,7 @@ impl Sitl {
         self.foreign_travel = (!alike(&found, &self.travels)).then_some(found);
     }
 
-    /// Why it cannot be engaged, see [`super::Vehicle::obstacle`].
+    /// Reason for which the vehicle cannot be engaged, see [`super::Vehicle::obstacle`].
     pub fn obstacle(&self) -> Option<String> {
         self.foreign_travel.map(|found| {
             format!(
@@ -238,7 +238,7 @@ impl Sitl {
         })
     }
 
-    /// The oldest notice, see [`super::Vehicle::take_notice`]: a differing travel is reported once.
+    /// The oldest notice, see [`super::Vehicle::take_notice`]. Differing travels are reported once.
     pub fn take_notice(&mut self) -> Option<Notice> {
         if self.told_foreign_travel {
             return None;
@@ -248,7 +248,7 @@ impl Sitl {
         Some(Notice::Text(Severity::Error, format!("cannot be engaged: {obstacle}")))
     }
 
-    /// Updates the counters from the frame's time.
+    /// Determines the order of a frame by its timestamp, and updates the counters.
     fn order(&mut self, time: Time) -> Order {
         let (now, before) = (time.as_micros(), self.last.time.as_micros());
         if self.counts.starts == 0 || now.saturating_add(RESTART_US) < before {
@@ -275,8 +275,8 @@ impl Sitl {
         }
     }
 
-    /// The reply to a state, see [`super::Vehicle::answer`]. A command that is not finite is replaced by the last
-    /// finite one.
+    /// The reply to a state, see [`super::Vehicle::answer`]. The last finite command replaces a command that is not
+    /// finite.
     pub fn command(&mut self, time: Time, outputs: Outputs) -> Vec<u8> {
         let outputs = match outputs {
             Outputs::Armed(command) if !command.is_finite() => {
@@ -295,7 +295,7 @@ impl Sitl {
         self.write(&wire::actuator_controls(time, outputs, self.mixer.as_ref()))
     }
 
-    /// Frames due, see [`super::Vehicle::due`].
+    /// The heartbeat if it is due at `host`, see [`super::Vehicle::due`].
     pub fn heartbeat(&mut self, host: Duration, outputs: Outputs) -> Option<Vec<u8>> {
         if host < self.next_heartbeat {
             return None;
@@ -354,7 +354,7 @@ fn fill_air(
     }
 }
 
-/// Whether two aircraft have the same travel. A rudder that only the vehicle has stays centred.
+/// Whether two aircraft have the same travels. A rudder that only the vehicle has stays centred and is not compared.
 fn alike(found: &Travels, wanted: &Travels) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= TRAVEL_TOLERANCE * b.abs();
     let same = |a: Travel, b: Travel| close(a.least, b.least) && close(a.most, b.most);

@@ -14,7 +14,7 @@ use crate::autopilot::{Parameter, ParameterValue, Severity};
 use crate::framing::Source;
 use greylag_physics::Time;
 
-/// Characters of one STATUSTEXT message.
+/// Largest number of characters of one STATUSTEXT message.
 pub const TEXT_CHUNK: usize = 50;
 
 /// The result of a command, MAV_RESULT.
@@ -30,17 +30,17 @@ pub enum CommandResult {
     Unsupported = 3,
 }
 
-/// COMMAND_ACK to the sender of a command; encoded by hand since `number` may be unknown.
+/// COMMAND_ACK to the sender of a command. It is encoded by hand, because rust-mavlink cannot represent an unknown
+/// `number`.
 pub fn command_ack(number: u16, result: CommandResult, to: Source) -> Message {
     let [low, high] = number.to_le_bytes();
-    // command, result, then the extensions: progress, result_param2, target system and component.
+    // command and result, then the extension fields: progress, result_param2, target system and component
     Message::raw(77, vec![low, high, result as u8, 0, 0, 0, 0, 0, to.system, to.component], 3)
 }
 
 /// PARAM_VALUE of one table entry.
 pub fn parameter_value(parameter: &Parameter, index: usize, count: usize) -> Message {
-    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. Encoded by hand, so that no bit pattern passes through a
-    // float on its way.
+    // MAV_PARAM_TYPE: 6 is INT32, 9 is REAL32. Encoded by hand, so that no integer passes through a float.
     let (value, kind) = match parameter.value {
         ParameterValue::Real(x) => (x.to_le_bytes(), 9),
         ParameterValue::Int(n) => (n.to_le_bytes(), 6),
@@ -60,11 +60,11 @@ pub enum ParameterFault {
     DoesNotExist,
     /// The value is out of range.
     OutOfRange,
-    /// The type differs from the table's.
+    /// The type differs from the type in the table.
     TypeMismatch,
 }
 
-/// PARAM_ERROR about a parameter, by name or by index (−1 when by name).
+/// PARAM_ERROR about a parameter. `index` is −1 if the parameter was requested by name.
 pub fn parameter_error(
     name: ParameterName,
     index: i16,
@@ -87,15 +87,15 @@ pub fn parameter_error(
 
 /// STATUSTEXT messages that together carry `words`, in chunks that share `id`.
 ///
-/// MAVLink 1 has no fields for the id and the number of a chunk: there each chunk is a text of its own. Characters
-/// outside ASCII become `?`, because receivers differ in their encoding.
+/// MAVLink 1 has no fields for the id and the number of a chunk. Each chunk is then a separate text. Characters outside
+/// ASCII become `?`, because receivers differ in their encoding.
 pub fn texts(severity: Severity, words: &str, id: u16) -> Vec<Message> {
     let bytes: Vec<u8> =
         words.chars().map(|c| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' }).collect();
     if bytes.len() <= TEXT_CHUNK {
         return vec![text(severity, &bytes, 0, 0)];
     }
-    // A chunk shorter than the field ends the text, hence an empty one after an exact multiple.
+    // A chunk shorter than the field ends the text. After an exact multiple an empty chunk follows.
     let ender = bytes.len().is_multiple_of(TEXT_CHUNK).then_some(&[][..]);
     bytes
         .chunks(TEXT_CHUNK)
@@ -137,13 +137,13 @@ pub fn autopilot_version() -> Message {
     }))
 }
 
-/// Major, minor and patch in the upper three bytes; the lowest, 0, marks a development version.
+/// Packs major, minor and patch into the upper three bytes. The lowest byte is 0 for a development version.
 fn software_version(text: &str) -> u32 {
     let part = |part: &str| part.parse::<u8>().map_or(0, u32::from);
     text.split(['.', '-']).take(3).map(part).fold(0, |sum, p| sum << 8 | p) << 8
 }
 
-/// PROTOCOL_VERSION: MAVLink 1 and 2, 2 preferred.
+/// PROTOCOL_VERSION: MAVLink 1 and 2 are supported, 2 is preferred.
 pub fn protocol_version() -> Message {
     let mut payload = vec![0; 22];
     for (field, version) in payload.chunks_mut(2).zip([200u16, 100, 200]) {
@@ -152,7 +152,7 @@ pub fn protocol_version() -> Message {
     Message::raw(300, payload, 22)
 }
 
-/// MESSAGE_INTERVAL: µs between messages, −1 when off, 0 when the message is not sent here.
+/// MESSAGE_INTERVAL: µs between messages; −1 if the message is off, 0 if it is not available.
 pub fn message_interval(id: u32, interval_us: i32) -> Message {
     Message::coded(MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA {
         interval_us,
@@ -160,7 +160,7 @@ pub fn message_interval(id: u32, interval_us: i32) -> Message {
     }))
 }
 
-/// HOME_POSITION: latitude and longitude in 1e-7 degrees, altitude above mean sea level in mm.
+/// HOME_POSITION: latitude and longitude in 1e-7°, altitude above mean sea level in mm.
 pub fn home_position(home: Home, now: Time) -> Message {
     Message::coded(MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude: (home.position[0] * 1e7).round() as i32,
@@ -172,7 +172,7 @@ pub fn home_position(home: Home, now: Time) -> Message {
     }))
 }
 
-/// MISSION_COUNT 0 for a mission type.
+/// MISSION_COUNT of 0 items for the mission type `kind`.
 pub fn empty_mission(kind: u8, to: Source) -> Message {
     Message::raw(44, vec![0, 0, to.system, to.component, kind, 0, 0, 0, 0], 4)
 }
@@ -188,18 +188,18 @@ pub enum MissionResult {
     InvalidSequence = 13,
 }
 
-/// MISSION_ACK for a mission type.
+/// MISSION_ACK for the mission type `kind`.
 pub fn mission_ack(result: MissionResult, kind: u8, to: Source) -> Message {
     Message::raw(47, vec![to.system, to.component, result as u8, kind, 0, 0, 0, 0], 3)
 }
 
-/// FTP refusal: NAK with "unknown command", as there are no files.
+/// FTP refusal: NAK with "unknown command", because there are no files.
 pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     const NAK: u8 = 129;
     const UNKNOWN_COMMAND: u8 = 7;
     let mut payload = [0; 251];
     payload[..2].copy_from_slice(&sequence.wrapping_add(1).to_le_bytes());
-    // session, opcode, size, the request's opcode; the data start at 12.
+    // session, opcode, size and opcode of the request; the data start at byte 12
     payload[2..6].copy_from_slice(&[session, NAK, 1, opcode]);
     payload[12] = UNKNOWN_COMMAND;
     Message::coded(MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
@@ -210,9 +210,9 @@ pub fn file_nak(sequence: u16, session: u8, opcode: u8, to: Source) -> Message {
     }))
 }
 
-/// TIMESYNC reply: our time and the time of the request, both in ns.
+/// TIMESYNC reply with the time of this program and the time of the request, both in ns.
 pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
-    // Zero would read as a request.
+    // a reply with a time of zero would count as a request
     let ours = i64::try_from(now.as_micros().saturating_mul(1000)).unwrap_or(i64::MAX).max(1);
     Message::coded(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: ours,
@@ -222,7 +222,7 @@ pub fn time_sync(theirs: i64, now: Time, to: Source) -> Message {
     }))
 }
 
-/// PING answer: the request's numbers, addressed to its sender.
+/// PING reply with the request's time and sequence number, addressed to its sender.
 pub fn ping(time_usec: u64, sequence: u32, to: Source) -> Message {
     let mut payload = time_usec.to_le_bytes().to_vec();
     payload.extend(sequence.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The messages between the companion and a real flight controller.
+//! Messages between the companion and a real flight controller.
 
 use mavlink::Message as _;
 use mavlink::dialects::ardupilotmega::{
@@ -17,18 +17,18 @@ pub const SET_MODE: u16 = 176;
 /// Command number of MAV_CMD_SET_MESSAGE_INTERVAL.
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 
-/// Standard deviations assumed for the wind of WIND_COV (PX4) and of WIND (ArduPlane), m/s. PX4's wind was accurate to
-/// 0.1 m/s in calm air. ArduPlane's is sent at 2 Hz and drifts by 0.9 m/s: assuming 0.5 m/s for it gave a sideslip error
-/// of 1.3° (standard deviation), assuming 4 m/s gave 0.3° (`tests/firmware/angles.py`).
+/// Assumed standard deviations of the wind in WIND_COV (PX4) and in WIND (ArduPlane), m/s. PX4's wind had an error of
+/// 0.1 m/s in calm air. ArduPlane's wind is sent at 2 Hz and drifts by 0.9 m/s. Assuming 0.5 m/s for it gave a sideslip
+/// error of 1.3° (standard deviation), assuming 4 m/s gave 0.3° (`tests/firmware/angles.py`).
 const WIND_COV_SD: f64 = 0.5;
 const WIND_SD: f64 = 4.0;
 
-/// A message from a flight controller, in SI units.
+/// A message from a flight controller, converted to SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ControllerMessage {
     /// HEARTBEAT of the flight controller.
     Heartbeat {
-        /// MAV_AUTOPILOT: 12 is PX4, 3 ArduPilot, 8 no flight controller.
+        /// MAV_AUTOPILOT: 12 is PX4, 3 is ArduPilot, 8 is no flight controller.
         autopilot: u8,
         /// Whether MAV_MODE_FLAG_SAFETY_ARMED is set.
         armed: bool,
@@ -46,16 +46,16 @@ pub enum ControllerMessage {
     },
     /// Accelerometers and air density from HIGHRES_IMU.
     Imu {
-        /// Time of the measurement.
+        /// Time of the measurement, as stamped by the flight controller.
         time: Time,
         /// Specific force, m/s², FRD.
         specific_force: [f64; 3],
-        /// Air density from static pressure and temperature, kg/m³; NaN when they are not reported.
+        /// Air density from static pressure and temperature, kg/m³; NaN if they are not reported or implausible.
         density: f64,
     },
     /// Airspeed, altitude and climb rate from VFR_HUD.
     Air {
-        /// Equivalent airspeed (calibrated, on PX4), m/s.
+        /// Equivalent airspeed, m/s; PX4 reports calibrated airspeed.
         airspeed: f64,
         /// Altitude above mean sea level, m.
         altitude: f64,
@@ -75,8 +75,8 @@ pub enum ControllerMessage {
     Wind {
         /// Velocity of the air, NED, m/s.
         velocity: [f64; 3],
-        /// Standard deviation assumed for each horizontal component, m/s: larger than the error of one message, because
-        /// successive errors are correlated.
+        /// Assumed standard deviation of each horizontal component, m/s. It is larger than the error of one message,
+        /// because successive errors are correlated.
         sd: f64,
     },
     /// Result of a command, COMMAND_ACK.
@@ -85,12 +85,12 @@ pub enum ControllerMessage {
         command: u16,
         /// MAV_RESULT; 0 is ACCEPTED.
         result: u8,
-        /// Target of the reply: zeros from firmware that leaves it out.
+        /// Target of the reply; zeros from firmware without target fields.
         to: Source,
     },
     /// Radio receiver status from SYS_STATUS.
     Receiver {
-        /// Whether it is present and healthy.
+        /// Whether the receiver is present and healthy.
         alive: bool,
     },
     /// Present flight mode, from CURRENT_MODE.
@@ -98,13 +98,13 @@ pub enum ControllerMessage {
         /// Mode number of the flight stack.
         custom_mode: u32,
     },
-    /// PARAM_VALUE, decoded by both encodings of its value.
+    /// PARAM_VALUE, with its value decoded by both encodings.
     Parameter {
         /// Name of the parameter.
         name: String,
-        /// The float field as a number: ArduPilot's encoding of integers.
+        /// The number in the float field: ArduPilot's encoding of integers.
         cast: f64,
-        /// The float field's bytes in the parameter's type: PX4's encoding.
+        /// The bytes of the float field read in the parameter's type: PX4's encoding.
         bytewise: f64,
     },
     /// One chunk of a STATUSTEXT.
@@ -114,9 +114,9 @@ pub enum ControllerMessage {
         /// Text of the chunk.
         words: String,
     },
-    /// TIMESYNC reply with our own time, ns.
+    /// TIMESYNC reply.
     TimeSync {
-        /// The time that we sent, ns.
+        /// The time that this program sent in its request, ns.
         ours: i64,
     },
 }
@@ -131,7 +131,7 @@ const AIR: f64 = 287.053;
 pub fn read(frame: &Frame<'_>) -> Option<ControllerMessage> {
     let fields = Fields(frame.payload);
     match frame.id {
-        // Decoded by byte offset: the crate rejects values that a later release added to an enumeration.
+        // Decoded by byte offset, because rust-mavlink rejects enumeration values of later releases.
         0 => {
             return Some(ControllerMessage::Heartbeat {
                 autopilot: fields.u8(5),
@@ -210,40 +210,41 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
             ControllerMessage::Wind { velocity, sd: WIND_COV_SD }
         }
         MavMessage::WIND(m) => {
-            // the direction that the wind comes from
+            // the direction from which the wind comes
             let (sin, cos) = wide(m.direction).to_radians().sin_cos();
             let speed = wide(m.speed);
             let velocity = [-speed * cos, -speed * sin, wide(m.speed_z)];
             ControllerMessage::Wind { velocity, sd: WIND_SD }
         }
-        // A reply carries the other side's time.
+        // A reply contains the other side's time, a request zero.
         MavMessage::TIMESYNC(m) if m.tc1 != 0 => ControllerMessage::TimeSync { ours: m.ts1 },
         _ => return None,
     })
 }
 
-/// Air density from pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message specifies
-/// hPa; PX4 of 2025 sends Pa, which is distinguishable in this atmosphere.
+/// Air density from pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message specifies hPa.
+/// PX4 of 2025 sends Pa, which the value reveals in this atmosphere.
 fn density(pressure: f64, temperature: f64) -> f64 {
     let pressure = if pressure > 10_000.0 { pressure / 100.0 } else { pressure };
     let believable = (200.0..=1100.0).contains(&pressure) && (-80.0..=85.0).contains(&temperature);
     if believable { 100.0 * pressure / (AIR * (temperature + 273.15)) } else { f64::NAN }
 }
 
-/// Target system and component of a frame; 0 is a broadcast or a message without a target.
+/// Target system and component of a frame; 0 for a broadcast or a message without a target.
 pub fn recipient(frame: &Frame<'_>) -> (u8, u8) {
     decode(frame).map_or((0, 0), |message| {
         (message.target_system_id().unwrap_or(0), message.target_component_id().unwrap_or(0))
     })
 }
 
-/// Whether a message commands the aircraft, so that it is blocked while the companion has control authority:
-/// MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, SET_ATTITUDE_TARGET, SET_POSITION_TARGET_*.
+/// Whether a message commands the aircraft: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, SET_ATTITUDE_TARGET,
+/// SET_POSITION_TARGET_* and SET_ACTUATOR_CONTROL_TARGET. Such messages are blocked while the companion has control
+/// authority.
 pub fn steers(id: u32) -> bool {
     matches!(id, 69 | 70 | 82 | 84 | 86 | 139)
 }
 
-/// SETUP_SIGNING, which holds a secret key and is never forwarded.
+/// Message id of SETUP_SIGNING, which contains a secret key and is never forwarded.
 pub const SETUP_SIGNING: u32 = 256;
 
 /// HEARTBEAT of an onboard computer.
@@ -261,7 +262,7 @@ pub fn heartbeat(engaged: bool) -> Message {
     }))
 }
 
-/// COMMAND_LONG, encoded by hand so that no enumeration limits its number.
+/// COMMAND_LONG, encoded by hand because rust-mavlink cannot represent every command number.
 fn command(to: Source, number: u16, params: [f32; 3]) -> Message {
     let mut payload = Vec::with_capacity(33);
     params.iter().for_each(|p| payload.extend(p.to_le_bytes()));
@@ -271,18 +272,18 @@ fn command(to: Source, number: u16, params: [f32; 3]) -> Message {
     Message::raw(76, payload, 33)
 }
 
-/// Requests a message every `interval_us` microseconds.
+/// Request for message `id` every `interval_us` microseconds.
 pub fn message_interval(to: Source, id: u32, interval_us: f32) -> Message {
     command(to, SET_MESSAGE_INTERVAL, [id as f32, interval_us, 0.0])
 }
 
-/// Requests a mode: the stack's mode number, and its sub mode where it has one.
+/// Request for a mode by the stack's mode number and sub mode (0 without one).
 pub fn set_mode(to: Source, main: u8, sub: u8) -> Message {
     // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
     command(to, SET_MODE, [1.0, f32::from(main), f32::from(sub)])
 }
 
-/// PARAM_REQUEST_READ of a parameter by name.
+/// PARAM_REQUEST_READ of the parameter `name`.
 pub fn parameter_request(to: Source, name: &str) -> Message {
     Message::coded(MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
         param_index: -1,
@@ -292,7 +293,7 @@ pub fn parameter_request(to: Source, name: &str) -> Message {
     }))
 }
 
-/// MANUAL_CONTROL: pitch (+ nose down), roll (+ right), throttle in thousandths.
+/// MANUAL_CONTROL in thousandths: pitch (positive nose down), roll (positive right), throttle (0..1000).
 pub fn manual_control(to: Source, [x, y, z]: [i16; 3]) -> Message {
     Message::coded(MavMessage::MANUAL_CONTROL(MANUAL_CONTROL_DATA {
         x,
@@ -303,7 +304,7 @@ pub fn manual_control(to: Source, [x, y, z]: [i16; 3]) -> Message {
     }))
 }
 
-/// RC_CHANNELS_OVERRIDE of the first three channels, µs; 0 returns a channel to the radio.
+/// RC_CHANNELS_OVERRIDE of channels 1 to 3, pulse widths in µs. 0 returns a channel to the radio.
 pub fn channels_override(to: Source, [one, two, three]: [u16; 3]) -> Message {
     // 65535 leaves a channel unchanged
     let rest = u16::MAX;
@@ -322,7 +323,7 @@ pub fn channels_override(to: Source, [one, two, three]: [u16; 3]) -> Message {
     }))
 }
 
-/// SET_ATTITUDE_TARGET: roll and pitch (rad) at yaw zero, with thrust 0..1; rates are ignored.
+/// SET_ATTITUDE_TARGET with roll and pitch (rad) at yaw zero, and thrust 0..1. Body rates are masked.
 pub fn attitude_target(to: Source, time_ms: u32, [roll, pitch]: [f64; 2], thrust: f64) -> Message {
     Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
         time_boot_ms: time_ms,
@@ -335,7 +336,7 @@ pub fn attitude_target(to: Source, time_ms: u32, [roll, pitch]: [f64; 2], thrust
     }))
 }
 
-/// TIMESYNC request with our time, ns.
+/// TIMESYNC request with the time of this program, ns.
 pub fn time_sync(ours: i64, to: Source) -> Message {
     Message::coded(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: 0,
@@ -351,7 +352,7 @@ mod tests {
 
     #[test]
     fn pressure_is_read_in_hectopascal_and_in_pascal() {
-        // 934.0756 hPa at 10.6 °C, as real PX4 sent it in Pa: 93407.56 / (287.053 · 283.75).
+        // 934.0756 hPa at 10.6 °C, which a real PX4 sent in Pa: 93407.56 / (287.053 · 283.75).
         for pressure in [934.0756, 93_407.56] {
             assert!(
                 (density(pressure, 10.6) - 1.14678).abs() < 1e-4,

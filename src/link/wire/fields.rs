@@ -1,6 +1,6 @@
-//! Payload fields read by their offset, for messages whose enumerations must not reject a frame.
+//! Payload fields read by byte offset, for messages in which unknown enumeration values must not reject a frame.
 
-/// A payload whose truncated end reads as zeros, as in MAVLink 2.
+/// A payload whose truncated trailing bytes read as zeros, as in MAVLink 2.
 #[derive(Clone, Copy)]
 pub struct Fields<'a>(pub &'a [u8]);
 

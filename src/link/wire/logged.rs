@@ -1,4 +1,4 @@
-//! Messages of a telemetry log as named numbers, in the units of the wire.
+//! Messages of a telemetry log as named numbers, in the units of MAVLink.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 
@@ -9,7 +9,7 @@ use super::{Frame, decode};
 pub enum Own {
     /// Milliseconds since the sender started, modulo 2³².
     BootMs(u32),
-    /// Microseconds since the sender started, or since 1970.
+    /// Microseconds since the sender started, or since 1970, depending on the sender.
     Micros(u64),
     /// The message has no timestamp.
     None,
@@ -20,11 +20,11 @@ pub enum Own {
 pub struct Values {
     /// Name of the message.
     pub topic: &'static str,
-    /// Timestamp inside the message.
+    /// Timestamp inside the message; `Own::None` without one.
     pub own: Own,
-    /// Names of its fields.
+    /// Names of the message's fields.
     pub fields: &'static [&'static str],
-    /// Their values in the units of the wire; those beyond `fields` are unused.
+    /// Values of the fields in the units of MAVLink. Values beyond the length of `fields` are unused.
     pub values: [f64; 16],
 }
 
@@ -42,7 +42,7 @@ pub enum Logged {
     },
 }
 
-/// The names of the actuator fields.
+/// Names of the fields with actuator controls, actuator outputs and servo outputs.
 const CONTROLS: [&str; 4] = ["controls0", "controls1", "controls2", "controls3"];
 const ACTUATORS: [&str; 16] = [
     "actuator0",
@@ -81,7 +81,7 @@ const SERVOS: [&str; 16] = [
     "servo16_raw",
 ];
 
-/// Decodes a frame; `None` for messages without the flight's states or commands.
+/// Decodes a frame; `None` for messages without states, commands or parameters of the flight.
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
     Some(Logged::Values(match decode(frame)? {
         MavMessage::PARAM_VALUE(m) => {

@@ -1,4 +1,4 @@
-//! Conversion between MAVLink messages and the project's own types. Only this module uses rust-mavlink's types.
+//! Conversion between MAVLink messages and Greylag's types. Only this module uses rust-mavlink's types.
 
 pub mod answer;
 pub mod controller;
@@ -25,11 +25,11 @@ pub struct Message(Content);
 enum Content {
     /// Encoded by rust-mavlink.
     Coded(Box<MavMessage>),
-    /// Encoded by hand, because the enumerations of rust-mavlink cannot represent every number.
+    /// Encoded by hand, because rust-mavlink's enumerations cannot represent every number.
     Raw {
         id: u32,
         payload: Vec<u8>,
-        /// The length without extension fields, for MAVLink 1.
+        /// Payload length without extension fields, bytes, for MAVLink 1.
         base: usize,
     },
 }
@@ -43,7 +43,7 @@ impl Message {
         Message(Content::Raw { id, payload, base })
     }
 
-    /// Message id, as numbered by MAVLink.
+    /// MAVLink id of the message.
     pub fn id(&self) -> u32 {
         match &self.0 {
             Content::Coded(message) => message.message_id(),
@@ -51,7 +51,7 @@ impl Message {
         }
     }
 
-    /// The encoded frame; `None` when MAVLink 1 cannot carry the message id.
+    /// The encoded frame; `None` if MAVLink 1 cannot carry the message id.
     pub fn encode(&self, version: Version, sequence: u8, source: Source) -> Option<Vec<u8>> {
         match &self.0 {
             Content::Coded(message) => {
@@ -74,12 +74,12 @@ fn codec_version(version: Version) -> MavlinkVersion {
     }
 }
 
-/// Decodes a frame by rust-mavlink; `None` if an enumeration has an unknown value.
+/// Decodes a frame with rust-mavlink; `None` if an enumeration has an unknown value.
 fn decode(frame: &Frame<'_>) -> Option<MavMessage> {
     MavMessage::parse(codec_version(frame.version), frame.id, frame.payload).ok()
 }
 
-/// CRC_EXTRA of a message; `None` outside the dialect.
+/// CRC_EXTRA of a message; `None` if the message is not in the dialect.
 pub fn crc_extra(id: u32) -> Option<u8> {
     match MavMessage::extra_crc(id) {
         // rust-mavlink returns 0 for unknown messages, and one known message has a CRC_EXTRA of 0.

@@ -1,4 +1,4 @@
-//! Flight modes in PX4's `custom_mode` encoding, and the heartbeat that carries them.
+//! Flight modes in PX4's `custom_mode` encoding, and the heartbeat that contains them.
 
 use mavlink::dialects::ardupilotmega::{
     AVAILABLE_MODES_DATA, CURRENT_MODE_DATA, HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag,
@@ -22,7 +22,7 @@ pub enum ModeRequest {
     Unknown,
 }
 
-/// The main and sub mode of PX4.
+/// PX4's main and sub mode of a mode.
 fn numbers(mode: Mode) -> (u8, u8) {
     match mode {
         Mode::Manual => (1, 0),
@@ -33,13 +33,13 @@ fn numbers(mode: Mode) -> (u8, u8) {
     }
 }
 
-/// The `custom_mode` of a mode: main mode in the third byte, sub mode in the fourth.
+/// The `custom_mode` of a mode: main mode in bits 16 to 23, sub mode in bits 24 to 31.
 pub fn custom_mode(mode: Mode) -> u32 {
     let (main, sub) = numbers(mode);
     u32::from(main) << 16 | u32::from(sub) << 24
 }
 
-/// The mode requested by SET_MODE.
+/// The mode that SET_MODE requests with its base mode and custom mode.
 pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     match base & CUSTOM {
         0 => from_base(base),
@@ -47,8 +47,8 @@ pub fn from_set_mode(base: u8, custom: u32) -> ModeRequest {
     }
 }
 
-/// The mode requested by DO_SET_MODE: main and sub mode in two parameters as PX4's clients send them, or the whole
-/// `custom_mode` in one. NaN counts as zero.
+/// The mode that DO_SET_MODE requests. PX4's clients send main and sub mode in two parameters. Other clients send the
+/// whole `custom_mode` in one. NaN counts as zero.
 pub fn from_do_set_mode(base: f64, main: f64, sub: f64) -> ModeRequest {
     let base = base as u32 as u8;
     match base & CUSTOM {
@@ -66,7 +66,7 @@ fn from_numbers(main: u8, sub: u8) -> ModeRequest {
     }
 }
 
-/// The mode of a base mode alone: its most automatic flag has priority.
+/// The mode for a base mode alone. Its most automatic flag has priority.
 fn from_base(base: u8) -> ModeRequest {
     match base {
         b if b & 0b1100 != 0 => ModeRequest::Known(Mode::Hold),
@@ -86,7 +86,7 @@ fn base_mode(status: &Status) -> u8 {
     flags | CUSTOM | if status.armed { ARMED } else { 0 }
 }
 
-/// Content of a heartbeat: one is sent immediately when it changes.
+/// Content of a heartbeat. A change is sent immediately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulse {
     base: u8,
@@ -95,7 +95,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// The heartbeat's content for this status.
+    /// The content of the heartbeat for `status`.
     pub fn of(status: &Status) -> Self {
         let state = match (status.failsafe || !status.vehicle_alive, status.armed) {
             (true, _) => MavState::MAV_STATE_CRITICAL,
@@ -115,7 +115,7 @@ pub enum Role {
     Onboard,
 }
 
-/// HEARTBEAT of a fixed-wing autopilot, or of the computer beside one.
+/// HEARTBEAT of a fixed-wing autopilot, or of an onboard computer, according to `role`.
 pub fn heartbeat(status: &Status, role: Role) -> Message {
     let pulse = Pulse::of(status);
     let state =
@@ -139,7 +139,7 @@ pub fn heartbeat(status: &Status, role: Role) -> Message {
     }))
 }
 
-/// AVAILABLE_MODES, counted from 1; 0 requests all. Empty when the index does not exist.
+/// AVAILABLE_MODES of mode `index`, counted from 1; 0 returns all modes. Empty if the index does not exist.
 pub fn available_modes(index: usize) -> Vec<Message> {
     const AUTOMATIC: u32 = 4;
     let modes = [
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn modes_are_written_as_px4_writes_them() {
-        // PX4's px4_custom_mode.h: { uint16 reserved; uint8 main_mode; uint8 sub_mode }.
+        // PX4's px4_custom_mode.h: { uint16 reserved; uint8 main_mode; uint8 sub_mode }
         assert_eq!(custom_mode(Mode::Offboard), 6 << 16);
         assert_eq!(custom_mode(Mode::Hold), 0x0304_0000);
         for mode in [Mode::Manual, Mode::Hold, Mode::Return, Mode::Offboard, Mode::Stabilized] {
@@ -187,7 +187,7 @@ mod tests {
             let known = ModeRequest::Known(mode);
             assert_eq!(from_set_mode(1, custom_mode(mode)), known);
             assert_eq!(from_do_set_mode(1.0, main.into(), sub.into()), known);
-            // pymavlink's set_mode_apm puts the whole custom_mode into one float.
+            // pymavlink's set_mode_apm sends the whole custom_mode in one float
             assert_eq!(from_do_set_mode(1.0, f64::from(custom_mode(mode) as f32), f64::NAN), known);
         }
     }

@@ -1,4 +1,4 @@
-//! Messages of an offboard client: sent to, and received from, an autopilot.
+//! Messages that an offboard client sends to an autopilot, and messages that it receives.
 
 use mavlink::dialects::ardupilotmega::{
     AttitudeTargetTypemask, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage,
@@ -13,23 +13,23 @@ use crate::framing::{Frame, Source};
 /// A message received from an autopilot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
-    /// HEARTBEAT: armed state, and the mode or `None` if unknown.
+    /// HEARTBEAT of the autopilot.
     Heartbeat {
-        /// Actuator outputs are live.
+        /// Whether the actuator outputs are enabled.
         armed: bool,
-        /// The active mode.
+        /// The active mode; `None` if it is unknown.
         mode: Option<Mode>,
     },
-    /// Roll and pitch, rad, with the autopilot's time.
+    /// Attitude with the autopilot's time, from ATTITUDE.
     Attitude {
-        /// Time since its boot, s.
+        /// Time since the autopilot's boot, s.
         time_s: f64,
         /// Roll angle φ, rad.
         roll: f64,
         /// Pitch angle θ, rad.
         pitch: f64,
     },
-    /// True airspeed in m/s, altitude in m.
+    /// Airspeed and altitude, from VFR_HUD.
     Speed {
         /// True airspeed V_a, m/s.
         airspeed: f64,
@@ -43,7 +43,7 @@ pub enum Heard {
         /// Whether the result is MAV_RESULT_ACCEPTED.
         accepted: bool,
     },
-    /// A line of text (a chunk of at most 50 characters).
+    /// A chunk of text of at most 50 characters, from STATUSTEXT.
     Text(String),
 }
 
@@ -59,7 +59,7 @@ pub fn heartbeat() -> Message {
     }))
 }
 
-/// SET_ATTITUDE_TARGET with roll and pitch (rad); rates and thrust are masked.
+/// SET_ATTITUDE_TARGET with roll and pitch (rad) at yaw zero. Body rates and thrust are masked.
 pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Message {
     Message::coded(MavMessage::SET_ATTITUDE_TARGET(SET_ATTITUDE_TARGET_DATA {
         time_boot_ms: time_ms,
@@ -71,12 +71,12 @@ pub fn attitude_target(to: Source, time_ms: u32, roll: f64, pitch: f64) -> Messa
     }))
 }
 
-/// Command MAV_CMD_COMPONENT_ARM_DISARM that arms.
+/// MAV_CMD_COMPONENT_ARM_DISARM that arms.
 pub fn arm(to: Source) -> Message {
     command(to, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0])
 }
 
-/// MAV_CMD_DO_SET_MODE to a mode, in PX4's numbers.
+/// MAV_CMD_DO_SET_MODE for a mode, in PX4's mode numbers.
 pub fn set_mode(to: Source, wanted: Mode) -> Message {
     let custom = mode::custom_mode(wanted);
     let [_, _, main, sub] = custom.to_le_bytes();

@@ -1,4 +1,4 @@
-//! Requests of clients, decoded from frames.
+//! Requests of clients, decoded from MAVLink frames.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 
@@ -10,13 +10,13 @@ use crate::autopilot::{AttitudeSetpoint, ParameterValue, Sticks};
 /// Target of a message; 0 is a broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipient {
-    /// System id, 0 for all.
+    /// System id; 0 for all systems.
     pub system: u8,
-    /// Component id, 0 for all.
+    /// Component id; 0 for all components.
     pub component: u8,
 }
 
-/// A parameter's name as sent: up to 16 bytes, zero-terminated if shorter.
+/// A parameter's name as sent: up to 16 bytes. A shorter name ends with a zero byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParameterName(pub [u8; 16]);
 
@@ -30,24 +30,24 @@ impl ParameterName {
 /// Key of a requested parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKey {
-    /// By its index in the table (which may not exist).
+    /// Index in the parameter table, which may not exist.
     Index(usize),
-    /// By its name.
+    /// Name of the parameter.
     Name(ParameterName),
 }
 
-/// A command from COMMAND_LONG or COMMAND_INT; its number may be unknown.
+/// A command from COMMAND_LONG or COMMAND_INT. Its number may be unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandRequest {
     /// Number of the MAV_CMD.
     pub number: u16,
-    /// Parameters 1 to 7; those a command does not use are often NaN.
+    /// Parameters 1 to 7. Parameters that a command does not use are often NaN.
     pub params: [f64; 7],
-    /// 0 on the first transmission, then counting up.
+    /// Number of retransmissions: 0 on the first transmission.
     pub confirmation: u8,
 }
 
-/// Steps of the mission protocol that are answered.
+/// Steps of the mission protocol to which this program replies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionStep {
     /// Request for the number of items.
@@ -67,17 +67,17 @@ pub enum Request {
     Command(CommandRequest),
     /// SET_MODE: base mode and custom mode.
     SetMode { base: u8, custom: u32 },
-    /// SET_ATTITUDE_TARGET, or why it is invalid.
+    /// SET_ATTITUDE_TARGET, or the reason for which it is invalid.
     Attitude(Result<AttitudeSetpoint, SetpointFault>),
-    /// A setpoint of an unsupported kind (positions, velocities, raw actuators).
+    /// A setpoint of an unsupported kind (position, velocity, raw actuators).
     OtherSetpoint,
-    /// MANUAL_CONTROL; `None` when an axis is missing.
+    /// MANUAL_CONTROL; `None` if an axis is marked as invalid.
     Sticks(Option<Sticks>),
     /// Request for the whole table, PARAM_REQUEST_LIST.
     ParameterList,
-    /// PARAM_REQUEST_READ.
+    /// PARAM_REQUEST_READ by index or name.
     ParameterRead(ParameterKey),
-    /// PARAM_SET; the value is `None` for a type that is not in the table (8 or 16 bits, …).
+    /// PARAM_SET. The value is `None` for a type other than INT32 and REAL32.
     ParameterSet { name: ParameterName, value: Option<ParameterValue> },
     /// A mission message with its MAV_MISSION_TYPE.
     Mission { step: MissionStep, kind: u8 },
@@ -85,9 +85,9 @@ pub enum Request {
     File { sequence: u16, session: u8, opcode: u8 },
     /// TIMESYNC request with the client's time, ns.
     TimeSync { theirs: i64 },
-    /// PING with its time and sequence number.
+    /// PING with the sender's time (µs) and sequence number.
     Ping { time_usec: u64, sequence: u32 },
-    /// REQUEST_DATA_STREAM: the group, and its rate in Hz or `None` to stop it.
+    /// REQUEST_DATA_STREAM: the group and its rate in Hz (0: default rates); `None` stops the group.
     DataStream { group: u8, rate: Option<u16> },
 }
 
@@ -103,7 +103,7 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
             let to = Recipient { system: fields.u8(4), component: 0 };
             (to, Request::SetMode { base: fields.u8(5), custom: fields.u32(0) })
         }
-        // a request is broadcast (0/0), a reply has one target
+        // a PING request is broadcast (0/0), a reply has one target
         4 if fields.bytes(12) == [0, 0] => {
             (at(12), Request::Ping { time_usec: fields.u64(0), sequence: fields.u32(8) })
         }
@@ -124,7 +124,7 @@ pub fn read(frame: &Frame<'_>) -> Option<(Recipient, Request)> {
     Some(found)
 }
 
-/// Decodes messages without enum fields; the codec rejects unknown enum values.
+/// Decodes messages without enumeration fields. rust-mavlink rejects unknown enumeration values.
 fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
     let to = |system: u8, component: u8| Recipient { system, component };
     Some(match message {
@@ -148,7 +148,7 @@ fn coded(message: MavMessage) -> Option<(Recipient, Request)> {
                 Request::File { sequence: body.u16(0), session: body.u8(2), opcode: body.u8(3) };
             (to(m.target_system, m.target_component), file)
         }
-        // A reply carries a time in tc1, a request zero.
+        // a reply contains a time in tc1, a request zero
         MavMessage::TIMESYNC(m) if m.tc1 == 0 => {
             (to(m.target_system, m.target_component), Request::TimeSync { theirs: m.ts1 })
         }

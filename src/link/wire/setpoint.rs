@@ -1,32 +1,32 @@
-//! Decoding and validation of clients' setpoints.
+//! Decoding and validation of setpoints from clients.
 
 use mavlink::dialects::ardupilotmega::{MANUAL_CONTROL_DATA, SET_ATTITUDE_TARGET_DATA};
 
 use crate::autopilot::{AttitudeSetpoint, Sticks};
 
-/// Mask bit: thrust is to be ignored.
+/// Mask bit that marks the thrust as ignored.
 const IGNORE_THRUST: u8 = 64;
-/// Mask bit: the attitude is to be ignored.
+/// Mask bit that marks the attitude as ignored.
 const IGNORE_ATTITUDE: u8 = 128;
-/// Range of a quaternion's norm that is normalised; outside it the quaternion is invalid.
+/// Norms of quaternions that are accepted and normalised. A quaternion outside this range is invalid.
 const NORM: std::ops::RangeInclusive<f64> = 0.1..=10.0;
-/// Thrust above this is invalid; below it, thrust is clamped to 0..1.
+/// Largest valid magnitude of the thrust. Valid thrust is clamped to 0..1.
 const MAX_THRUST: f64 = 1.5;
 /// INT16_MAX marks an axis of MANUAL_CONTROL as invalid.
 const NO_AXIS: i16 = i16::MAX;
 
-/// Why a setpoint is refused; it does not restart the offboard timeout either.
+/// Reason for which a setpoint is refused. A refused setpoint does not restart the offboard timeout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetpointFault {
     /// A value is NaN, infinite or out of range.
     NotFinite,
     /// The quaternion has a zero norm.
     NoAttitude,
-    /// Only body rates or thrust are commanded: an attitude is required.
+    /// The attitude is masked: only body rates or thrust are commanded.
     AttitudeMasked,
 }
 
-/// The commanded attitude. Rates and yaw are ignored: a fixed-wing aircraft turns by banking.
+/// The commanded attitude. Body rates and yaw are ignored, because a fixed-wing aircraft turns by banking.
 pub(super) fn attitude(data: &SET_ATTITUDE_TARGET_DATA) -> Result<AttitudeSetpoint, SetpointFault> {
     let mask = data.type_mask.bits();
     if mask & IGNORE_ATTITUDE != 0 {
@@ -48,7 +48,8 @@ fn thrust(sent: f32) -> Result<f64, SetpointFault> {
     }
 }
 
-/// Roll, pitch and yaw, rad, of a quaternion NED→FRD (w first) of any sign and a norm near one.
+/// Roll, pitch and yaw, rad, of a quaternion NED→FRD (w first). The quaternion may have either sign and a norm of
+/// 0.1..10.
 pub fn euler(q: [f64; 4]) -> Result<(f64, f64, f64), SetpointFault> {
     if q.iter().any(|x| !x.is_finite()) {
         return Err(SetpointFault::NotFinite);
@@ -67,7 +68,7 @@ pub fn euler(q: [f64; 4]) -> Result<(f64, f64, f64), SetpointFault> {
     Ok((roll, pitch, yaw))
 }
 
-/// The quaternion NED→FRD, w first, of Euler angles in rad.
+/// The quaternion NED→FRD, w first, of Euler angles roll, pitch and yaw in rad.
 pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     let ((sr, cr), (sp, cp), (sy, cy)) =
         ((roll / 2.0).sin_cos(), (pitch / 2.0).sin_cos(), (yaw / 2.0).sin_cos());
@@ -79,7 +80,7 @@ pub fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
     ]
 }
 
-/// Stick positions; `None` when one of the three axes in use is marked as invalid.
+/// Stick positions; `None` if one of the three used axes is marked as invalid.
 pub(super) fn sticks(data: &MANUAL_CONTROL_DATA) -> Option<Sticks> {
     if [data.x, data.y, data.z].contains(&NO_AXIS) {
         return None;
@@ -98,7 +99,7 @@ mod tests {
 
     #[test]
     fn a_quaternion_and_its_negative_are_one_attitude() {
-        // Any attitude away from ±90° pitch; 1e-12 is rounding in a dozen operations.
+        // Any attitude away from ±90° pitch. 1e-12 covers the rounding of a dozen operations.
         let angles = [0.7, -0.3, 2.5];
         let q = quaternion(angles);
         for signed in [q, q.map(|c| -c), q.map(|c| 3.0 * c)] {

@@ -1,4 +1,4 @@
-//! The messages of the `sitl` profile's vehicle link.
+//! Messages of the vehicle link in the `sitl` profile.
 
 use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState,
@@ -13,17 +13,18 @@ use greylag_physics::{Command, Time};
 /// Flag MAV_MODE_FLAG_SAFETY_ARMED of the base mode.
 const ARMED: u8 = 128;
 
-/// Smallest value of `active` of a vehicle that reports all surfaces and their travel.
+/// Least value of `active` with which a vehicle reports all surfaces and their travels.
 const ALL: u32 = 15;
 
-/// Deflection at a normalised command of 1 for a vehicle that does not report its travel, rad: that of the X8.
+/// Deflection at a normalised command of 1, rad, for a vehicle that does not report its travel. The value is that of
+/// the X8.
 #[expect(clippy::approx_constant, reason = "the simulator's stop is at 0.5235 rad, not at 30°")]
 pub const TRAVEL: f64 = 0.5235;
 
-/// A message from the vehicle, in SI units except for the normalised actuators.
+/// A message from the vehicle in SI units, except for the normalised actuators.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VehicleMessage {
-    /// HIGHRES_IMU: the frame's time and the specific force, m/s², FRD.
+    /// Time and specific force of a state frame, from HIGHRES_IMU.
     Imu {
         /// Time of the state frame.
         time: Time,
@@ -46,16 +47,16 @@ pub enum VehicleMessage {
         /// Sideslip angle, rad.
         beta: f64,
     },
-    /// ACTUATOR_OUTPUT_STATUS: positions and rates of the surfaces as fractions of the larger of their two travels.
+    /// ACTUATOR_OUTPUT_STATUS. Surface positions and rates are fractions of the larger of the surface's two travels.
     Actuators {
         /// Time of the state frame.
         time: Time,
         /// Number of outputs in use.
         active: u32,
-        /// Aileron, elevator and throttle positions, aileron and elevator rates in 1/s, rudder
-        /// position and rate.
+        /// Aileron, elevator and throttle positions, aileron and elevator rates (1/s), rudder position and rudder rate
+        /// (1/s).
         outputs: [f64; 7],
-        /// Travel of the surfaces.
+        /// Travels of the surfaces, rad.
         travels: Travels,
     },
     /// ATTITUDE_QUATERNION, which completes a state frame.
@@ -117,14 +118,15 @@ pub fn read(frame: &Frame<'_>) -> Option<VehicleMessage> {
     })
 }
 
-/// Aileron, elevator, throttle, aileron rate, elevator rate, rudder, rudder rate.
+/// Aileron, elevator, throttle, aileron rate, elevator rate, rudder, rudder rate; the rudder is 0 if it is not
+/// reported.
 fn outputs(active: u32, actuator: &[f64; 32]) -> [f64; 7] {
     let rudder = if active >= ALL { [actuator[7], actuator[8]] } else { [0.0; 2] };
     let [a, e, t, ar, er] = std::array::from_fn(|i| actuator[i]);
     [a, e, t, ar, er, rudder[0], rudder[1]]
 }
 
-/// The travel of the surfaces that the vehicle reports.
+/// The travels of the surfaces that the vehicle reports, rad; the default travel if it reports none.
 fn travels(active: u32, actuator: &[f64; 32]) -> Travels {
     let side = |at: usize| Travel { least: actuator[at + 3], most: actuator[at] };
     match active {
@@ -151,11 +153,11 @@ pub enum Outputs {
     Armed(Command),
 }
 
-/// Index of the first individual surface or motor command.
+/// Index of the first control that commands an individual surface or motor.
 const OWN: usize = 4;
 
-/// HIL_ACTUATOR_CONTROLS in reply to the state frame of `time`; after the four controls come the individual commands
-/// of the surfaces and motors of `mixer`.
+/// HIL_ACTUATOR_CONTROLS in reply to the state frame of `time`. After the four controls come the commands of the
+/// individual surfaces and motors of `mixer`.
 pub fn actuator_controls(time: Time, outputs: Outputs, mixer: Option<&Mixer>) -> Message {
     let mut controls = [0.0; 16];
     let mut mode = 0;

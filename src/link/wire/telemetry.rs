@@ -16,9 +16,9 @@ use greylag_physics::Time;
 pub struct Stream {
     /// Message id.
     pub id: u32,
-    /// Default rate, Hz; 0 is off.
+    /// Default rate, Hz; 0 if the stream is off by default.
     pub default_hz: f64,
-    /// The group of REQUEST_DATA_STREAM it belongs to (MAV_DATA_STREAM).
+    /// Group of REQUEST_DATA_STREAM (MAV_DATA_STREAM) to which the stream belongs.
     pub group: u8,
 }
 
@@ -44,10 +44,10 @@ pub const STREAMS: [Stream; 14] = [
     stream(NAMED_VALUE_FLOAT, 1.0, 12),
 ];
 
-/// Message id of the residuals, one message for each known residual.
+/// Message id of NAMED_VALUE_FLOAT, which is sent once for each known residual.
 pub const NAMED_VALUE_FLOAT: u32 = 251;
 
-/// Index of a message in [`STREAMS`].
+/// Index of message `id` in [`STREAMS`]; `None` if it is not a stream.
 pub fn position(id: u32) -> Option<usize> {
     STREAMS.iter().position(|stream| stream.id == id)
 }
@@ -61,10 +61,10 @@ pub struct Home {
     pub altitude: f64,
 }
 
-/// Inputs of the streams other than the status.
+/// Inputs of the streams in addition to the status.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scene {
-    /// Time of the vehicle's clock.
+    /// Vehicle time.
     pub now: Time,
     /// The home position; `None` until it is known.
     pub home: Option<Home>,
@@ -72,7 +72,7 @@ pub struct Scene {
     pub bad_frames: u64,
 }
 
-/// NAMED_VALUE_FLOAT for each residual that is known.
+/// One NAMED_VALUE_FLOAT for each known residual.
 pub fn residuals(status: &Status, scene: &Scene) -> impl Iterator<Item = Message> {
     let time_boot_ms = boot_ms(scene.now);
     let known = RESIDUALS.iter().zip(status.residuals).filter(|(_, value)| value.is_finite());
@@ -85,7 +85,7 @@ pub fn residuals(status: &Status, scene: &Scene) -> impl Iterator<Item = Message
     })
 }
 
-/// One stream message; `None` when `id` is no stream or its content is unknown.
+/// The stream message `id`; `None` if `id` is not a stream or its content is unknown.
 pub fn message(id: u32, status: &Status, scene: &Scene) -> Option<Message> {
     let built = match id {
         1 => sys_status(status, scene),
@@ -152,7 +152,7 @@ fn attitude_quaternion(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// ATTITUDE_TARGET; without a target the mask marks attitude and rates as ignored.
+/// ATTITUDE_TARGET. Without a target the mask marks attitude and body rates as ignored.
 fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     let yaw = if status.attitude[2].is_finite() { status.attitude[2] } else { 0.0 };
     let (attitude, mask) = match finite(status.target) {
@@ -168,7 +168,7 @@ fn attitude_target(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// Ignore bits of body rates, ATTITUDE_TARGET_TYPEMASK.
+/// Mask bits of ATTITUDE_TARGET_TYPEMASK that mark body rates, and the attitude, as ignored.
 const RATES_IGNORED: u8 = 0b111;
 const ATTITUDE_IGNORED: u8 = 1 << 7;
 
@@ -201,7 +201,7 @@ fn global_position(status: &Status, scene: &Scene) -> Option<MavMessage> {
     }))
 }
 
-/// A compass angle in 0.01°, 65535 when unknown.
+/// A compass angle in 0.01°; 65535 if it is unknown.
 fn centidegrees(degrees: f64) -> u16 {
     match degrees.is_finite() {
         true => (degrees.rem_euclid(360.0) * 100.0) as u16 % 36000,
@@ -249,7 +249,7 @@ fn servo_output(status: &Status, scene: &Scene) -> MavMessage {
 
 fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     type S = MavSysStatusSensor;
-    // sensors behind the vehicle's own estimate, all or none; the compass is included because
+    // the sensors behind the vehicle's estimate are all healthy or all unhealthy; the compass is included because
     // MAVSDK's `health_all_ok` waits for it
     let sensors = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
@@ -262,7 +262,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
         | S::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
         | S::MAV_SYS_STATUS_AHRS
         | S::MAV_SYS_STATUS_PREARM_CHECK;
-    // There is no fence to be breached: MAVProxy reports a breach when this bit is missing.
+    // Without a fence none can be breached. MAVProxy reports a breach if this bit is missing.
     let fence = S::MAV_SYS_STATUS_GEOFENCE;
     let health = if status.vehicle_alive { sensors | fence } else { fence };
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
@@ -278,7 +278,7 @@ fn sys_status(status: &Status, scene: &Scene) -> MavMessage {
     })
 }
 
-/// BATTERY_STATUS with all values unknown: the flight controller reports the battery on its own link.
+/// BATTERY_STATUS with unknown values. The flight controller reports the battery on its own link.
 fn battery() -> MavMessage {
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
         current_consumed: -1,
@@ -291,7 +291,7 @@ fn battery() -> MavMessage {
     })
 }
 
-/// `MAV_LANDED_STATE`: an armed aircraft counts as in air, because there is no weight-on-wheels sensor.
+/// `MAV_LANDED_STATE`. An armed aircraft counts as in air, because there is no weight-on-wheels sensor.
 fn landed(status: &Status) -> MavLandedState {
     match (status.vehicle_alive, status.armed) {
         (_, true) => MavLandedState::MAV_LANDED_STATE_IN_AIR,

@@ -1,16 +1,18 @@
-//! Reader of AVL's stability derivatives (`ST`, `SB`): rows of `NAME = number`, totals at a reference incidence,
-//! derivatives by α and β (1/rad), by pb/2V, qc/2V, rb/2V, and by controls whose names stand above their columns.
-//! `ST` is in stability axes, converted here to body axes; `SB` is by u, v, w over V in body axes.
+//! Reader of AVL's stability derivatives, commands `ST` and `SB`.
+//!
+//! The text has rows of `NAME = number`, with totals at a reference angle of attack. Derivatives are with respect to α and β
+//! (1/rad), pb/2V, qc/2V, rb/2V, and controls, whose names are above their columns. `ST` is in stability axes, which are
+//! converted to body axes. `SB` is with respect to u, v, w over V, in body axes.
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
 
-/// Description of the text's origin for messages.
+/// Origin of the text, for messages.
 const FROM: &str = "AVL's command ST (or SB), given in the menu OPER after a run, writes it";
-/// Side force, lift, rolling, pitching and yawing moment.
+/// AVL's names of side force, lift, rolling, pitching and yawing moment.
 const NAMES: [&str; 5] = ["CY", "CL", "Cl", "Cm", "Cn"];
 
-/// Reads AVL's `text`; control derivatives are converted to 1/rad, given the `radians` in their unit.
+/// Reads AVL's `text`. Control derivatives are converted to 1/rad. `radians` is their unit of angle in rad.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let numbers = Numbers::read(text)?;
     let alpha = numbers.need("Alpha", FROM)?.to_radians();
@@ -36,7 +38,7 @@ pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesE
     })
 }
 
-/// The derivatives with that suffix, moments in body axes.
+/// The derivatives with the name suffix `suffix`, with moments in body axes. `alpha` is in rad.
 fn column(
     numbers: &Numbers,
     suffix: &str,
@@ -56,7 +58,7 @@ fn column(
     Ok(to_body(all, alpha))
 }
 
-/// Names of the controls with the suffixes of their derivatives; a line holds `aileron d01 elevator d02`.
+/// Names of the controls, each with the suffix of its derivatives. A line contains `aileron d01 elevator d02`.
 fn control_names(text: &str) -> Vec<(String, String)> {
     let mut all: Vec<(String, String)> = Vec::new();
     for line in text.lines().filter(|line| !line.contains('=')) {

@@ -1,20 +1,20 @@
-//! Plausibility checks of derivatives: a quantity that a tool did not compute is zero in its output and is rejected.
+//! Plausibility checks of derivatives. A quantity that a tool did not compute is zero in its output and is rejected.
 
 use super::{Tool, Value};
 use crate::textbook::{Measures, Tail};
 
-/// Least rolling damping relative to the lift slope: elliptic wings have 1/8 of it, very short ones 1/12.
+/// Smallest roll damping as a fraction of the lift slope. Elliptic wings have 1/8, very short wings 1/12.
 const ROLL_DAMPING: f64 = 0.02;
-/// Least pitch damping of an aircraft with a tail; textbook values are −5 and beyond.
+/// Smallest |Cmq| of an aircraft with a tail. Textbook values are −5 and below.
 const PITCH_DAMPING: f64 = 1.0;
-/// Least yaw damping of an aircraft with a tail; a fin alone gives −0.02 and beyond.
+/// Smallest |Cnr| of an aircraft with a tail. A fin alone gives −0.02 and below.
 const YAW_DAMPING: f64 = 8e-3;
-/// Least moment derivative of a control, 1/rad.
+/// Smallest magnitude of a control's moment derivative, 1/rad.
 const CONTROL: f64 = 5e-3;
 /// Plausible lift slopes of whole aircraft, 1/rad.
 const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=8.0;
 
-/// Removes the values that `tool` cannot have computed; returns warnings about these and about implausible ones.
+/// Removes the values that `tool` cannot have computed. Returns warnings about these values and about implausible ones.
 pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>) -> Vec<String> {
     let of = |name: &str| values.iter().find(|(full, _)| full.ends_with(name)).map(|(_, x)| *x);
     let slope = of(".CLalpha").unwrap_or(0.0);
@@ -31,7 +31,7 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
         let x = of(name)?;
         (x > -least).then(|| {
             let text = format!(
-                "{} = {x:.4} beside CLalpha = {slope:.2}: {}; {} are textbook estimates",
+                "{} = {x:.4} with CLalpha = {slope:.2}: {}; {} are textbook estimates",
                 &name[1..],
                 tool.of_damping(),
                 rates.iter().map(|r| &r[1..]).collect::<Vec<_>>().join(", ")
@@ -57,14 +57,14 @@ pub(super) fn doubtful(tool: Tool, measures: &Measures, values: &mut Vec<Value>)
     warnings
 }
 
-/// Controls with their primary moment, and all their derivatives.
+/// Controls, each with the derivative of its primary moment and with all its derivatives.
 const CONTROLS: [(&str, &str, &[&str]); 3] = [
     ("aileron", ".Clda", &[".CYda", ".Clda", ".Cnda"]),
     ("elevator", ".Cmde", &[".CLde", ".Cmde"]),
     ("rudder", ".Cndr", &[".CYdr", ".Cldr", ".Cndr"]),
 ];
 
-/// Appends warnings about values that are kept but implausible.
+/// Appends warnings about values that are implausible but kept.
 fn odd(of: &dyn Fn(&str) -> Option<f64>, slope: f64, warnings: &mut Vec<String>) {
     if !SLOPES.contains(&slope) {
         warnings.push(format!(

@@ -1,8 +1,9 @@
-//! Reader of results of OptVL and AeroSandbox in Python, written as JSON: the tools' names under a few keys of ours
-//! (docs/how-to/add-an-aircraft.md has the ten lines that write it).
+//! Reader of results of OptVL and AeroSandbox in Python, written as JSON.
 //!
-//! OptVL: `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), controls per degree. AeroSandbox:
-//! `CLa`, moments about body axes; control derivatives are differences computed by the script, per degree.
+//! The quantities have the tools' names, under a few keys of this program. The ten lines that write the file are in
+//! docs/how-to/add-an-aircraft.md. OptVL has `dCL/dalpha`, moments about stability axes with a prime (`dCl'/dp'`), and controls
+//! per degree. AeroSandbox has `CLa`, and moments about body axes. Its control derivatives are differences per degree that the
+//! script computes.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use serde_json::{Map, Value};
 
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, positive, to_body};
 
-/// Numbers of a document at any depth, except those of `controls`.
+/// Content of a document: its numbers at any depth (except those of `controls`), and its other entries.
 struct Flat<'a> {
     numbers: BTreeMap<&'a str, f64>,
     controls: Option<&'a Map<String, Value>>,
@@ -18,7 +19,7 @@ struct Flat<'a> {
     point: Option<[f64; 2]>,
 }
 
-/// Reads a JSON document; control derivatives are converted to 1/rad, given the `radians` in their unit.
+/// Reads a JSON document. Control derivatives are converted to 1/rad. `radians` is their unit of angle in rad.
 pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesError> {
     let flat = document(text)?;
     let flat = Flat::of(&flat)?;
@@ -29,7 +30,7 @@ pub(super) fn read(text: &str, radians: f64) -> Result<Derivatives, DerivativesE
     }
 }
 
-/// Reference area, chord and span, in the file's unit.
+/// Reference area, chord and span, in the file's unit of length.
 pub(super) fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
     Flat::of(&document(text)?)?.reference()
 }
@@ -64,7 +65,7 @@ impl<'a> Flat<'a> {
                 }
                 Value::Object(inner) => self.gather(inner)?,
                 Value::String(text) if name == "tool" => self.tool = Some(text),
-                // for a missing number Python writes NaN, which is not valid JSON, or null
+                // Python writes a missing number as NaN, which is not valid JSON, or as null
                 Value::Null => return Err(no_number(name, value)),
                 Value::Array(all) if name == "XYZref" => {
                     let at = |k: usize| all.get(k).and_then(Value::as_f64);

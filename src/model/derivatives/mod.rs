@@ -1,8 +1,8 @@
-//! Stability derivatives computed by aerodynamic tools, converted to an airframe and a model.
+//! Stability derivatives computed by aerodynamic tools, and their conversion to an airframe and a model.
 //!
-//! Each tool has its axes, units and names; they are converted to body axes, 1/rad, and nondimensional rates pb/2V,
-//! qc/2V, rb/2V. Each derivative has the standard deviation of its tool ([`widths`]), and a derivative that a tool
-//! cannot compute is reported and not used (`checks`).
+//! Each tool has its own axes, units and names. Its derivatives are converted to body axes, 1/rad, and nondimensional rates
+//! pb/2V, qc/2V, rb/2V. Each derivative has the standard deviation of its tool ([`widths`]). A derivative that a tool cannot
+//! compute is reported and not used (`checks`).
 
 mod avl;
 mod checks;
@@ -16,33 +16,33 @@ pub use widths::Tool;
 
 use super::textbook::{Estimate, Measures, Section};
 
-/// Data of an aircraft beside its derivatives.
+/// Data of an aircraft in addition to its derivatives.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Name, mass, tail, travel and thrust; span and area come from the file.
+    /// Name, mass, tail, travel and thrust. The file's span and area replace those given here.
     pub measures: Measures,
-    /// Length in metres of the file's unit of length.
+    /// The file's unit of length, m.
     pub metres: f64,
-    /// Angle in radians of the control derivatives' unit; AVL has degrees times the control's gain.
+    /// Unit of angle of the control derivatives, rad. AVL's unit is a degree times the control's gain.
     pub radians: f64,
 }
 
-/// Result of reading a file.
+/// Result of the conversion of a file.
 #[derive(Clone, Debug)]
 pub struct Read {
     /// Tool that wrote the file.
     pub tool: Tool,
     /// Text of the airframe file.
     pub airframe: String,
-    /// Text of the model file, to be stored beside `airframe.toml`.
+    /// Text of the model file, which belongs in the folder of `airframe.toml`.
     pub model: String,
-    /// Assumptions beyond the file, and changes of sign, one sentence each.
+    /// Assumptions that are not in the file, and changes of sign, one sentence each.
     pub notes: Vec<String>,
-    /// Implausible values by name, one sentence each.
+    /// Warnings about implausible values, one sentence each, with the coefficient's name.
     pub warnings: Vec<String>,
 }
 
-/// Error of reading derivatives.
+/// Reason why derivatives cannot be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DerivativesError {
     /// A required number is missing.
@@ -50,7 +50,7 @@ pub enum DerivativesError {
     Missing {
         /// Name of the number.
         name: String,
-        /// Description of its origin.
+        /// Which output of the tool contains the number.
         tool: &'static str,
     },
     /// A value is not a number.
@@ -58,7 +58,7 @@ pub enum DerivativesError {
     Number {
         /// Name of the number.
         name: String,
-        /// The text in its place.
+        /// The text that is there instead.
         text: String,
         /// Line of the text, from 1.
         line: usize,
@@ -71,40 +71,40 @@ pub enum DerivativesError {
         /// Description of the error.
         what: String,
     },
-    /// The tool is unknown.
+    /// The tool named in the JSON is unknown.
     #[error(
         "the tool '{said}' is not known: name AeroSandbox's method, as \"tool\": \"AeroBuildup\", \"VortexLatticeMethod\" or \"LiftingLine\""
     )]
     Tool {
-        /// Name in the file.
+        /// Name of the tool in the file.
         said: String,
     },
-    /// The tool is not named and cannot be inferred from the names.
+    /// The JSON does not name the tool, and its keys do not identify it.
     #[error(
         "the JSON does not say which method computed it, and its errors depend on it: add \"tool\": \"AeroBuildup\", \"VortexLatticeMethod\" or \"LiftingLine\""
     )]
     NoTool,
-    /// The reference area or span is not positive.
+    /// The reference area, chord or span is not positive.
     #[error("Sref, Cref and Bref must be positive; check the geometry's reference")]
     Reference,
 }
 
-/// Derivatives of side force, lift, rolling, pitching, yawing moment with respect to one variable, body axes.
+/// Derivatives of side force, lift, rolling, pitching and yawing moment with respect to one variable, in body axes.
 type Column = [f64; 5];
 
-/// A control with its derivatives, 1/rad, in the tool's sign convention.
+/// A control and its derivatives, 1/rad, in the tool's sign convention.
 #[derive(Clone, Debug)]
 struct Control {
     name: String,
     column: Column,
 }
 
-/// Derivatives of a file: body axes, 1/rad.
+/// Derivatives of a file, converted to body axes and 1/rad.
 struct Derivatives {
     tool: Tool,
-    /// Reference area, chord, span in the file's unit.
+    /// Reference area, chord and span, in the file's unit of length.
     reference: [f64; 3],
-    /// Moment reference point, x and z in the file's axes.
+    /// Moment reference point: x and z in the file's axes. `None` if the file does not state it.
     point: Option<[f64; 2]>,
     /// Angle of attack of the run, rad.
     alpha: f64,
@@ -114,7 +114,7 @@ struct Derivatives {
     by_beta: Column,
     by_rates: [Column; 3],
     controls: Vec<Control>,
-    /// Assumptions of the reader.
+    /// Assumptions of the reader, one sentence each.
     notes: Vec<String>,
 }
 
@@ -132,14 +132,14 @@ fn is_json(text: &str) -> bool {
     text.trim_start().starts_with('{')
 }
 
-/// Converts moments about stability axes to body axes.
+/// Converts moments about stability axes to moments about body axes. `alpha` is in rad.
 fn to_body([side, lift, roll, pitch, yaw]: Column, alpha: f64) -> Column {
     let (sin, cos) = alpha.sin_cos();
     [side, lift, roll * cos - yaw * sin, pitch, roll * sin + yaw * cos]
 }
 
-/// Converts derivatives with respect to rates about stability axes to those about body axes: p' = p cos α + r sin α,
-/// r' = r cos α − p sin α.
+/// Converts derivatives with respect to rates about stability axes to derivatives with respect to rates about body axes.
+/// With stability-axis rates p' and r': p' = p cos α + r sin α, r' = r cos α − p sin α.
 fn about_body([p, q, r]: [Column; 3], alpha: f64) -> [Column; 3] {
     let (sin, cos) = alpha.sin_cos();
     let both = |a: f64, b: f64| std::array::from_fn(|i| a * p[i] + b * r[i]);
@@ -153,7 +153,7 @@ fn positive(all: [f64; 3]) -> Result<[f64; 3], DerivativesError> {
 /// Reference area, chord and span of the `text` of a file, in its unit of length.
 ///
 /// # Errors
-/// If one is missing or not positive.
+/// If the text cannot be parsed, or one of the three is missing or not positive.
 pub fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
     match is_json(text) {
         true => json::reference(text),
@@ -164,10 +164,10 @@ pub fn reference(text: &str) -> Result<[f64; 3], DerivativesError> {
     }
 }
 
-/// Reads the `text` of AVL, XFLR5, or OptVL's and AeroSandbox's results as JSON, with the data `beside` it.
+/// Reads the `text` of AVL or XFLR5, or the results of OptVL or AeroSandbox as JSON. `beside` has the remaining data.
 ///
 /// # Errors
-/// If a required number is missing or not a number.
+/// If the text cannot be parsed, a required number is missing or not a number, or the tool is unknown.
 pub fn read(text: &str, beside: &Beside) -> Result<Read, DerivativesError> {
     let mut found = Derivatives::read(text, beside.radians)?;
     let [area, chord, span] = found.reference;
@@ -206,7 +206,7 @@ pub fn read(text: &str, beside: &Beside) -> Result<Read, DerivativesError> {
     })
 }
 
-/// The moment reference point, in words.
+/// A sentence about the moment reference point.
 fn about(d: &Derivatives) -> String {
     match d.point {
         Some([x, z]) => format!(
@@ -217,7 +217,7 @@ fn about(d: &Derivatives) -> String {
     }
 }
 
-/// Full name and value of a coefficient.
+/// Full name (`effect.coefficient`) and value of a coefficient.
 type Value = (&'static str, f64);
 
 fn longitudinal(d: &Derivatives) -> Vec<Value> {
@@ -248,12 +248,12 @@ fn lateral(d: &Derivatives) -> Vec<Value> {
     ]
 }
 
-/// Derivatives by aileron, elevator and rudder in our sign convention; what the file lacks keeps the textbook's
-/// value.
+/// Derivatives with respect to aileron, elevator and rudder in this program's sign convention. Coefficients that the file
+/// lacks keep their textbook values.
 fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Vec<Value> {
     let mut out = Vec::new();
     let mut used = Vec::new();
-    // the place in a column, and its sign for a positive deflection
+    // for each control: the index of its primary moment in a column, and the moment's sign for a positive deflection
     for (control, word, place, sign) in
         [("aileron", "ail", 2, 1.0), ("elevator", "elev", 3, -1.0), ("rudder", "rud", 4, -1.0)]
     {
@@ -272,7 +272,7 @@ fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Ve
         used.push(name.as_str());
         let turn = if column[place] * sign < 0.0 { -1.0 } else { 1.0 };
         if turn < 0.0 {
-            notes.push(format!("{name} of the file is turned round: {}", SENSE[place - 2]));
+            notes.push(format!("{name} of the file is reversed in sign: {}", SENSE[place - 2]));
         }
         let [side, lift, roll, pitch, yaw] = column.map(|x| turn * x);
         out.extend(match control {
@@ -295,7 +295,7 @@ fn controls(d: &Derivatives, measures: &Measures, notes: &mut Vec<String>) -> Ve
     out
 }
 
-/// Effect of a positive deflection here.
+/// Effect of a positive deflection in this program, for messages.
 const SENSE: [&str; 3] = [
     "a positive aileron rolls right here",
     "a positive elevator pitches down here",
@@ -307,12 +307,12 @@ fn value(sections: &[Section], effect: &str, name: &str) -> f64 {
     own.and_then(|(_, all)| all.iter().find(|e| e.0 == name)).map_or(0.0, |e| e.1)
 }
 
-/// Lift slope (1/rad) and lift coefficient at α = 0.
+/// Lift slope (1/rad), and lift coefficient at α = 0.
 fn slope_and_zero(sections: &[Section]) -> [f64; 2] {
     [value(sections, "lift_linear", "CLalpha"), value(sections, "lift_linear", "CL0")]
 }
 
-/// Adapts the induced drag to the file's lift.
+/// Adapts the induced drag to the lift derivatives of the file.
 fn trimmed(sections: &mut [Section], measures: &Measures) {
     let [slope, zero] = slope_and_zero(sections);
     let [linear, square] = measures.induced_by(slope, zero);

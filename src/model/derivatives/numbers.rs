@@ -1,10 +1,10 @@
-//! Parser of texts of `NAME = number`, as Fortran and Qt programs write them.
+//! Parser of texts with `NAME = number`, as written by Fortran and Qt programs.
 
 use std::collections::BTreeMap;
 
 use super::DerivativesError;
 
-/// Numbers of a text by name; the first one of a name counts.
+/// Numbers of a text by name. If a name occurs several times, the first number counts.
 pub(super) struct Numbers(BTreeMap<String, f64>);
 
 impl Numbers {
@@ -25,7 +25,7 @@ impl Numbers {
                     Ok(number) if number.is_finite() => {
                         all.entry(name.to_owned()).or_insert(number);
                     }
-                    // Fortran writes stars where a number does not fit
+                    // Fortran writes asterisks for a number that does not fit its field
                     Ok(_) | Err(_)
                         if value.starts_with('*') || value.eq_ignore_ascii_case("nan") =>
                     {
@@ -43,7 +43,7 @@ impl Numbers {
         self.0.get(name).copied()
     }
 
-    /// The number `name`, required from `tool`.
+    /// The number `name`. If it is missing, the error says with `tool` which output contains it.
     pub fn need(&self, name: &str, tool: &'static str) -> Result<f64, DerivativesError> {
         let missing = || DerivativesError::Missing { name: name.into(), tool };
         self.get(name).ok_or_else(missing)

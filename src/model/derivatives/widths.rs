@@ -1,9 +1,9 @@
-//! Relative errors of each tool's derivatives: standard deviations as shares of the value.
+//! Relative errors of each tool's derivatives: standard deviations as fractions of the value.
 //!
-//! `params/widths/widths.csv` holds them: the tool's errors on aircraft whose derivatives were identified in flight
-//! or measured in a wind tunnel (`params/widths/measured.csv`, with sources), combined with a prior guess that counts
-//! as two aircraft, since few were measured: w² = (2 g² + Σ e²) / (2 + n), with the guess g and the relative errors e
-//! of n aircraft. `cargo run --no-default-features --example derivative_widths` computes them.
+//! They are in `params/widths/widths.csv`. They combine a tool's errors on aircraft whose derivatives were identified in
+//! flight or measured in a wind tunnel (`params/widths/measured.csv`, with sources) with a prior guess. The guess counts as
+//! two aircraft, because few were measured: w² = (2 g² + Σ e²) / (2 + n), with the guess g and the relative errors e of n
+//! aircraft. `cargo run --no-default-features --example derivative_widths` computes them.
 
 use std::fmt;
 use std::sync::LazyLock;
@@ -52,7 +52,8 @@ impl Tool {
         }
     }
 
-    /// Tool whose errors are used for this one: lattice methods have similar errors, except for what they neglect.
+    /// Name of the tools whose errors are used if the tables have none for this tool. Lattice methods form one family, because
+    /// they have similar errors.
     pub fn family(self) -> &'static str {
         match self {
             Tool::Avl | Tool::OptVl | Tool::Xflr5 => "lattice",
@@ -60,7 +61,7 @@ impl Tool {
         }
     }
 
-    /// Source text for a coefficient.
+    /// Text of a coefficient's source in a model file.
     pub(super) fn source(self) -> &'static str {
         match self {
             Tool::Textbook => "textbook",
@@ -73,7 +74,7 @@ impl Tool {
         }
     }
 
-    /// Explanation why a control's derivatives may be zero, with the remedy.
+    /// Explanation of why a control's derivatives may be zero, and the remedy.
     pub(super) fn of_controls(self, control: &str) -> String {
         match self {
             Tool::AeroSandboxLattice => format!(
@@ -85,11 +86,11 @@ impl Tool {
         }
     }
 
-    /// Explanation why a damping may be missing.
+    /// Explanation of why a damping derivative may be missing.
     pub(super) fn of_damping(self) -> &'static str {
         match self {
-            Tool::LiftingLine => "AeroSandbox's lifting line does not see rotation",
-            _ => "the run did not see rotation, or its reference lengths are wrong",
+            Tool::LiftingLine => "AeroSandbox's lifting line does not model rotation",
+            _ => "the run did not model rotation, or its reference lengths are wrong",
         }
     }
 }
@@ -100,7 +101,7 @@ impl fmt::Display for Tool {
     }
 }
 
-/// Entries: tool (or family), derivative, relative standard deviation.
+/// Entries of the table: tool or family, derivative, relative standard deviation.
 static WIDTHS: LazyLock<Vec<(&str, &str, f64)>> = LazyLock::new(|| {
     let lines = include_str!("../../../params/widths/widths.csv").lines();
     let columns = |line: &'static str| {
@@ -110,7 +111,7 @@ static WIDTHS: LazyLock<Vec<(&str, &str, f64)>> = LazyLock::new(|| {
     lines.filter(|line| !line.starts_with('#')).skip(1).filter_map(columns).collect()
 });
 
-/// Relative standard deviation of the derivative `name` (`CLalpha`) by `tool`; `None` if no table has it.
+/// Relative standard deviation of the derivative `name` (for example `CLalpha`) from `tool`. `None` if the table lacks it.
 pub fn of(tool: Tool, name: &str) -> Option<f64> {
     let by = |tool: &str| WIDTHS.iter().find(|w| w.0 == tool && w.1 == name).map(|w| w.2);
     by(tool.name()).or_else(|| by(tool.family()))

@@ -1,8 +1,8 @@
-//! Reader of XFLR5's log of a stability analysis: stability axes, derivatives by α, β, pb/2V, qc/2V, rb/2V, and by
-//! one control.
+//! Reader of XFLR5's log of a stability analysis: derivatives with respect to α, β, pb/2V, qc/2V, rb/2V and one control,
+//! in stability axes.
 //!
-//! The log has no reference area, chord and span: the user adds them as `Sref = …`. The analysis is at trim: its lift
-//! balances the weight at the log's speed, and its pitching moment is zero.
+//! The log has no reference area, chord and span. The user adds them as `Sref = …`. The analysis is at trim: the lift
+//! balances the weight at the log's airspeed, and the pitching moment is zero.
 
 use super::numbers::Numbers;
 use super::{Column, Control, Derivatives, DerivativesError, Tool, about_body, to_body};
@@ -21,7 +21,7 @@ pub(super) fn read(text: &str) -> Result<Derivatives, DerivativesError> {
     let need = |name: &str| numbers.need(name, FROM);
     let alpha = need("Alpha")?.to_radians();
     let reference = numbers.reference(FROM)?;
-    // a symmetric aircraft: only these are written
+    // the log of a symmetric aircraft has only these derivatives
     let stability = |values: [Option<f64>; 5]| -> Column {
         to_body(values.map(Option::unwrap_or_default), alpha)
     };
@@ -56,7 +56,7 @@ pub(super) fn read(text: &str) -> Result<Derivatives, DerivativesError> {
     })
 }
 
-/// The one control of an analysis, identified by its largest moment.
+/// The control of the analysis, identified by its largest moment. `None` if the log has no control derivatives.
 fn control(numbers: &Numbers, alpha: f64, notes: &mut Vec<String>) -> Option<Control> {
     let get = |name: &str| numbers.get(name).unwrap_or(0.0);
     let moments = [get("CLde"), get("CMde"), get("CNde")];

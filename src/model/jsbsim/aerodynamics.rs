@@ -1,4 +1,4 @@
-//! Aerodynamics of an exported aircraft: a function for each axis.
+//! Aerodynamics of an exported aircraft, one function per axis.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use super::{AILERON, ALPHA, BETA, ELEVATOR, RUDDER, coefficient, engine, product
 use crate::GreyBox;
 use greylag_num::Table;
 
-/// Axis and factors of a coefficient beside q S (and b or c for a moment).
+/// A coefficient: its name, its axis, and its factors in addition to q S (and b or c for a moment).
 type Factor = (&'static str, &'static str, &'static [&'static str]);
 
 const P: [&str; 2] = ["aero/bi2vel", "velocities/p-aero-rad_sec"];
@@ -52,7 +52,7 @@ const FACTORS: &[Factor] = &[
     ("rudder_linear.Cndr", "YAW", &[RUDDER]),
 ];
 
-/// Tables over the angle of attack: effect and axis.
+/// Tables over the angle of attack, each as effect and axis.
 const TABLES: &[(&str, &str)] =
     &[("lift_table", "LIFT"), ("drag_table", "DRAG"), ("pitch_table", "PITCH")];
 
@@ -62,7 +62,7 @@ pub(super) fn knows(name: &str) -> bool {
         || TABLES.iter().any(|(table, _)| name.strip_suffix(".k") == Some(table))
 }
 
-/// The aerodynamics section, in all conditions.
+/// The aerodynamics section for all conditions.
 pub(super) fn section(conditions: &Conditions) -> String {
     let mut out = "  <aerodynamics>\n".to_owned();
     for (axis, length) in [
@@ -93,7 +93,7 @@ pub(super) fn section(conditions: &Conditions) -> String {
     out
 }
 
-/// Terms of one axis of `model`, to be summed.
+/// The terms of one axis of `model` as elements of a sum.
 fn terms(model: &GreyBox, axis: &str) -> String {
     let products = FACTORS
         .iter()

@@ -1,4 +1,4 @@
-//! Export of one aircraft's models in several conditions as one aircraft that interpolates between them.
+//! Export of the models of several conditions as one aircraft that interpolates between the conditions.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -6,11 +6,11 @@ use std::fmt::Write;
 use super::aerodynamics;
 use crate::GreyBox;
 
-/// Settings that every JSBSim aircraft has.
+/// Settings that every JSBSim aircraft has, which need no declaration.
 const OF_JSBSIM: [&str; 4] =
     ["fcs/flap-cmd-norm", "fcs/speedbrake-cmd-norm", "fcs/spoiler-cmd-norm", "gear/gear-cmd-norm"];
 
-/// Error of combining models in several conditions.
+/// Reason why models cannot be exported as one aircraft in several conditions.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConditionsError {
     /// No model is given.
@@ -38,12 +38,12 @@ pub enum ConditionsError {
         first: String,
         /// Name of the second model.
         second: String,
-        /// Property that distinguishes the conditions.
+        /// The property that distinguishes the conditions.
         property: String,
-        /// Value of the property in both.
+        /// Value of the property in both models.
         setting: f64,
     },
-    /// A quantity that conditions cannot change differs between models.
+    /// A quantity that a condition cannot change differs between two models.
     #[error(
         "cannot export the models {first} and {second} as one aircraft: their {what} differ; a condition changes only \
          aerodynamic coefficients, so give both models the same {what}"
@@ -58,21 +58,21 @@ pub enum ConditionsError {
     },
 }
 
-/// Models of one aircraft, one for each setting of a property.
+/// Models of one aircraft, one per setting of a property.
 pub(super) struct Conditions<'a> {
-    /// Name of the property; empty for a single model.
+    /// Name of the property. Empty for a single model.
     property: String,
-    /// Settings in ascending order, with their models.
+    /// Settings in ascending order, each with its model.
     settings: Vec<(f64, &'a GreyBox)>,
 }
 
 impl<'a> Conditions<'a> {
-    /// A single model, whose condition always holds.
+    /// A single model that applies in all conditions.
     pub(super) fn one(model: &'a GreyBox) -> Self {
         Conditions { property: String::new(), settings: vec![(0.0, model)] }
     }
 
-    /// Several models, distinguished by the one property in which their airframes' conditions differ.
+    /// Several models, which are distinguished by the only property in which their airframes' conditions differ.
     pub(super) fn of(models: &'a [GreyBox]) -> Result<Self, ConditionsError> {
         let Some((first, rest)) = models.split_first() else {
             return Err(ConditionsError::Nothing);
@@ -96,23 +96,23 @@ impl<'a> Conditions<'a> {
         Ok(Conditions { property, settings })
     }
 
-    /// The models, by their settings.
+    /// The models in ascending order of their settings.
     pub(super) fn models(&self) -> impl Iterator<Item = &'a GreyBox> + '_ {
         self.settings.iter().map(|(_, model)| *model)
     }
 
-    /// Model of the lowest setting, from which all common quantities are taken.
+    /// The model of the lowest setting, from which all common quantities are taken.
     pub(super) fn first(&self) -> &'a GreyBox {
         self.settings[0].1
     }
 
-    /// Names of the models, joined.
+    /// Names of the models, separated by commas.
     pub(super) fn names(&self) -> String {
         let names: Vec<&str> = self.models().map(|m| m.name.as_str()).collect();
         names.join(", ")
     }
 
-    /// Declares the property at the lowest setting, unless JSBSim has it already.
+    /// Declaration of the property with the lowest setting. Empty if JSBSim has the property already.
     pub(super) fn declaration(&self) -> String {
         match &self.settings[..] {
             [_] => String::new(),
@@ -126,7 +126,7 @@ impl<'a> Conditions<'a> {
         }
     }
 
-    /// Channel with the weights of the conditions: each is one at its own setting and zero at the others.
+    /// Channel with the weights of the conditions. Each weight is one at its own setting and zero at the others.
     pub(super) fn weights(&self) -> String {
         if self.settings.len() == 1 {
             return String::new();
@@ -152,7 +152,7 @@ impl<'a> Conditions<'a> {
         out
     }
 
-    /// Weighted sum over all conditions, `terms` being that of one model.
+    /// Weighted sum over all conditions. `terms` gives the terms of one model.
     pub(super) fn weighted(&self, terms: impl Fn(&GreyBox) -> String) -> String {
         if let [(_, model)] = &self.settings[..] {
             return terms(model);
@@ -171,12 +171,12 @@ impl<'a> Conditions<'a> {
     }
 }
 
-/// Property that holds the weight of condition `number`.
+/// Name of the property with the weight of condition `number`.
 fn weight(number: usize) -> String {
     format!("fcs/condition-{number}")
 }
 
-/// The one property that distinguishes `models`.
+/// The only property in which the conditions of `models` differ.
 fn property(models: &[GreyBox]) -> Result<String, ConditionsError> {
     let names: BTreeSet<&String> =
         models.iter().flat_map(|m| m.airframe.conditions.keys()).collect();
@@ -193,7 +193,7 @@ fn property(models: &[GreyBox]) -> Result<String, ConditionsError> {
     }
 }
 
-/// Checks that two models agree in all quantities that conditions cannot change.
+/// Checks that two models agree in all quantities that a condition cannot change.
 fn same(first: &GreyBox, second: &GreyBox) -> Result<(), ConditionsError> {
     let differ = |what: &str| ConditionsError::Differ {
         first: first.name.clone(),

@@ -1,4 +1,4 @@
-//! Individually commanded surfaces in the flight-control section of an exported aircraft.
+//! Flight-control section of an exported aircraft whose surfaces are commanded individually.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use greylag_physics::airframe::ActuatorFigures;
 use greylag_physics::mixer::{CONTROLS, Does, Effector, Mixer};
 use greylag_physics::servos::{Surface, Travel};
 
-/// Surfaces of `mixer` with their JSBSim properties; `None` if a surface has none.
+/// Surfaces of `mixer` with their travel, command property and position property. `None` if a surface lacks a property.
 fn named(mixer: &Mixer) -> Option<Vec<(&Effector, Travel, &str, &str)>> {
     let surfaces = mixer.effectors().iter().filter_map(|e| match e.does {
         Does::Deflects(travel) => Some((e, travel)),
@@ -18,7 +18,7 @@ fn named(mixer: &Mixer) -> Option<Vec<(&Effector, Travel, &str, &str)>> {
         .collect()
 }
 
-/// A channel for each surface, then the deflections of the controls; `None` if the surfaces have no properties.
+/// One channel per surface, then a channel with the deflections of the controls. `None` if a surface lacks a property.
 pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<String> {
     let surfaces = named(mixer)?;
     let mut out = String::new();
@@ -63,7 +63,7 @@ pub(super) fn channels(mixer: &Mixer, figures: &ActuatorFigures) -> Option<Strin
     Some(out)
 }
 
-/// Filter of the control with the surface's largest gain.
+/// The actuator filter of the control on which the surface has its largest gain.
 fn like(effector: &Effector, figures: &ActuatorFigures) -> Surface {
     let [aileron, elevator, rudder, _] = effector.gains.map(f64::abs);
     match figures.rudder {

@@ -1,20 +1,20 @@
-//! The engine of an exported aircraft: thrust as an external force, its lag, its arm and its torque.
+//! The engine of an exported aircraft: thrust as an external force, with its lag, lever arm and torque.
 
 use super::{FT, LBF, THROTTLE, coefficient, product};
 use crate::GreyBox;
 use greylag_num::Grid;
 
 const SPEED: &str = "velocities/vt-fps";
-/// Property of the throttle that acts on the engine if its thrust lags.
+/// Property of the throttle that acts on the engine if the thrust has a lag.
 const LATE_THROTTLE: &str = "fcs/engine-throttle-norm";
 const LAG: &str = "thrust_lag.tau_s";
 const DENSITY: &str = "fcs/density-ratio";
-/// Coefficient that scales the thrust table.
+/// Coefficient by which the thrust table is multiplied.
 const TABLE: &str = "thrust_table.k";
 const ARM: &str = "thrust_line_offset.z_m";
 const TORQUE: &str = "motor_torque.k_nm";
 
-/// Thrust terms: coefficient, factors; airspeed is in ft/s there.
+/// Thrust terms, each as coefficient and factors. JSBSim's airspeed is in ft/s.
 const THRUST: &[(&str, &[&str])] = &[
     ("thrust_linear.Cp_n", &[THROTTLE]),
     ("propeller.T0_n", &[DENSITY]),
@@ -30,12 +30,12 @@ pub(super) fn knows(name: &str) -> bool {
     THRUST.iter().any(|(term, _)| *term == name) || [TABLE, LAG, ARM, TORQUE].contains(&name)
 }
 
-/// Property of the throttle that acts on the engine.
+/// Property of the throttle that acts on the engine of `model`.
 fn throttle(model: &GreyBox) -> &'static str {
     if coefficient(model, LAG) > 0.0 { LATE_THROTTLE } else { THROTTLE }
 }
 
-/// Filter after the throttle's, if the thrust lags.
+/// Filter of the thrust's lag after the throttle filter. Empty if the thrust has no lag.
 pub(super) fn lag(model: &GreyBox) -> String {
     let lag = coefficient(model, LAG);
     if lag <= 0.0 {
@@ -48,7 +48,7 @@ pub(super) fn lag(model: &GreyBox) -> String {
     )
 }
 
-/// Section of external reactions: the thrust along body x.
+/// Section of external reactions, with the thrust along body x.
 pub(super) fn force(model: &GreyBox) -> String {
     let throttle = throttle(model);
     let terms: String = THRUST
@@ -62,7 +62,7 @@ pub(super) fn force(model: &GreyBox) -> String {
         })
         .chain(model.thrust_grid().map(|grid| tabulated(grid, coefficient(model, TABLE), throttle)))
         .collect();
-    // JSBSim's structural frame has z up
+    // the z axis of JSBSim's structural frame points up
     let below = coefficient(model, ARM);
     let z = if below == 0.0 { "0".to_owned() } else { format!("{:?}", -below) };
     format!(
@@ -73,7 +73,7 @@ pub(super) fn force(model: &GreyBox) -> String {
     )
 }
 
-/// Thrust table times `factor`, in lbf over throttle and airspeed in ft/s.
+/// Thrust table times `factor`, in lbf, over throttle and airspeed in ft/s.
 fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
     let [throttles, airspeeds] = grid.axes();
     let heads: String = airspeeds.iter().map(|v| format!(" {:?}", v / FT)).collect();
@@ -90,7 +90,7 @@ fn tabulated(grid: &Grid, factor: f64, throttle: &str) -> String {
     )
 }
 
-/// Rolling-moment function of the engine's torque, to the left.
+/// Rolling-moment function of the engine's torque. A positive torque rolls the aircraft to the left.
 pub(super) fn torque(model: &GreyBox) -> String {
     let torque = coefficient(model, TORQUE);
     if torque == 0.0 {

@@ -1,4 +1,4 @@
-//! Dimensionless flight characteristics, comparable between a toy and an airliner.
+//! Dimensionless flight characteristics, which are comparable between aircraft of all sizes.
 
 use nalgebra::Matrix2;
 
@@ -6,8 +6,7 @@ use crate::modes::{Rates, rates};
 use crate::{GreyBox, Trim, TrimError};
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// A dimensionless characteristic of an aircraft. Times are in units of V/g at the cruise airspeed V (Froude
-/// scaling).
+/// A dimensionless characteristic of an aircraft. Times are in units of V/g at the cruise airspeed V (Froude scaling).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trait {
     /// Name in tables.
@@ -45,13 +44,13 @@ pub struct Character {
     pub values: [f64; TRAITS.len()],
 }
 
-/// Straight flight at the cruise airspeed with its rates.
+/// Straight flight at the cruise airspeed, with its linear model.
 pub(super) struct Cruise {
     pub trim: Trim,
     pub rates: Rates,
-    /// Acceleration at full throttle, m/s².
+    /// Rate of the airspeed at full throttle from this trim, m/s².
     pub excess: f64,
-    /// V/g, s.
+    /// The ratio V/g, s.
     pub time: f64,
 }
 
@@ -67,8 +66,8 @@ impl Cruise {
         Ok(Cruise { trim, rates: rates(model, &trim, altitude), excess, time })
     }
 
-    /// The short period: the largest growth rate (1/s; negative if it decays) and the largest natural frequency
-    /// (rad/s) of the eigenvalues over q and α.
+    /// The short period, from the eigenvalues of the states q and α: the largest growth rate (1/s, negative for decay) and the
+    /// largest natural frequency (rad/s).
     pub(super) fn short_period(&self) -> [f64; 2] {
         let a = &self.rates.a;
         let short = Matrix2::new(a[(4, 4)], a[(4, 6)], a[(6, 4)], a[(6, 6)]);
@@ -77,27 +76,27 @@ impl Cruise {
         [most(&|k| modes[k].re), most(&|k| modes[k].norm())]
     }
 
-    /// Decay of the roll rate, 1/s.
+    /// Decay rate of the roll rate, 1/s.
     pub(super) fn roll_damping(&self) -> f64 {
         -self.rates.a[(3, 3)]
     }
 }
 
 impl Character {
-    /// The traits of `model`'s aircraft.
+    /// The traits of the aircraft that `model` describes.
     ///
     /// # Errors
-    /// If it has no straight flight at its cruise airspeed.
+    /// If the model has no straight-flight trim at its cruise airspeed.
     pub fn of(model: &GreyBox) -> Result<Character, TrimError> {
         let Cruise { rates: Rates { a, b }, excess, time, .. } = Cruise::of(model)?;
         let (body, geometry) = (&model.body, &model.airframe.geometry);
         let speed = model.airframe.envelope.airspeed_cruise_mps;
         let figures = &model.airframe.actuators;
         let weight = body.mass * STANDARD_GRAVITY;
-        // pitching moment slope over lift slope times chord; the lift slope here includes thrust and drag
+        // pitching moment slope divided by lift slope and chord, where the lift slope includes thrust and drag
         let margin = a[(4, 6)] * body.jy / (a[(6, 6)] * body.mass * speed * geometry.chord);
         let [b0, a1, a2] = figures.aileron.filter;
-        // inverse of the bilinear transform: 4 b0 / (1 - a1 + a2) is (w step / 2)^2
+        // by the inverse of the bilinear transform, 4 b0 / (1 - a1 + a2) is (w step / 2)^2
         let servo = 2.0 * (4.0 * b0 / (1.0 - a1 + a2)).sqrt() / figures.step;
         let square = time * time;
         Ok(Character {

@@ -1,4 +1,4 @@
-//! Draws of aircraft from a distribution: measures within their ranges, coefficients about textbook values.
+//! Random draws of aircraft from a distribution: measures within ranges, coefficients about textbook values.
 
 use rand_distr::{Distribution, StandardNormal, Uniform};
 
@@ -9,28 +9,28 @@ use crate::textbook::{Drives, Estimate, Measures, Section, Tail};
 use greylag_num::stream::{Stream, stream};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Number of the random stream.
+/// Number of the random stream for aircraft.
 const AIRCRAFT: u64 = 49;
-/// Number of attempts at one aircraft before the distribution is rejected as unflyable.
+/// Largest number of attempts at one aircraft, after which the draw fails.
 const TRIES: u64 = 200;
-/// Truncation of log-normal factors, standard deviations.
+/// Truncation of log-normal factors, in standard deviations.
 const CUT: f64 = 2.5;
-/// Lift coefficient of the textbook's cruise: that of its stall over 1.6².
+/// Lift coefficient of the textbook's cruise: the largest lift coefficient divided by 1.6².
 const CRUISE_LIFT: f64 = 0.47;
-/// Ratio of the rolling moment by the rudder of a V-tail to that by a rudder on a fin.
+/// Ratio of the rolling moment of a V-tail's rudder to that of a rudder on a fin.
 const V_TAIL_ROLL: f64 = 4.0;
 const SOURCE: &str = "drawn";
 
-/// Layout of a drawn aircraft.
+/// Layout of a drawn aircraft's tail and surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// Tailplane, fin, rudder.
+    /// A tailplane and a fin with a rudder.
     Conventional,
-    /// Two surfaces that act as elevator and rudder.
+    /// A V-tail with two surfaces that act as elevator and rudder.
     VTail,
-    /// Tailplane and fin, no rudder.
+    /// A tailplane and a fin without a rudder.
     WithoutRudder,
-    /// A wing with elevons.
+    /// A tailless wing with elevons.
     Elevons,
 }
 
@@ -55,19 +55,19 @@ pub struct Drawn {
     pub layout: Layout,
     /// Static margin as a fraction of the chord.
     pub static_margin: f64,
-    /// Delay between a command and the surface's response, in addition to the servo's lag, s.
+    /// Delay between a command and the surface's response in addition to the servo's lag, s.
     pub delay_s: f64,
-    /// Measures of the aircraft, as a user could take them.
+    /// Measures of the aircraft, as a user could state them.
     pub measures: Measures,
     /// The exact model of the aircraft.
     pub exact: GreyBox,
-    /// The textbook model made from the measures.
+    /// The textbook model that is estimated from the measures.
     pub textbook: GreyBox,
-    /// Texts of the exact model's airframe file and model file.
+    /// Texts of the exact model's airframe file and model file, in this order.
     pub files: [String; 2],
 }
 
-/// Why no aircraft could be drawn.
+/// Reason why no aircraft could be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
     /// The drawn values do not form a valid model.
@@ -82,7 +82,7 @@ pub enum DrawError {
 }
 
 fn uniform(rng: &mut Stream, [least, most]: Range) -> f64 {
-    // equal ends are a fixed number
+    // a range with equal ends is a fixed number
     Uniform::new_inclusive(least, most).map_or(least, |between| between.sample(rng))
 }
 
@@ -96,7 +96,7 @@ fn log_normal(rng: &mut Stream, width: f64) -> f64 {
 }
 
 impl Population {
-    /// Aircraft `number` of `seed`. It does not depend on other draws.
+    /// Draws aircraft `number` of `seed`. The result does not depend on other draws.
     ///
     /// # Errors
     /// If no drawn aircraft is a valid model that meets the conditions of `[flyable]`.
@@ -107,7 +107,7 @@ impl Population {
             match self.one(&mut rng, seed, number) {
                 Ok(drawn) if self.flies(&drawn.exact) => return Ok(drawn),
                 Ok(_) => {}
-                // a coefficient is outside the physical bounds of the catalogue
+                // a coefficient is outside its physical bounds in the catalogue
                 Err(error) => why = error,
             }
         }
@@ -194,7 +194,7 @@ impl Population {
         Ok(Drawn { number, layout, static_margin, delay_s, measures, exact, textbook, files })
     }
 
-    /// The textbook's coefficients times random factors, which keep their signs.
+    /// The textbook's coefficients times positive random factors.
     fn sections(&self, rng: &mut Stream, measures: &Measures) -> Vec<Section> {
         let mut sections = measures.sections();
         for (_, value, width, source) in sections.iter_mut().flat_map(|(_, all)| all.iter_mut()) {
@@ -204,7 +204,7 @@ impl Population {
         sections
     }
 
-    /// Sets the moments about all axes: static margin, elevator at cruise, and asymmetry in roll and yaw.
+    /// Sets the balance of moments: the static margin, the elevator at cruise, and the asymmetry in roll and yaw.
     fn balanced(
         &self,
         rng: &mut Stream,
@@ -223,7 +223,7 @@ impl Population {
         change(sections, "yaw_linear", "Cn0", |_| crooked[1]);
     }
 
-    /// Moments of inertia; Jz is less than Jx + Jy, as for every rigid body.
+    /// Moments of inertia, kg m². Jz is less than Jx + Jy, as for every rigid body.
     fn inertia(&self, rng: &mut Stream, measures: &Measures) -> [Estimate; 4] {
         let [(_, jx, ..), (_, jy, ..), (_, jz, ..), _] = measures.inertia();
         let width = self.shape.inertia_width;
@@ -239,7 +239,7 @@ impl Population {
     }
 }
 
-/// Widens the airframe's pitch limit to 20° down, for test manoeuvres instead of a first flight.
+/// Extends the airframe's pitch limit to 20° nose down. The textbook's limit is for a first flight, this one for tests.
 fn deeper(airframe: &str) -> String {
     airframe.replace("pitch_min_deg = -10.0", "pitch_min_deg = -20.0")
 }
@@ -288,12 +288,12 @@ mod tests {
         let drawn: Vec<Drawn> = (0..60).map(|k| population.draw(1, k).unwrap()).collect();
         for d in &drawn {
             let body = &d.exact.body;
-            // a file has five decimals
+            // numbers in the file have five decimals
             assert!(body.jz <= body.jx + body.jy + 2e-5 && body.is_physical(), "{body:?}");
             assert!((-0.05..=0.3).contains(&d.static_margin));
             assert!(population.flies(&d.exact));
             assert_eq!(d.exact.has_rudder(), d.measures.rudder.is_some());
-            // the coefficient is what the margin says, to the five decimals of a file
+            // the coefficient corresponds to the static margin, to the five decimals of the file
             let of =
                 |name: &str| d.exact.coefficients().iter().find(|c| c.name == name).unwrap().value;
             let margin = -of("pitch_linear.Cmalpha") / of("lift_linear.CLalpha");

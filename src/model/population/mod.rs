@@ -1,4 +1,4 @@
-//! A distribution of fixed-wing aircraft. Each draw has an exact model and the textbook model of its measures.
+//! A distribution of fixed-wing aircraft. Each drawn aircraft has an exact model and the textbook model of its measures.
 
 mod character;
 mod draw;
@@ -15,7 +15,7 @@ pub use draw::{DrawError, Drawn, Layout};
 /// Smallest and largest value of a quantity.
 type Range = [f64; 2];
 
-/// A distribution of aircraft, read from `params/any/aircraft.toml`. Comments in that file explain each number.
+/// A distribution of aircraft, read from `params/any/aircraft.toml`. Comments in this file explain each number.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Population {
@@ -91,10 +91,11 @@ struct Flyable {
 }
 
 impl Population {
-    /// Reads a distribution (`schema = 1`).
+    /// Reads a distribution from a file (`schema = 1`).
     ///
     /// # Errors
-    /// If the file cannot be read, is not TOML of this schema, or has a range whose ends are not finite and in order.
+    /// If the file cannot be read, is not TOML of this schema, or has a range whose ends are not finite, in order and, where
+    /// required, positive. Invalid shares of the layouts are also an error.
     pub fn load(path: &Path) -> Result<Population, FileError> {
         let what = "distribution of aircraft";
         let text = greylag_physics::text_file::read(path).map_err(|why| FileError::Read {
@@ -106,7 +107,7 @@ impl Population {
         Population::parse(&text).map_err(|why| FileError::Content { what, path: path.into(), why })
     }
 
-    /// [`load`](Self::load) from the file's text; the error describes the fault.
+    /// Reads the text of a distribution, as [`load`](Self::load) does. The error describes the fault.
     pub fn parse(text: &str) -> Result<Population, String> {
         let read: Population = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
         check_schema(read.schema, 1)?;

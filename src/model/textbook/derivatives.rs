@@ -1,10 +1,10 @@
-//! Coefficients of each effect, by textbook formulas.
+//! Coefficients of each effect from textbook formulas.
 
 use super::{Estimate, Figures, Measures, Tail, helmbold};
 
-/// Tailplane: volume coefficient, distance in chords, efficiency, and elevator effectiveness.
+/// Tailplane: volume coefficient, distance in chords, efficiency, elevator effectiveness.
 const TAIL: [f64; 4] = [0.5, 2.8, 0.95, 0.5];
-/// Fin: volume coefficient, distance in spans, lift slope, and rudder effectiveness.
+/// Fin: volume coefficient, distance in spans, lift slope (1/rad), rudder effectiveness.
 const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
 /// Oswald efficiency factor of the wing.
 const EFFICIENCY: f64 = 0.85;
@@ -18,7 +18,7 @@ impl Measures {
         }
     }
 
-    /// Lift and pitching moment derivatives of the elevator, 1/rad.
+    /// Lift and pitching moment derivatives with respect to the elevator, 1/rad.
     fn elevator(&self, f: &Figures) -> [f64; 2] {
         match self.tail {
             Tail::Conventional => {
@@ -112,7 +112,8 @@ impl Measures {
         ]
     }
 
-    /// Thrust T = Ts (δ² − δ V/Vp) of a fixed-pitch propeller, with the voltage proportional to the throttle.
+    /// Thrust T = Ts (δ² − δ V/Vp) of a fixed-pitch propeller with static thrust Ts (N) and pitch speed Vp (m/s). The voltage
+    /// is proportional to the throttle δ.
     pub(super) fn thrust(&self) -> Vec<Estimate> {
         let (rest, source) = (self.static_thrust, "static thrust and pitch speed");
         vec![
@@ -126,7 +127,7 @@ impl Measures {
     }
 }
 
-/// Side force, rolling and yawing moment derivatives of a rudder on the fin.
+/// Derivatives of side force, rolling and yawing moment with respect to a rudder on the fin, 1/rad.
 pub(super) fn rudder() -> Vec<Estimate> {
     let force = FIN[2] * FIN[3] * FIN[0] / FIN[1];
     let source = "fin volume 0.04, half of it by the rudder";
@@ -137,7 +138,7 @@ pub(super) fn rudder() -> Vec<Estimate> {
     ]
 }
 
-/// Lift slope of the tailplane times its efficiency, 1/rad.
+/// Lift slope of the tailplane multiplied by its efficiency, 1/rad.
 fn tailplane() -> f64 {
     TAIL[2] * helmbold(4.5)
 }
@@ -147,7 +148,7 @@ fn downwash(f: &Figures) -> f64 {
     2.0 * f.wing / (std::f64::consts::PI * f.aspect)
 }
 
-/// The factor π e AR of induced drag.
+/// The factor π e AR in the induced drag CL²/(π e AR).
 pub(super) fn induced(f: &Figures) -> f64 {
     std::f64::consts::PI * EFFICIENCY * f.aspect
 }

@@ -1,9 +1,9 @@
-//! Tests of networks: against the definition, over every scalar, against central differences.
+//! Tests of networks: against their definition with every scalar type, and against central differences.
 
 use super::*;
 use crate::{Dual, Lanes, stream};
 
-/// A network in which no layer is a multiple of the block.
+/// A network without a layer size that is a multiple of the block size.
 fn network() -> Dense {
     let mut network = Dense::silent(&[3, 21, 9, 2], &mut stream::stream(5, &[])).unwrap();
     let mut rng = stream::stream(6, &[]);
@@ -12,7 +12,7 @@ fn network() -> Dense {
     network
 }
 
-/// The definition of the network, written out.
+/// The network's output computed by its definition.
 fn by_hand(network: &Dense, input: [f64; 3]) -> Vec<f64> {
     let mut x = input.to_vec();
     let last = network.sizes().len() - 2;
@@ -82,7 +82,7 @@ fn derivatives_agree_with_central_differences() {
         };
         let (up, down) = (moved(1e-6), moved(-1e-6));
         for o in 0..2 {
-            // piecewise linear: the difference quotient errs by rounding only
+            // the network is piecewise linear, and the difference quotient has only rounding errors
             assert!((dual[o].gradient[i] - (up[o] - down[o]) / 2e-6).abs() < 1e-8);
         }
     }

@@ -1,4 +1,4 @@
-//! Registers of x86 processors: SSE2, AVX2 and AVX-512.
+//! Registers of x86-64 processors: SSE2, AVX2 and AVX-512.
 
 use std::arch::x86_64::*;
 
@@ -10,14 +10,14 @@ impl Register for __m128 {
         _mm_sqrt_ps _mm_set1_ps _mm_loadu_ps _mm_storeu_ps);
     #[inline(always)]
     fn neg(self) -> Self {
-        // SAFETY: as the trait demands, the processor has the instructions; this applies below as well
+        // SAFETY: as the trait requires, the processor has the instructions. This is also true of the methods below.
         unsafe { _mm_xor_ps(self, _mm_set1_ps(-0.0)) }
     }
     #[inline(always)]
     fn abs(self) -> Self {
         unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), self) }
     }
-    /// Without such an instruction, a library call for each lane.
+    /// A library call for each lane, because SSE2 has no fused multiply-add.
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {
         let (mut x, mut f, mut a) = ([0.0_f32; 4], [0.0; 4], [0.0; 4]);
@@ -61,10 +61,10 @@ impl Register for __m128 {
     }
 }
 
-/// Selects `then` where all bits of `mask` are set, `otherwise` where none is.
+/// Selects `then` where all bits of `mask` are set, and `otherwise` where none are.
 #[inline(always)]
 unsafe fn chosen(mask: __m128, then: __m128, otherwise: __m128) -> __m128 {
-    // SAFETY: SSE2
+    // SAFETY: every x86-64 processor has SSE2
     unsafe { _mm_or_ps(_mm_and_ps(mask, then), _mm_andnot_ps(mask, otherwise)) }
 }
 
@@ -74,7 +74,7 @@ impl Register for __m256 {
         _mm256_max_ps _mm256_sqrt_ps _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps);
     #[inline(always)]
     fn neg(self) -> Self {
-        // SAFETY: as the trait demands, the processor has the instructions; this applies below as well
+        // SAFETY: as the trait requires, the processor has the instructions. This is also true of the methods below.
         unsafe { _mm256_xor_ps(self, _mm256_set1_ps(-0.0)) }
     }
     #[inline(always)]
@@ -123,7 +123,7 @@ impl Register for __m512 {
         _mm512_max_ps _mm512_sqrt_ps _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps);
     #[inline(always)]
     fn neg(self) -> Self {
-        // SAFETY: as the trait demands, the processor has the instructions; this applies below as well
+        // SAFETY: as the trait requires, the processor has the instructions. This is also true of the methods below.
         unsafe {
             let sign = _mm512_set1_epi32(i32::MIN);
             _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(self), sign))

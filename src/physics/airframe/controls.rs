@@ -1,29 +1,29 @@
-//! Controls of an airframe file with their actuator filters.
+//! The controls of an airframe file and their actuator filters.
 
 use serde::Deserialize;
 
 use super::{Sourced, positive};
 use crate::servos::{ActuatorFigures, Surface, Travel};
 
-/// Time step of the filters, s.
+/// Time step of the filters, s: the control period.
 const STEP: f64 = 0.01;
 /// Largest accepted deflection of a surface, rad.
 const TRAVEL: f64 = 1.6;
-/// Largest accepted frequency of a surface, rad/s.
+/// Largest accepted natural frequency of a surface actuator, rad/s.
 const FREQUENCY: f64 = 1000.0;
 /// Largest accepted rate of a surface, rad/s.
 const RATE: f64 = 200.0;
 
-/// Statement of an airframe file on the rudder.
+/// Whether an airframe file can describe a rudder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Yaw {
-    /// The file has schema 1, which cannot state a rudder.
+    /// The file has schema 1, which cannot describe a rudder.
     Unstated,
-    /// The file has schema 2: a rudder exists if its figures are given.
+    /// The file has schema 2. The aircraft has a rudder if the file describes one.
     Stated,
 }
 
-/// Section `[actuators]` of schema 1: ailerons and elevator alike, without a statement on a rudder.
+/// Section `[actuators]` of schema 1: the same values for aileron and elevator, and no rudder.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Alike {
@@ -33,7 +33,7 @@ pub(super) struct Alike {
     throttle_lag_s: Sourced,
 }
 
-/// Section `[controls]` of schema 2; a missing control does not exist.
+/// Section `[controls]` of schema 2. The aircraft has no rudder if the section has none.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Each {
@@ -112,7 +112,7 @@ impl SurfaceFile {
     }
 }
 
-/// Travel of `name`, either symmetric (`both`) or with two limits (`min`, `max`).
+/// Travel of `name` (rad), either symmetric (`both`) or with two limits (`min`, `max`).
 pub(super) fn travel(
     name: &str,
     [both, min, max]: [&Option<Sourced>; 3],

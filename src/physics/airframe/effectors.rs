@@ -1,4 +1,4 @@
-//! Named surfaces and motors of an airframe file.
+//! Surfaces and motors that an airframe file names.
 
 use std::collections::BTreeMap;
 
@@ -9,9 +9,9 @@ use super::controls::travel;
 use crate::mixer::{Does, Effector, Mixer};
 use crate::servos::{Travel, Travels};
 
-/// Number of servo outputs of a flight controller.
+/// Largest channel number of a flight controller's servo outputs.
 const CHANNELS: u8 = 32;
-/// Largest accepted gain of an effector.
+/// Largest accepted |gain| of an effector.
 const GAIN: f64 = 2.0;
 
 /// Section `[surfaces.NAME]` of an airframe file.
@@ -44,9 +44,9 @@ pub(super) struct MotorFile {
     position: Option<String>,
 }
 
-/// The mixer described by the file; `None` if it names neither surfaces nor motors.
+/// The mixer described by the file. `None` if the file names neither surfaces nor motors.
 ///
-/// If it names surfaces only, one motor follows the throttle; if it names motors only, the surfaces are those of
+/// If the file names only surfaces, one motor follows the throttle. If it names only motors, the surfaces are those of
 /// `travels`.
 pub(super) fn mixer(
     surfaces: &BTreeMap<String, SurfaceFile>,

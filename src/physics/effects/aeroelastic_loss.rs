@@ -4,7 +4,7 @@ use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coeffici
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed at which the model's effectiveness is exact, m/s: that of the neutral start.
+/// Airspeed of the neutral start, m/s. At this airspeed the model's effectiveness is unchanged.
 const V0: f64 = State::NEUTRAL.airspeed;
 
 /// Effectiveness of aileron and elevator that decreases with dynamic pressure.

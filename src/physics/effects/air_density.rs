@@ -1,10 +1,10 @@
-//! Air density different from the model's.
+//! Air density that differs from the model's.
 
 use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// A common relative change of every aerodynamic force and moment.
+/// The same relative change of every aerodynamic force and moment.
 pub struct AirDensity;
 
 impl Effect for AirDensity {
@@ -29,7 +29,7 @@ impl Effect for AirDensity {
             Channel::Yaw,
         ],
         look_alikes: &["mass_error", "airspeed_scale"],
-        separated_by: "two altitudes under one known atmosphere; at one altitude, with free coefficients, no manoeuvre tells it: it scales them all",
+        separated_by: "two altitudes under one known atmosphere; at one altitude, with free coefficients, no manoeuvre identifies it: it scales them all",
         example: &[0.2],
         starts: &[],
     });

@@ -4,12 +4,12 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Constant roll, yaw and side force coefficients.
+/// Constant coefficients of rolling moment, yawing moment and side force.
 pub struct Asymmetry;
 
 impl Effect for Asymmetry {
     const ID: &'static str = "asymmetry";
-    const DESCRIPTION: &'static str = "The airframe is bent: it rolls, yaws and slides by itself.";
+    const DESCRIPTION: &'static str = "The airframe is bent: it rolls, yaws and sideslips without a command.";
     const FORMULA: &'static str = "l = Q b Cl0, n = Q b Cn0, Y = Q CY0";
     const SOURCE: &'static str = "GSFM26 eqs. (42), (44), (46)";
     const COEFFICIENTS: &'static [Coefficient] = &[
@@ -31,7 +31,7 @@ impl Effect for Asymmetry {
             "side_force_linear.CY0",
             "beta_bias",
         ],
-        separated_by: "throttle steps at several airspeeds: it grows with V² and does not know the throttle",
+        separated_by: "throttle steps at several airspeeds: it grows with V² and is independent of the throttle",
         example: &[0.004, 0.004, 0.004],
         starts: &[],
     });

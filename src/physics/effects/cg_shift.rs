@@ -1,11 +1,10 @@
-//! Centre of gravity different from the model's.
+//! Centre of gravity that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Moments of the forces about a centre of gravity aft of the model's (along x only; a negative distance is forward
-/// of it).
+/// Moments of the forces about a centre of gravity that is aft of the model's along x. A negative distance is forward.
 pub struct CgShift;
 
 impl Effect for CgShift {

@@ -1,24 +1,24 @@
 //! Curves over the angle of attack as sums of hat functions, linear in their ordinates.
 //!
-//! Two knots of the grid are fixed at zero, since a straight line would otherwise be represented twice: by the curve,
-//! and by the coefficients `CL0` and `CLalpha` (`CD0`) of the effects beside it.
+//! Two knots of the grid are fixed at zero. Otherwise the curve could represent a straight line that the coefficients `CL0`
+//! and `CLalpha` (or `CD0`) of other effects already represent.
 
 use super::Terms;
 use crate::Channel;
 use greylag_num::Real;
 
-/// First knot of the grid, °.
+/// First knot of the grid, degrees.
 const FIRST_DEG: f64 = -8.0;
-/// Distance between knots of the grid, °.
+/// Distance between knots of the grid, degrees.
 const SPACING_DEG: f64 = 2.0;
-/// Range of angles of attack with half the distance between knots, °, because lift breaks there.
+/// Range with half the distance between knots, degrees of angle of attack. The stall is in this range.
 const FINE_DEG: (f64, f64) = (10.0, 20.0);
 /// Number of knots, from −8° to 30°.
 const PLACES: usize = 25;
-/// Indices of the knots at which a curve is zero, 0° and 4°, the usual range of flight.
+/// Indices of the knots at which a curve is zero: 0° and 4°, the ends of the usual range of flight.
 const ZERO: [usize; 2] = [4, 6];
 
-/// Coefficients of a curve: its ordinates at the knots that are not fixed at zero, named like `CL_m8` or `CL_p20`.
+/// Coefficients of a curve: its ordinates at the knots that are not fixed at zero, with names like `CL_m8` or `CL_p20`.
 macro_rules! heights {
     ($letter:literal, $bounds:expr) => {
         super::curve::heights!($letter, $bounds,
@@ -30,7 +30,7 @@ macro_rules! heights {
     ($letter:literal, $bounds:expr, $($name:literal $degrees:literal),*) => {
         &[$(super::coefficient(
             concat!($letter, "_", $name),
-            concat!("what ", $letter, " is more at α = ", $degrees, "°"),
+            concat!("addition to ", $letter, " at α = ", $degrees, "°"),
             "",
             $bounds,
         )),*]
@@ -38,9 +38,9 @@ macro_rules! heights {
 }
 pub(super) use heights;
 
-/// Reports to `terms` each hat over `alpha` (rad) times `amount`; beyond its ends a curve is constant.
+/// Adds to `terms` each hat function at `alpha` (rad) times `amount`. Beyond its first and last knot a curve is constant.
 ///
-/// Unlike other effects it is not inlined where a call is cheap, because inlining would enlarge the code of every fit.
+/// Unlike other effects it is not inlined if a call is cheap, because inlining would enlarge the code of every fit.
 #[inline(always)]
 pub(super) fn hats<R: Real>(alpha: R, amount: R, channel: Channel, terms: &mut impl Terms<R>) {
     #[inline(never)]
@@ -99,7 +99,7 @@ mod tests {
         assert_eq!(names.len(), KNOTS);
         let share =
             |degrees: f64, name: &str| at(degrees)[names.iter().position(|n| *n == name).unwrap()];
-        // −1° lies half way between −2° and 0°, where the curve is zero
+        // −1° is half way between −2° and 0°, where the curve is zero
         assert!((share(-1.0, "CL_m2") - 0.5).abs() < 1e-12);
         assert!((share(9.5, "CL_p10") - 0.75).abs() < 1e-12);
         assert!((share(10.5, "CL_p10") - 0.5).abs() < 1e-12 && share(11.5, "CL_p10") == 0.0);

@@ -1,10 +1,10 @@
-//! Dihedral effect that depends on the angle of attack, as with a swept wing.
+//! Dihedral effect that depends on the angle of attack, as for a swept wing.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Rolling moment due to sideslip, proportional to angle of attack.
+/// Rolling moment due to sideslip, proportional to the angle of attack.
 pub struct DihedralAlpha;
 
 impl Effect for DihedralAlpha {

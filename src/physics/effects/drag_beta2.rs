@@ -1,4 +1,4 @@
-//! Drag due to sideslip.
+//! Drag that grows with sideslip.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -14,8 +14,8 @@ impl Effect for DragBeta2 {
     const SOURCE: &'static str = "Gryte18; JSBSim reading in params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CDbeta", "drag due to the magnitude of sideslip", "1/rad", (-0.5, 0.5)),
-        // may be negative where the side force acts along body y instead of across the airflow: |CYβ| β² of the side
-        // force is then part of the drag
+        // may be negative if the side force acts along body y instead of across the airflow, because the drag then contains
+        // the part |CYβ| β² of the side force
         coefficient("CDbeta2", "drag due to the square of sideslip", "1/rad²", (-0.5, 5.0)),
     ];
     const ENTRY: Option<Entry> = Some(Entry {

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Own, Terms, curve};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Drag beyond that of the other effects, as a curve over the angle of attack.
+/// Drag in addition to that of the other effects, as a curve over the angle of attack.
 pub struct DragCurve;
 
 impl Effect for DragCurve {

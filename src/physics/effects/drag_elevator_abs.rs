@@ -1,4 +1,4 @@
-//! Drag of a deflected elevator, up or down alike.
+//! Drag of a deflected elevator, the same for up and down.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,4 +1,4 @@
-//! Drag that is linear in incidence, pitch rate and elevator.
+//! Drag that is linear in angle of attack, pitch rate and elevator.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;

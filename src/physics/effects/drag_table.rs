@@ -1,4 +1,4 @@
-//! Drag from a table over incidence.
+//! Drag from a table over the angle of attack.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,14 +1,14 @@
-//! A suspended load that pulls straight down.
+//! A suspended load that pulls vertically down.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, rigid_body};
 
-/// A constant force at the centre of gravity along gravity.
+/// A constant force at the centre of gravity in the direction of gravity.
 ///
-/// A tether or a tow also pulls along the ground, in a direction fixed there; the state has no heading, so only the
-/// vertical part of such a force is modelled. The load adds no mass: a load that moves with the aircraft corresponds
-/// to `mass_error` instead.
+/// A tether or a tow also pulls horizontally, in a direction fixed to the ground. The state has no heading, and only the
+/// vertical part of such a force is modelled. The load adds no mass. For a load that moves with the aircraft the effect is
+/// `mass_error`.
 pub struct ExternalLoad;
 
 impl Effect for ExternalLoad {

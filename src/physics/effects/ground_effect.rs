@@ -1,4 +1,4 @@
-//! Ground effect: more lift and less drag within a span of the ground.
+//! Ground effect: more lift and less drag within one span of the ground.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -6,9 +6,9 @@ use crate::{Channel, Point};
 
 /// Lift slope and induced drag that change towards the ground.
 ///
-/// A model knows its altitude above the sea, not the terrain: the ground's altitude is a constant of the effect, so
-/// it is valid over flat ground such as an airfield, and vanishes a few spans above it. No log in this program
-/// carries a height above ground.
+/// A model has the altitude above sea level but not the terrain. The ground's altitude is therefore a constant of the
+/// effect, which is valid over flat ground such as an airfield. The effect vanishes a few spans above the ground. The logs
+/// of this program contain no height above ground.
 pub struct GroundEffect;
 
 impl Effect for GroundEffect {

@@ -1,11 +1,11 @@
-//! Product of inertia different from the model's.
+//! Product of inertia that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::rigid_body::RigidBody;
 use crate::{Channel, Point};
 
-/// Addition to the product of inertia Jxz.
+/// Addition to the product of inertia Jxz, kg m².
 pub struct InertiaXz;
 
 impl Effect for InertiaXz {

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Needs, Own, Terms, curve};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Lift beyond that of the other effects, as a curve over the angle of attack.
+/// Lift in addition to that of the other effects, as a curve over the angle of attack.
 pub struct LiftCurve;
 
 impl Effect for LiftCurve {
@@ -14,8 +14,7 @@ impl Effect for LiftCurve {
     const FORMULA: &'static str = "L = Q Σ CLk hk(α), hk falling from 1 at αk to 0 at the knots beside it";
     const SOURCE: &'static str = "piecewise linear, knots every 2°, from 10° to 20° every 1°, zero at 0° and 4°";
     const COEFFICIENTS: &'static [Coefficient] = curve::heights!("CL", (-0.5, 0.5));
-    /// Evaluated after the effects that need only the point, since `lift_stall` would otherwise blend out the curve
-    /// beyond the stall.
+    /// Evaluated after the effects that need only the point. Otherwise `lift_stall` would remove the curve beyond the stall.
     const NEEDS: Needs = Needs::Base;
 
     #[inline(always)]

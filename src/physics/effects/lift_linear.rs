@@ -1,4 +1,4 @@
-//! Lift that is linear in incidence, pitch rate and elevator.
+//! Lift that is linear in angle of attack, pitch rate and elevator.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;

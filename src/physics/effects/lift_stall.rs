@@ -1,13 +1,13 @@
-//! Stall: blends the lift from the linear law to that of a flat plate.
+//! Stall: a transition of the lift from the linear law to that of a flat plate.
 
 use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Lift lost beyond the stall, blended as in \[BM12\] section 4.2.
+/// Loss of lift beyond the stall, with the transition of \[BM12\] section 4.2.
 pub struct LiftStall;
 
-/// Computes e^(x · sharpness); a function rather than a closure, which would prevent vectorisation of a kernel.
+/// Computes e^(x · sharpness). It is a function because a closure would prevent the vectorisation of a kernel.
 #[inline(always)]
 fn power<R: Real>(x: R, sharpness: f64) -> R {
     x.scale(sharpness).clamp(-40.0, 40.0).exp()
@@ -50,8 +50,8 @@ impl Effect for LiftStall {
     fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let &[alpha0, sharpness] = own.shape else { return };
         let alpha = at.state.alpha;
-        // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), with the exponents limited so that
-        // the exponential stays finite in f32
+        // σ = (1 + e^−M(α−α0) + e^M(α+α0)) / ((1 + e^−M(α−α0)) (1 + e^M(α+α0))), with limited exponents, which keep the
+        // exponential finite in f32
         let above = power(R::from_f64(alpha0) - alpha, sharpness);
         let below = power(R::from_f64(alpha0) + alpha, sharpness);
         let one = R::from_f64(1.0);

@@ -1,10 +1,10 @@
-//! Lift from a table over incidence, stall included.
+//! Lift from a table over the angle of attack, including the stall.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Lift as a table over angle of attack, stall included.
+/// Lift as a table over angle of attack, including the stall.
 pub struct LiftTable;
 
 impl Effect for LiftTable {

@@ -1,11 +1,11 @@
-//! Mass different from the model's.
+//! Mass that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::rigid_body::RigidBody;
 use crate::{Channel, Point};
 
-/// Relative change of the mass; gravity, inertia and forces are unchanged.
+/// Relative change of the mass. The gravitational acceleration, moments of inertia and forces are unchanged.
 pub struct MassError;
 
 impl Effect for MassError {

@@ -1,8 +1,8 @@
 //! Physical effects, each a group of forces or moments in its own file.
 //!
-//! To add one: write its file beside these and name it in the list at the end of this file. It then takes part in the
-//! model, its trim and its linearisation, the planner, the parameter files, the search for missing effects and the
-//! report under its id. Effects between actuator positions and acting deflections are in [`inputs`](crate::inputs).
+//! A new effect needs a file in this folder and its name in the list at the end of this file. It is then part of models,
+//! trim, linearisation, the planner, the parameter files, the search for missing effects and the report under its id.
+//! Effects between actuator positions and acting deflections are in [`inputs`](crate::inputs).
 
 use crate::formula::{Written, register};
 use crate::rigid_body::RigidBody;
@@ -16,15 +16,15 @@ pub struct Coefficient {
     pub name: &'static str,
     /// Physical meaning, in words.
     pub meaning: &'static str,
-    /// Unit of the value; empty if dimensionless.
+    /// Unit of the value. Empty if it is dimensionless.
     pub unit: &'static str,
     /// Range of physically possible values.
     pub bounds: (f64, f64),
-    /// Whether `bounds` apply up to 25 kg and grow for a larger aircraft; see [`Size`](crate::size::Size).
+    /// Whether `bounds` grow for an aircraft larger than 25 kg or 5 m. See [`Size`](crate::size::Size).
     pub grows: bool,
 }
 
-/// Constructor for the coefficient lists.
+/// A coefficient whose bounds grow with the size of the aircraft.
 pub const fn coefficient(
     name: &'static str,
     meaning: &'static str,
@@ -35,27 +35,26 @@ pub const fn coefficient(
 }
 
 impl Coefficient {
-    /// The coefficient with bounds that do not grow with the aircraft.
+    /// The coefficient with bounds that do not grow with the size of the aircraft.
     pub(crate) const fn of_any_size(self) -> Coefficient {
         Coefficient { grows: false, ..self }
     }
 }
 
-/// Channels of aerodynamic forces and moments: all but thrust.
+/// Channels of aerodynamic forces and moments: all except thrust.
 const AERODYNAMIC: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
 /// Inputs of an effect in addition to the point of evaluation.
 ///
-/// Effects that need more are evaluated after those that need only the point, and receive their sum.
+/// Effects that need more than the point are evaluated after the others. They receive the sum of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Needs {
     /// Only the state, the controls and the airflow.
     Point,
     /// Also [`Point::base`]: the forces and moments of the effects that need only the point.
     Base,
-    /// Also [`Base::deflected`](crate::point::Base::deflected) and
-    /// [`Base::still`](crate::point::Base::still).
+    /// Also [`Base::deflected`](crate::point::Base::deflected) and [`Base::still`](crate::point::Base::still).
     Parts,
     /// Also the state's rate, [`Base::rate`](crate::point::Base::rate).
     Rate,
@@ -64,45 +63,44 @@ pub enum Needs {
 /// Data of one effect of one model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Own<'a> {
-    /// Table of the effect; present exactly if [`Effect::TABLE`] is.
+    /// Table of the effect. It is present exactly if [`Effect::TABLE`] is.
     pub table: Option<&'a Table>,
-    /// Grid of the effect; present exactly if [`Effect::GRID`] is.
+    /// Grid of the effect. It is present exactly if [`Effect::GRID`] is.
     pub grid: Option<&'a Grid>,
-    /// Values of its shape constants, the last [`Effect::SHAPE`] coefficients.
+    /// Values of the effect's shape constants, its last [`Effect::SHAPE`] coefficients.
     pub shape: &'a [f64],
-    /// Index of its first lag among those of the model, [`Controls::lagged`](crate::Controls::lagged).
+    /// Index of the effect's first lag among the model's lags, [`Controls::lagged`](crate::Controls::lagged).
     pub first_lag: usize,
 }
 
 /// Properties of an effect for the search for missing effects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// Channels in which it acts; empty for an input effect, which acts wherever the deflections do. A changed mass
-    /// or inertia acts like a force or moment in these channels.
+    /// Channels in which the effect acts. Empty for an input effect, which acts in the channels of the deflections. A changed
+    /// mass or inertia acts like a force or moment in these channels.
     pub channels: &'static [Channel],
-    /// Quantities it may be confounded with: ids of effects, full names (`effect.coefficient`) of a model's
+    /// Quantities with which the effect may be confounded: ids of effects, full names (`effect.coefficient`) of a model's
     /// coefficients, or a sensor error in words.
     pub look_alikes: &'static [&'static str],
-    /// Manoeuvre that distinguishes it from them, in words.
+    /// Manoeuvre that distinguishes the effect from its `look_alikes`, in words.
     pub separated_by: &'static str,
-    /// Values of all coefficients with a clearly visible effect on an aircraft like the X8; empty for measurement
+    /// Values of all coefficients that make the effect clearly visible on an aircraft like the X8. Empty for measurement
     /// errors.
     pub example: &'static [f64],
-    /// Starting values of all coefficients for a search over shape constants; empty for an effect that is linear in
-    /// all of them, or whose constants must be given.
+    /// Starting values of all coefficients for a search over shape constants. Empty for an effect that is linear in all of
+    /// its coefficients, or whose shape constants must be given.
     pub starts: &'static [&'static [f64]],
 }
 
 /// Receiver of the terms that an effect reports.
 ///
-/// A trait rather than a closure, because its one method can be forced inline: a call would end a planner's
-/// vectorised code.
+/// It is a trait because its method can always be inlined. The call of a closure would leave a planner's vectorised code.
 pub trait Terms<R> {
-    /// Receives the contribution of a unit of the effect's coefficient `index` to `channel`, N or N m.
+    /// Receives the contribution of one unit of the effect's coefficient `index` to `channel`, in N or N m per unit.
     fn add(&mut self, index: usize, channel: Channel, amount: R);
 }
 
-/// A physical effect that is linear in its coefficients, except for shape constants.
+/// A physical effect that is linear in its coefficients, except in its shape constants.
 pub trait Effect {
     /// Identifier in parameter files, JSON and the command line.
     const ID: &'static str;
@@ -114,20 +112,20 @@ pub trait Effect {
     const SOURCE: &'static str;
     /// The coefficients, in the order of [`basis`](Effect::basis), then the shape constants.
     const COEFFICIENTS: &'static [Coefficient];
-    /// Number of shape constants, in which the effect is nonlinear; they are the last coefficients.
+    /// Number of shape constants, in which the effect is nonlinear. They are the last coefficients.
     const SHAPE: usize = 0;
-    /// Name of the ordinate of the required table over `alpha_rad`, if there is one.
+    /// Name of the ordinate of the required table over `alpha_rad`. `None` if the effect needs no table.
     const TABLE: Option<&'static str> = None;
-    /// Name of the ordinate of the required grid over `throttle` and `airspeed_mps`, if there is one.
+    /// Name of the ordinate of the required grid over `throttle` and `airspeed_mps`. `None` if the effect needs no grid.
     const GRID: Option<&'static str> = None;
-    /// Input that the effect needs.
+    /// Inputs that the effect needs.
     const NEEDS: Needs = Needs::Point;
-    /// Full names of coefficients whose terms it replaces; they are zero in a model that it joins.
+    /// Full names of the coefficients whose terms the effect replaces. They are zero in a model with the effect.
     const REPLACES: &'static [&'static str] = &[];
-    /// Entry in the catalogue of effects that a model may lack; `None` for parts of a basic model.
+    /// Entry in the catalogue of effects that a model may lack. `None` for parts of a basic model.
     const ENTRY: Option<Entry> = None;
 
-    /// Reports to `terms` the contribution of one unit of each coefficient to each channel at `at`.
+    /// Adds to `terms` the contribution of one unit of each coefficient to each channel at the point `at`.
     fn basis<R: Real>(at: &Point<R>, own: Own, terms: &mut impl Terms<R>);
 
     /// Applies the effect's coefficients to the rigid body.
@@ -153,7 +151,7 @@ pub struct Description {
     pub table: Option<&'static str>,
     /// Ordinate of the required grid, [`Effect::GRID`].
     pub grid: Option<&'static str>,
-    /// Coefficients whose terms it replaces, [`Effect::REPLACES`].
+    /// Coefficients whose terms the effect replaces, [`Effect::REPLACES`].
     pub replaces: &'static [&'static str],
     /// Entry for the search for missing effects, [`Effect::ENTRY`].
     pub entry: Option<Entry>,
@@ -165,7 +163,7 @@ macro_rules! effects {
     ($($module:ident :: $type:ident),* $(,)?) => {
         $(mod $module; pub use $module::$type;)*
 
-        /// Identifies one effect of the list or of a file.
+        /// Identifies an effect of the list in this file or of an effect file.
         #[derive(Clone, Copy, Debug)]
         pub enum Kind { $(
             #[doc = concat!("See [`", stringify!($type), "`].")]
@@ -176,7 +174,7 @@ macro_rules! effects {
         }
 
         impl Kind {
-            /// All effects of the catalogue, without those of files.
+            /// All effects of the list, without those of effect files.
             pub const ALL: &'static [Kind] = &[$(Kind::$type),*];
 
             /// Description of the effect.
@@ -205,8 +203,8 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs only the point; otherwise nothing. A sum over such
-            /// effects then contains no code of the others, which halves the time of a planner.
+            /// [`Effect::basis`] of this effect if it needs only the point. Otherwise it adds nothing. A sum over independent
+            /// effects then contains no code of the others, which halves the computation time of a planner.
             #[inline(always)]
             pub fn independent_basis<R: Real>(
                 self,
@@ -222,7 +220,7 @@ macro_rules! effects {
                 }
             }
 
-            /// [`Effect::basis`] of this effect if it needs more than the point; otherwise nothing.
+            /// [`Effect::basis`] of this effect if it needs more than the point. Otherwise it adds nothing.
             #[inline(always)]
             pub fn dependent_basis<R: Real>(
                 self,
@@ -256,13 +254,13 @@ impl PartialEq for Kind {
 }
 
 impl Kind {
-    /// The effect with the id `id`, of the catalogue or of an effect file that was read.
+    /// The effect `id` of the catalogue, or of an effect file that was read. `None` if there is no such effect.
     pub fn from_id(id: &str) -> Option<Kind> {
         let known = Kind::ALL.iter().copied().find(|kind| kind.describe().id == id);
         known.or_else(|| register::find(id).map(Kind::Written))
     }
 
-    /// The effect of a file, if this is one.
+    /// The effect of an effect file. `None` if this is an effect of the list.
     pub fn written(self) -> Option<&'static Written> {
         match self {
             Kind::Written(effect) => Some(effect),

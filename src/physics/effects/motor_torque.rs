@@ -23,7 +23,7 @@ impl Effect for MotorTorque {
     const ENTRY: Option<Entry> = Some(Entry {
         channels: &[Channel::Roll],
         look_alikes: &["asymmetry", "roll_linear.Cl0"],
-        separated_by: "throttle steps at fixed airspeed: an asymmetry does not know the throttle",
+        separated_by: "throttle steps at fixed airspeed: an asymmetry is independent of the throttle",
         example: &[0.5],
         starts: &[],
     });

@@ -1,10 +1,10 @@
-//! Pitching moment that is nonlinear at large angles of attack.
+//! Pitching moment that becomes nonlinear at large angles of attack.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Pitching moment as the cube of angle of attack.
+/// Pitching moment proportional to the cube of the angle of attack.
 pub struct PitchBreak;
 
 impl Effect for PitchBreak {

@@ -1,4 +1,4 @@
-//! Pitching moment that is linear in incidence, pitch rate and elevator.
+//! Pitching moment that is linear in angle of attack, pitch rate and elevator.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,4 +1,4 @@
-//! Pitching moment from a table over incidence.
+//! Pitching moment from a table over the angle of attack.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -10,7 +10,7 @@ pub struct PitchTable;
 impl Effect for PitchTable {
     const ID: &'static str = "pitch_table";
     const DESCRIPTION: &'static str =
-        "Pitching moment as a table over angle of attack, beside the line of pitch_linear.";
+        "Pitching moment as a table over angle of attack, in addition to the line of pitch_linear.";
     const FORMULA: &'static str = "m = Q c k Cm(α)";
     const SOURCE: &'static str = "Klein and Morelli, Aircraft System Identification, section 3.3";
     const COEFFICIENTS: &'static [Coefficient] =

@@ -1,4 +1,4 @@
-//! Thrust of a propeller over throttle and airspeed.
+//! Thrust of a propeller as a polynomial in throttle and airspeed.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -7,9 +7,9 @@ use crate::{Channel, Point};
 
 /// Thrust of a motor with a propeller, as a second-degree polynomial in throttle and airspeed.
 ///
-/// With the voltage in proportion to the throttle, the torque balance of a motor and a propeller of quadratic CT(J)
-/// and CQ(J) gives a thrust that this polynomial follows to 0.2 N over the envelope of an Aerosonde. It includes the
-/// drag of a windmilling propeller: below some throttle the thrust is negative.
+/// The voltage is proportional to the throttle. The torque balance of a motor and a propeller with quadratic CT(J) and CQ(J)
+/// gives a thrust that this polynomial reproduces to 0.2 N over the envelope of an Aerosonde. It includes the drag of a
+/// windmilling propeller: at low throttle the thrust is negative.
 pub struct Propeller;
 
 impl Effect for Propeller {

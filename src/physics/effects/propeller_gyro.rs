@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Gyroscopic moments of a rotor whose axis is body x.
+/// Gyroscopic moments of a rotor whose axis is the body's x axis.
 pub struct PropellerGyro;
 
 impl Effect for PropellerGyro {

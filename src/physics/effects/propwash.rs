@@ -4,7 +4,7 @@ use super::{AERODYNAMIC, Coefficient, Effect, Entry, Needs, Own, Terms, coeffici
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Throttle at which the model's effectiveness is exact: level flight of the X8 at 16.67 m/s.
+/// Throttle in level flight of the X8 at 16.67 m/s, 0..1. At this throttle the model's effectiveness is unchanged.
 const THROTTLE0: f64 = 0.118;
 
 /// Effectiveness of aileron and elevator that grows with throttle.

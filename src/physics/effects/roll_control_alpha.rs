@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Rolling and yawing moments of the aileron, proportional to angle of attack.
+/// Rolling and yawing moments of the aileron that are proportional to the angle of attack.
 pub struct RollControlAlpha;
 
 impl Effect for RollControlAlpha {

@@ -1,10 +1,10 @@
-//! Rolling moment that is linear in sideslip, rates and aileron.
+//! Rolling moment that is linear in sideslip, roll rate, yaw rate and aileron.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Rolling moment linear in sideslip, roll and yaw rate and aileron.
+/// Rolling moment linear in sideslip, roll rate, yaw rate and aileron.
 pub struct RollLinear;
 
 impl Effect for RollLinear {

@@ -1,10 +1,10 @@
-//! Side force with rolling and yawing moment that are linear in the rudder.
+//! Side force, rolling moment and yawing moment that are linear in the rudder.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Side force, rolling and yawing moment linear in the rudder's deflection.
+/// Side force, rolling moment and yawing moment linear in the rudder deflection.
 pub struct RudderLinear;
 
 impl Effect for RudderLinear {

@@ -1,10 +1,10 @@
-//! Side force that is linear in sideslip, rates and aileron.
+//! Side force that is linear in sideslip, roll rate, yaw rate and aileron.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Side force linear in sideslip, roll and yaw rate and aileron.
+/// Side force linear in sideslip, roll rate, yaw rate and aileron.
 pub struct SideForceLinear;
 
 impl Effect for SideForceLinear {

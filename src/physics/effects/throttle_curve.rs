@@ -4,7 +4,8 @@ use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Thrust quadratic in throttle, as that of a motor whose voltage follows it.
+/// Thrust quadratic in throttle, as for a motor whose voltage follows the throttle. The added thrust is zero at idle
+/// and at full throttle.
 pub struct ThrottleCurve;
 
 impl Effect for ThrottleCurve {
@@ -13,10 +14,10 @@ impl Effect for ThrottleCurve {
         "The thrust bends over the throttle; without and at full throttle it stays.";
     const FORMULA: &'static str = "T += Tb δt (δt − 1)";
     const SOURCE: &'static str =
-        "thrust goes with the square of a propeller's speed, and that with the voltage: BM12 section 4.3";
+        "thrust is proportional to the square of a propeller's speed, and that to the voltage: BM12 section 4.3";
     const COEFFICIENTS: &'static [Coefficient] = &[coefficient(
         "Tb_n",
-        "four times what half throttle gives less than half the thrust",
+        "four times the thrust missing at half throttle",
         "N",
         (-1e4, 1e4),
     )];

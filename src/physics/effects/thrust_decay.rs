@@ -4,10 +4,10 @@ use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point, State};
 
-/// Airspeed at which the thrust is unchanged, m/s: that of the neutral start.
+/// Airspeed of the neutral start, m/s. At this airspeed the thrust is unchanged.
 const V0: f64 = State::NEUTRAL.airspeed;
 
-/// Change of thrust proportional to airspeed, as with a fixed-pitch propeller.
+/// Change of thrust that is linear in airspeed, as for a fixed-pitch propeller.
 pub struct ThrustDecay;
 
 impl Effect for ThrustDecay {
@@ -22,7 +22,7 @@ impl Effect for ThrustDecay {
     const ENTRY: Option<Entry> = Some(Entry {
         channels: &[Channel::BodyX],
         look_alikes: &["drag_linear.CD0", "thrust_linear.Cp_n", "thrust_scale"],
-        separated_by: "throttle steps at several airspeeds: drag does not know the throttle",
+        separated_by: "throttle steps at several airspeeds: drag is independent of the throttle",
         example: &[0.6],
         starts: &[],
     });

@@ -4,7 +4,7 @@ use super::{Coefficient, Effect, Entry, Needs, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Pitching moment of thrust acting below the centre of gravity.
+/// Pitching moment of a thrust that acts below the centre of gravity.
 pub struct ThrustLineOffset;
 
 impl Effect for ThrustLineOffset {
@@ -23,7 +23,7 @@ impl Effect for ThrustLineOffset {
     const ENTRY: Option<Entry> = Some(Entry {
         channels: &[Channel::Pitch],
         look_alikes: &["pitch_linear.Cm0", "cg_shift", "propwash"],
-        separated_by: "throttle doublets: Cm0 does not know the throttle",
+        separated_by: "throttle doublets: Cm0 is independent of the throttle",
         example: &[0.03],
         starts: &[],
     });

@@ -1,4 +1,4 @@
-//! Thrust that is proportional to throttle, whatever the airspeed.
+//! Thrust that is proportional to throttle and independent of airspeed.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;

@@ -1,4 +1,4 @@
-//! Thrust larger or smaller than the model's.
+//! Thrust that differs from the model's.
 
 use super::{Coefficient, Effect, Entry, Own, Terms, coefficient};
 use greylag_num::Real;
@@ -15,14 +15,14 @@ impl Effect for ThrustScale {
     const SOURCE: &'static str = "GSFM26 eq. (38)";
     const COEFFICIENTS: &'static [Coefficient] = &[coefficient(
         "dCp_n",
-        "thrust at full throttle beside that of the model",
+        "thrust at full throttle minus that of the model",
         "N",
         (-1000.0, 1000.0),
     )];
     const ENTRY: Option<Entry> = Some(Entry {
         channels: &[Channel::BodyX],
         look_alikes: &["thrust_linear.Cp_n", "thrust_decay", "drag_linear.CD0"],
-        separated_by: "throttle doublets at one airspeed; a free thrust_linear.Cp_n is the same term, so only its prior width tells them apart",
+        separated_by: "throttle doublets at one airspeed; a free thrust_linear.Cp_n is the same term, so only its prior width distinguishes them",
         example: &[-5.0],
         starts: &[],
     });

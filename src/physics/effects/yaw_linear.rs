@@ -1,10 +1,10 @@
-//! Yawing moment that is linear in sideslip, rates and aileron.
+//! Yawing moment that is linear in sideslip, roll rate, yaw rate and aileron.
 
 use super::{Coefficient, Effect, Own, Terms, coefficient};
 use greylag_num::Real;
 use crate::{Channel, Point};
 
-/// Yawing moment linear in sideslip, roll and yaw rate and aileron.
+/// Yawing moment linear in sideslip, roll rate, yaw rate and aileron.
 pub struct YawLinear;
 
 impl Effect for YawLinear {

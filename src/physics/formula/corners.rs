@@ -1,4 +1,4 @@
-//! Check that a formula is finite in all flight conditions of aircraft.
+//! Check that a formula is finite in all flight conditions of an aircraft.
 
 use super::variable::Variable;
 use super::written::Written;
@@ -8,10 +8,10 @@ use crate::point::Base;
 use crate::rigid_body::ForceAxes;
 use crate::{AirData, Channel, Controls, Point, State};
 
-/// Number of variables whose corners are all tried; with more variables, the same number of corners is tried.
+/// Number of variables up to which all corners are tried. With more variables the number of corners does not grow.
 const ALL_CORNERS: usize = 12;
 
-/// Whether all terms are finite.
+/// Whether all terms that it received are finite.
 struct Finite(bool);
 
 impl Terms<f64> for Finite {
@@ -20,11 +20,12 @@ impl Terms<f64> for Finite {
     }
 }
 
-/// Rejects an effect that is not finite at some point: at the ends and in the middle of its variables' ranges, with
-/// its shape constants as in the file and with each of them at its bounds, which a fit may reach.
+/// Rejects an effect that is not finite at some point. The points are at the ends and in the middle of its variables' ranges,
+/// and at zero. The shape constants have the values of the file, then one of them at a time is at a bound, which a fit may
+/// reach.
 ///
 /// # Errors
-/// The point, and the remedy.
+/// If a term is not finite. The error names the point and the remedy.
 pub fn check(effect: &Written) -> Result<(), String> {
     let linear = effect.about.coefficients.len() - effect.about.shape;
     let own = &effect.values[linear..];
@@ -41,12 +42,12 @@ pub fn check(effect: &Written) -> Result<(), String> {
     Ok(())
 }
 
-/// Performs the check for given shape constants.
+/// Checks all points with given shape constants.
 fn everywhere(effect: &Written, shape: &[f64]) -> Result<(), String> {
     let variables = effect.variables();
     let tried = 1usize << variables.len().min(ALL_CORNERS);
     for corner in 0..tried {
-        // one bit for each variable; variables after the twelfth share the bits of the first ones
+        // one bit per variable, where variables after the twelfth share the bits of the first ones
         let side = |k: usize| corner >> (k % ALL_CORNERS) & 1;
         try_at(effect, shape, &variables, |k, v| v.range()[side(k)])?;
     }
@@ -75,7 +76,7 @@ fn try_at(
         .map(|(k, v)| format!("{} = {}", v.name(), value(k, *v)))
         .collect();
     Err(format!(
-        "the formula is no number at {}; keep what is divided by, and what stands under a root, above zero with max",
+        "the formula is not finite at {}; keep divisors and arguments of roots above zero with max",
         words.join(", ")
     ))
 }

@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-/// Exponents of kilogram, metre and second, doubled, so that the root of a unit is representable. A radian is
-/// dimensionless.
+/// Exponents of kilogram, metre and second. They are stored doubled, because the square root of a unit must be
+/// representable. A radian is dimensionless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dimension([i16; 3]);
 
-/// Units by name, with their exponents (not doubled).
+/// Units by name, with their exponents of kilogram, metre and second (not doubled).
 const UNITS: &[(&str, [i16; 3])] = &[
     ("rad", [0, 0, 0]),
     ("kg", [1, 0, 0]),
@@ -48,15 +48,15 @@ impl Dimension {
         Dimension(self.0.map(|x| x.saturating_mul(exponent)))
     }
 
-    /// Dimension of the square root, if it is representable.
+    /// Dimension of the square root. `None` if an exponent of this dimension is not a whole number.
     pub fn root(self) -> Option<Dimension> {
         self.0.iter().all(|x| x % 2 == 0).then(|| Dimension(self.0.map(|x| x / 2)))
     }
 
-    /// Parses a unit such as `N m`, `1/rad²`, `kg m^2` or `m/s`; empty if dimensionless.
+    /// Parses a unit such as `N m`, `1/rad²`, `kg m^2` or `m/s`. An empty text is dimensionless.
     ///
     /// # Errors
-    /// If it is not an SI unit or is too long.
+    /// If a part is not one of the SI units of the list, or its exponent is not a whole number from −8 to 8.
     pub fn parse(text: &str) -> Result<Dimension, String> {
         let mut dimension = Dimension::NONE;
         let (mut sign, mut rest) = (1, text.trim());
@@ -76,14 +76,14 @@ impl Dimension {
                 _ => return Err(unknown(text, name)),
             };
             dimension = dimension.times(one.to_power(sign * power));
-            // what follows a division by one unit is again in the numerator: 1/s m is m/s
+            // a division applies to one unit only: 1/s m is m/s
             (sign, rest) = (1, behind);
         }
         Ok(dimension)
     }
 }
 
-/// The exponent at the start of `text`, 1 if there is none, and the rest.
+/// The exponent at the start of `text` (1 if there is none) and the text after it. `None` if the exponent is invalid.
 fn exponent(text: &str) -> Option<(i16, &str)> {
     const RAISED: [(char, i16); 8] =
         [('¹', 1), ('²', 2), ('³', 3), ('⁴', 4), ('⁵', 5), ('⁶', 6), ('⁷', 7), ('⁸', 8)];

@@ -1,4 +1,4 @@
-//! Expression tree of a formula.
+//! Expression tree of a formula, and its text form.
 
 use std::fmt;
 
@@ -13,20 +13,20 @@ pub struct Expression {
     pub at: usize,
 }
 
-/// Kind of a node with its children.
+/// Kind of a node, with its children.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Node {
     /// A number written in the formula.
     Number(f64),
     /// A variable of the flight, for example α.
     Variable(Variable),
-    /// A parameter, by its index in the effect's list.
+    /// A parameter, as its index in the effect's list.
     Parameter(usize),
     /// A function or operator with its arguments.
     Call(Function, Vec<Expression>),
     /// An expression raised to an integer power.
     Power(Box<Expression>, i16),
-    /// A function of one argument by its points (argument, value): linear between them, constant outside.
+    /// A function of one argument given by points (argument, value), linear between them and constant beyond them.
     Table(Box<Expression>, Vec<[f64; 2]>),
 }
 
@@ -39,7 +39,7 @@ macro_rules! functions {
         impl Function {
             /// All functions and operators.
             pub const ALL: &'static [Function] = &[$(Function::$id),*];
-            /// Name in a formula, or operator sign.
+            /// Name in a formula, or the operator's sign.
             pub const fn name(self) -> &'static str {
                 match self { $(Function::$id => $name,)* }
             }
@@ -77,23 +77,23 @@ functions! {
 }
 
 impl Function {
-    /// The function called `name`; operators are not found.
+    /// The function called `name`. `None` for operators and unknown names.
     pub fn from_name(name: &str) -> Option<Function> {
         Function::ALL.iter().copied().find(|f| f.name() == name && !f.is_operator())
     }
 
-    /// Whether it is an operator, written as a sign.
+    /// Whether it is an operator, which is written as a sign.
     pub fn is_operator(self) -> bool {
         use Function::{Add, Divide, Multiply, Negate, Subtract};
         matches!(self, Add | Subtract | Multiply | Divide | Negate)
     }
 
-    /// Whether it depends on the past of its argument.
+    /// Whether its value depends on past values of its argument.
     pub fn has_memory(self) -> bool {
         matches!(self, Function::Lag | Function::Delay)
     }
 
-    /// Whether it has a kink or a jump.
+    /// Whether its value or its slope is discontinuous.
     pub fn has_kink(self) -> bool {
         use Function::{Abs, Deadband, Max, Min, Sign};
         matches!(self, Abs | Min | Max | Sign | Deadband)
@@ -101,7 +101,7 @@ impl Function {
 }
 
 impl Expression {
-    /// An expression that is the number `x`.
+    /// An expression of the number `x`.
     pub fn number(x: f64) -> Expression {
         Expression { node: Node::Number(x), at: 0 }
     }
@@ -112,7 +112,7 @@ impl Expression {
         Expression { node: Node::Call(function, arguments), at }
     }
 
-    /// The product of two expressions; a factor of one is dropped.
+    /// The product of two expressions, without a factor of one.
     pub fn times(self, other: Expression) -> Expression {
         let one = |e: &Expression| e.node == Node::Number(1.0);
         match (one(&self), one(&other)) {
@@ -137,35 +137,35 @@ impl Expression {
         self.children().iter().for_each(|child| child.visit(visit));
     }
 
-    /// Whether `of` holds for the node or any descendant.
+    /// Whether `of` holds for the node or any of its descendants.
     pub fn any(&self, of: &impl Fn(&Node) -> bool) -> bool {
         of(&self.node) || self.children().iter().any(|child| child.any(of))
     }
 
-    /// Variables that occur, each once, in the order of the list.
+    /// The variables that occur, each once, in the order of `Variable::ALL`.
     pub fn variables(&self) -> Vec<Variable> {
         let named = |v: &Variable| self.any(&|node| *node == Node::Variable(*v));
         Variable::ALL.iter().copied().filter(named).collect()
     }
 
-    /// Number of nodes, this one and its descendants.
+    /// Number of nodes: this node and its descendants.
     pub fn size(&self) -> usize {
         1 + self.children().iter().map(Expression::size).sum::<usize>()
     }
 
-    /// The formula as text that can be parsed again, parameters named by `names`.
+    /// The formula as text that can be parsed again, with the parameter names `names`.
     pub fn written<'a>(&'a self, names: &'a [&'a str]) -> Written<'a> {
         Written { of: self, names }
     }
 }
 
-/// A formula to be formatted.
+/// A formula with its parameter names, for formatting.
 pub struct Written<'a> {
     of: &'a Expression,
     names: &'a [&'a str],
 }
 
-/// Operator precedence of a node: sums, products, powers, all else.
+/// Operator precedence of a node: 0 for sums, 1 for products, 2 for powers, 3 for all others.
 fn binding(node: &Node) -> u8 {
     match node {
         Node::Call(Function::Add | Function::Subtract, _) => 0,

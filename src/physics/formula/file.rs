@@ -1,4 +1,4 @@
-//! Effect files: TOML, each with one effect.
+//! Reader of effect files: TOML, with one effect per file.
 
 use std::collections::BTreeMap;
 
@@ -20,11 +20,11 @@ use crate::airframe::{check_schema, toml_error};
 use crate::effects::{Coefficient, Description, Entry, Kind, Needs};
 use crate::inputs;
 
-/// Longest id, and longest name of a parameter, bytes.
+/// Largest length of an id and of a parameter's name, bytes.
 const LONGEST_NAME: usize = 40;
 /// Largest number of parameters of an effect.
 const MOST_PARAMETERS: usize = 16;
-/// Default prior width, as a share of the range between a parameter's bounds.
+/// Default prior width, as a fraction of the range between a parameter's bounds.
 const WIDTH: f64 = 0.25;
 
 #[derive(Deserialize)]
@@ -49,7 +49,7 @@ struct Parameter {
     value: f64,
     width: Option<f64>,
     bounds: [f64; 2],
-    /// Whether the bounds grow for an aircraft of more than 25 kg or 5 m, as those of the catalogue do.
+    /// Whether the bounds grow for an aircraft larger than 25 kg or 5 m, like the bounds of the catalogue.
     #[serde(default)]
     grows: bool,
     unit: String,
@@ -64,7 +64,7 @@ struct ChannelFile {
     shape: Spanned<String>,
 }
 
-/// Channels by their names in effect files.
+/// Channels and their names in effect files.
 const CHANNELS: [(&str, Channel); 7] = [
     ("drag", Channel::Drag),
     ("lift", Channel::Lift),
@@ -75,12 +75,12 @@ const CHANNELS: [(&str, Channel); 7] = [
     ("yaw", Channel::Yaw),
 ];
 
-/// The name of a channel in effect files.
+/// The name of a channel in effect files. Empty for a channel that effect files cannot use.
 pub fn channel_name(channel: Channel) -> &'static str {
     CHANNELS.iter().find(|(_, c)| *c == channel).map_or("", |(name, _)| name)
 }
 
-/// Dimension of an amount in `channel`.
+/// Dimension of the contributions to `channel`.
 fn measured_in(channel: Channel) -> Dimension {
     match channel {
         Channel::Roll | Channel::Pitch | Channel::Yaw => Dimension::MOMENT,
@@ -91,7 +91,7 @@ fn measured_in(channel: Channel) -> Dimension {
 /// Parses the text of an effect file.
 ///
 /// # Errors
-/// Description of the fault with its line, and the remedy.
+/// If the text is not a valid effect file. The error describes the fault with its line, and the remedy.
 pub fn parse(text: &str) -> Result<Written, String> {
     let file: File = toml::from_str(text).map_err(|e| toml_error(text, &e))?;
     check_schema(file.schema, 1)?;
@@ -115,11 +115,11 @@ pub fn parse(text: &str) -> Result<Written, String> {
     let shapes: Vec<Expression> = lines.iter().map(|l| l.line.shape.clone()).collect();
     for (k, name) in names.iter().enumerate() {
         if !shapes.iter().any(|s| s.any(&|node| *node == Node::Parameter(k))) {
-            return Err(format!("parameters.{name} stands in no shape; use it or take it out"));
+            return Err(format!("parameters.{name} is in no shape; use it or remove it"));
         }
     }
     let linear = split::linear(&shapes, names.len());
-    // coefficients first, then shape constants, as of every effect
+    // every effect has its linear coefficients first, then its shape constants
     let order: Vec<usize> = (0..names.len())
         .filter(|k| linear[*k])
         .chain((0..names.len()).filter(|k| !linear[*k]))
@@ -129,21 +129,21 @@ pub fn parse(text: &str) -> Result<Written, String> {
     Ok(written)
 }
 
-/// A line with the positions of its texts in the file.
+/// A line of a formula, with the byte offset of its shape in the file.
 struct Placed {
     line: Line,
     shape_at: usize,
 }
 
-/// The text of a file, to locate faults in it.
+/// The text of a file, in which faults are located.
 struct Places<'a> {
     text: &'a str,
 }
 
 impl Places<'_> {
-    /// Message for the `fault` of the string whose value begins at byte `start` of the file.
+    /// Message for the `fault` in the string that begins at byte `start` of the file.
     fn message(&self, start: usize, fault: &Fault) -> String {
-        // a string's value begins behind its quotes
+        // the value of a string begins after its quotes
         let quotes = self.text[start..].chars().take_while(|c| matches!(c, '"' | '\'')).count();
         let at = (start + if quotes >= 3 { 3 } else { 1 } + fault.at).min(self.text.len());
         let before = self.text.get(..at).unwrap_or(self.text);
@@ -258,7 +258,7 @@ fn built(
     })
 }
 
-/// Renumbers parameters by their index among the coefficients.
+/// Replaces the indices of parameters by their indices among the coefficients.
 fn renumber(of: &mut Expression, order: &[usize]) {
     match &mut of.node {
         Node::Parameter(k) => *k = order.iter().position(|o| o == k).unwrap_or_default(),
@@ -268,7 +268,7 @@ fn renumber(of: &mut Expression, order: &[usize]) {
     }
 }
 
-/// Rejects a term whose unit differs from its channel's.
+/// Rejects a term whose dimension differs from that of its channel.
 fn balance(
     channel: Channel,
     factor: Option<Dimension>,
@@ -354,7 +354,7 @@ fn description(
     }
 }
 
-/// The lines as text, one for each channel.
+/// The lines as text, separated by semicolons.
 fn formula(lines: &[Line], names: &[&str]) -> String {
     let one = |line: &Line| {
         let (factor, shape) = (line.factor.written(names), line.shape.written(names));
@@ -366,8 +366,8 @@ fn formula(lines: &[Line], names: &[&str]) -> String {
     lines.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Starting points of a search over shape constants: the values of the file, and each constant one width to either
-/// side. Coefficients of zero start at their width, since a shape has no effect without an amount.
+/// Starting points of a search over shape constants: the values of the file, and each constant one width lower or higher.
+/// A coefficient of zero starts at its width, because shape constants have no effect without it.
 fn starts(
     parameters: &[&Parameter],
     linear: usize,
@@ -381,7 +381,7 @@ fn starts(
     for k in 0..linear {
         if first[k] == 0.0 {
             let [low, high] = parameters[k].bounds;
-            // towards the side on which there is more room
+            // towards the bound with the larger distance from zero
             first[k] = if high >= -low { widths[k].min(high) } else { (-widths[k]).max(low) };
         }
     }

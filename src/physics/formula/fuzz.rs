@@ -1,4 +1,4 @@
-//! Fuzz test of the effect file reader: thousands of broken files, none of which may cause a panic.
+//! Fuzz test of the reader of effect files: thousands of broken files, of which none may cause a panic.
 
 use rand::RngExt;
 
@@ -7,9 +7,9 @@ use super::file;
 use super::variable::Variable;
 use greylag_num::stream::{Stream, stream};
 
-/// Number of the random stream that draws the mutations.
+/// Number of the random stream for the mutations.
 const DRAW: u64 = 31;
-/// A valid effect file to mutate.
+/// A valid effect file, from which the broken files are made.
 const WHOLE: &str = r#"schema = 1
 id = "broken"
 description = "d"
@@ -32,8 +32,8 @@ factor = "qbar*S*b"
 shape = "k*max(abs(beta) - w, 0)^2 + k*table(alpha; -0.1:0, 0.2:1)"
 "#;
 
-/// Reads `count` files drawn from `seed`, each with a random formula or with random damage; `observe` receives the text
-/// of each and the reader's result. Returns the number of valid effect files.
+/// Reads `count` files drawn from `seed`. Each has a random formula or random damage. `observe` receives the text and the
+/// reader's result of each file. Returns the number of valid effect files.
 pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), String>)) -> usize {
     let mut random = stream(seed, &[DRAW]);
     let mut good = 0;
@@ -46,7 +46,7 @@ pub fn run(count: usize, seed: u64, observe: &mut dyn FnMut(&str, &Result<(), St
     good
 }
 
-/// The file with a random formula.
+/// The file with a random factor and shape.
 fn grown(random: &mut Stream) -> String {
     let depth = random.random_range(0..7);
     let shape = format!("k*({})", term(random, depth));
@@ -84,7 +84,7 @@ fn pick<T: Copy>(random: &mut Stream, all: &[T]) -> T {
     all[random.random_range(0..all.len() as u32) as usize]
 }
 
-/// The file with bytes removed, inserted, doubled or changed.
+/// The file with characters removed, inserted or copied at random.
 fn damaged(random: &mut Stream) -> String {
     const ODD: [&str; 24] = [
         "(",

@@ -1,4 +1,4 @@
-//! State of the `lag(…)` and `delay(…)` terms of a formula.
+//! The `lag(…)` and `delay(…)` terms of a formula: their check and evaluation.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
@@ -11,7 +11,7 @@ use crate::rigid_body::ForceAxes;
 use crate::{AirData, Controls, Point, State};
 use greylag_num::Real;
 
-/// Longest delay, s, limited by the number of remembered samples.
+/// Longest delay, s. The number of stored samples limits it.
 pub const LONGEST_DELAY_S: f64 = (PAST - 2) as f64 * STEP;
 
 /// A lag or delay term of a formula.
@@ -20,14 +20,14 @@ pub struct Memory {
     pub(super) function: Function,
     /// Argument of the lag or delay.
     pub(super) argument: Tape,
-    /// Index of its time constant among the effect's shape constants.
+    /// Index of the time constant or delay among the effect's shape constants.
     pub(super) time: u16,
 }
 
 impl Memory {
-    /// Value of the argument under `controls`, to which the lag or delay settles.
+    /// Value of the argument under `controls`. The lag or delay settles to this value.
     ///
-    /// Not inlined: a copy of the tape in each planner's kernel would take minutes to compile, for few models.
+    /// It is not inlined, because a copy of the tape in each planner's kernel would add minutes to the compilation.
     #[inline(never)]
     pub fn settled<R: Real>(&self, controls: &Controls<R>, shape: &[f64]) -> R {
         let zero = R::zero();
@@ -57,7 +57,7 @@ impl Memory {
         value
     }
 
-    /// The lagged or delayed value under `controls`; called once every [`STEP`].
+    /// The lagged or delayed value under `controls`. To be called once every [`STEP`].
     #[inline(always)]
     pub fn act<R: Real>(&self, controls: &Controls<R>, shape: &[f64], past: &mut Past<R>) -> R {
         let now = self.settled(controls, shape);
@@ -69,10 +69,10 @@ impl Memory {
     }
 }
 
-/// Rejects a lag or delay in `of` that cannot be evaluated; `bounds` are those of the effect's parameters.
+/// Rejects a lag or delay in `of` that cannot be evaluated. `bounds` are the bounds of the effect's parameters.
 ///
 /// # Errors
-/// The position in the text, and the remedy.
+/// If a lag or delay has an invalid argument or time. The error has the position in the text, and the remedy.
 pub fn check(of: &Expression, bounds: &[[f64; 2]]) -> Result<(), Fault> {
     let mut fault = None;
     of.visit(&mut |e| {
@@ -103,8 +103,7 @@ fn refusal(function: Function, all: &[Expression], bounds: &[[f64; 2]]) -> Optio
             other.name()
         ));
     }
-    // a literal number has no bounds, and an effect without a shape constant would share one model with all such
-    // effects in a search
+    // a number in the formula has no bounds, and effects without a shape constant share one model in a search
     let Node::Parameter(k) = time.node else {
         return Some(format!("the time of {name} must be a parameter in s, so that it has bounds"));
     };

@@ -1,9 +1,9 @@
-//! Formulas of effects that are read from files and need no compilation.
+//! Formulas of effects that are read from files and need no compilation of the program.
 //!
-//! A text becomes a tree ([`parser`]), its units are checked ([`units`]), it is split into the factor of each
-//! coefficient ([`split`]), and these are compiled to a list of operations over [`Real`](greylag_num::Real)
-//! ([`tape`]). An effect file ([`mod@file`]) holds one effect; once read,
-//! [`Kind::Written`](crate::effects::Kind::Written) is an effect like all others.
+//! The parser turns a text into a tree ([`parser`]). The units of the tree are checked ([`units`]). The tree is then split
+//! into the factor of each coefficient ([`split`]). The factors are compiled to a list of operations over
+//! [`Real`](greylag_num::Real) ([`tape`]). An effect file ([`mod@file`]) has one effect, which
+//! [`Kind::Written`](crate::effects::Kind::Written) makes usable like a compiled effect.
 
 mod corners;
 pub mod dimension;

@@ -3,30 +3,30 @@
 use super::expression::{Expression, Function, Node};
 use super::variable::Variable;
 
-/// Longest formula in bytes.
+/// Longest formula, bytes.
 const LONGEST: usize = 2000;
-/// Largest number of nodes of a formula.
+/// Largest number of nodes in a formula.
 const MOST_NODES: usize = 400;
-/// Deepest nesting of parentheses.
+/// Deepest nesting of parentheses, signs and function calls.
 const DEEPEST: usize = 40;
-/// Largest integer power that is accepted.
+/// Largest accepted magnitude of an integer power.
 const LARGEST_POWER: i16 = 8;
 
-/// A fault of a formula with its position.
+/// A fault in a formula, with its position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// Byte offset in the text.
     pub at: usize,
-    /// Description of the fault, and the remedy.
+    /// Description of the fault and its remedy.
     pub why: String,
 }
 
 type Parsed = Result<Expression, Fault>;
 
-/// Parses `text`; names in `parameters` take precedence over variables and functions.
+/// Parses `text`. Names in `parameters` take precedence over variables.
 ///
 /// # Errors
-/// The position, the fault, and a correct form.
+/// If `text` is not a valid formula. The error has the position, the fault and the remedy.
 pub fn parse(text: &str, parameters: &[&str]) -> Parsed {
     if text.len() > LONGEST {
         let why = format!(
@@ -383,7 +383,7 @@ fn no_function(name: &str) -> String {
     )
 }
 
-/// Edit distance between two names: letters to change, add or remove.
+/// Edit distance between two names: the number of letters to change, add or remove.
 fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

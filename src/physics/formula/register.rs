@@ -1,8 +1,8 @@
-//! Registry of effects from files: those shipped with the program, and those read by this process.
+//! Registry of effects from files: shipped effects, and effects that this process has read.
 //!
-//! An effect of a file is found by its id, like one of the catalogue, and both live as long as the process. A file
-//! that is read again gives the same effect; one that was edited in between replaces it for later look-ups. Models
-//! loaded before keep the earlier one.
+//! An effect of a file is found by its id, like an effect of the catalogue. Both live as long as the process. A file that
+//! is read again gives the same effect. If the file was edited in between, the new effect replaces the earlier one for
+//! later look-ups. Models that were loaded before keep the earlier effect.
 
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, PoisonError, RwLock};
@@ -27,7 +27,7 @@ pub fn shipped() -> &'static [Written] {
     &SHIPPED
 }
 
-/// The effect with the id `id`, of a file that was read or else of a shipped file.
+/// The effect `id` of the file that was read last, or else of a shipped file. `None` if there is no such effect.
 pub fn find(id: &str) -> Option<&'static Written> {
     let read = READ.read().unwrap_or_else(PoisonError::into_inner);
     let own = read.iter().rev().copied().find(|effect| effect.about.id == id);
@@ -37,7 +37,7 @@ pub fn find(id: &str) -> Option<&'static Written> {
 /// Parses the text of an effect file and registers the effect.
 ///
 /// # Errors
-/// The fault with its position, and the remedy.
+/// If the text is not a valid effect file. The error describes the fault with its position, and the remedy.
 pub fn read(text: &str) -> Result<&'static Written, String> {
     let known = |all: &[&'static Written]| all.iter().copied().find(|e| e.text == text);
     let parsed = match known(&READ.read().unwrap_or_else(PoisonError::into_inner)) {
@@ -45,13 +45,13 @@ pub fn read(text: &str) -> Result<&'static Written, String> {
         None => Box::leak(Box::new(file::parse(text)?)),
     };
     let mut all = READ.write().unwrap_or_else(PoisonError::into_inner);
-    // the newest of an id is at the end
+    // the newest effect with an id is at the end
     all.retain(|e| e.text != text);
     all.push(parsed);
     Ok(parsed)
 }
 
-/// Reads an effect file, or every `.toml` of a folder, in the order of their names.
+/// Reads an effect file, or every `.toml` file of a folder in the order of the names.
 ///
 /// # Errors
 /// If a file cannot be read or is not an effect file.

@@ -1,13 +1,14 @@
-//! Splitting of a formula into the factor of each coefficient.
+//! Division of a formula into the factor of each coefficient.
 
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 
-/// Parts of a formula: for each parameter in which it is linear, the factor of that parameter.
+/// Parts of a formula: each parameter in which the formula is linear, as its index, with the factor of this parameter.
 pub type Parts = Vec<(usize, Expression)>;
 
-/// Marks which of `count` parameters all of `formulas` are linear in: those that occur in no function or denominator,
-/// and in no product with another such parameter. Of the parameters of a product, the leftmost stays linear.
+/// Marks the parameters, of which there are `count`, in which all of `formulas` are linear. Such a parameter occurs in no
+/// function, in no denominator and in no product with another of them. In a product of parameters the leftmost stays
+/// linear.
 pub fn linear(formulas: &[Expression], count: usize) -> Vec<bool> {
     let mut linear = vec![true; count];
     loop {
@@ -23,7 +24,7 @@ fn holds(of: &Expression, linear: &[bool]) -> bool {
     of.any(&|node| matches!(node, Node::Parameter(k) if linear[*k]))
 }
 
-/// Clears in `linear` the parameters that `of` is not linear in.
+/// Clears the marks in `linear` of the parameters in which `of` is not linear.
 fn mark(of: &Expression, linear: &mut [bool]) {
     match &of.node {
         Node::Call(Function::Add | Function::Subtract | Function::Negate, all) => {
@@ -44,7 +45,7 @@ fn mark(of: &Expression, linear: &mut [bool]) {
     }
 }
 
-/// Clears in `linear` all parameters in `of`.
+/// Clears the marks in `linear` of all parameters in `of`.
 fn bend(of: &Expression, linear: &mut [bool]) {
     of.visit(&mut |e| {
         if let Node::Parameter(k) = e.node {
@@ -53,10 +54,10 @@ fn bend(of: &Expression, linear: &mut [bool]) {
     });
 }
 
-/// The factor of each parameter of `linear` in `formula`.
+/// The factor in `formula` of each parameter that `linear` marks.
 ///
 /// # Errors
-/// If a term has no such parameter: the effect could not be zero without one.
+/// If a term contains no such parameter. Without one the effect could not be zero.
 pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     let mut all: Parts = Vec::new();
     for (parameter, part) in divided(formula, linear) {
@@ -78,7 +79,7 @@ pub fn parts(formula: &Expression, linear: &[bool]) -> Result<Parts, Fault> {
     Ok(all)
 }
 
-/// Terms of a sum, each with the parameter that multiplies it.
+/// The terms of a sum, each with the index of the parameter that multiplies it. `None` if there is no such parameter.
 fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)> {
     if !holds(of, linear) {
         return vec![(None, of.clone())];
@@ -104,7 +105,7 @@ fn divided(of: &Expression, linear: &[bool]) -> Vec<(Option<usize>, Expression)>
         Node::Call(Function::Divide, all) => {
             each(&all[0], &|part| Expression::call(Function::Divide, vec![part, all[1].clone()]))
         }
-        // `linear` leaves no other node with one of its parameters below
+        // no other node contains a marked parameter, because `linear` has cleared its mark
         _ => vec![(None, of.clone())],
     }
 }

@@ -1,7 +1,7 @@
-//! A formula compiled to a list of operations, generic over the scalar.
+//! A formula compiled to a list of operations, generic over the scalar type.
 //!
-//! It is a stack machine whose top is kept in a register. Derivatives by states and controls come from running it
-//! with [`Dual`](greylag_num::Dual) numbers.
+//! The list is the program of a stack machine whose top is kept in a register. With [`Dual`](greylag_num::Dual) numbers it
+//! gives the derivatives with respect to states and controls.
 
 use super::expression::{Expression, Function, Node};
 use super::memory::Memory;
@@ -9,10 +9,10 @@ use super::variable::Variable;
 use crate::{Channel, Point};
 use greylag_num::{Real, Table};
 
-/// Largest depth of the stack below the top.
+/// Largest number of values on the stack below the top.
 const DEPTH: usize = 12;
 
-/// Largest number of operations and multiplied variables of an effect, a limit on the cost of a model's step.
+/// Largest number of operations and multiplied variables of an effect. It limits the time of a model's step.
 const LONGEST: usize = 4000;
 
 /// An operation of the stack machine.
@@ -37,45 +37,45 @@ enum Operation {
     Sqrt,
     Smoothstep,
     Deadband,
-    /// Replaces the top by the lag or delay of that index if the past is known; else keeps it: the settled value.
+    /// Replaces the top by the lag or delay with this index. If the past is unknown, the top remains: the settled value.
     Remembered(u16),
     Square,
     Power(i16),
     Table(u16),
-    /// Adds a number to the top; as the following operations, without using the stack.
+    /// Adds a number to the top. This operation and the next four do not use the stack.
     AddNumber(f64),
     Scale(f64),
     AddVariable(Variable),
     Times(Variable),
-    /// Multiplies the top by a run of variables of the list.
+    /// Multiplies the top by the variables from the first index up to the second in the list of variables.
     TimesAll(u16, u16),
-    /// Stores the top as the shared factor and removes it.
+    /// Stores the top as the factor that several parts share, and removes it.
     Keep,
     TimesKept,
     /// Reports the top and removes it.
     Report(u16, Channel),
 }
 
-/// A list of operations with the tables they use.
+/// A list of operations with the tables, variables and memories that it uses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tape {
     operations: Vec<Operation>,
     tables: Vec<Table>,
-    /// Variables that are multiplied in runs.
+    /// Variables of the products, in runs.
     variables: Vec<Variable>,
     memories: Vec<Memory>,
     depth: usize,
     deepest: usize,
 }
 
-/// Index of each parameter among the shape constants, if it is one.
+/// Index of each parameter among the shape constants. `None` for a coefficient.
 pub type Places = [Option<u16>];
 
 impl Tape {
-    /// Appends the evaluation of `part` times `factor` for coefficient `index` in `channel`.
+    /// Appends the evaluation of `part` times `factor` (`None`: the kept factor) for coefficient `index` in `channel`.
     ///
     /// # Errors
-    /// If the stack would be too deep.
+    /// If the stack would be too deep, there would be too many operations, or the formula contains an invalid term.
     pub fn report(
         &mut self,
         part: &Expression,
@@ -96,10 +96,10 @@ impl Tape {
         self.checked_length()
     }
 
-    /// Appends the evaluation of a factor that several parts share.
+    /// Appends the evaluation of a factor that several parts share, and keeps its value.
     ///
     /// # Errors
-    /// As [`Tape::report`].
+    /// If the stack would be too deep, or the factor contains an invalid term.
     pub fn keep(&mut self, factor: &Expression, places: &Places) -> Result<(), String> {
         self.push(factor, places)?;
         self.operations.push(Operation::Keep);
@@ -107,12 +107,12 @@ impl Tape {
         Ok(())
     }
 
-    /// Number of operations.
+    /// Number of operations in the list.
     pub fn len(&self) -> usize {
         self.operations.len()
     }
 
-    /// Whether there are no operations.
+    /// Whether the list has no operations.
     pub fn is_empty(&self) -> bool {
         self.operations.is_empty()
     }
@@ -139,7 +139,7 @@ impl Tape {
         }
     }
 
-    /// Appends a product: its factors other than variables one by one, then all variables in a run.
+    /// Appends a product: first the factors other than variables, then all variables as a run, then the number.
     fn product(&mut self, of: &Expression, places: &Places) -> Result<(), String> {
         let mut factors = Vec::new();
         let number = factors_of(of, &mut factors);
@@ -182,7 +182,7 @@ impl Tape {
             Node::Variable(v) => self.leaf(Operation::Variable(*v)),
             Node::Parameter(k) => match places.get(*k).copied().flatten() {
                 Some(place) => self.leaf(Operation::Constant(place)),
-                None => Err("a coefficient stands where only shape constants may".into()),
+                None => Err("a coefficient is used where only shape constants are allowed".into()),
             },
             Node::Power(base, n) => {
                 self.push(base, places)?;
@@ -220,7 +220,7 @@ impl Tape {
         if function.has_memory() {
             return self.remembered(function, all, places);
         }
-        // an addend that is a number or a variable is added directly, without a place on the stack
+        // a number or variable is added directly, without a place on the stack
         if let ([left, right], F::Add) = (all, function) {
             for (leaf, other) in [(right, left), (left, right)] {
                 if let Some(direct) = direct(function, &leaf.node) {
@@ -256,7 +256,7 @@ impl Tape {
         Ok(())
     }
 
-    /// The lag or delay of an expression; equal expressions share one.
+    /// Appends the lag or delay of an expression. Equal lags or delays share one memory.
     fn remembered(
         &mut self,
         function: Function,
@@ -283,13 +283,13 @@ impl Tape {
         Ok(())
     }
 
-    /// Lags and delays, in the order of their indices.
+    /// The lags and delays, in the order of their indices.
     pub fn memories(&self) -> &[Memory] {
         &self.memories
     }
 
-    /// Evaluates at `at` with shape constants `shape`, its lags being those of the model from `first_lag` on, and
-    /// reports each part's value.
+    /// Evaluates the list at the point `at` with the shape constants `shape`, and reports the value of each part. The lags
+    /// of the list are the lags of the model from index `first_lag` on.
     #[inline(always)]
     pub fn run<R: Real>(
         &self,
@@ -389,7 +389,7 @@ fn factors_of<'a>(of: &'a Expression, factors: &mut Vec<&'a Expression>) -> f64 
     }
 }
 
-/// The variables among `factors`, a square as two of them, and the other factors.
+/// Separates `factors` into variables and others. A power of a variable up to the fourth counts as that many variables.
 fn divided<'a>(factors: &[&'a Expression]) -> (Vec<Variable>, Vec<&'a Expression>) {
     let (mut variables, mut others) = (Vec::new(), Vec::new());
     for factor in factors {
@@ -405,7 +405,7 @@ fn divided<'a>(factors: &[&'a Expression]) -> (Vec<Variable>, Vec<&'a Expression
     (variables, others)
 }
 
-/// Replaces dynamic pressure and wing area by their product, which the airflow holds.
+/// Replaces dynamic pressure and wing area by their product, which the air data contain.
 fn of_area(variables: &mut Vec<Variable>) {
     let place = |v: Variable| variables.iter().position(|other| *other == v);
     if let (Some(pressure), Some(area)) = (place(Variable::Pressure), place(Variable::Area)) {
@@ -414,7 +414,7 @@ fn of_area(variables: &mut Vec<Variable>) {
     }
 }
 
-/// The operation that applies a leaf directly.
+/// The operation that adds a number or variable directly. `None` for other terms.
 fn direct(function: Function, leaf: &Node) -> Option<Operation> {
     Some(match (function, leaf) {
         (Function::Add, Node::Number(x)) => Operation::AddNumber(*x),
@@ -425,7 +425,7 @@ fn direct(function: Function, leaf: &Node) -> Option<Operation> {
 
 #[inline(always)]
 fn put<R: Real>(below: &mut [R; DEPTH], depth: &mut usize, x: R) {
-    // the first push stores a meaningless value there, so that the top need not be optional
+    // the first call stores an unused value, which is simpler than an optional top
     if let Some(place) = below.get_mut(*depth) {
         *place = x;
     }

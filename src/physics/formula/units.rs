@@ -4,7 +4,7 @@ use super::dimension::Dimension;
 use super::expression::{Expression, Function, Node};
 use super::parser::Fault;
 
-/// Dimension of a part of a formula.
+/// Dimension of a term of a formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Measure {
     /// A definite dimension.
@@ -13,10 +13,10 @@ enum Measure {
     Any,
 }
 
-/// Dimension of `formula` with parameters of `dimensions`.
+/// Dimension of `formula`, whose parameters have `dimensions`. `None` if the formula is always zero.
 ///
 /// # Errors
-/// The position of two operands with different dimensions, with both.
+/// If the units do not balance. The error has the position and the dimensions that do not match.
 pub fn dimension(
     formula: &Expression,
     dimensions: &[Dimension],
@@ -41,7 +41,7 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
         },
         Node::Table(x, _) => {
             part(x)?;
-            // its points carry the unit of its variable
+            // the abscissae have the unit of the variable, the ordinates have none
             Of(Dimension::NONE)
         }
         Node::Call(function, all) => match function {
@@ -78,7 +78,7 @@ fn measure(of: &Expression, dimensions: &[Dimension]) -> Result<Measure, Fault> 
     })
 }
 
-/// Dimension of a lag or delay: that of its argument; its time must be in s.
+/// Dimension of a lag or delay, which is that of its argument. Its time must be in s.
 fn timed(
     function: Function,
     all: &[Expression],
@@ -112,7 +112,7 @@ fn same(left: Measure, right: Measure, at: &Expression, name: &str) -> Result<Me
         (Measure::Of(a), Measure::Of(b)) => Err(Fault {
             at: at.at,
             why: format!(
-                "the units do not balance: left of {name:?} stands {a}, right of it {b}; give a number that has \
+                "the units do not balance: left of {name:?} is {a}, right of it {b}; give a number that has \
                  a unit as a parameter, or divide by a speed or length"
             ),
         }),

@@ -1,4 +1,4 @@
-//! Variables of formulas, one line each.
+//! The variables of formulas, one line per variable.
 
 use super::dimension::Dimension;
 use crate::effects::Needs;
@@ -20,7 +20,7 @@ macro_rules! variables {
         pub enum Variable { $(#[doc = $meaning] $id,)* }
 
         impl Variable {
-            /// All variables, in the order of the list.
+            /// All variables, in the order of the list in this file.
             pub const ALL: &'static [Variable] = &[$(Variable::$id),*];
 
             /// Name in a formula.
@@ -43,17 +43,17 @@ macro_rules! variables {
                 match self { $(Variable::$id => $dimension,)* }
             }
 
-            /// Range in the flight of any aircraft, used to test formulas.
+            /// Range of the variable in the flight of any aircraft, in its unit. It is used to test formulas.
             pub const fn range(self) -> [f64; 2] {
                 match self { $(Variable::$id => [$low, $high],)* }
             }
 
-            /// Input needed to evaluate it.
+            /// Input needed to evaluate the variable.
             pub const fn needs(self) -> Needs {
                 match self { $(Variable::$id => Needs::$needs,)* }
             }
 
-            /// Value at the point `at`.
+            /// Value at the point `at`, in SI units.
             #[inline(always)]
             pub fn value<R: Real>(self, at: &Point<R>) -> R {
                 match self { $(Variable::$id => { let $at = at; $value })* }
@@ -93,7 +93,7 @@ variables! {
 const FORCE: Dimension = Dimension::FORCE;
 
 impl Variable {
-    /// The variable called `name`, or by its alternative name.
+    /// The variable with the name or alternative name `name`. `None` if there is no such variable.
     pub fn from_name(name: &str) -> Option<Variable> {
         Variable::ALL.iter().copied().find(|v| v.name() == name || v.alias() == name)
     }

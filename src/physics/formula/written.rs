@@ -1,4 +1,4 @@
-//! An effect from a file, ready for evaluation.
+//! An effect from an effect file, ready for evaluation.
 
 use super::expression::{Expression, Node};
 use super::memory::Memory;
@@ -13,9 +13,9 @@ use greylag_num::Real;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// A search proposed it, and no person has reviewed it.
+    /// A search proposed the effect, and no person has reviewed it.
     Proposed,
-    /// A person has accepted it.
+    /// A person has reviewed and accepted the effect.
     Accepted,
 }
 
@@ -24,24 +24,24 @@ pub enum Status {
 pub struct Line {
     /// Channel of the contribution.
     pub channel: Channel,
-    /// Factor of the shape.
+    /// Factor by which the shape is multiplied.
     pub factor: Expression,
-    /// Sum of terms, each with a parameter.
+    /// Sum of terms, each multiplied by a parameter.
     pub shape: Expression,
 }
 
 /// An effect read from a file.
 #[derive(Debug)]
 pub struct Written {
-    /// Description, as of any effect.
+    /// Description in the form used for every effect.
     pub about: Description,
     /// Acceptance status.
     pub status: Status,
-    /// Contributions to each channel; parameters in the order of `about.coefficients`.
+    /// Contributions to the channels. Parameters have the order of `about.coefficients`.
     pub lines: Vec<Line>,
     /// Values of the coefficients in the file.
     pub values: Vec<f64>,
-    /// Prior standard deviations of the coefficients.
+    /// Prior standard deviations of the coefficients, in their units.
     pub widths: Vec<f64>,
     /// The text of the file.
     pub text: String,
@@ -50,13 +50,13 @@ pub struct Written {
 }
 
 impl Written {
-    /// Input it needs: never only the point, so that a planner's sum over effects that need only the point contains
-    /// no code of formulas.
+    /// Inputs of the effect. They are never only the point, because a planner's sum over effects that need only the point must
+    /// contain no code of formulas.
     pub const fn needs(&self) -> Needs {
         self.needs
     }
 
-    /// Reports the contribution of one unit of each coefficient.
+    /// Adds to `terms` the contribution of one unit of each coefficient.
     #[inline(always)]
     pub fn basis<R: Real>(&self, at: &Point<R>, own: Own, terms: &mut impl Terms<R>) {
         let Own { shape, first_lag, .. } = own;
@@ -65,12 +65,12 @@ impl Written {
         });
     }
 
-    /// Lags and delays of the effect; at most [`LAGS`](crate::actuators::LAGS).
+    /// Lags and delays of the effect, at most [`LAGS`](crate::actuators::LAGS).
     pub fn memories(&self) -> &[Memory] {
         self.tape.memories()
     }
 
-    /// Value of a coefficient in the file, with its source.
+    /// Value of a coefficient in the file, with the effect's source and the prior standard deviation.
     pub fn number(&self, coefficient: usize) -> Sourced {
         Sourced {
             bounds: None,
@@ -80,18 +80,18 @@ impl Written {
         }
     }
 
-    /// Number of operations of an evaluation.
+    /// Number of operations of one evaluation.
     pub fn operations(&self) -> usize {
         self.tape.len()
     }
 
-    /// Variables it depends on.
+    /// The variables on which the effect depends.
     pub fn variables(&self) -> Vec<Variable> {
         let named = |v: &Variable| self.lines.iter().any(|l| l.uses(*v));
         Variable::ALL.iter().copied().filter(named).collect()
     }
 
-    /// Names of its functions with kinks or jumps, each once.
+    /// Names of the effect's functions with a discontinuous value or slope, each once. Tables are included.
     pub fn kinks(&self) -> Vec<&'static str> {
         let mut all = Vec::new();
         let mut note = |e: &Expression| {

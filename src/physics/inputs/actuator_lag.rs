@@ -1,10 +1,10 @@
-//! Lag of the surfaces behind their measured position.
+//! First-order lag of the surfaces behind their measured position.
 
 use super::{InputEffect, Past, STEP};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A first-order lag behind the measured position.
+/// A first-order lag between the measured position and the acting deflection.
 pub struct ActuatorLag;
 
 impl InputEffect for ActuatorLag {

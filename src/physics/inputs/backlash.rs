@@ -1,10 +1,10 @@
-//! Backlash in the linkage.
+//! Backlash in the linkage of the surfaces.
 
 use super::{InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A play that is crossed at every reversal.
+/// Backlash that a surface crosses at every reversal.
 pub struct Backlash;
 
 impl InputEffect for Backlash {

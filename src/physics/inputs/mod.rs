@@ -1,13 +1,13 @@
-//! Input effects, between the actuators' measured positions and the acting deflections: one file each.
+//! Input effects between the actuators' measured positions and the acting deflections, each in its own file.
 //!
-//! They have memory and are not linear in their constant. Several of one model act one after the other in
-//! the order of the list at the end of this file. To add one: write its file beside these and name it
-//! there.
+//! Input effects have memory and are nonlinear in their constant. Several effects of one model act one after the other in
+//! the order of the list at the end of this file. A new effect needs a file in this folder and its name in that list.
 //!
-//! They apply wherever a model is stepped: free runs, imagined flights, the planner (which assumes surfaces and
-//! throttle at rest before, since it does not observe the acting deflections). In trim only the dead zone would
-//! matter, and trim neglects it; the linear model, and thus the design of the LQI, neglects all. The LQI's integrators
-//! compensate their constant part; the cost of a lag or delay is measured in `tests/model/effects_lqi.rs`.
+//! Input effects apply wherever a model is stepped: free runs, simulated flights and the planner. The planner does not
+//! observe the acting deflections and assumes surfaces and throttle at rest before its plan. Trim neglects input effects,
+//! of which only the dead zone would matter. The linear model, and thus the design of the LQI, neglects all of them. The
+//! LQI's integrators compensate their constant part. The cost of a lag or delay is measured in
+//! `tests/model/effects_lqi.rs`.
 
 use crate::Controls;
 use crate::actuators::LAGS;
@@ -17,13 +17,13 @@ use greylag_num::Real;
 /// Time between two calls of [`InputEffect::act`], s.
 pub const STEP: f64 = 0.01;
 
-/// Number of past deflections that an effect may use.
+/// Number of past inputs that an effect stores, one per `STEP`.
 pub const PAST: usize = 24;
 
 /// Largest number of input effects of a model.
 pub const MOST: usize = 3;
 
-/// Controls that an input effect acts on.
+/// Controls on which an input effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Acts {
     /// Aileron and elevator, rad.
@@ -38,7 +38,7 @@ pub trait InputEffect {
     const ID: &'static str;
     /// Description of the effect, in one sentence.
     const DESCRIPTION: &'static str;
-    /// Formula of its effect on a deflection or throttle u, in textbook notation.
+    /// Formula for a deflection or throttle u, in textbook notation.
     const FORMULA: &'static str;
     /// Source of the formula.
     const SOURCE: &'static str;
@@ -46,15 +46,15 @@ pub trait InputEffect {
     const COEFFICIENTS: &'static [Coefficient; 1];
     /// Entry in the catalogue of effects.
     const ENTRY: Entry;
-    /// Controls that it acts on.
+    /// Controls on which the effect acts.
     const ACTS: Acts = Acts::OnSurfaces;
 
-    /// Acting deflection (rad) or throttle (0 to 1) at the measured position `input`, with the effect's `constant`.
-    /// Must be called once every [`STEP`].
+    /// Acting deflection (rad) or throttle (0 to 1) at the measured position `input`, with the effect's `constant`. To be
+    /// called once every [`STEP`].
     fn act<R: Real>(constant: f64, memory: &mut Past<R>, input: R) -> R;
 }
 
-/// Memory of an effect for one surface (rad) or for the throttle.
+/// Memory of an effect for one surface or the throttle. Values are in rad for a surface, 0..1 for the throttle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Past<R = f64> {
     /// Previous acting value.
@@ -70,7 +70,7 @@ impl<R: Real> Past<R> {
         Past { output: position, inputs: [position; PAST] }
     }
 
-    /// Prepends `input` to the inputs.
+    /// Stores `input` as the newest input.
     #[inline(always)]
     pub fn push(&mut self, input: R) {
         self.inputs.copy_within(0..PAST - 1, 1);
@@ -78,17 +78,17 @@ impl<R: Real> Past<R> {
     }
 }
 
-/// Memory of a model's past controls; `GreyBox::at_rest` of the crate `greylag-model` creates it.
+/// Memory of a model's past controls. `GreyBox::at_rest` of the crate `greylag-model` creates it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMemory<R = f64> {
-    /// Memories of its input effects for aileron, elevator and throttle; they do not act on a rudder.
+    /// Memories of the model's input effects for aileron, elevator and throttle. Input effects do not act on a rudder.
     inputs: [[Past<R>; 3]; MOST],
-    /// Memories of its formulas' lags and delays.
+    /// Memories of the lags and delays in the model's formulas.
     pub formulas: [Past<R>; LAGS],
 }
 
 impl<R: Real> InputMemory<R> {
-    /// Memory of surfaces and throttle at rest at `controls`, with lagged arguments at rest at `lagged`.
+    /// Memory of surfaces and throttle at rest at `controls`. The arguments of lags and delays are at rest at `lagged`.
     #[inline(always)]
     pub fn at_rest(controls: &Controls<R>, lagged: [R; LAGS]) -> Self {
         let Controls { aileron, elevator, throttle, .. } = *controls;
@@ -98,7 +98,7 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// Selects the memory `then` where `chosen` is above zero, else this one.
+    /// Selects the memory `then` where `chosen` is above zero, else this memory.
     pub fn replaced(&self, chosen: R, then: &Self) -> Self {
         let one = |old: R, new: R| R::where_less(R::zero(), chosen, new, old);
         let past = |old: &Past<R>, new: &Past<R>| Past {
@@ -115,7 +115,7 @@ impl<R: Real> InputMemory<R> {
         }
     }
 
-    /// Acting controls after the effect at index `place` (below [`MOST`]) of a model's list.
+    /// Controls after the effect at index `place` (below [`MOST`]) of the model's list, for the controls `z` before it.
     #[inline(always)]
     pub fn act(&mut self, place: usize, kind: Kind, constant: f64, z: &Controls<R>) -> Controls<R> {
         let [aileron, elevator, throttle] = &mut self.inputs[place];
@@ -136,7 +136,7 @@ macro_rules! inputs {
     ($($module:ident :: $type:ident),* $(,)?) => {
         $(mod $module; pub use $module::$type;)*
 
-        /// Identifies one input effect of the list.
+        /// Identifies an input effect of the list in this file.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Kind { $(
             #[doc = concat!("See [`", stringify!($type), "`].")]
@@ -144,7 +144,7 @@ macro_rules! inputs {
         )* }
 
         impl Kind {
-            /// All input effects.
+            /// All input effects, in the order of the list.
             pub const ALL: &'static [Kind] = &[$(Kind::$type),*];
 
             /// Description of the effect.
@@ -163,7 +163,7 @@ macro_rules! inputs {
                 },)* }
             }
 
-            /// Controls that the effect acts on.
+            /// Controls on which the effect acts.
             pub const fn acts(self) -> Acts {
                 match self { $(Kind::$type => $type::ACTS,)* }
             }
@@ -178,7 +178,7 @@ macro_rules! inputs {
 }
 
 impl Kind {
-    /// The input effect with the id `id`.
+    /// The input effect `id`. `None` if there is no such effect.
     pub fn from_id(id: &str) -> Option<Kind> {
         Kind::ALL.iter().copied().find(|kind| kind.describe().id == id)
     }

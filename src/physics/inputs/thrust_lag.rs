@@ -1,10 +1,10 @@
-//! Lag of the thrust behind the throttle: a propeller's inertia, a turbine's spool.
+//! Lag of the thrust behind the throttle, due to the inertia of a propeller or the spool of a turbine.
 
 use super::{ActuatorLag, Acts, InputEffect, Past};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A first-order lag between the measured throttle and the thrust.
+/// A first-order lag between the measured throttle and the acting throttle.
 pub struct ThrustLag;
 
 impl InputEffect for ThrustLag {

@@ -4,7 +4,7 @@ use super::{InputEffect, PAST, Past, STEP};
 use greylag_num::Real;
 use crate::effects::{Coefficient, Entry, coefficient};
 
-/// A pure delay, linear between samples.
+/// A pure delay, with linear interpolation between samples.
 pub struct TimeDelay;
 
 impl InputEffect for TimeDelay {

@@ -1,4 +1,4 @@
-//! Input of the report on an amendment.
+//! Input of the report on an amendment of a model.
 
 pub(super) mod page;
 
@@ -6,30 +6,29 @@ use crate::Page;
 use greylag_sysid::amend::Amendment;
 use greylag_sysid::compare::{Answer, Comparison};
 
-/// Results of an amendment, with the files and commands that they come from.
+/// Result of an amendment, with the files and the command line that produced it.
 #[derive(Clone, Debug)]
 pub struct AmendmentReport<'a> {
     /// Title of the page.
     pub title: String,
     /// Result of the amendment: fit, evidence and scores.
     pub amendment: &'a Amendment,
-    /// The amendment's answer with the command that comes next, where that is known.
+    /// The amendment's answer including the next command; `None` if the report uses the answer of `amendment`.
     pub answer: Option<&'a Answer>,
-    /// Comparison of the models (as given, tuned, amended) with flights that no fit has seen; `None` if none was
-    /// made.
+    /// Comparison of the models (as given, tuned, amended) with flights that no fit has used; `None` if there is none.
     pub held_out: Option<&'a Comparison>,
-    /// The model's file before, then after, where one was written.
+    /// Paths of the model file before the amendment and, if one was written, after it.
     pub model_files: Vec<String>,
-    /// The logs' files, as they were given.
+    /// Paths of the log files, as given.
     pub log_files: Vec<String>,
-    /// The command line that made the amendment.
+    /// The command line that ran the amendment.
     pub command_line: String,
-    /// Further programs or files and their versions or hashes.
+    /// Names and versions or hashes of further programs or files.
     pub versions: Vec<(String, String)>,
 }
 
 impl AmendmentReport<'_> {
-    /// The page of the amendment.
+    /// Builds the page of the amendment.
     pub fn page(&self) -> Page {
         page::amendment_page(self)
     }

@@ -1,4 +1,4 @@
-//! The page of one amendment: the error before and after, the effects added, every coefficient.
+//! Page of one amendment: the error before and after it, the added effects, and all coefficients.
 
 use crate::Align::{Left, Right};
 use crate::amendment::AmendmentReport;
@@ -13,10 +13,10 @@ use greylag_sysid::amend::{Amendment, FittedFlight, Parameter};
 use greylag_sysid::compare::HorizonScore;
 use greylag_sysid::diagnose::Tuned;
 
-/// Number of findings that are shown first.
+/// Number of prominent findings.
 const LEADING: usize = 2;
 
-/// The page of `report`: the verdict first, then the evidence for it.
+/// The page of `report`: first the answer, then the evidence for it.
 pub fn amendment_page(report: &AmendmentReport) -> Page {
     let a = report.amendment;
     let answer = report.answer.unwrap_or(&a.answer).clone();
@@ -39,7 +39,7 @@ pub fn amendment_page(report: &AmendmentReport) -> Page {
     Page { title: report.title.clone(), subtitle, sections }
 }
 
-/// Section with the sentences of the amendment, the first [`LEADING`] of them prominent.
+/// Section with the sentences of the amendment; the first [`LEADING`] sentences are prominent.
 fn in_words(a: &Amendment) -> Section {
     let finding = |s: &String| Finding { sentence: s.clone(), link: None };
     let [lead, rest] = [
@@ -57,7 +57,7 @@ fn in_words(a: &Amendment) -> Section {
     }
 }
 
-/// The errors at the horizons, model by model.
+/// Section with the errors of each model at each horizon.
 fn before_and_after(a: &Amendment) -> Section {
     let models = [("as given", &a.given), ("tuned", &a.before), ("amended", &a.after)];
     let columns = [
@@ -122,7 +122,7 @@ fn effects(a: &Amendment) -> Section {
     }
 }
 
-/// Section on the coefficients of the added effects, with the estimate from each flight alone.
+/// Section on the coefficients of the added effects, with the estimates from single flights.
 fn added(a: &Amendment) -> Section {
     let columns =
         [("Coefficient", Left), ("Value", Right), ("95 % interval", Right), ("What it is", Left)];
@@ -150,7 +150,7 @@ fn by_flight(p: &Parameter) -> crate::Whiskers {
     suspects::flight_by_flight(p.name.clone(), "", flights, (p.value, p.ci95))
 }
 
-/// The prior's coefficients in the amended model.
+/// The coefficients that the model had before effects were added.
 fn tuned(a: &Amendment) -> Vec<Tuned> {
     let own = a.parameters.iter().filter(|p| !p.added);
     own.map(|p| Tuned {
@@ -198,8 +198,7 @@ fn sensors(a: &Amendment) -> Section {
     Section::new("Sensors", &note, vec![Figure::Table(table)])
 }
 
-/// Name, value with standard deviation, factor to the displayed unit, and unit of each flight's
-/// constants.
+/// Constants of each flight: name, value with standard deviation, factor to the displayed unit, and unit.
 fn constants(f: &FittedFlight) -> [(&'static str, [f64; 2], f64, &'static str); 4] {
     let degree = 1f64.to_degrees();
     [

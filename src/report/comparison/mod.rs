@@ -1,4 +1,4 @@
-//! Input of the report on a comparison.
+//! Input of the report on a comparison of models with flights.
 
 pub(super) mod page;
 pub(super) mod place;
@@ -9,25 +9,25 @@ pub(super) mod traces;
 use crate::Page;
 use greylag_sysid::compare::Comparison;
 
-/// A comparison of models with flights, with the files and commands that it comes from.
+/// A comparison of models with flights, with the files and the command line that produced it.
 #[derive(Clone, Debug)]
 pub struct ComparisonReport<'a> {
     /// Title of the page.
     pub title: String,
     /// Result of the comparison.
     pub comparison: &'a Comparison,
-    /// The models' files, in the order of the comparison's models.
+    /// Paths of the model files, in the order of the comparison's models.
     pub model_files: Vec<String>,
-    /// The logs' files, as they were given.
+    /// Paths of the log files, as given.
     pub log_files: Vec<String>,
-    /// The command line that made the comparison.
+    /// The command line that ran the comparison.
     pub command_line: String,
-    /// Further programs or files and their versions or hashes.
+    /// Names and versions or hashes of further programs or files.
     pub versions: Vec<(String, String)>,
 }
 
 impl ComparisonReport<'_> {
-    /// The page of the comparison.
+    /// Builds the page of the comparison.
     pub fn page(&self) -> Page {
         page::comparison_page(self)
     }

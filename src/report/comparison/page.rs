@@ -1,4 +1,4 @@
-//! The page of one comparison of models with flights.
+//! Page of one comparison of models with flights.
 
 use crate::comparison::ComparisonReport;
 use crate::comparison::{place, regimes, tables, traces};
@@ -9,19 +9,19 @@ use crate::{
 use greylag_sysid::compare::answer::Way;
 use greylag_sysid::compare::{ChannelId, Comparison, GrowthPoint, ModelResult};
 
-/// Number of findings on the first model that are shown first.
+/// Number of prominent findings on the first model.
 const LEADING: usize = 2;
-/// Sentences of each further model that are shown.
+/// Number of sentences on each further model.
 const OF_OTHERS: usize = 2;
 
-/// The page of `report`: the verdict first, then the evidence for it.
+/// The page of `report`: first the answer, then the evidence for it.
 pub fn comparison_page(report: &ComparisonReport) -> Page {
     let c = report.comparison;
     let answer = c.answer.clone();
     let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
     let words = Figure::Findings(findings(c));
-    // for one model the page leads with where it fails, for several with how much they differ
+    // the page of a single model begins with its failures, that of several models with their differences
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
         _ => (vec![answer], Section::new("In words", "", vec![words])),
@@ -42,10 +42,10 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     Page { title: report.title.clone(), subtitle: subtitle(c), sections }
 }
 
-/// The short section of a flight report: the errors of the flight's own model.
+/// The short section of a flight report: the errors of the model of that flight.
 pub(crate) fn short_section(c: &Comparison) -> Section {
     let mut found = findings(c);
-    // The figures that the links point to are on the page of the comparison itself.
+    // The links point to figures that only the page of the comparison contains.
     for finding in found.lead.iter_mut().chain(&mut found.rest) {
         finding.link = None;
     }
@@ -57,8 +57,8 @@ pub(crate) fn short_section(c: &Comparison) -> Section {
 const UNEXPLAINED_NOTE: &str = "Share of each channel's variation that is neither explained by \
      the model nor by the sensors' noise. Over 100 % the model is worse than a constant.";
 
-/// The note on the unexplained share. If the second model was tuned before its effects were added, the note explains
-/// that tuning alone removes part of the first model's bars.
+/// The note on the unexplained share. If the second model was tuned before its effects were added, the note adds that tuning
+/// alone removes part of the first model's unexplained share.
 fn unexplained_note(c: &Comparison) -> String {
     let tuned = c.answer.numbers.steps.iter().any(|step| step.way == Way::Tuned);
     match (tuned, &c.models[..]) {
@@ -81,7 +81,7 @@ fn subtitle(c: &Comparison) -> String {
     )
 }
 
-/// Name of a channel on buttons and in tables.
+/// Display name of a channel: symbol and name.
 pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
@@ -110,14 +110,14 @@ fn findings(c: &Comparison) -> Findings {
     Findings { lead, rest, ..Findings::default() }
 }
 
-/// Link to the regimes of the channel that `sentence` is about.
+/// Link to the regimes of the channel whose worst regime `sentence` describes.
 fn link(model: &ModelResult, sentence: &str) -> Option<Link> {
     let plain = |text: &str| text.trim_end_matches('.').to_lowercase();
     let of = model.channels.iter().find(|ch| plain(&ch.worst_regime) == plain(sentence))?;
     Some(Link { anchor: regimes::ANCHOR.into(), option: channel_name(of.channel) })
 }
 
-/// The models with their colours.
+/// The models with their line styles.
 pub(crate) fn keys(c: &Comparison) -> Vec<(String, Style)> {
     c.models.iter().enumerate().map(|(i, m)| (m.name.clone(), Style::nth(i))).collect()
 }
@@ -159,7 +159,7 @@ pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     let longest = c.models.iter().map(|m| &m.growth).max_by_key(|g| g.len());
     let Some(longest) = longest.filter(|g| !g.is_empty()) else { return Vec::new() };
     let curves = |title: &str, value: fn(&GrowthPoint) -> f64| {
-        // The models fly the same runs, so their times are the same as far as they reach.
+        // All models have the same runs, so their times agree up to the end of the shorter curve.
         let series = c.models.iter().enumerate().map(|(i, m)| {
             let mut values: Vec<f64> = m.growth.iter().map(value).collect();
             values.resize(longest.len(), f64::NAN);
@@ -180,7 +180,7 @@ pub(crate) fn growth(c: &Comparison) -> Vec<Figure> {
     ]
 }
 
-/// One alternative for each channel for which `figures` returns a figure.
+/// One choice option per channel, for the channels that have figures.
 pub(crate) fn by_channel(
     c: &Comparison,
     figures: impl Fn(ChannelId) -> Vec<Figure>,

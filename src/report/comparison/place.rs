@@ -1,10 +1,10 @@
-//! Where a model fails, in one sentence for the answer box.
+//! Sentence for the answer box on the channel with the largest unexplained share.
 
 use crate::kit::numbers::number;
 use greylag_sysid::compare::{ChannelId, ModelResult};
 
-/// Sentence on the channel of which the first model leaves the largest share unexplained, with the share that the
-/// last model leaves.
+/// Sentence on the channel in which the first model leaves the largest share unexplained. It includes the share that the last
+/// model leaves in this channel. Empty without finite shares.
 pub(crate) fn of_models(models: &[ModelResult]) -> String {
     let share = |model: &ModelResult, id: ChannelId| {
         let of = model.channels.iter().find(|ch| ch.channel == id);

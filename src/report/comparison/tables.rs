@@ -1,4 +1,4 @@
-//! The tables of a comparison: free-run errors, nuisances, notes, provenance.
+//! Tables of a comparison: free-run errors, baselines, sensor errors and wind, notes, provenance.
 
 use crate::comparison::ComparisonReport;
 use crate::kit::numbers::{NORMAL_95, interval, number, percent};
@@ -41,7 +41,7 @@ pub(crate) fn summary(c: &Comparison) -> Section {
     Section::new("Free runs", note, figures)
 }
 
-/// Scores of forecasts without aerodynamics over the same free runs, which a model has to beat.
+/// Section with the scores of forecasts without aerodynamics over the same free runs. A useful model has smaller errors.
 pub(crate) fn baselines(c: &Comparison) -> Section {
     let columns = [
         ("Forecast", Align::Left),
@@ -84,7 +84,7 @@ fn summary_row(model: &str, score: &HorizonScore) -> Vec<String> {
     row
 }
 
-/// Name, RMSE with its unit, R², U, and the three shares.
+/// Cells for one state: name, RMSE with unit, R², Theil's U, and its three shares.
 fn state_cells(s: &StateScore) -> Vec<String> {
     let (name, unit, factor) = people(s.state);
     let mut cells = vec![name.to_string(), format!("{} {unit}", number(factor * s.rmse))];
@@ -93,7 +93,7 @@ fn state_cells(s: &StateScore) -> Vec<String> {
     cells
 }
 
-/// Name and unit of a state as displayed, and the factor from its SI unit.
+/// Display name and display unit of a state, with the factor from its SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let (name, unit) = state.rsplit_once('_').unwrap_or((state, ""));
     let name = match name {

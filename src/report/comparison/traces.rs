@@ -1,19 +1,18 @@
-//! Measured against predicted states over time: selected stretches of the flights, then each flight
-//! as a whole.
+//! Measured and predicted states over time: selected stretches of the flights, then whole flights.
 
 use crate::comparison::page::channel_name;
 use crate::{Choice, ChoiceOption, Figure, Panel, Section, Series, Style, TimeFigure};
 use greylag_sysid::compare::{ChannelId, ChannelTrace, Comparison, FlightTrace, ModelTrace};
 
-/// Length of a stretch, s: several free runs of the usual 3 s.
+/// Length of a stretch, s; a free run usually lasts 3 s.
 const STRETCH_S: f64 = 30.0;
-/// Rows drawn of a stretch.
+/// Largest number of rows per stretch in a plot.
 const STRETCH_ROWS: usize = 1000;
-/// Values drawn of all whole flights together, so that the page stays near 2 MB.
+/// Largest number of values in the plots of all whole flights together; it keeps the page near 2 MB.
 const WHOLE_VALUES: usize = 120_000;
-/// Largest number of whole flights that are drawn.
+/// Largest number of whole flights in plots.
 const WHOLE_FLIGHTS: usize = 6;
-/// Names and units of the states, in the order of `State::NAMES`, with the factor from SI.
+/// Display names and units of the states, in the order of `State::NAMES`, with the factor from SI units.
 const STATES: [(&str, &str, f64); 8] = [
     ("Roll φ", "°", DEGREE),
     ("Pitch θ", "°", DEGREE),
@@ -26,7 +25,7 @@ const STATES: [(&str, &str, f64); 8] = [
 ];
 const DEGREE: f64 = 180.0 / std::f64::consts::PI;
 
-/// A stretch of one flight: the flight, its rows, and how far the first model strays there.
+/// A stretch of one flight: index of the flight, range of rows, and scaled squared error of the first model.
 #[derive(Clone, Copy)]
 struct Stretch {
     flight: usize,
@@ -35,7 +34,7 @@ struct Stretch {
     error: f64,
 }
 
-/// The section; `None` if the comparison holds no traces of its flights.
+/// The section on traces; `None` if the comparison contains no traces.
 pub(crate) fn section(c: &Comparison) -> Option<Section> {
     let mut stretches = stretches(c);
     let mut options = Vec::new();
@@ -93,8 +92,8 @@ fn option(c: &Comparison, word: &str, s: Stretch) -> ChoiceOption {
     }
 }
 
-/// Squared error of the first model at every row, summed over the states. Each state's squared error is divided by
-/// its mean over all flights.
+/// Squared error of the first model at every row of every flight, summed over the states. Each state's squared error is divided
+/// by its mean over all flights.
 fn errors(c: &Comparison) -> Vec<Vec<f64>> {
     let Some(model) = c.models.first() else { return Vec::new() };
     let pairs: Vec<(&FlightTrace, &ModelTrace)> =
@@ -119,7 +118,7 @@ fn errors(c: &Comparison) -> Vec<Vec<f64>> {
     sums
 }
 
-/// The flights cut into stretches that the first model was flown through.
+/// Divides the flights into stretches and keeps those for which the first model has enough finite errors.
 fn stretches(c: &Comparison) -> Vec<Stretch> {
     let mut found = Vec::new();
     for (flight, errors) in errors(c).iter().enumerate() {
@@ -130,7 +129,7 @@ fn stretches(c: &Comparison) -> Vec<Stretch> {
             let end = first + time[first..].iter().take_while(|t| **t < last).count().max(1);
             let own: Vec<f64> =
                 errors[first..end].iter().copied().filter(|e| e.is_finite()).collect();
-            // A stretch that is mostly a gap, or the short rest at the end, shows little.
+            // Excludes stretches that are mostly a gap, and a short remainder at the end of a flight.
             if time[end - 1] - time[first] > 0.5 * STRETCH_S && 2 * own.len() > end - first {
                 let error = own.iter().sum::<f64>() / own.len() as f64;
                 found.push(Stretch { flight, first, end, error });
@@ -145,7 +144,7 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
     let trace = &c.flights[flight].trace;
     let every = rows.len().div_ceil(most).max(1);
     let gap = |i: usize| trace.states.iter().all(|s| s.get(i).is_none_or(|v| v.is_nan()));
-    // Rows of NaN are kept whatever the step, since they break the lines between segments.
+    // Rows of NaN are always kept, because they separate the line segments.
     let kept: Vec<usize> =
         rows.clone().filter(|i| (i - rows.start).is_multiple_of(every) || gap(*i)).collect();
     let take = |list: &[f64], factor: f64| -> Vec<f64> {
@@ -163,7 +162,7 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
         Panel::new(title, unit, series)
     });
     let mut figure = TimeFigure::default();
-    // No limit on gaps: thinned rows may be far apart, and the rows of NaN between segments break the lines.
+    // No limit on gaps: thinned rows may be far apart, and rows of NaN separate the segments.
     figure.add_track(&take(&trace.time_s, 1.0), f64::INFINITY, panels.collect());
     if let (Some(first), Some(last)) =
         (trace.time_s.get(rows.start), trace.time_s.get(rows.end - 1))
@@ -176,7 +175,7 @@ fn figure(c: &Comparison, flight: usize, rows: std::ops::Range<usize>, most: usi
     figure
 }
 
-/// Adds the channels in weak form between two times (s), one panel each.
+/// Adds the channels in weak form between two times, s, with one panel per channel.
 fn add_channels(
     figure: &mut TimeFigure,
     c: &Comparison,
@@ -210,7 +209,7 @@ fn add_channels(
     figure.add_track(&take(&any.time_s), f64::INFINITY, panels);
 }
 
-/// The windows between two times that are drawn: every nth, with those that break the curves.
+/// Windows between two times, s, for a plot: every nth window, and all windows of NaN, which break the curves.
 fn thinned(trace: &ChannelTrace, [from, to]: [f64; 2], most: usize) -> Vec<usize> {
     let rows = 0..trace.time_s.len();
     let inside: Vec<usize> = rows.filter(|i| (from..=to).contains(&trace.time_s[*i])).collect();

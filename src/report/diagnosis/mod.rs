@@ -1,4 +1,4 @@
-//! Input of the report on a diagnosis.
+//! Input of the report on a diagnosis of a model.
 
 pub(super) mod page;
 pub(super) mod place;
@@ -17,24 +17,25 @@ pub struct DiagnosisReport<'a> {
     pub title: String,
     /// Result of the diagnosis.
     pub diagnosis: &'a Diagnosis,
-    /// The fall of the error and the changes that cause it; `None` if it is not known.
+    /// The reduction of the error and the changes that cause it; `None` if they are not known.
     pub answer: Option<&'a Answer>,
-    /// Comparison of the tuned model, then of the model as given, with the flights of the diagnosis.
+    /// Comparison of the tuned model and the model as given with the flights of the diagnosis; `None` if there is none.
     pub failing: Option<&'a Comparison>,
-    /// Comparison of the models (as given, tuned, with the asserted effects) with flights that no fit has seen.
+    /// Comparison of the models (as given, tuned, with the asserted effects) with flights that no fit has used; `None` if there
+    /// is none.
     pub held_out: Option<&'a Comparison>,
-    /// Path of the model's file.
+    /// Path of the model file.
     pub model_file: String,
-    /// The logs' files, as they were given.
+    /// Paths of the log files, as given.
     pub log_files: Vec<String>,
-    /// The command line that made the diagnosis.
+    /// The command line that ran the diagnosis.
     pub command_line: String,
-    /// Further programs or files and their versions or hashes.
+    /// Names and versions or hashes of further programs or files.
     pub versions: Vec<(String, String)>,
 }
 
 impl DiagnosisReport<'_> {
-    /// The page of the diagnosis.
+    /// Builds the page of the diagnosis.
     pub fn page(&self) -> Page {
         page::diagnosis_page(self)
     }

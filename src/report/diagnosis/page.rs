@@ -1,4 +1,4 @@
-//! The page of one diagnosis: the missing effect, in sentences first, with the evidence below.
+//! Page of one diagnosis: sentences on the missing effects, then the evidence.
 
 use crate::comparison::page::channel_name;
 use crate::diagnosis::DiagnosisReport;
@@ -12,15 +12,15 @@ use crate::{
 use greylag_sysid::compare::{ChannelId, ChannelResult, Comparison, ModelResult, RegimeVariable};
 use greylag_sysid::diagnose::{Diagnosis, Verdict};
 
-/// Number of findings that are shown first.
+/// Number of prominent findings.
 const LEADING: usize = 2;
-/// Share below which a cell of the map stays blank.
+/// Share below which a cell of the map is blank.
 const BLANK: f64 = 0.05;
 
-/// Words that identify the sentences on sensor errors, one for each flight.
+/// Text by which sentences on sensor errors are recognised; there is one such sentence per flight.
 const SENSORS: &str = ": errors of the sensors and the wind";
 
-/// The page of `report`: the verdict first, then the evidence for it.
+/// The page of `report`: first the answer, then the evidence for it.
 pub fn diagnosis_page(report: &DiagnosisReport) -> Page {
     let d = report.diagnosis;
     let answer = report.answer.cloned();
@@ -70,7 +70,7 @@ fn subtitle(report: &DiagnosisReport) -> String {
 
 fn findings(d: &Diagnosis) -> Findings {
     let finding = |s: &String| Finding { sentence: s.clone(), link: link(d, s) };
-    // the sensors' errors have a table of their own
+    // sentences on sensor errors are omitted, because a separate table contains the sensor errors
     let said = || d.sentences.iter().filter(|s| !s.contains(SENSORS));
     let mut lead: Vec<Finding> = said().take(LEADING).map(finding).collect();
     if lead.is_empty() {
@@ -81,7 +81,7 @@ fn findings(d: &Diagnosis) -> Findings {
     Findings { lead, rest, ..Findings::default() }
 }
 
-/// Link to the curve of the effect that `sentence` names.
+/// Link to the curve of the effect whose identifier `sentence` contains.
 fn link(d: &Diagnosis, sentence: &str) -> Option<Link> {
     let letter = |c: char| c.is_alphanumeric() || c == '_';
     let names = |id: &str| sentence.split(|c| !letter(c)).any(|word| word == id);
@@ -109,7 +109,7 @@ fn where_it_fails(d: &Diagnosis, failing: Option<&Comparison>) -> Section {
     Section::new("Where it fails", note, figures)
 }
 
-/// Residuals of the channels over regime variables, for each model; those of the first model are shown initially.
+/// Maps of the channels' residuals over regime variables, one per model; the first is shown initially.
 fn maps(c: &Comparison) -> Option<Figure> {
     // the same colour scale for all models
     let options: Vec<ChoiceOption> = c
@@ -121,7 +121,7 @@ fn maps(c: &Comparison) -> Option<Figure> {
     (!choice.options.is_empty()).then_some(Figure::Choice(choice))
 }
 
-/// Map of channels over regime variables: how far each variable explains a model's residual.
+/// Map of channels over regime variables: the share of a model's residual that each variable explains.
 fn map(model: &ModelResult) -> Option<Figure> {
     let channels = &model.channels;
     let variables: Vec<RegimeVariable> = RegimeVariable::CONTINUOUS
@@ -155,7 +155,7 @@ fn cell(channel: &ChannelResult, variable: RegimeVariable) -> GridCell {
     if share.is_nan() || share < BLANK {
         return GridCell { text: String::new(), weight: 0.0 };
     }
-    // The cells of an explained channel are pale.
+    // The cells of a channel with a small unexplained share are pale.
     let left = channel.unexplained_fraction;
     let importance = if left.is_finite() { (left / 0.1).clamp(0.0, 1.0) } else { 0.0 };
     GridCell { text: percent(share), weight: share * importance }
@@ -196,7 +196,7 @@ fn left(d: &Diagnosis) -> Figure {
     };
     let groups: Vec<BarGroup> = d.channels.iter().map(group).collect();
     let all = groups.iter().flat_map(|g| &g.values).copied().filter(|v| v.is_finite());
-    // The scale ends at the largest share, so that shares of a few percent can be distinguished.
+    // The scale ends at the largest share, between 5 % and 100 %, so that small shares can be distinguished.
     let full = all.fold(0.0, f64::max).clamp(5.0, 100.0);
     Figure::Bars(Bars { title: "Left unexplained".into(), unit: "%".into(), keys, groups, full })
 }

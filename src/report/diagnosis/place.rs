@@ -1,11 +1,11 @@
-//! Where the tuned model fails, in one sentence for the answer box.
+//! Sentence for the answer box on where the tuned model fails.
 
 use crate::kit::numbers::number;
 use greylag_sysid::compare::ChannelId;
 use greylag_sysid::diagnose::{Candidate, ChannelLeft, Diagnosis, Verdict};
 
-/// Sentence on the channel of each asserted effect with the variable that shows it. Without an asserted effect it names
-/// the channel with the largest share that is unexplained after tuning.
+/// Sentence on the channel of each asserted effect, with the variable that shows the effect. Without an asserted effect, the
+/// sentence is on the channel with the largest share that is unexplained after tuning.
 pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     let asserted: Vec<&Candidate> = d.effects.iter().filter(|c| c.asserted).collect();
     let places: Vec<String> = asserted.iter().filter_map(|c| of_effect(d, c)).collect();
@@ -29,7 +29,7 @@ pub(crate) fn of_diagnosis(d: &Diagnosis) -> String {
     }
 }
 
-/// "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash 0.3 %)".
+/// Text such as "pitching moment, with elevator movement (tuned 28 % unexplained, with backlash 0.3 %)".
 fn of_effect(d: &Diagnosis, c: &Candidate) -> Option<String> {
     let curve = c.curve.as_ref()?;
     let mut text = format!("{}, with {}", name(&curve.channel), plain(&curve.variable));
@@ -48,7 +48,7 @@ fn name(symbol: &str) -> &str {
     id.map_or(symbol, |id| id.name())
 }
 
-/// A variable without its unit: the last word, if it contains `°` or `/` or is a single letter.
+/// A variable without its unit, which is the last word if that word contains `°` or `/` or is a single letter.
 fn plain(variable: &str) -> &str {
     match variable.rsplit_once(' ') {
         Some((words, unit)) if unit.contains(['°', '/']) || unit.len() == 1 => words,

@@ -1,4 +1,4 @@
-//! Evidence for a diagnosis: the level that arises by chance, and the error on held-out flights.
+//! Evidence for a diagnosis: the level that chance reaches, and the error on held-out flights.
 
 use crate::Align::{Left, Right};
 use crate::comparison::page::{growth, unexplained};
@@ -8,15 +8,14 @@ use crate::{Figure, Finding, Findings, Histogram, Rule, Section, Table};
 use greylag_sysid::compare::{Comparison, ModelResult};
 use greylag_sysid::diagnose::Diagnosis;
 
-/// Null evidence below this value is not drawn, to keep the logarithmic scale short.
+/// Smallest null evidence in the histogram; a limit keeps the logarithmic scale short.
 const DRAWN: f64 = 0.1;
-/// Decoys in the table, the strongest first.
+/// Number of decoys in the table, in order of decreasing evidence.
 const DECOYS: usize = 8;
-/// Horizon of the error in the sentence, s, if the comparison has it.
+/// Preferred horizon for the error in the sentence, s; without it, the last horizon is used.
 const SHOWN_S: f64 = 5.0;
 
-/// Evidence that arises by chance: under nulls that lack nothing, and for columns that cannot be
-/// effects.
+/// Section on the evidence that chance produces: in nulls without a missing effect, and for decoys.
 pub(crate) fn chance(d: &Diagnosis) -> Section {
     let mut figures = Vec::new();
     let best = d.effects.iter().find(|c| c.asserted).or(d.effects.first());
@@ -78,18 +77,18 @@ fn decoys(d: &Diagnosis) -> Table {
     table
 }
 
-/// [`before_and_after`] with the fall of the error in a sentence, for a page whose answer is about other flights.
+/// [`before_and_after`] with a sentence on the reduction of the error, for a page whose answer is about other flights.
 pub(crate) fn stated(c: &Comparison) -> Section {
     let mut section = before_and_after(c);
     section.figures.insert(0, Figure::Findings(statement(c)));
     section
 }
 
-/// Free runs and what is unexplained on flights that no fit has seen, model by model.
+/// Section with free runs and unexplained shares of each model on flights that no fit has used.
 pub(crate) fn before_and_after(c: &Comparison) -> Section {
     let mut figures = growth(c);
     figures.push(unexplained(c));
-    // Only the table by horizon: the errors by state are on the comparison's own page.
+    // Only the table by horizon is shown; the errors of single states are on the page of the comparison.
     figures.extend(summary(c).figures.into_iter().take(1));
     let names = c.flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
     let note = format!(
@@ -100,7 +99,7 @@ pub(crate) fn before_and_after(c: &Comparison) -> Section {
     Section::new("Before and after", &note, figures)
 }
 
-/// The fall of the error in one sentence: from the last but one model, the tuned one, to the last.
+/// Sentence on the change of the error from the last model but one (tuned) to the last.
 fn statement(c: &Comparison) -> Findings {
     let horizons = || c.settings.horizons_s.iter().copied();
     let shown = horizons().find(|h| *h == SHOWN_S).or(horizons().next_back()).unwrap_or(SHOWN_S);

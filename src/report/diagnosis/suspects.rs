@@ -1,4 +1,4 @@
-//! The suspects of a diagnosis: evidence, curves, agreement between flights.
+//! Candidate effects of a diagnosis: evidence, curves, and agreement between flights.
 
 use crate::Align::{Left, Right};
 use crate::diagnosis::page::channel_of;
@@ -9,11 +9,11 @@ use crate::{
 };
 use greylag_sysid::diagnose::{Candidate, Curve, Diagnosis};
 
-/// Anchor of the figure to which sentences about an effect link.
+/// Anchor of the figure, for links from sentences about an effect.
 pub(crate) const ANCHOR: &str = "effect";
-/// Number of candidates below their thresholds in the figure; the table lists all.
+/// Number of candidates below their thresholds in the figure; the table contains all candidates.
 const BELOW: usize = 8;
-/// Number of candidates whose curves are drawn although they are not asserted.
+/// Number of candidates that are not asserted but whose curves are drawn.
 const CURVES: usize = 3;
 /// Largest number of measured points in a plot.
 const POINTS: usize = 1500;
@@ -59,7 +59,7 @@ pub(crate) fn ranking(d: &Diagnosis) -> Section {
     Section::new("Suspects", note, vec![Figure::Evidence(figure)])
 }
 
-/// An asserted effect with the effects that the data cannot distinguish from it.
+/// An asserted effect and the effects that the data cannot distinguish from it.
 fn tied<'a>(d: &'a Diagnosis, found: &'a Candidate, seen: &mut Vec<&'a str>) -> EvidenceGroup {
     let alike = |c: &&Candidate| found.indistinguishable_from.contains(&c.id);
     let others: Vec<&Candidate> = d.effects.iter().filter(alike).collect();
@@ -113,7 +113,7 @@ pub(crate) fn curves(d: &Diagnosis) -> Section {
                 averages over about 0.4 s), and what the effect contributes as fitted, with its \
                 95 % interval.";
     let choice = Choice { anchor: ANCHOR.into(), label: "Effect".into(), options };
-    // candidates that are not asserted must not look like findings
+    // curves of candidates that are not asserted must not appear to be findings
     let title = match d.effects.iter().any(|c| c.asserted) {
         true => "The effect",
         false => "The nearest suspects, none of them shown",
@@ -188,8 +188,8 @@ fn by_flight(c: &Candidate) -> Option<Whiskers> {
     Some(flight_by_flight(title, &first.unit, flights, (first.value, first.ci95)))
 }
 
-/// One flight's estimates of a value (flight, value, standard deviation) above the estimate from
-/// all flights together (value with its 95 % interval).
+/// Estimates of a coefficient from each flight (flight, value, standard deviation), then the estimate from all flights together
+/// (value with its 95 % interval).
 pub(crate) fn flight_by_flight<'a>(
     title: String,
     unit: &str,

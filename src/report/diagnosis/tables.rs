@@ -1,4 +1,4 @@
-//! The tables of a diagnosis: advice, detection limits, coefficients, sensors, candidates.
+//! Tables of a diagnosis: advice, detection limits, coefficients, sensors, trims, candidates, notes, provenance.
 
 use crate::Align::{Left, Right};
 use crate::diagnosis::DiagnosisReport;
@@ -24,7 +24,7 @@ pub(crate) fn advice(d: &Diagnosis) -> Section {
     Section::new("What to fly next", "The most useful first.", vec![figure])
 }
 
-/// Detection limits of the effects that are not asserted: the smallest amounts that the data would have shown.
+/// Detection limits of the effects that are not asserted: the smallest value at which the data would have shown each effect.
 pub(crate) fn unseen(d: &Diagnosis) -> Section {
     let columns = [("Effect", Left), ("Not seen below", Right), ("of", Left), ("What it is", Left)];
     let mut table = Table::new("What could not have been seen", &columns);
@@ -42,7 +42,7 @@ pub(crate) fn unseen(d: &Diagnosis) -> Section {
     section("What could not have been seen", note, table)
 }
 
-/// The prior's coefficients as tuned, those that moved most first.
+/// The tuned coefficients and their priors, in order of decreasing change relative to the prior's standard deviation.
 pub(crate) fn tuned(tuned: &[Tuned]) -> Section {
     if tuned.is_empty() {
         return Section::default();
@@ -109,21 +109,21 @@ pub(crate) fn measurement(d: &Diagnosis) -> Section {
     }
     let note = match d.settings.per_flight.askew_deg {
         Some(_) => {
-            "Decided from kinematics alone, before any aerodynamics, and taken out; axes_askew beside the aerodynamics."
+            "Decided from kinematics alone, before any aerodynamics, and taken out; axes_askew together with the aerodynamics."
         }
         None => "Decided from kinematics alone, before any aerodynamics, and taken out.",
     };
     section("Sensors and wind", note, table)
 }
 
-/// The trims of each flight, where they were asked for.
+/// Trim constants of each flight; empty if the diagnosis did not estimate them.
 pub(crate) fn trims(d: &Diagnosis) -> Section {
     let columns = [
         ("Flight", Left),
         ("Trim", Left),
         ("Value", Right),
         ("95 % interval", Right),
-        ("Beside the flights' mean", Right),
+        ("Minus the flights' mean", Right),
         ("95 % interval", Right),
         ("Clearly its own", Left),
     ];
@@ -142,7 +142,7 @@ pub(crate) fn trims(d: &Diagnosis) -> Section {
             if t.asserted { "yes".into() } else { "no".to_string() },
         ]);
     }
-    let note = "Fitted beside the aerodynamics, to be added to the model's coefficients in that flight. What all \
+    let note = "Fitted together with the aerodynamics, to be added to the model's coefficients in that flight. What all \
                 flights have in common is in the model's coefficients as well, so that the difference from the \
                 flights' mean is known better.";
     section("Trims of the flights", note, table)
@@ -219,7 +219,7 @@ pub(crate) fn provenance(report: &DiagnosisReport) -> Section {
     Section::new("Provenance", "", vec![Figure::Table(table)])
 }
 
-/// A section of one table; an empty section if the table has no row.
+/// A section with one table; an empty section if the table has no rows.
 fn section(title: &str, note: &str, table: Table) -> Section {
     match table.rows.is_empty() {
         true => Section::default(),

@@ -1,34 +1,34 @@
-//! The answer of an evaluation: which controller tracks best inside the envelope and by how much, how often the envelope was kept, which
-//! targets were lost, where the best controller is worst.
+//! Sentences of an evaluation's answer: ranking inside the envelope, envelope violations, lost targets, weakest group.
 
 use super::label;
 use crate::kit::numbers::number;
 use greylag_sim::evaluation::{Evaluation, Score};
 
-/// Group over which controllers are ranked, where it was flown.
+/// Group over which controllers are ranked if the evaluation contains it.
 const ALL: &str = "all";
-/// Largest difference in the share of flights within the envelope that does not matter: one flight in twenty. A controller
-/// further below the largest share ranks behind, since a small settled error does not make up for a load factor beyond the limit.
+/// Largest difference in the share of flights within the envelope that does not affect the ranking: one flight in twenty. A
+/// controller further below the largest share ranks behind the others: a small settled error does not compensate for a load
+/// factor beyond the limit.
 const KEPT_APART: f64 = 0.05;
 
-/// The evaluation that ranks first; `None` if nothing was flown.
+/// The evaluation that ranks first; `None` if there are no scores.
 pub fn best(evaluations: &[Evaluation]) -> Option<&Evaluation> {
     let [keeping, _] = ranked(evaluations, &ranked_over(evaluations)?);
     keeping.first().map(|(e, _)| *e)
 }
 
-/// Evaluations with their scores over `group` by settled error: those that keep the envelope, then the others.
+/// Evaluations with their scores over `group`, sorted by settled error: first those that keep the envelope, then the others.
 fn ranked<'a>(evaluations: &'a [Evaluation], group: &str) -> [Vec<(&'a Evaluation, &'a Score)>; 2] {
     let mut all: Vec<(&Evaluation, &Score)> =
         evaluations.iter().filter_map(|e| Some((e, e.score(group)?))).collect();
     all.sort_by(|(_, a), (_, b)| a.mean_deg.total_cmp(&b.mean_deg));
     let most = all.iter().map(|(_, s)| s.kept_rate).fold(f64::NAN, f64::max);
-    // without measurement the share is NaN, and no controller ranks behind
+    // without envelope measurements the share is NaN and does not affect the ranking
     let (leaving, keeping) = all.into_iter().partition(|(_, s)| s.kept_rate < most - KEPT_APART);
     [keeping, leaving]
 }
 
-/// The sentences of the answer, the first of them the ranking; none if nothing was flown.
+/// The sentences of the answer, beginning with the ranking; empty if there are no scores.
 pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
     let Some(group) = ranked_over(evaluations) else { return Vec::new() };
     let [keeping, leaving] = ranked(evaluations, &group);
@@ -53,7 +53,7 @@ pub fn sentences(evaluations: &[Evaluation]) -> Vec<String> {
     all
 }
 
-/// "all" where Table II of the paper was flown, else the group with most targets.
+/// The group "all" (Table II of the paper) if the evaluation contains it, otherwise the group with most targets.
 fn ranked_over(evaluations: &[Evaluation]) -> Option<String> {
     let groups = &evaluations.first()?.groups;
     let most = groups.iter().max_by_key(|score| score.count)?;
@@ -100,7 +100,7 @@ fn each(ranked: &[(&Evaluation, &Score)], of: impl Fn(&Score) -> String) -> Stri
     said.join(", ")
 }
 
-/// Sentence on the group in which the best controller is worst; `None` with fewer than two groups.
+/// Sentence on the group in which the best controller has its largest error; `None` if there are fewer than two groups.
 fn weakest(best: &Evaluation) -> Option<String> {
     let groups = || best.groups.iter().filter(|s| s.targets != ALL);
     let worst = groups().max_by(|a, b| a.max_deg.total_cmp(&b.max_deg))?;

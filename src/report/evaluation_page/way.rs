@@ -1,5 +1,4 @@
-//! Transients on the way to the targets: error against surface travel, every measure, their
-//! definitions.
+//! Sections on the transients of an evaluation: error against surface travel, all measures, and their definitions.
 
 use super::{EvaluationReport, Left, Right, label, with_interval};
 use crate::kit::numbers::number;
@@ -8,10 +7,10 @@ use greylag_control::quality::{MEASURES, Measure};
 use greylag_sim::evaluation::{Evaluation, Score};
 use greylag_sim::summary::Spread;
 
-/// Number of controllers with a colour of their own. Further ones repeat the colours with wide lines.
+/// Number of controllers with distinct colours; further controllers repeat the colours with wide lines.
 const COLOURS: usize = 4;
 
-/// The sections; empty if the evaluation was not measured.
+/// The sections on transients; empty if the evaluation has no transient measures.
 pub(super) fn sections(report: &EvaluationReport) -> Vec<Section> {
     let measured =
         report.evaluations.iter().any(|e| e.groups.iter().any(|g| !g.measures.is_empty()));
@@ -25,7 +24,7 @@ fn by_group(report: &EvaluationReport, anchor: &str, figure: &dyn Fn(&str) -> Fi
     let option =
         |group: &str| ChoiceOption { name: group.replace('_', " "), figures: vec![figure(group)] };
     let groups = report.groups();
-    // the whole of Table II first, then its parts
+    // the group of the whole Table II comes first, then its parts
     let (all, parts): (Vec<&str>, Vec<&str>) = groups.into_iter().partition(|g| *g == "all");
     Figure::Choice(Choice {
         anchor: anchor.into(),
@@ -34,7 +33,7 @@ fn by_group(report: &EvaluationReport, anchor: &str, figure: &dyn Fn(&str) -> Fi
     })
 }
 
-/// One cross a controller: integral of error against surface travel.
+/// Plot with one cross per controller: integral of the error against surface travel.
 fn picture(report: &EvaluationReport) -> Section {
     let figure = |group: &str| {
         let crosses = report.evaluations.iter().enumerate().filter_map(|(k, e)| {
@@ -67,7 +66,7 @@ fn cross(label: String, k: usize, x: &Spread, y: &Spread) -> XySeries {
     }
 }
 
-/// Every measure of every controller.
+/// Table with every measure of every controller.
 fn measures(report: &EvaluationReport) -> Section {
     let figure = |group: &str| {
         let scored: Vec<(&Evaluation, &Score)> =
@@ -110,7 +109,7 @@ fn push(
     table.push(std::iter::once(title).chain(cells).collect::<Vec<_>>());
 }
 
-/// Whether a measure is ever non-zero: that of a rudder is zero for an aircraft without one.
+/// Whether a measure is nonzero for any controller; rudder measures are zero for an aircraft without a rudder.
 fn moves(scored: &[(&Evaluation, &Score)], m: &Measure) -> bool {
     scored.iter().any(|(_, score)| score.measures.get(m.id).is_some_and(|s| s.worst != 0.0))
 }
@@ -129,7 +128,7 @@ fn titled(m: &Measure) -> String {
     format!("{first}{}{unit}", letters.as_str())
 }
 
-/// The limits that the flights are measured against, in words.
+/// Text on the limits that the evaluation applies.
 fn limits(report: &EvaluationReport) -> String {
     let Some(limits) = report.evaluations.iter().find_map(|e| e.limits) else {
         return String::new();

@@ -1,4 +1,4 @@
-//! Input of a flight report.
+//! Input of the report on one flight.
 
 pub(super) mod page;
 pub(super) mod quality;
@@ -11,7 +11,7 @@ use greylag_control::quality::{Limits, Quality};
 use greylag_logs::Flight;
 use greylag_sysid::compare::Comparison;
 
-/// A flight with what is known about it.
+/// Input of the report: the log of a flight and further data about the flight.
 #[derive(Clone, Debug)]
 pub struct FlightReport<'a> {
     /// Title of the page.
@@ -20,21 +20,21 @@ pub struct FlightReport<'a> {
     pub flight: &'a Flight,
     /// Name of the controller that flew.
     pub controller: String,
-    /// Name of the model it flew with.
+    /// Name of the model that the controller used.
     pub model: String,
-    /// Seed of everything random in the flight; `None` when nothing was random or the seed is not known.
+    /// Seed of the random numbers in the flight; `None` if there were none or the seed is not known.
     pub seed: Option<u64>,
-    /// The command line that made the flight.
+    /// The command line that produced the flight.
     pub command_line: String,
-    /// Programs and their versions.
+    /// Names and versions of programs.
     pub versions: Vec<(String, String)>,
-    /// The schedule, in time order; empty when no target was set.
+    /// Segments of the schedule, in time order; empty if no target was set.
     pub segments: Vec<Segment>,
     /// Largest settled error that counts as tracked, rad.
     pub tolerance_rad: f64,
-    /// The envelope that the flight is measured against; `None` when the aircraft is not known.
+    /// The envelope with which the flight is compared; `None` if the aircraft's limits are not known.
     pub envelope: Option<EnvelopeFlown>,
-    /// Deflections at full command, with which commands are drawn as deflections.
+    /// Deflections at full command, by which the plots convert commands to deflections.
     pub travel: SurfaceTravel,
     /// Durations of the control cycles; `None` when they were not recorded.
     pub timing: Option<LoopTiming>,
@@ -42,22 +42,22 @@ pub struct FlightReport<'a> {
     pub events: Vec<Event>,
     /// Prediction errors of the model on this flight; `None` if they were not computed.
     pub comparison: Option<Comparison>,
-    /// Insight into the planner at some ticks; empty if no planner flew.
+    /// Candidates and plans of the planner at some steps; empty if no planner flew.
     pub sights: Vec<Sight>,
-    /// The next command, ready to be copied; empty if none is known.
+    /// The next command for the user to run; empty if there is none.
     pub next: String,
 }
 
-/// Flight envelope with which a flight is compared.
+/// Flight envelope with which a flight is compared, and the airspeed at which flight begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvelopeFlown {
     /// The limits of the aircraft.
     pub limits: Limits,
-    /// Airspeed from which a sample counts as flight, m/s.
+    /// Lowest true airspeed at which a sample counts as flight, m/s.
     pub flying_from_mps: f64,
 }
 
-/// Deflections at a command of +1.
+/// Surface deflections at a command of +1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTravel {
     /// Deflection of the aileron, rad.
@@ -66,37 +66,37 @@ pub struct SurfaceTravel {
     pub elevator_rad: f64,
 }
 
-/// A part of the schedule with one target.
+/// A part of the schedule with a constant target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// When the target was set, s, on the flight's clock.
+    /// Start of the target, s, on the flight's clock.
     pub start_s: f64,
-    /// When it ended, s.
+    /// End of the target, s, on the flight's clock.
     pub end_s: f64,
     /// Commanded roll angle, rad.
     pub roll_target_rad: f64,
     /// Commanded pitch angle, rad.
     pub pitch_target_rad: f64,
-    /// How far the target is from level flight.
+    /// Group of the target, by its difference from level flight.
     pub difficulty: Difficulty,
-    /// Settled error: mean of the roll and pitch RMS errors over the last fifth, rad; NaN when it
-    /// could not be determined.
+    /// Settled error, rad: mean of the roll and pitch RMS errors over the last fifth of the segment. NaN if it could not be
+    /// determined.
     pub settled_error_rad: f64,
 }
 
 impl Segment {
-    /// Whether the settled error is within `tolerance_rad`; one that could not be determined is not.
+    /// Whether the settled error is at most `tolerance_rad`, rad; `false` if the error could not be determined.
     pub fn tracked(&self, tolerance_rad: f64) -> bool {
         self.settled_error_rad <= tolerance_rad
     }
 }
 
-/// How far a target is from level flight, by the groups of the evaluation.
+/// Difference of a target from level flight, in the groups of the evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Difficulty {
-    /// |roll| below 45° with |pitch| below 25°.
+    /// |roll| below 45° and |pitch| below 25°.
     Easy,
-    /// Any other target: |roll| from 45° up, or |pitch| from 25° up.
+    /// |roll| of at least 45°, or |pitch| of at least 25°.
     Hard,
 }
 
@@ -110,14 +110,14 @@ impl Difficulty {
     }
 }
 
-/// An event at an instant.
+/// An event at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// When, s, on the flight's clock.
+    /// Time of the event, s, on the flight's clock.
     pub time_s: f64,
     /// Kind of the event.
     pub kind: EventKind,
-    /// Description of the event for the reader.
+    /// Description of the event for the user.
     pub text: String,
 }
 
@@ -128,7 +128,7 @@ pub enum EventKind {
     Mode,
     /// A message was sent or received.
     Text,
-    /// A failsafe took over.
+    /// A failsafe was triggered.
     Failsafe,
 }
 
@@ -144,25 +144,24 @@ impl EventKind {
 }
 
 impl FlightReport<'_> {
-    /// Number of segments that were tracked.
+    /// Number of tracked segments.
     pub fn tracked(&self) -> usize {
         self.segments.iter().filter(|s| s.tracked(self.tolerance_rad)).count()
     }
 
-    /// What happened on the way to each target, in the order of the segments; `None` where the aircraft's limits are
-    /// not known.
+    /// Measures of the transient to each target, in the order of the segments; `None` if the aircraft's limits are not known.
     pub fn qualities(&self) -> Option<Vec<Quality>> {
         let limits = self.envelope?.limits;
         let of = |segment: &Segment| quality::of_segment(&self.flight.samples, segment, &limits);
         Some(self.segments.iter().map(of).collect())
     }
 
-    /// Verdict on the flight in one line.
+    /// One-line verdict on the flight.
     pub fn page_sentence(&self) -> String {
         verdict::sentence(self)
     }
 
-    /// The page of the flight.
+    /// Builds the page of the flight.
     pub fn page(&self) -> Page {
         page::page(self)
     }

@@ -1,4 +1,4 @@
-//! The page of one flight.
+//! Page of one flight: verdict, attitude, air data, surfaces, loop timing, targets and events.
 
 use crate::comparison;
 use crate::flight::FlightReport;
@@ -10,9 +10,9 @@ use crate::{
 };
 use greylag_logs::Sample;
 
-/// A gap longer than this interrupts the lines, s: the log format splits a flight there.
+/// Gap above which the lines are interrupted, s; the flight-log format splits a flight at the same gap.
 const GAP_S: f64 = 0.1;
-/// Events up to this number are marked in the plots; more would hide the lines.
+/// Largest number of events that are marked in the plots; more marks would hide the lines.
 const MARKED_EVENTS: usize = 40;
 
 pub(crate) fn page(report: &FlightReport) -> Page {
@@ -51,7 +51,7 @@ fn column(report: &FlightReport, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
     report.flight.samples.iter().map(value).collect()
 }
 
-/// Panels over the samples of the log, with the events marked.
+/// Panels over the samples of the log, with marks at the events.
 fn time_figure(report: &FlightReport, panels: Vec<Panel>) -> TimeFigure {
     let mut figure = TimeFigure { marks: marks(report), ..TimeFigure::default() };
     figure.add_track(&column(report, |s| s.time_s), GAP_S, panels);
@@ -66,7 +66,7 @@ fn marks(report: &FlightReport) -> Vec<Mark> {
     timed.map(|(i, e)| Mark { time_s: e.time_s, label: (i + 1).to_string() }).collect()
 }
 
-/// Legend of the numbered marks above the plots.
+/// Sentence of a note that explains the numbered marks; empty without marks.
 fn marked(report: &FlightReport) -> &'static str {
     match report.events.len() {
         1..=MARKED_EVENTS => " The numbers above the plots are the events listed at the end.",
@@ -133,7 +133,7 @@ fn error_panel(title: &str, tolerance_rad: f64, (actual, command): &(Vec<f64>, V
     let error = actual.iter().zip(command).map(size).collect();
     let tolerance = tolerance_rad.to_degrees();
     Panel {
-        // Two decades below the tolerance: what lies under that no longer matters.
+        // The scale begins two decades below the tolerance, because smaller errors are irrelevant.
         scale: Scale::Log { floor: positive_or(tolerance / 100.0, 1e-3) },
         rules: vec![Rule { value: tolerance, label: "tolerance".into() }],
         ..Panel::new(title, "°", vec![Series::new("error", Style::Actual, error)])
@@ -168,7 +168,7 @@ fn air_data(report: &FlightReport) -> Section {
 fn surfaces(report: &FlightReport) -> Section {
     let pair = |title: &str, unit: &str, acting: Vec<f64>, command: Vec<f64>| {
         let series = vec![
-            // The acting deflection follows its command closely and is drawn over it, so that both are visible.
+            // The acting deflection stays close to its command; drawn in this order, both lines are visible.
             Series::new("commanded", Style::Command, command),
             Series::new("acting", Style::Actual, acting),
         ];

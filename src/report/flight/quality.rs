@@ -1,4 +1,4 @@
-//! Step responses to the targets of a recorded flight, and time outside the envelope.
+//! Transients to the targets of a recorded flight, and time outside the envelope.
 
 use crate::flight::verdict::signed;
 use crate::flight::{EnvelopeFlown, FlightReport, Segment};
@@ -10,19 +10,19 @@ use greylag_logs::Sample;
 use greylag_physics::Command;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 
-/// A gap longer than this splits a flight, s.
+/// Gap above which a flight is split, s.
 const GAP_S: f64 = 0.1;
 
-/// A whole flight against its envelope.
+/// Envelope measures of a whole flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kept {
-    /// Least and largest load factor.
+    /// Smallest and largest load factor, in units of standard gravity; NaN if not measured.
     pub load_factor: [f64; 2],
     /// Largest angle of attack, degrees.
     pub alpha_deg: f64,
-    /// Seconds outside each limit.
+    /// Time outside each limit, s.
     pub outside_s: OutsideS,
-    /// Whether load factor and angle of attack stayed within their limits, apart from the permitted transient.
+    /// Whether load factor and angle of attack stayed within their limits, except for the permitted transient.
     pub kept: bool,
 }
 
@@ -44,19 +44,19 @@ fn moment(s: &Sample) -> Moment {
     }
 }
 
-/// Measures of a segment between its ends.
+/// Measures of the transient in `segment`.
 pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits) -> Quality {
     let first = samples.partition_point(|s| s.time_s < segment.start_s);
     let end = samples.partition_point(|s| s.time_s <= segment.end_s).max(first);
     let before = first.checked_sub(1).map(|k| moment(&samples[k]).command);
     let (roll, pitch) = (segment.roll_target_rad, segment.pitch_target_rad);
-    // the log format has no column for the commanded airspeed
+    // the log format has no column for the airspeed setpoint
     let target = Target { roll, pitch, airspeed: f64::NAN };
     let moments = samples[first..end].iter().map(moment).collect();
     Track { moments, target, before, lost_s: 0.0 }.quality(limits)
 }
 
-/// Measures of the whole flight, over the samples whose airspeed counts as flight or is unknown.
+/// Measures of the whole flight, over the samples at which the airspeed is unknown or counts as flight.
 pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     let flying = |s: &Sample| s.airspeed_mps.is_nan() || s.airspeed_mps >= envelope.flying_from_mps;
     let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
@@ -81,7 +81,7 @@ pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     all
 }
 
-/// Clause about the time outside the envelope.
+/// Part of a sentence on the time outside the envelope.
 pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     let of = |value: f64, limit: f64, unit: &str| {
         let stated =
@@ -104,12 +104,12 @@ pub(super) fn clause(kept: &Kept, limits: &Limits) -> String {
     format!("{outside}: {load}, {alpha}")
 }
 
-/// The largest of a measure over the segments.
+/// The largest value of a measure over the segments; NaN if there is none.
 pub(super) fn most(qualities: &[Quality], of: impl Fn(&Quality) -> f64) -> f64 {
     qualities.iter().map(of).fold(f64::NAN, f64::max)
 }
 
-/// The section on the transients to the targets; `None` without targets or limits.
+/// The section on the transients to the targets; `None` if there are no targets or no limits.
 pub(crate) fn section(report: &FlightReport) -> Option<Section> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let limits = report.envelope?.limits;

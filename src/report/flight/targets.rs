@@ -1,13 +1,13 @@
-//! The targets of a flight: attitude, quality of tracking, and place in the envelope.
+//! Section on the targets of a flight: settled error of each target, and the path in roll and pitch.
 
 use crate::flight::FlightReport;
 use crate::flight::verdict::signed;
 use crate::{Align, Figure, Row, Section, Style, Table, XyFigure, XyMark, XySeries};
 
-/// Samples up to this number are drawn as a path in the roll and pitch plane.
+/// Largest number of samples in the plotted path of roll and pitch.
 const PATH_POINTS: usize = 20_000;
 
-/// The section of the targets: a table, and the plane of roll and pitch.
+/// The section on the targets: a table, and a plot of pitch over roll.
 pub(crate) fn section(report: &FlightReport) -> Section {
     let mut table = Table::new(
         "Segments",
@@ -48,7 +48,7 @@ pub(crate) fn section(report: &FlightReport) -> Section {
     )
 }
 
-/// Roll against pitch: the path flown, and the targets by whether they were tracked.
+/// Plot of pitch over roll: the flown path, and the tracked and missed targets.
 fn target_plane(report: &FlightReport) -> XyFigure {
     let targets = |label: &str, style, mark, tracked: bool| {
         let of =

@@ -1,4 +1,4 @@
-//! The verdict on a flight in a sentence, with the measurements behind it.
+//! The verdict on a flight: one sentence and the measurements that it is based on.
 
 use crate::flight::quality::{clause, kept, most};
 use crate::flight::{Difficulty, FlightReport, Segment};
@@ -7,10 +7,10 @@ use crate::{LoopTiming, Outcome, Verdict};
 use greylag_control::quality::TRANSIENT;
 use greylag_logs::Sample;
 
-/// Largest number of targets not tracked that are listed under the sentence.
+/// Largest number of missed targets in the list under the sentence.
 const LISTED_TARGETS: usize = 6;
 
-/// From the first time to the last, s.
+/// Time from the first to the last sample, s; 0 without finite times.
 pub(crate) fn duration_s(samples: &[Sample]) -> f64 {
     let times = || samples.iter().map(|s| s.time_s).filter(|t| t.is_finite());
     match (times().next(), times().next_back()) {
@@ -19,7 +19,7 @@ pub(crate) fn duration_s(samples: &[Sample]) -> f64 {
     }
 }
 
-/// Clauses of the verdict: those of its main sentence, and further ones.
+/// Parts of the verdict: those of its main sentence, and further measurements.
 struct Parts {
     first: Vec<String>,
     beside: Vec<String>,
@@ -53,7 +53,7 @@ impl Parts {
     }
 }
 
-/// The verdict in one line.
+/// The verdict in one line, with all parts.
 pub(crate) fn sentence(report: &FlightReport) -> String {
     let Parts { first, beside } = Parts::of(report);
     format!("{}.", first.into_iter().chain(beside).collect::<Vec<_>>().join("; "))
@@ -78,7 +78,7 @@ pub(crate) fn verdict(report: &FlightReport) -> Verdict {
     Verdict { outcome, reason, sentence, details, next: report.next.clone() }
 }
 
-/// The requirements that the flight missed, in words.
+/// The missed requirements as text; empty if none was missed.
 fn reason(not_tracked: usize, late: Option<usize>, kept: Option<bool>) -> String {
     let plural = |n: usize, one: &str| match n {
         1 => format!("1 {one}"),
@@ -97,13 +97,13 @@ fn reason(not_tracked: usize, late: Option<usize>, kept: Option<bool>) -> String
     all.join(", ")
 }
 
-/// The text with a capital letter first.
+/// The text with a capital first letter.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// The worst integral of error and overshoot, where the flight was measured.
+/// Text on the largest integral of error and overshoot over the segments; `None` without segments or limits.
 fn on_the_way(report: &FlightReport) -> Option<String> {
     let qualities = report.qualities().filter(|all| !all.is_empty())?;
     let integral = most(&qualities, |q| q.error_integral_deg_s);
@@ -149,7 +149,7 @@ fn details(report: &FlightReport) -> Vec<String> {
     details
 }
 
-/// A line for each target that was not tracked, and one for those beyond the first few.
+/// One line for each missed target, up to `LISTED_TARGETS`, and one line on the number of the others.
 fn not_tracked(report: &FlightReport) -> Vec<String> {
     let missed = || {
         let numbered = report.segments.iter().zip(1..);
@@ -170,12 +170,12 @@ fn not_tracked(report: &FlightReport) -> Vec<String> {
     lines
 }
 
-/// Degrees with a sign, by a true minus.
+/// An angle in degrees with its sign and one decimal.
 pub(crate) fn signed(rad: f64) -> String {
     format!("{:+.1}", rad.to_degrees()).replace('-', "−")
 }
 
-/// An error in degrees, with digits enough that a small one is not shown as zero.
+/// An error in degrees, with enough decimals that a small error is not shown as zero.
 pub(crate) fn degrees(rad: f64) -> String {
     let deg = rad.to_degrees();
     match deg.abs() {

@@ -1,10 +1,10 @@
-//! The box with the answer: sentences in large type, where the model fails, the remaining error, the command to run next.
+//! Box with the answer of a page: main sentences, where the model fails, the remaining error, the next command.
 
 use crate::kit::figure::next_command;
 use crate::kit::html::escape;
 use greylag_sysid::compare::Answer;
 
-/// Definition of the error, printed once on every page.
+/// Definition of the error, which every box contains.
 const ERROR: &str = "Error: root mean square over the eight states of a free run on the recorded actuators, each state over its \
                      characteristic value x_c (NRMSE).";
 
@@ -13,18 +13,18 @@ const ERROR: &str = "Error: root mean square over the eight states of a free run
 pub struct AnswerBox {
     /// The answer that the box shows.
     pub answer: Answer,
-    /// Where the model fails, in one sentence; empty if nothing is known.
+    /// Sentence on where the model fails; empty if this is not known.
     pub place: String,
-    /// Sentence in the first place.
+    /// The first sentence of the box.
     pub first: First,
 }
 
-/// Sentence that leads the box.
+/// Choice of the first sentence in the box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum First {
-    /// The fall of the error.
+    /// The change of the error.
     Error,
-    /// The sentence on effects: where none is missing, the fall by tuning is not the answer.
+    /// The sentence on effects. It comes first if no effect is missing, because a reduction by tuning is then not the answer.
     Effect,
 }
 
@@ -51,7 +51,7 @@ impl AnswerBox {
         )
     }
 
-    /// CSS class of the colour; empty if the error falls.
+    /// CSS class for the colour of the box; empty if the error falls.
     fn tone(&self) -> &'static str {
         let change = self.answer.numbers.change_percent;
         match self.first {
@@ -81,7 +81,7 @@ mod tests {
         };
         assert!(html(-50.0, First::Error).starts_with("<div class=\"verdict answer\">"));
         assert!(html(5.0, First::Error).starts_with("<div class=\"verdict answer missed\">"));
-        // of one model alone there is no change
+        // there is no change for a single model
         assert!(html(f64::NAN, First::Error).starts_with("<div class=\"verdict answer open\">"));
     }
 

@@ -1,29 +1,29 @@
-//! Horizontal bars: one quantity for several things, side by side for several models.
+//! Horizontal bars: one quantity for several items, with adjacent bars for several models.
 
 use crate::Style;
 use crate::kit::html::escape;
 
-/// Groups of bars from zero.
+/// Groups of horizontal bars that begin at zero.
 #[derive(Clone, Debug)]
 pub struct Bars {
     /// Title of the figure.
     pub title: String,
     /// Unit of the values, such as `%`.
     pub unit: String,
-    /// Names of the bars of a group, in their order.
+    /// Names and styles of the bars in each group, in order.
     pub keys: Vec<(String, Style)>,
     /// The groups, top to bottom.
     pub groups: Vec<BarGroup>,
-    /// The value at which a bar is full; longer ones are cut, and marked.
+    /// Value of a bar of full length; the bar of a larger value is truncated and marked.
     pub full: f64,
 }
 
-/// Bars of one item, one for each key.
+/// Bars of one item, one per key.
 #[derive(Clone, Debug)]
 pub struct BarGroup {
     /// Name of the item.
     pub label: String,
-    /// One value for each key, in the unit of the figure; NaN where it cannot be determined.
+    /// One value per key, in the unit of the figure; NaN if it cannot be determined.
     pub values: Vec<f64>,
 }
 
@@ -69,7 +69,7 @@ fn value_text(value: f64, unit: &str) -> String {
     }
 }
 
-/// A key of colours; empty if there is one only.
+/// Legend of the keys; empty for fewer than two keys.
 pub(crate) fn keys_html(keys: &[(String, Style)]) -> String {
     if keys.len() < 2 {
         return String::new();
@@ -97,7 +97,7 @@ mod tests {
         let html = bars.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // Cut at full; no bar for NaN, for a negative value and for infinity.
+        // The values are cut at 100, NaN, negative, infinite; the last three give no bar.
         assert_eq!(widths, ["100.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("250 %") && html.contains("cannot be determined"));
     }

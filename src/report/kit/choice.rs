@@ -1,25 +1,25 @@
-//! Alternative figures, shown one at a time.
+//! Alternative figures, of which one is visible at a time.
 
 use crate::Figure;
 use crate::kit::html::escape;
 
-/// Named alternatives behind a row of buttons; choices with the same label switch together.
+/// Named alternatives with a row of buttons; choices with the same label switch together.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// Target of links: letters and hyphens, unique on the page.
+    /// Anchor for links: letters and hyphens, unique on the page.
     pub anchor: String,
     /// Name of the choice, for example `Channel`.
     pub label: String,
-    /// The alternatives; the first is shown initially. A browser without scripts shows all.
+    /// The alternatives; the first is visible initially. Without scripts, a browser shows all of them.
     pub options: Vec<ChoiceOption>,
 }
 
-/// One of the alternatives.
+/// One alternative of a choice.
 #[derive(Clone, Debug)]
 pub struct ChoiceOption {
-    /// Label of its button.
+    /// Label of the button.
     pub name: String,
-    /// Figures shown when it is selected.
+    /// Figures of the alternative.
     pub figures: Vec<Figure>,
 }
 

@@ -1,4 +1,4 @@
-//! Lines of one quantity over another, with a logarithmic or a linear vertical axis.
+//! Curves of one quantity over another, with a logarithmic or linear vertical axis.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::Series;
 use crate::kit::html::compact;
 use crate::kit::xy::plotted;
 
-/// A figure of lines over a common horizontal axis.
+/// A figure of curves over a common horizontal axis.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curves {
     /// Title of the figure.
@@ -19,18 +19,18 @@ pub struct Curves {
     /// Values on the horizontal axis, ascending.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// The lines, with one value per abscissa. A value outside the domain of the scale leaves a gap.
+    /// The curves, each with one value per element of `x`. A value outside the domain of the scale leaves a gap.
     pub series: Vec<Series>,
-    /// Shaded ranges around lines, such as the minimum and maximum over several seeds.
+    /// Shaded ranges around curves, such as the minimum and maximum over several seeds.
     pub ranges: Vec<Range>,
-    /// Whether the vertical axis is linear; it is logarithmic otherwise.
+    /// Whether the vertical axis is linear instead of logarithmic.
     pub linear: bool,
 }
 
-/// A shaded range in the colour of a line.
+/// A shaded range in the colour of its curve.
 #[derive(Clone, Debug, Serialize)]
 pub struct Range {
-    /// Index of the line among the series.
+    /// Index of the curve in `Curves::series`.
     pub of: usize,
     /// Lower edge, one value for each of [`Curves::x`].
     #[serde(serialize_with = "compact")]

@@ -1,7 +1,6 @@
-//! Selection of rows for drawing: in time order, broken at gaps, thinned without losing extremes.
+//! Selects rows for plots: in time order, separated at gaps, thinned without loss of extremes.
 
-/// Indices of the rows whose times ascend, with `None` where a gap longer than `gap_s` (s) lies
-/// between two of them.
+/// Indices of the rows whose times ascend, with `None` between two rows that are more than `gap_s`, s, apart.
 pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     let mut rows = Vec::with_capacity(time_s.len());
     let mut last = f64::NEG_INFINITY;
@@ -18,7 +17,7 @@ pub(crate) fn rows_in_order(time_s: &[f64], gap_s: f64) -> Vec<Option<usize>> {
     rows
 }
 
-/// The times of `rows`, s; a gap gets the middle of its two neighbours.
+/// The times of `rows`, s; a gap gets the mean of its neighbours' times.
 pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
     let at = |k: usize| rows.get(k).copied().flatten().map_or(f64::NAN, |i| time_s[i]);
     (0..rows.len())
@@ -29,12 +28,12 @@ pub(crate) fn times_of(rows: &[Option<usize>], time_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The values of `rows`; NaN at a gap or where `values` ends early.
+/// The values of `rows`; NaN at a gap and beyond the end of `values`.
 pub(crate) fn values_of(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     rows.iter().map(|row| row.and_then(|i| values.get(i)).copied().unwrap_or(f64::NAN)).collect()
 }
 
-/// Two values for every `group` values: the smallest and the largest, in the order they came.
+/// Two values for every `group` values: the smallest and the largest, in their original order; NaN without finite values.
 pub(crate) fn extremes(values: &[f64], group: usize) -> Vec<f64> {
     values.chunks(group).flat_map(pair_of_extremes).collect()
 }
@@ -50,13 +49,13 @@ fn pair_of_extremes(chunk: &[f64]) -> [f64; 2] {
     }
 }
 
-/// The two times that go with [`extremes`]: the start and the middle of every group.
+/// The times for the values of [`extremes`], s: the start and the middle of every group.
 pub(crate) fn pair_times(time_s: &[f64], group: usize) -> Vec<f64> {
     time_s
         .chunks(group)
         .flat_map(|chunk| {
             let (first, last) = (chunk[0], chunk[chunk.len() - 1]);
-            // A last group of one row still needs two ascending times.
+            // A last group of a single row also needs two ascending times.
             let middle = if last > first { 0.5 * (first + last) } else { first + 1e-3 };
             [first, middle]
         })
@@ -75,7 +74,7 @@ mod tests {
         assert_eq!(times_of(&rows, &time), [0.0, 0.01, 0.02, 0.52, 1.02]);
         let values = values_of(&rows, &[1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(values[..3], [1.0, 2.0, 5.0]);
-        // The pause, then the row that `values` is too short for.
+        // The first is the gap; the second is the row beyond the end of `values`.
         assert!(values[3].is_nan() && values[4].is_nan());
     }
 

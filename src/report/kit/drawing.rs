@@ -1,17 +1,17 @@
-//! A drawing of lines and areas, to scale.
+//! A figure of SVG lines and areas, to scale.
 
 use crate::kit::html::escape;
 
-/// A drawing; its parts have the classes `body`, `wing` and `surface`.
+/// A drawing to scale; its elements have the classes `body`, `wing` and `surface`.
 #[derive(Clone, Debug)]
 pub struct Drawing {
     /// Title of the drawing.
     pub title: String,
-    /// Text alternative for readers who cannot see the drawing.
+    /// Text alternative for users who cannot see the drawing.
     pub said: String,
-    /// Width and height, in the unit of its coordinates.
+    /// Width and height, in the unit of the drawing's coordinates.
     pub size: [f64; 2],
-    /// SVG elements of the drawing, without text from a user.
+    /// SVG elements of the drawing. It must not contain unescaped text of a user.
     pub svg: String,
 }
 

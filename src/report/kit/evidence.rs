@@ -1,13 +1,13 @@
-//! Evidence for candidates, each drawn as a bar against its own threshold, in groups.
+//! Evidence for candidates: bars relative to the candidates' thresholds, in groups.
 
 use crate::Style;
 use crate::kit::html::escape;
 use crate::kit::numbers::evidence;
 
-/// Longest bars, in thresholds; longer ones are cut, and marked.
+/// Length of the longest bar, in thresholds; a longer bar is truncated and marked.
 const FULL: f64 = 6.0;
 
-/// Bars of evidence divided by threshold, with one line through all of them at one.
+/// Bars of evidence divided by threshold, with a vertical line at a ratio of 1.
 #[derive(Clone, Debug)]
 pub struct Evidence {
     /// Title of the figure.
@@ -19,17 +19,17 @@ pub struct Evidence {
 /// A group of candidates.
 #[derive(Clone, Debug)]
 pub struct EvidenceGroup {
-    /// Property that the rows of the group share.
+    /// Title of the group: the property that its rows share.
     pub title: String,
     /// A sentence on the group; may be empty.
     pub note: String,
-    /// Style of its bars.
+    /// Style of the bars.
     pub style: Style,
     /// The candidates, top to bottom.
     pub rows: Vec<EvidenceRow>,
 }
 
-/// One candidate: its evidence and the threshold under the null.
+/// One candidate: its evidence, and the threshold under the null hypothesis.
 #[derive(Clone, Debug)]
 pub struct EvidenceRow {
     /// Name of the candidate.
@@ -38,7 +38,7 @@ pub struct EvidenceRow {
     pub detail: String,
     /// Evidence; NaN if it could not be determined.
     pub value: f64,
-    /// Threshold of the evidence under the null; NaN if it is not known.
+    /// Threshold of the evidence under the null hypothesis; NaN if it is not known.
     pub threshold: f64,
 }
 
@@ -50,7 +50,7 @@ impl EvidenceRow {
 }
 
 impl Evidence {
-    /// The longest bar that the figure has room for, in thresholds.
+    /// Length of the horizontal axis, in thresholds.
     fn full(&self) -> f64 {
         let ratios = self.groups.iter().flat_map(|g| &g.rows).map(EvidenceRow::ratio);
         let longest = ratios.filter(|r| r.is_finite()).fold(0.0, f64::max);
@@ -128,7 +128,7 @@ mod tests {
         let html = Evidence { title: "e".into(), groups: vec![group] }.html();
         let widths: Vec<&str> =
             html.split("width:").skip(1).map(|w| w.split('%').next().unwrap()).collect();
-        // Twelve thresholds are cut at six; half a threshold is a twelfth of six; the others have no bar.
+        // Twelve thresholds are truncated at six. Half a threshold is a twelfth of six. The others give no bar.
         assert_eq!(widths, ["100.00", "8.33", "0.00", "0.00", "0.00", "0.00"]);
         assert!(html.contains("bar-fill cut") && html.contains("left:16.67%"));
         assert!(html.contains("5.0, chance 10.0") && html.contains("cannot be determined"));

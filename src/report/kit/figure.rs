@@ -1,4 +1,4 @@
-//! The kinds of figure a section may hold.
+//! The types of figure in a section, with verdicts and line styles.
 
 use serde::Serialize;
 
@@ -13,9 +13,9 @@ use crate::{
 pub enum Figure {
     /// Verdict in one sentence.
     Verdict(Verdict),
-    /// The answer, before anything else.
+    /// The answer to the page's question.
     Answer(Box<AnswerBox>),
-    /// Lines and areas, to scale.
+    /// Lines and areas to scale.
     Drawing(Drawing),
     /// Panels of curves over time.
     Time(TimeFigure),
@@ -23,17 +23,17 @@ pub enum Figure {
     Xy(XyFigure),
     /// Counts of one quantity.
     Histogram(Histogram),
-    /// Rows and columns of text.
+    /// Text in rows and columns.
     Table(Table),
     /// Findings, one sentence each.
     Findings(Findings),
-    /// Alternative figures, shown one at a time.
+    /// Alternative figures, of which one is visible at a time.
     Choice(Choice),
-    /// Lines of one quantity over another.
+    /// Curves of one quantity over another.
     Curves(Curves),
     /// Means in bins with their intervals.
     Intervals(Intervals),
-    /// A signed quantity over two others.
+    /// A signed quantity over two other quantities.
     HeatMap(HeatMap),
     /// Horizontal bars from zero.
     Bars(Bars),
@@ -48,26 +48,26 @@ pub enum Figure {
 /// Outcome of a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The goal was reached.
+    /// All requirements were met.
     Reached,
     /// A requirement was missed.
     Missed,
-    /// There is no requirement, or it cannot be judged.
+    /// There is no requirement, or the result is undetermined.
     Open,
 }
 
-/// Verdict in one sentence, with the details behind it.
+/// Verdict in one sentence, with details.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// Its outcome, shown as a word as well as a colour.
+    /// Outcome, shown as a word and by colour.
     pub outcome: Outcome,
-    /// Why it is missed, beside the word of the outcome; empty if the sentence says so.
+    /// The missed requirements, shown next to the outcome; empty if the sentence states them.
     pub reason: String,
     /// The verdict as one sentence.
     pub sentence: String,
-    /// Shorter lines under it, in order.
+    /// Further lines below the sentence, in order.
     pub details: Vec<String>,
-    /// The next command, ready to be copied; empty if none is known.
+    /// The next command for the user to run; empty if there is none.
     pub next: String,
 }
 
@@ -93,7 +93,7 @@ impl Verdict {
     }
 }
 
-/// The next command as a line of a box; nothing if there is none.
+/// The next command as a line of a box; empty if there is no command.
 pub(crate) fn next_command(next: &str) -> String {
     match next.is_empty() {
         true => String::new(),
@@ -115,7 +115,7 @@ pub enum Style {
     Third,
     /// Fourth actual value: ochre.
     Fourth,
-    /// Measured value beside predicted ones: grey, and wide enough to be visible under them.
+    /// Measured value: grey, and wide enough to be visible behind predicted values.
     Measured,
 }
 
@@ -139,11 +139,11 @@ impl Style {
     }
 }
 
-/// A straight line at one value, such as a budget or a percentile.
+/// A straight line at one value of an axis, such as a budget or a percentile.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rule {
-    /// Where, in the unit of the axis.
+    /// Position of the line, in the unit of the axis.
     pub value: f64,
-    /// Name of the value, a word or two.
+    /// Name of the line, one or two words.
     pub label: String,
 }

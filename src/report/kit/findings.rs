@@ -1,25 +1,25 @@
-//! Findings in plain words, each with a link to its evidence.
+//! Findings as sentences, each with an optional link to its evidence.
 
 use crate::kit::figure::next_command;
 use crate::kit::html::escape;
 
-/// Sentences, the leading ones large.
+/// A list of findings, of which the leading ones are prominent.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
-    /// Findings that are shown first.
+    /// Prominent findings.
     pub lead: Vec<Finding>,
-    /// The rest, in order.
+    /// Further findings, in order.
     pub rest: Vec<Finding>,
-    /// The next command, ready to be copied; empty if none is known.
+    /// The next command for the user to run; empty if there is none.
     pub next: String,
 }
 
 /// One finding, as a sentence.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The sentence, with its full stop.
+    /// The sentence, including its full stop.
     pub sentence: String,
-    /// The figure that shows it.
+    /// The figure with the evidence; `None` for a sentence without a link.
     pub link: Option<Link>,
 }
 

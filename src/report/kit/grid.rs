@@ -1,4 +1,4 @@
-//! A table of numbers whose cells are coloured by their weight.
+//! A table of numbers whose cells are shaded by weight.
 
 use crate::kit::html::escape;
 
@@ -7,11 +7,11 @@ use crate::kit::html::escape;
 pub struct Grid {
     /// Title of the figure.
     pub title: String,
-    /// Quantity of the numbers.
+    /// Quantity and unit of the numbers.
     pub unit: String,
     /// Name of the rows, in the corner of the table.
     pub corner: String,
-    /// Heads of the columns: a sign with its meaning.
+    /// Column heads: a symbol and its meaning.
     pub columns: Vec<(String, String)>,
     /// The rows, top to bottom.
     pub rows: Vec<GridRow>,
@@ -22,7 +22,7 @@ pub struct Grid {
 pub struct GridRow {
     /// Name of the row.
     pub label: String,
-    /// Cells of the row, as many as columns.
+    /// Cells of the row, one per column.
     pub cells: Vec<GridCell>,
 }
 

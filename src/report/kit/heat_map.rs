@@ -1,4 +1,4 @@
-//! A signed quantity over two others, in cells of colour.
+//! A signed quantity over two other quantities, as coloured cells.
 
 use serde::Serialize;
 
@@ -14,9 +14,9 @@ pub struct HeatMap {
     pub x_label: String,
     /// Name of the vertical axis, with its unit.
     pub y_label: String,
-    /// Unit of the cells.
+    /// Unit of the cell values.
     pub unit: String,
-    /// Magnitude at which the colour scale ends, in the unit of the cells; positive.
+    /// Magnitude at the ends of the colour scale, in the unit of the cells; positive.
     pub limit: f64,
     /// Edges of the columns, ascending.
     #[serde(serialize_with = "compact")]
@@ -24,7 +24,7 @@ pub struct HeatMap {
     /// Edges of the rows, ascending.
     #[serde(serialize_with = "compact")]
     pub y_edges: Vec<f64>,
-    /// The cells that hold something; the others stay blank.
+    /// The cells with data; other cells stay blank.
     pub cells: Vec<HeatCell>,
 }
 
@@ -38,14 +38,14 @@ pub struct HeatCell {
     /// Value of the cell, in the figure's unit.
     #[serde(serialize_with = "compact_one")]
     pub value: f64,
-    /// Independent samples in it.
+    /// Number of independent samples in the cell.
     pub samples: usize,
-    /// Whether they are enough; hatched if not.
+    /// Whether the samples are sufficient; otherwise the cell is hatched.
     pub supported: bool,
 }
 
 fn compact_one<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    // Single precision is finer than any colour.
+    // Single precision exceeds the resolution of the colours.
     match value.is_finite() {
         true => serializer.serialize_f32(*value as f32),
         false => serializer.serialize_none(),

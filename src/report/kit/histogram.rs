@@ -1,14 +1,14 @@
-//! How often a quantity took which value.
+//! Histogram with logarithmic axes.
 
 use serde::Serialize;
 
 use crate::Rule;
 use crate::kit::html::{compact, escape};
 
-/// Bins in one decade of a logarithmic histogram.
+/// Number of bins per decade.
 const BINS_PER_DECADE: f64 = 20.0;
 
-/// Counts in bins, with both axes logarithmic: rare large values stay visible.
+/// Counts in bins on two logarithmic axes, which keep rare large values visible.
 #[derive(Clone, Debug, Serialize)]
 pub struct Histogram {
     /// Title of the figure.
@@ -16,20 +16,19 @@ pub struct Histogram {
     pub title: String,
     /// Name of the horizontal axis, with its unit.
     pub x_label: String,
-    /// Name of the counted items, in the plural.
+    /// Name of the counted items, in the plural form.
     pub counted: String,
-    /// Edges of the bins, ascending, one more than counts.
+    /// Edges of the bins, ascending; one more than the counts.
     #[serde(serialize_with = "compact")]
     edges: Vec<f64>,
     /// Number of values in each bin.
     counts: Vec<u64>,
-    /// Values marked on the horizontal axis.
+    /// Values marked on the horizontal axis, in its unit.
     rules: Vec<Rule>,
 }
 
 impl Histogram {
-    /// Counts the positive finite `values` (in the unit of `x_label`) in bins of equal ratio that
-    /// also reach over `rules`.
+    /// Counts the positive finite `values`, in the unit of `x_label`, in bins of equal ratio. The bins also cover `rules`.
     pub fn log(
         title: &str,
         x_label: &str,
@@ -77,7 +76,7 @@ mod tests {
         let values = [0.1, 0.11, 1.0, 10.0, 0.0, -1.0, f64::NAN, f64::INFINITY];
         let budget = Rule { value: 100.0, label: "budget".into() };
         let h = Histogram::log("t", "ms", "cycles", &values, vec![budget]);
-        // Four of the eight are positive and finite.
+        // Four of the eight values are positive and finite.
         assert_eq!(h.counts.iter().sum::<u64>(), 4);
         assert_eq!(h.edges.len(), h.counts.len() + 1);
         assert!(h.edges[0] <= 0.1 && h.edges[h.edges.len() - 1] > 100.0);

@@ -1,15 +1,15 @@
-//! Text and data escaped for an HTML page.
+//! Escapes text and data for an HTML page.
 
 #[cfg(feature = "study")]
 use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
-/// Number of files that a line names.
+/// Largest number of file names in a line.
 #[cfg(feature = "study")]
 const NAMED: usize = 6;
 
-/// `text` with the five characters that mean something to HTML replaced; safe as element text
+/// `text` with the five special characters of HTML escaped and control characters replaced. The result is safe as element text
 /// and inside a quoted attribute.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
@@ -20,7 +20,7 @@ pub fn escape(text: &str) -> String {
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
             '\'' => safe.push_str("&#39;"),
-            // Control characters are not allowed in HTML text; logs may hold them.
+            // HTML text must not contain control characters, but logs may.
             c if c.is_control() && !matches!(c, '\n' | '\t') => safe.push('\u{fffd}'),
             c => safe.push(c),
         }
@@ -28,7 +28,7 @@ pub fn escape(text: &str) -> String {
     safe
 }
 
-/// Names of the files without their folders, the first ones of many; the provenance has the paths.
+/// File names without their folders, at most `NAMED` of them. The provenance lists the full paths.
 #[cfg(feature = "study")]
 pub(crate) fn file_names(paths: &[String]) -> String {
     let name = |path: &String| {
@@ -41,21 +41,20 @@ pub(crate) fn file_names(paths: &[String]) -> String {
     names.join(", ")
 }
 
-/// `data` as JSON for a `<script>` element: no `<` is left in it, so neither `</script>` nor `<!--`
-/// can end it.
+/// `data` as JSON for a `<script>` element. It contains no `<`, so neither `</script>` nor `<!--` can end the element.
 pub(crate) fn script_json<T: Serialize>(data: &T) -> String {
     serde_json::to_string(data)
         .expect("figures are structs of strings and numbers, which JSON can hold")
         .replace('<', "\\u003c")
 }
 
-/// Serialises values with six significant digits, which is more than a screen shows and less
-/// than an f32 holds; what is not finite becomes `null`.
+/// Serialises values with six significant digits: finer than a screen resolves, and within the precision of an f32. A value that
+/// is not finite becomes `null`.
 pub(crate) fn compact<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(values.iter().map(|&v| six_digits(v)))
 }
 
-/// Serialises times to 0.1 ms: six digits would not do after the first 1000 s.
+/// Serialises times, s, with a resolution of 0.1 ms. Six significant digits would not suffice after 1000 s.
 pub(crate) fn compact_time<S: Serializer>(times: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(times.iter().map(|t| (t * 1e4).round() / 1e4))
 }
@@ -92,7 +91,7 @@ mod tests {
         struct Values(#[serde(serialize_with = "compact")] Vec<f64>);
         let values =
             Values(vec![std::f64::consts::PI, -0.000_123_456_78, 1e300, f64::NAN, 0.0, 1e-320]);
-        // 1e300 is beyond f32, so it is no number on the page either.
+        // 1e300 exceeds the range of f32 and becomes null.
         assert_eq!(script_json(&values), "[3.14159,-0.000123457,null,null,0.0,0.0]");
     }
 }

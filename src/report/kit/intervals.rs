@@ -1,4 +1,4 @@
-//! Means with their intervals in bins, one small plot for each quantity that was binned.
+//! Means in bins with their intervals: one small plot for each binned quantity.
 
 use serde::Serialize;
 
@@ -6,42 +6,42 @@ use crate::Style;
 use crate::kit::bars::keys_html;
 use crate::kit::html::{compact, escape};
 
-/// Small plots of means in bins that share one vertical scale.
+/// Small plots of binned means with a common vertical scale.
 #[derive(Clone, Debug, Serialize)]
 pub struct Intervals {
     /// Name of the vertical axis, with its unit.
     pub y_label: String,
     /// Unit of the means.
     pub unit: String,
-    /// Names of the lines in every panel, in their order.
+    /// Names and styles of the lines in every panel, in order.
     pub keys: Vec<(String, Style)>,
-    /// One panel for each quantity.
+    /// One panel per binned quantity.
     pub panels: Vec<IntervalPanel>,
 }
 
-/// One quantity in bins.
+/// Panel of one binned quantity.
 #[derive(Clone, Debug, Serialize)]
 pub struct IntervalPanel {
     /// Name of the binned quantity.
     pub title: String,
-    /// Unit of the quantity; empty for a dimensionless one.
+    /// Unit of the binned quantity; empty for a dimensionless quantity.
     pub unit: String,
-    /// Names at 0, 1, 2 …, when the bins are no intervals.
+    /// Names at the positions 0, 1, 2 … for bins that are not intervals; empty otherwise.
     pub names: Vec<String>,
-    /// The bins of each line, as many as keys.
+    /// The bins of each line, one element per key.
     pub lines: Vec<IntervalBins>,
 }
 
-/// The bins of one line; all lists have one length.
+/// The bins of one line; all lists have the same length.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct IntervalBins {
-    /// Lower edges; NaN if open.
+    /// Lower edges, in the unit of the panel; NaN if open.
     #[serde(serialize_with = "compact")]
     pub from: Vec<f64>,
-    /// Upper edges; NaN if open.
+    /// Upper edges, in the unit of the panel; NaN if open.
     #[serde(serialize_with = "compact")]
     pub to: Vec<f64>,
-    /// Where the mean is drawn.
+    /// Horizontal position of the mean, in the unit of the panel.
     #[serde(serialize_with = "compact")]
     pub center: Vec<f64>,
     /// Mean of each bin.
@@ -53,9 +53,9 @@ pub struct IntervalBins {
     /// Upper ends of the 95 % intervals.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
-    /// Independent samples in each.
+    /// Number of independent samples in each bin.
     pub samples: Vec<usize>,
-    /// Whether they are enough; drawn grey if not.
+    /// Whether the samples are sufficient; otherwise the bin is drawn grey.
     pub supported: Vec<bool>,
 }
 

@@ -1,33 +1,32 @@
-//! How long each cycle of the control loop took.
+//! Durations of the cycles of the control loop.
 
 /// One cycle of the control loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
-    /// When it ended, s, on the flight's clock.
+    /// End of the cycle, s, on the flight's clock.
     pub time_s: f64,
-    /// How long it took, µs.
+    /// Duration of the cycle, µs.
     pub duration_us: f64,
 }
 
-/// How long each cycle of the control loop took.
+/// Durations of all cycles of the control loop, with their budget.
 #[derive(Clone, Debug)]
 pub struct LoopTiming {
     /// Name of the timed interval, such as "state frame to actuator command".
     pub measure: String,
-    /// Budget of a cycle, µs; a cycle that takes longer is late.
+    /// Budget of a cycle, µs; a longer cycle is late.
     pub budget_us: f64,
     /// The cycles, in time order.
     pub cycles: Vec<Cycle>,
 }
 
 impl LoopTiming {
-    /// Number of cycles that took longer than the budget.
+    /// Number of cycles longer than the budget.
     pub fn late(&self) -> usize {
         self.cycles.iter().filter(|c| c.duration_us > self.budget_us).count()
     }
 
-    /// The duration, µs, that each share (0..1) of the cycles did not exceed, by nearest rank; NaN
-    /// without cycles.
+    /// Quantiles of the cycle duration, µs, at the probabilities `shares` (0..1), by nearest rank; NaN without cycles.
     pub fn percentiles_us<const N: usize>(&self, shares: [f64; N]) -> [f64; N] {
         let mut sorted: Vec<f64> =
             self.cycles.iter().map(|c| c.duration_us).filter(|d| d.is_finite()).collect();
@@ -54,7 +53,7 @@ mod tests {
 
     #[test]
     fn percentiles_are_nearest_ranks() {
-        // 1..=1000: the value is its own rank, so each percentile can be read off.
+        // The values are 1 to 1000, so each value equals its rank.
         let timing = timing((1..=1000).rev().map(f64::from));
         assert_eq!(timing.percentiles_us([0.5, 0.99, 0.999, 1.0]), [500.0, 990.0, 999.0, 1000.0]);
         assert_eq!(timing.late(), 10);

@@ -1,4 +1,4 @@
-//! The figure kit: pages, tables and plots that do not depend on the subject.
+//! Figure kit: pages, tables and plots, independent of the subject of a report.
 
 pub(super) mod answer_box;
 pub(super) mod bars;

@@ -1,6 +1,6 @@
-//! Numbers as people read them.
+//! Formats numbers for display.
 
-/// Half width of a 95 % interval in standard deviations of a normal distribution.
+/// Half width of the 95 % interval of a normal distribution, in standard deviations.
 pub(crate) const NORMAL_95: f64 = 1.96;
 
 /// Three significant digits with a true minus sign; a dash for NaN and infinity.
@@ -17,7 +17,7 @@ pub(crate) fn number(value: f64) -> String {
     text.replace('-', "−")
 }
 
-/// Evidence with one decimal, from 100 on without; a dash for NaN and infinity.
+/// Evidence with one decimal, or without decimals from 100 on; a dash for NaN and infinity.
 pub(crate) fn evidence(value: f64) -> String {
     let text = match value {
         v if !v.is_finite() => return "–".into(),
@@ -37,7 +37,7 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
-/// Two ends of an interval.
+/// Text of an interval with both ends.
 pub(crate) fn interval(low: f64, high: f64) -> String {
     format!("{} to {}", number(low), number(high))
 }

@@ -1,4 +1,4 @@
-//! A page: sections of figures rendered into one HTML file.
+//! A page: sections of figures that are rendered into one HTML file.
 
 use serde_json::Value;
 
@@ -9,41 +9,41 @@ const UPLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
 const STYLE: &str = include_str!("assets/page.css");
-/// Scripts that draw the figures; each uses functions of those before it, so that all run in one scope.
+/// Scripts that draw the figures. Each uses functions of the scripts before it, so all run in one scope.
 const SCRIPTS: [&str; 4] = [
     include_str!("assets/draw.js"),
     include_str!("assets/link.js"),
     include_str!("assets/bins.js"),
     include_str!("assets/page.js"),
 ];
-/// Runs before the page is drawn, so that a dark screen does not flash white.
+/// Script that sets the theme before the page is drawn; otherwise a dark page would first appear white.
 const THEME_SCRIPT: &str = include_str!("assets/theme.js");
 
-/// A page: a title over sections.
+/// A page: a title and sections.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
-    /// Title of the page, also that of the browser's tab.
+    /// Title of the page and of the browser tab.
     pub title: String,
-    /// A line under the title.
+    /// Subtitle of the page.
     pub subtitle: String,
     /// The sections, in order.
     pub sections: Vec<Section>,
 }
 
-/// Figures under a heading.
+/// Figures under a common heading.
 #[derive(Clone, Debug, Default)]
 pub struct Section {
-    /// The heading; empty for a section without one.
+    /// The heading; empty for no heading.
     pub title: String,
-    /// One or two sentences under the heading: what is shown and how it is defined.
+    /// One or two sentences under the heading on what the figures show and how it is defined.
     pub note: String,
     /// The figures, in order.
     pub figures: Vec<Figure>,
-    /// Whether the section is open at first. One with plots must be, because a plot takes its size when it is drawn.
+    /// Whether the section is initially open. A section with plots must be, because a plot gets its size when it is drawn.
     pub folding: Folding,
 }
 
-/// Whether a section is open at first.
+/// Initial state of a section.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Folding {
     /// Open when the page loads.
@@ -54,7 +54,7 @@ pub enum Folding {
 }
 
 impl Page {
-    /// The page as one HTML file in UTF-8, which loads no other file.
+    /// The page as a self-contained HTML file in UTF-8.
     pub fn render(&self) -> String {
         let mut data = Vec::new();
         let mut body = String::new();
@@ -99,22 +99,22 @@ impl Page {
 }
 
 impl Section {
-    /// A section of figures under a heading and a note, either of which may be empty.
+    /// A section with a heading, a note and figures; heading and note may be empty.
     pub fn new(title: &str, note: &str, figures: Vec<Figure>) -> Self {
         Section { title: title.into(), note: note.into(), figures, folding: Folding::Open }
     }
 
-    /// The section closed at first, with its heading only.
+    /// The section, initially closed with only its heading visible.
     pub fn folded(self) -> Self {
         Section { folding: Folding::Folded, ..self }
     }
 
-    /// A section that is one verdict, without a heading.
+    /// A section without a heading that contains one verdict.
     pub fn verdict(verdict: Verdict) -> Self {
         Section::new("", "", vec![Figure::Verdict(verdict)])
     }
 
-    /// The section as HTML; the data of its plots is added to `data`, one JSON value a plot.
+    /// The section as HTML. The data of its plots is appended to `data`, one JSON value per plot.
     fn html(&self, index: usize, data: &mut Vec<String>) -> String {
         let mut html = format!("<section id=\"s{index}\">\n");
         let heading = match (self.title.is_empty(), self.folding) {

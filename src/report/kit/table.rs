@@ -1,10 +1,10 @@
-//! Rows and columns of text.
+//! A table of text cells.
 
 use crate::kit::html::escape;
 
-/// Length above which the texts of the last column are broken into lines, characters.
+/// Number of characters above which texts in the last column are wrapped.
 const LONG: usize = 28;
-/// Number of columns above which cells are broken into lines, so that the table fits a screen.
+/// Number of columns above which all cells are wrapped, to fit the table on a screen.
 const WIDE: usize = 9;
 
 /// A table of text with column heads.
@@ -21,7 +21,7 @@ pub struct Table {
 /// Head of a column.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// Title of the column, with the unit of its numbers.
+    /// Title of the column, including the unit of its numbers.
     pub title: String,
     /// Alignment of the column's text.
     pub align: Align,
@@ -39,18 +39,18 @@ pub enum Align {
 /// One row of a table.
 #[derive(Clone, Debug, Default)]
 pub struct Row {
-    /// Text of each column.
+    /// Text of the row's cells, one per column.
     pub cells: Vec<String>,
-    /// Start and end, s, of the time it speaks of: its first cell then zooms the time figures there.
+    /// Start and end of the described time, s. If set, the first cell is a button that zooms the time figures to this time.
     pub span_s: Option<[f64; 2]>,
-    /// Anchor for links to the row.
+    /// Anchor for links to this row; `None` for no anchor.
     pub anchor: Option<String>,
-    /// The anchor that its first cell leads to.
+    /// Anchor to which the first cell links; `None` for no link.
     pub link: Option<String>,
 }
 
 impl Table {
-    /// A table without rows; `columns` are title and alignment.
+    /// A table without rows; `columns` are titles and alignments.
     pub fn new(caption: &str, columns: &[(&str, Align)]) -> Self {
         let column = |&(title, align): &(&str, Align)| Column { title: title.into(), align };
         Table {

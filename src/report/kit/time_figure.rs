@@ -1,4 +1,4 @@
-//! Panels over time whose zoom and cursor move together.
+//! Plots over time with a common zoom and cursor.
 
 use serde::Serialize;
 
@@ -6,22 +6,22 @@ use crate::kit::decimate;
 use crate::kit::html::{compact, compact_time, escape};
 use crate::{Rule, Style};
 
-/// Rows above which a track is thinned for drawing.
+/// Number of rows above which a track is thinned.
 const DRAWN_ROWS: usize = 20_000;
 
-/// Panels over time; all time figures of a page share one clock.
+/// Panels over time; all time figures of a page have the same time axis.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TimeFigure {
-    /// Groups of panels, one for each sample clock.
+    /// Groups of panels, one per set of sample times.
     pub tracks: Vec<Track>,
-    /// Instants marked in every panel.
+    /// Times marked in every panel.
     pub marks: Vec<Mark>,
-    /// Notes under the panels on what was dropped or thinned.
+    /// Notes under the panels on omitted or thinned data.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
 
-/// Panels whose series were sampled at the same times.
+/// Panels whose series have the same sample times.
 #[derive(Clone, Debug, Serialize)]
 pub struct Track {
     #[serde(serialize_with = "compact_time")]
@@ -34,7 +34,7 @@ pub struct Track {
 pub struct Panel {
     /// Title of the panel.
     pub title: String,
-    /// Unit of the values, empty when they have none.
+    /// Unit of the values; empty for dimensionless values.
     pub unit: String,
     /// Scale of the vertical axis.
     pub scale: Scale,
@@ -47,7 +47,7 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// A panel of lines on a linear scale, with no band and no rule.
+    /// A panel of lines on a linear scale, without bands and rules.
     pub fn new(title: &str, unit: &str, series: Vec<Series>) -> Self {
         Panel {
             title: title.into(),
@@ -66,9 +66,9 @@ impl Panel {
 pub enum Scale {
     /// Linear axis.
     Linear,
-    /// By decades from `floor` (in the unit of the panel) up; smaller values are drawn at `floor`.
+    /// Logarithmic axis from `floor` upward; smaller values are drawn at `floor`.
     Log {
-        /// The smallest value shown; positive.
+        /// The smallest displayed value, in the unit of the panel; positive.
         floor: f64,
     },
 }
@@ -80,13 +80,13 @@ pub struct Series {
     pub label: String,
     /// Meaning of the series, which sets its colour.
     pub style: Style,
-    /// One value for each time of the track; what is not finite is a gap.
+    /// One value per time of the track; a value that is not finite is a gap.
     #[serde(serialize_with = "compact")]
     pub values: Vec<f64>,
 }
 
 impl Series {
-    /// A line from its values.
+    /// A line with one value per time of its track.
     pub fn new(label: &str, style: Style, values: Vec<f64>) -> Self {
         Series { label: label.into(), style, values }
     }
@@ -96,7 +96,7 @@ impl Series {
     }
 }
 
-/// A shaded range around one line of the panel.
+/// A shaded band around one line of the panel.
 #[derive(Clone, Debug, Serialize)]
 pub struct Band {
     /// Index of the line in the panel's series.
@@ -107,21 +107,21 @@ pub struct Band {
     pub label: String,
 }
 
-/// A marked instant of time.
+/// A marked time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mark {
-    /// When, s, on the page's clock.
+    /// Marked time, s, on the page's time axis.
     pub time_s: f64,
-    /// A few characters that a table of the page explains.
+    /// Short label that a table of the page explains.
     pub label: String,
 }
 
 impl TimeFigure {
-    /// Adds panels sampled at `time_s` (s, ascending; rows out of order are dropped).
+    /// Adds panels with the sample times `time_s`, s, which should ascend. Rows out of time order are omitted.
     ///
-    /// A series without one finite value is left out, as is a panel without series; a gap longer
-    /// than `gap_s` breaks the lines; more than 20,000 rows are thinned to the extremes of equal
-    /// groups. The notes state each of these.
+    /// Series without a finite value and panels without a series are omitted. A gap longer than `gap_s`, s, interrupts the lines.
+    /// More than 20,000 rows are thinned to the extremes of equal groups. The notes state what was omitted or thinned, except for
+    /// gaps.
     pub fn add_track(&mut self, time_s: &[f64], gap_s: f64, panels: Vec<Panel>) {
         let mut panels = self.without_missing(panels);
         if panels.is_empty() {
@@ -161,7 +161,7 @@ impl TimeFigure {
                     panel.bands.retain(|b| b.around != i);
                 }
             }
-            // A band follows its line, whose index moves when a line before it goes.
+            // A band refers to its line by index, which decreases when an earlier line is removed.
             for band in &mut panel.bands {
                 let before = &panel.series[..band.around.min(panel.series.len())];
                 band.around -= before.iter().filter(|s| s.is_missing()).count();

@@ -1,53 +1,53 @@
-//! States and lines over one time axis, as SVG that fits any width without a script.
+//! States and curves over one time axis, as SVG that fits any width without a script.
 //!
-//! Positions along the time are shares of the width, so that words keep their size. Colours are classes, `tone-…` and
-//! `line-…`, for the style sheet of the page.
+//! Horizontal positions are percentages of the width, so the text keeps its size. Colours are CSS classes, `tone-…` and `line-…`,
+//! for the style sheet of the page.
 
 use crate::kit::html::escape;
 use crate::kit::numbers::number;
 
-/// Height of a row of states, and of a panel of lines, px.
+/// Height of a row of states and of a panel of curves, px.
 const ROW_PX: f64 = 26.0;
 const PANEL_PX: f64 = 84.0;
-/// Widths of the figure on a telephone and on a desk, at which a word is written if it fits, and width of a letter with its
-/// share of the margin, px.
+/// Widths of the figure on a telephone and on a desktop screen, px, at which a word is drawn if it fits; and the width of a
+/// letter including its share of the margin, px.
 const NARROW_PX: f64 = 330.0;
 const WIDE_PX: f64 = 800.0;
 const LETTER_PX: f64 = 8.0;
-/// Smallest width of a state, percent, so that short states stay visible.
+/// Smallest width of a state, % of the figure, for the visibility of short states.
 const SEEN: f64 = 0.6;
-/// Approximate number of levels in a panel.
+/// Approximate number of horizontal grid lines in a panel.
 const LEVELS: f64 = 3.0;
-/// Largest number of points of a line, more than a screen resolves.
+/// Largest number of points in a curve; more exceed the resolution of a screen.
 const POINTS: usize = 800;
 
-/// States and lines over time.
+/// A figure of states and curves over time.
 #[derive(Clone, Debug, Default)]
 pub struct TimeLine {
     /// Title of the figure.
     pub title: String,
-    /// Start and end, s.
+    /// Start and end of the time axis, s.
     pub span_s: [f64; 2],
     /// Rows of states, top to bottom.
     pub states: Vec<States>,
-    /// Panels of lines below them.
+    /// Panels of curves below the states.
     pub traces: Vec<Traces>,
-    /// Time that is shaded in the panels, s.
+    /// Time interval that is shaded in the panels, s; `None` for no shading.
     pub shaded_s: Option<[f64; 2]>,
-    /// Instants that are marked in the panels, s.
+    /// Times that are marked in the panels, s.
     pub marks_s: Vec<f64>,
 }
 
-/// A row of states, one after the other.
+/// A row of consecutive states.
 #[derive(Clone, Debug)]
 pub struct States {
-    /// Name of the party whose states these are.
+    /// Name of the system whose states the row shows.
     pub label: String,
-    /// The states, in order of time, with or without gaps.
+    /// The states, in time order; gaps are allowed.
     pub spans: Vec<Span>,
 }
 
-/// A state that lasts.
+/// One state with its duration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     /// Start and end, s.
@@ -58,27 +58,27 @@ pub struct Span {
     pub tone: Tone,
 }
 
-/// Kind of a state; each has a colour beside its word.
+/// Kind of a state, which sets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     /// No activity.
     Idle,
-    /// On the way to something.
+    /// Transition to another state.
     Begins,
-    /// The commanded activity.
+    /// The commanded state.
     Asked,
-    /// A safe activity in place of the commanded one.
+    /// A safe state in place of the commanded state.
     Safe,
     /// A failure.
     Wrong,
 }
 
-/// Lines on one pair of axes.
+/// Curves on one pair of axes.
 #[derive(Clone, Debug)]
 pub struct Traces {
     /// Name of the vertical axis, with its unit.
     pub label: String,
-    /// The lines, in drawing order.
+    /// The curves, in drawing order.
     pub lines: Vec<TraceLine>,
 }
 
@@ -89,7 +89,7 @@ pub struct TraceLine {
     pub label: String,
     /// Colour and stroke of the curve.
     pub style: crate::Style,
-    /// Time (s) and value; what is not finite is a gap.
+    /// Time (s) and value of each point; a value that is not finite is a gap.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -106,7 +106,7 @@ impl Tone {
 }
 
 impl TimeLine {
-    /// The figure as HTML, as wide as its container; empty if the time span has no length.
+    /// The figure as HTML, as wide as its container; empty if the time axis has no length.
     pub fn html(&self) -> String {
         if self.span_s[1] <= self.span_s[0] {
             return String::new();
@@ -120,7 +120,7 @@ impl TimeLine {
         )
     }
 
-    /// Place of a moment, percent of the width.
+    /// Horizontal position of a time, % of the width.
     fn place(&self, time_s: f64) -> f64 {
         let [from, to] = self.span_s;
         (100.0 * (time_s - from) / (to - from)).clamp(0.0, 100.0)
@@ -191,7 +191,7 @@ impl TimeLine {
         )
     }
 
-    /// SVG of shaded stretches and marks behind the lines.
+    /// SVG of the shaded interval and the marks behind the curves.
     fn behind(&self) -> String {
         let shaded = self.shaded_s.map_or_else(String::new, |[from, to]| {
             let [from, to] = [from, to].map(|t| self.place(t));
@@ -252,7 +252,7 @@ impl TimeLine {
     }
 }
 
-/// The name of a line with its colour.
+/// Legend entry of a curve.
 fn key(line: &TraceLine) -> String {
     let (style, label) = (line.style.name(), escape(&line.label));
     format!(
@@ -260,7 +260,7 @@ fn key(line: &TraceLine) -> String {
     )
 }
 
-/// A step of 1, 2 or 5 times a power of ten, of which about `count` are in `length`.
+/// The smallest step of 1, 2 or 5 times a power of ten that divides `length` into at most about `count` parts.
 fn step(length: f64, count: f64) -> f64 {
     let wanted = (length / count).max(f64::MIN_POSITIVE);
     let power = 10f64.powf(wanted.log10().floor());
@@ -268,13 +268,13 @@ fn step(length: f64, count: f64) -> f64 {
     times.unwrap_or(10.0) * power
 }
 
-/// A value in as many decimals as a scale of that step needs.
+/// A value with the decimals that a scale of the step `step` needs.
 fn rounded(value: f64, step: f64) -> String {
     let decimals = (-step.log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.decimals$}").replace('-', "−")
 }
 
-/// Round values inside a range.
+/// Multiples of a round step within a range.
 fn levels([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
     let step = step(high - low, LEVELS);
     let first = (low / step).ceil() as i64;
@@ -285,7 +285,7 @@ fn level(value: f64, [low, high]: [f64; 2]) -> String {
     let y = 100.0 * (high - value) / (high - low);
     let line =
         format!("<line class=\"level\" x1=\"0\" x2=\"100%\" y1=\"{y:.2}%\" y2=\"{y:.2}%\"/>");
-    // no room for a word above the topmost level
+    // there is no space for text above the topmost grid line
     let above = if y > 16.0 {
         format!(
             "<text x=\"3\" y=\"{y:.2}%\" dy=\"-3\">{}</text>",
@@ -327,7 +327,7 @@ mod tests {
     fn states_stand_where_their_time_is_and_are_read_out() {
         let html = time_line().html();
         assert!(html.contains("x=\"0.000%\" width=\"50.000%\""), "{html}");
-        // too short to be visible: drawn with the smallest width, its word in the title only
+        // too short for a word: drawn with the smallest width, and the word appears only in the title
         assert!(html.contains("x=\"50.000%\" width=\"0.600%\""), "{html}");
         assert!(
             html.contains("OFF&lt;BOARD from 0.0 to 30.0 s, HOLD from 30.0 to 30.0 s\""),

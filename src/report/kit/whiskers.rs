@@ -1,25 +1,24 @@
-//! Values with their intervals, one a line, on one horizontal scale.
+//! Values with their intervals, one per row, on one horizontal scale.
 
 use crate::kit::html::escape;
 use crate::kit::numbers::number;
 use crate::{Scale, Style};
 
-/// Room beside the outermost intervals, as a share of the width that all intervals span.
+/// Margin beyond the outermost intervals, as a fraction of the range that all intervals cover.
 const ROOM: f64 = 0.06;
 
-/// Figure of values with intervals, one to a row.
+/// A figure of values with intervals, one per row.
 #[derive(Clone, Debug)]
 pub struct Whiskers {
     /// Title of the figure.
     pub title: String,
-    /// The unit of the scale.
+    /// Unit of the scale.
     pub unit: String,
-    /// Mapping of values to positions; on a logarithmic scale, values that are not positive are
-    /// drawn at its floor.
+    /// Scale of the horizontal axis. On a logarithmic scale, values below the floor are drawn at the floor.
     pub scale: Scale,
-    /// Positions of vertical lines behind the values, in the unit.
+    /// Positions of vertical lines behind the values, in the unit of the scale.
     pub lines: Vec<f64>,
-    /// Explanation of the lines, under the figure.
+    /// Explanation of the vertical lines, below the figure.
     pub legend: String,
     /// The values, top to bottom.
     pub rows: Vec<Whisker>,
@@ -32,16 +31,16 @@ pub struct Whisker {
     pub label: String,
     /// Style of the mark.
     pub style: Style,
-    /// The value, in the figure's unit; NaN if there is none.
+    /// The value, in the unit of the scale; NaN if there is none.
     pub value: f64,
-    /// The ends of its 95 % interval.
+    /// Ends of the 95 % interval, in the unit of the scale.
     pub interval: [f64; 2],
-    /// The value with its interval as text.
+    /// Text of the value and its interval.
     pub text: String,
 }
 
 impl Whiskers {
-    /// A value on the scale.
+    /// Position of a value on the scale: the value itself, or its decimal logarithm.
     fn on_scale(&self, x: f64) -> f64 {
         match self.scale {
             Scale::Linear => x,
@@ -50,7 +49,7 @@ impl Whiskers {
         }
     }
 
-    /// The ends of the scale; `None` if nothing is finite.
+    /// The ends of the scale; `None` if no value is finite.
     fn ends(&self) -> Option<[f64; 2]> {
         let values = self.rows.iter().flat_map(|r| [r.value, r.interval[0], r.interval[1]]);
         let all = values.chain(self.lines.iter().copied()).map(|v| self.on_scale(v));

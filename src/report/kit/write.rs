@@ -9,26 +9,28 @@ use tempfile::{Builder, NamedTempFile};
 /// Why a file was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// A file of that name exists.
+    /// A file with this path exists.
     #[error("{path} is already there, and was left as it is: choose another name, or move it away")]
     Exists {
-        /// The file that was asked for.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// The folder or the disk refused.
+    /// The operating system reported an error.
     #[error(
         "writing {path}: {source}; check that its folder exists, can be written to and has room"
     )]
     Io {
-        /// The file that was asked for.
+        /// Path of the file.
         path: PathBuf,
         /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// Writes `text` to `path`, which must not exist yet: [`WriteError::Exists`] otherwise. A reader
-/// never sees half of it.
+/// Writes `text` to a new file at `path`. Another process never sees a partial file.
+///
+/// # Errors
+/// [`WriteError::Exists`] if `path` exists, and `WriteError::Io` if the operating system reports an error.
 pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
     let file = written_beside(path, text.as_bytes()).map_err(|source| io_error(path, source))?;
     file.persist_noclobber(path).map(sync).map_err(|e| match e.error.kind() {
@@ -37,7 +39,10 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), WriteError> {
     })
 }
 
-/// Writes `content` to `path` in place of any file there. A reader sees the old file or the new one.
+/// Writes `content` to `path` and replaces an existing file. Another process sees either the old or the new file.
+///
+/// # Errors
+/// `WriteError::Io` if the operating system reports an error.
 pub fn write_over(path: &Path, content: impl AsRef<[u8]>) -> Result<(), WriteError> {
     let file = written_beside(path, content.as_ref()).map_err(|source| io_error(path, source))?;
     file.persist(path).map(sync).map_err(|e| io_error(path, e.error))
@@ -47,7 +52,7 @@ fn io_error(path: &Path, source: io::Error) -> WriteError {
     WriteError::Io { path: path.into(), source }
 }
 
-/// The content in a temporary file of the same folder, so that renaming it is atomic.
+/// Writes the content to a temporary file in the same folder, from which it can be renamed atomically.
 fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -55,7 +60,7 @@ fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     };
     let mut builder = Builder::new();
     builder.prefix(".greylag-").suffix(".part");
-    // A temporary file is private by default; a report is as readable as the umask lets it be.
+    // A temporary file is private by default; a report gets the permissions that the umask allows.
     #[cfg(unix)]
     let everyone: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     #[cfg(unix)]
@@ -65,7 +70,7 @@ fn written_beside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Syncs the file to disk. A failure is only a warning, because the file has been written.
+/// Syncs the file to disk. A failure only gives a warning, because the file has been written.
 fn sync(file: File) {
     if let Err(error) = file.sync_all() {
         tracing::warn!("a written file could not be synced to disk: {error}");

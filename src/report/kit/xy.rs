@@ -1,4 +1,4 @@
-//! One quantity against another, as points or as a path.
+//! Plot of one quantity over another, as points or as a path.
 
 use serde::Serialize;
 
@@ -15,13 +15,13 @@ pub struct XyFigure {
     pub x_label: String,
     /// Name of the vertical axis, with its unit.
     pub y_label: String,
-    /// Shaded ranges behind what is drawn.
+    /// Shaded bands behind the series.
     pub bands: Vec<XyBand>,
     /// Points and paths, in drawing order.
     pub series: Vec<XySeries>,
 }
 
-/// A shaded range over the horizontal axis.
+/// A shaded band over a range of the horizontal axis.
 #[derive(Clone, Debug, Serialize)]
 pub struct XyBand {
     /// Name of the band in the legend.
@@ -29,40 +29,40 @@ pub struct XyBand {
     /// Abscissae, in ascending order.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// Lower edge, as many values as horizontal ones.
+    /// Lower edge, one value per abscissa.
     #[serde(serialize_with = "compact")]
     pub low: Vec<f64>,
-    /// Upper edge, as many values as horizontal ones.
+    /// Upper edge, one value per abscissa.
     #[serde(serialize_with = "compact")]
     pub high: Vec<f64>,
 }
 
-/// Points of one kind.
+/// A series of points.
 #[derive(Clone, Debug, Serialize)]
 pub struct XySeries {
     /// Name of the series in the legend.
     pub label: String,
     /// Meaning of the series, which sets its colour.
     pub style: Style,
-    /// Style of the mark.
+    /// Type of the marks.
     pub mark: XyMark,
-    /// Horizontal values; a pair with a value that is not finite breaks a path.
+    /// Horizontal values; a pair with a value that is not finite interrupts a path.
     #[serde(serialize_with = "compact")]
     pub x: Vec<f64>,
-    /// Vertical values, as many as horizontal ones.
+    /// Vertical values, one per horizontal value.
     #[serde(serialize_with = "compact")]
     pub y: Vec<f64>,
 }
 
-/// Style of points.
+/// Type of the marks of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum XyMark {
-    /// A thin line through them.
+    /// A thin line through the points.
     Path,
-    /// A wide line through them.
+    /// A wide line through the points.
     Line,
-    /// Small filled points, where there are many.
+    /// Small filled points, for large numbers of points.
     Dots,
     /// Open circles at the points.
     Circles,
@@ -76,7 +76,7 @@ impl XyFigure {
     }
 }
 
-/// The frame of a figure that the page's script draws.
+/// HTML frame of a figure that the page's script draws.
 pub(super) fn plotted(title: &str, index: usize) -> String {
     let title = escape(title);
     format!(

@@ -18,13 +18,13 @@ use greylag_model::GreyBox;
 pub enum Counterpart {
     /// The shim of the simulator.
     Sitl,
-    /// PX4, commanded surfaces.
+    /// PX4, to which the companion commands surfaces.
     Px4,
-    /// PX4, commanded attitudes.
+    /// PX4, to which the companion commands attitudes.
     Px4Attitude,
-    /// ArduPilot, commanded surfaces by channels.
+    /// ArduPilot, to which the companion commands surfaces by RC channels.
     Ardupilot,
-    /// ArduPilot, commanded attitudes.
+    /// ArduPilot, to which the companion commands attitudes.
     ArdupilotAttitude,
 }
 
@@ -89,7 +89,7 @@ pub(super) enum Aircraft {
 }
 
 impl Aircraft {
-    /// The aircraft `plant` in the scenario's air, with sensor noise and flight controller or shim.
+    /// The aircraft `plant` in the scenario's wind and turbulence, with sensor noise and flight controller or shim.
     pub(super) fn new(plant: &PlantOptions, scenario: &Scenario) -> Result<Self, ShimError> {
         let mut options = ShimOptions::new(scenario.air(plant), plant.start);
         options.seed = scenario.seed;
@@ -100,7 +100,7 @@ impl Aircraft {
                 return Err(ShimError::Parameter {
                     stack: "sitl",
                     name: setting.name.clone(),
-                    known: "none: no flight controller is played there".into(),
+                    known: "none: no flight controller is simulated there".into(),
                 });
             }
             (None, None) => Aircraft::Sitl(Box::new(Bench::new(&options)?)),
@@ -150,8 +150,8 @@ impl Aircraft {
         }
     }
 
-    /// Sets the flight controller's loiter mode as a ground station does; returns whether there is a flight
-    /// controller.
+    /// Sets the flight controller's loiter mode, as a ground station does. Returns `false` for the shim, which has no
+    /// modes.
     pub(super) fn take_over(&mut self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,
@@ -162,7 +162,7 @@ impl Aircraft {
         }
     }
 
-    /// Advances a step; `false` when the flight has ended on the ground or with a state that is not finite.
+    /// Advances a step. Returns `false` when the flight has ended on the ground or with a state that is not finite.
     pub(super) fn fly(&mut self) -> bool {
         let flown = match self {
             Aircraft::Sitl(bench) => bench.fly(),
@@ -179,7 +179,8 @@ impl Aircraft {
         }
     }
 
-    /// Whether the flight controller holds its own attitude in the companion's mode, as targets are missing.
+    /// Whether the flight controller is in the companion's mode but holds its own attitude, because targets are
+    /// missing.
     pub(super) fn turns_back(&self) -> bool {
         match self {
             Aircraft::Sitl(_) => false,

@@ -39,13 +39,13 @@ const STEPS: u64 = 6000;
 /// Time within which control must be returned on a dead link, s.
 const HAND_BACK_S: f64 = 0.5;
 
-/// Random stream of an overloaded processor.
+/// Random stream for the suspensions by an overloaded processor.
 const STARVED: u64 = 20;
 
 /// Conditions of a flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// Seed of all its random numbers.
+    /// Seed of all random numbers of the flight.
     pub seed: u64,
     /// Name of the controller.
     pub controller: ControllerKind,
@@ -60,7 +60,7 @@ pub struct Report {
     pub case: Case,
     /// The faults that occurred.
     pub faults: Vec<Fault>,
-    /// The findings of the judge.
+    /// The violated requirements.
     pub findings: Vec<Found>,
     /// Texts to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
@@ -69,9 +69,9 @@ pub struct Report {
 /// A flight with its samples, texts and replies.
 #[derive(Clone, Debug)]
 pub struct Witnessed {
-    /// Samples of every 10 ms; they end with a panic or on the ground.
+    /// Samples at intervals of 10 ms. They end with a panic or on the ground.
     pub samples: Vec<Sample>,
-    /// The findings of the judge.
+    /// The violated requirements.
     pub findings: Vec<Found>,
     /// Texts of the companion to the ground stations with their times, s.
     pub texts: Vec<(f64, String)>,
@@ -88,7 +88,7 @@ pub struct CompanionFactory {
 }
 
 impl CompanionFactory {
-    /// A factory of companions with `companion`, for the aircraft of `model`; the fallback is an LQI, as in flight.
+    /// A factory of copies of `companion` for the aircraft of `model`. The fallback controller is an LQI, as in flight.
     ///
     /// # Errors
     ///
@@ -102,12 +102,12 @@ impl CompanionFactory {
         Ok(CompanionFactory { companion, fallback, model: model.clone(), plant })
     }
 
-    /// A factory with the simulator's aircraft `plant`, from its start.
+    /// The same factory with the simulator's aircraft and start `plant`.
     pub fn with_aircraft(self, plant: PlantOptions) -> Self {
         CompanionFactory { plant, ..self }
     }
 
-    /// Envelope of its aircraft.
+    /// Flight envelope of the aircraft.
     pub fn envelope(&self) -> Envelope {
         self.model.airframe.envelope
     }
@@ -123,13 +123,13 @@ impl CompanionFactory {
         Ok(Desk::new(companion, vehicle(counterpart, &self.model)))
     }
 
-    /// Flies `case`; a panic of the companion is a finding. A finding on the aircraft is attributed to a cause if the
-    /// aircraft was exposed to it, and if the finding vanishes in the same flight without the faults of that kind; to
-    /// no cause if it remains without any faults.
+    /// Flies `case`. A panic of the companion is a finding. A finding on the aircraft is attributed to a cause if the
+    /// aircraft was exposed to this cause, and if the finding vanishes when the flight is repeated without the faults
+    /// that produce the cause. The cause is `Cause::Itself` if the finding remains without any faults.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be loaded.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn fly(&self, case: Case) -> Result<Report, FaultsError> {
         let scenario = Scenario::of_seed(case.counterpart, case.seed);
         let mut report = self.fly_under(case, scenario.faults)?;
@@ -162,21 +162,21 @@ impl CompanionFactory {
         Ok(Report { case, faults: scenario.faults, findings, texts: flight.texts })
     }
 
-    /// Flies `scenario` and returns its samples of every 10 ms and the findings of the judge. The samples end at a
-    /// panic.
+    /// Flies `scenario` and returns its samples at intervals of 10 ms and the violated requirements. The samples end at
+    /// a panic.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be loaded.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn trace(&self, scenario: &Scenario) -> Result<(Vec<Sample>, Vec<Found>), FaultsError> {
         self.witness(scenario).map(|flown| (flown.samples, flown.findings))
     }
 
-    /// Flies `scenario`, also with texts and replies.
+    /// Flies `scenario` and returns its samples, findings, texts and replies.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be loaded.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn witness(&self, scenario: &Scenario) -> Result<Witnessed, FaultsError> {
         let mut flight = self.flown(scenario, Some(Vec::with_capacity(STEPS as usize)))?;
         let samples = flight.trace.take().unwrap_or_default();
@@ -224,7 +224,7 @@ impl CompanionFactory {
             texts: Vec::new(),
             answers: Vec::new(),
         };
-        // after a panic the state is only read, to be judged
+        // after a panic the judge only reads the state of the flight
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
             flight.judge.note(0.0, Finding::Panic);
         }
@@ -243,7 +243,7 @@ fn set(desk: &mut Desk, Setting { name, times }: &Setting) -> Result<(), FaultsE
         ));
     };
     let ParameterValue::Real(default) = pilot.parameters()[place].value else {
-        return Err(refused("it is no real number and has no multiples".into()));
+        return Err(refused("it is not a real number and has no multiples".into()));
     };
     match pilot.set_parameter(place, ParameterValue::Real(default * *times as f32)) {
         Verdict::Rejected(why) | Verdict::Denied(why) => Err(refused(why)),
@@ -259,7 +259,7 @@ struct Flight {
     up: Wire,
     judge: Judge,
     scenario: Scenario,
-    /// Samples so far, where requested.
+    /// Samples so far; `None` unless requested.
     trace: Option<Vec<Sample>>,
     follower: Follower,
     /// Cruise airspeed of the aircraft, m/s.
@@ -268,17 +268,17 @@ struct Flight {
     disk: Option<Disk>,
     /// The companion is not scheduled before this step.
     asleep_until: u64,
-    /// Bytes that have arrived meanwhile.
+    /// Bytes that have arrived since the companion last ran.
     unread: Vec<Vec<u8>>,
     /// The actuators' command at the last step.
     flown: Inputs,
     /// Sum of the jumps of the vehicle's clock, µs.
     clock_us: i64,
     armed: bool,
-    /// Whether the companion has been killed; `spares` are its successors.
+    /// Whether the companion is killed at present. `spares` are its successors.
     killed: bool,
     spares: Vec<Desk>,
-    /// Time of the last arrival, while controlling through a real controller.
+    /// Time since which nothing has arrived while the companion controls through a flight controller, s.
     dead_since: Option<f64>,
     texts: Vec<(f64, String)>,
     answers: Vec<(f64, Asking, Verdict)>,
@@ -294,13 +294,13 @@ impl Flight {
         }
         let end = STEPS as f64 * 0.01;
         let truth = self.aircraft.truth();
-        // after a return the aircraft flies level; otherwise it flies the client's last leg, or level
+        // the flight must end with level wings and a pitch of −2° to 6°, as in level flight or in the client's last leg
         let pitch = truth.pitch_rad.to_degrees().clamp(-2.0, 6.0);
         self.judge.end(end, &truth, [0.0, pitch]);
         self.hear_of_the_disk(end);
     }
 
-    /// Advances a step of 10 ms; `false` when the aircraft is lost.
+    /// Advances a step of 10 ms. Returns `false` when the aircraft is lost.
     fn step(&mut self, step: u64, now_s: f64) -> bool {
         let acting: Vec<Fault> =
             self.scenario.faults.iter().filter(|f| f.acts(now_s)).copied().collect();
@@ -329,7 +329,7 @@ impl Flight {
         flies
     }
 
-    /// Runs the companion's step when it is scheduled.
+    /// Passes the arrived bytes to the companion, then runs the client and the companion's step.
     fn companion(&mut self, step: u64, now_s: f64, acting: &[Fault]) {
         let host = Duration::from_secs(1) + Duration::from_millis(10 * step);
         let mut up = Vec::new();

@@ -1,4 +1,4 @@
-//! The judge of a flight under faults: requirements at every step and at the end.
+//! Checks a flight under faults against requirements, at every step and at the end of the flight.
 
 use greylag_sitl::plant::Truth;
 
@@ -7,25 +7,26 @@ use greylag_flight::pilot::{Decision, Source};
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Largest accepted transient of bank and pitch outside the envelope, degrees: about that of a gust while the surfaces move
-/// at their slew limit.
+/// Largest accepted transient of bank and pitch outside the envelope, degrees. A gust causes about this transient while
+/// the surfaces move at their slew limit.
 pub(super) const OVERSHOOT_DEG: f64 = 15.0;
-/// The envelope's smallest airspeed divided by the airspeed that is a finding: half the dynamic pressure, near stall.
+/// Ratio of the envelope's smallest airspeed to the airspeed below which there is a finding. There the dynamic pressure
+/// is half that of the smallest airspeed, near the stall.
 pub(super) const ABOVE_STALL: f64 = std::f64::consts::SQRT_2;
 /// Largest accepted altitude loss in a flight of turns, climbs and descents that starts at 600 m, m.
 const ALTITUDE_LOSS_M: f64 = 200.0;
-/// Largest accepted attitude error at the end, degrees.
+/// Largest accepted roll error at the end, degrees. Twice this error is accepted in pitch.
 const RECOVERED_DEG: f64 = 3.0;
-/// Tolerance for rounding of a surface step.
+/// Rounding tolerance of a surface step, −1..1 being the travel.
 const ROUNDING: f64 = 1e-9;
 /// Number of steps with constant actuators after which the aircraft counts as uncommanded: 0.2 s.
 const UNSTEERED: u32 = 20;
-/// Steps after which an exposure no longer explains a finding. Bank and pitch recover within half a second of
-/// regained control; airspeed and altitude take longer.
+/// Steps of 10 ms after which an exposure no longer explains a finding. Bank and pitch recover within 0.5 s of regained
+/// control and have the shorter limit. Airspeed and altitude take longer.
 const MEMORY: u64 = 300;
 const MEMORY_OF_ATTITUDE: u64 = 100;
 
-/// A violated requirement. Those on the companion itself are never excused.
+/// A violated requirement. A finding on the companion itself is never attributed to a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Finding {
     /// The companion program panicked.
@@ -38,13 +39,13 @@ pub enum Finding {
     SlowHandBack,
     /// The aircraft hit the ground, or a state was not finite.
     Crash,
-    /// Bank or pitch was outside the envelope.
+    /// Bank or pitch was more than 15° outside the envelope.
     Attitude,
-    /// Airspeed was below the stall, or above the maximum.
+    /// Airspeed was below the envelope's smallest divided by √2 (near the stall), or above the envelope's largest.
     Airspeed,
-    /// The altitude loss was too large.
+    /// More than 200 m of altitude were lost.
     Altitude,
-    /// The attitude at the end was neither level nor the target.
+    /// The attitude at the end differed by more than 3° in roll or 6° in pitch from the required attitude.
     NotRecovered,
     /// A full disk was not reported.
     Unreported,
@@ -53,29 +54,30 @@ pub enum Finding {
 /// An exposure of the aircraft that its companion cannot prevent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposure {
-    /// The actuators hold their position, since no command arrives and no other pilot flies.
+    /// The actuators hold their position because no command arrives, or the flight controller holds its own attitude
+    /// because targets are missing.
     pub unsteered: bool,
-    /// The state is unusable, and there is no other pilot.
+    /// No state is usable, and no other pilot can fly.
     pub blind: bool,
     /// A sensor shows a plausible wrong value.
     pub misled: bool,
 }
 
-/// Explanation of a violated envelope.
+/// Cause of a finding on the aircraft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// No command arrived for 0.2 s or more, recently.
+    /// No command arrived for at least 0.2 s, within the last 3 s (within 1 s for bank and pitch).
     Unsteered,
-    /// The state was unusable recently, at a vehicle that cannot fly by itself.
+    /// The state was unusable within these times, at a vehicle that cannot fly by itself.
     Blind,
-    /// A sensor showed a plausible wrong value recently.
+    /// A sensor showed a plausible wrong value within these times.
     Misled,
-    /// No fault: the same flight without faults has the finding too.
+    /// No fault is the cause: the same flight without faults has the finding too.
     Itself,
 }
 
 impl Found {
-    /// Whether `cause` may explain the finding, for which no explanation is established yet.
+    /// Whether `cause` is suspected and no cause has been established yet.
     pub(super) fn is_open_to(&self, cause: Cause) -> bool {
         self.cause.is_none() && self.suspects.contains(&Some(cause))
     }
@@ -95,7 +97,7 @@ impl Cause {
         }
     }
 
-    /// Whether faults of `kind` produce it.
+    /// Whether faults of `kind` can produce the cause.
     pub fn is_of(self, kind: FaultKind) -> bool {
         let lie = matches!(kind, FaultKind::Airspeed | FaultKind::Alpha);
         match self {
@@ -108,16 +110,16 @@ impl Cause {
     }
 }
 
-/// A finding with its circumstances.
+/// A finding with its time and causes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Time of the finding, s.
     pub at_s: f64,
     /// The requirement that was violated.
     pub finding: Finding,
-    /// Established explanation, for findings on the aircraft.
+    /// Established cause. `None` if no cause is established, and for findings on the companion.
     pub cause: Option<Cause>,
-    /// Possible explanations, from the times of the faults alone.
+    /// Possible causes, from the times of the exposures alone.
     pub suspects: [Option<Cause>; 3],
 }
 
@@ -136,7 +138,7 @@ impl Finding {
         Finding::Unreported,
     ];
 
-    /// Whether it concerns the companion itself, which nothing excuses.
+    /// Whether the finding concerns the companion itself. This finding is never attributed to a cause.
     pub fn is_own(self) -> bool {
         use Finding::*;
         matches!(self, Panic | Command | Slew | SlowHandBack | Unreported)
@@ -159,7 +161,7 @@ impl Finding {
     }
 }
 
-/// The judge of one flight.
+/// Checks one flight and keeps its findings.
 #[derive(Clone, Debug)]
 pub struct Judge {
     envelope: Envelope,
@@ -167,15 +169,15 @@ pub struct Judge {
     start_m: Option<f64>,
     findings: Vec<Found>,
     steps: u64,
-    /// Number of uncommanded steps so far.
+    /// Number of consecutive uncommanded steps.
     unsteered: u32,
     blind: bool,
-    /// Last step of each cause.
+    /// Last step at which each cause was active.
     causes: [(Cause, Option<u64>); 3],
 }
 
 impl Judge {
-    /// A judge for an envelope.
+    /// Starts the check of a flight of an aircraft with `envelope`.
     pub fn new(envelope: Envelope) -> Self {
         Judge {
             envelope,
@@ -189,7 +191,7 @@ impl Judge {
         }
     }
 
-    /// Records a finding; only the first of each kind counts.
+    /// Records a finding. Only the first finding of each kind counts.
     pub fn note(&mut self, at_s: f64, finding: Finding) {
         if !self.findings.iter().any(|known| known.finding == finding) {
             let suspects = if finding.is_own() { [None; 3] } else { self.suspects(finding) };
@@ -225,7 +227,7 @@ impl Judge {
         }
     }
 
-    /// Judges a decision of the pilot.
+    /// Checks that the command of a decision is finite, in range and within the slew limit.
     pub fn decision(&mut self, now_s: f64, decision: &Decision) {
         let c = decision.command;
         self.blind = decision.source == Source::Level;
@@ -246,7 +248,7 @@ impl Judge {
         self.last = decision.armed.then_some(c);
     }
 
-    /// Judges the aircraft's state.
+    /// Checks attitude, airspeed and altitude loss of the aircraft.
     pub fn aircraft(&mut self, now_s: f64, truth: &Truth, exposure: Exposure) {
         self.suffer(exposure);
         let start = *self.start_m.get_or_insert(truth.altitude_m);
@@ -267,7 +269,7 @@ impl Judge {
         }
     }
 
-    /// Judges the end: final against required attitude, degrees.
+    /// Checks the final attitude against the required roll and pitch, degrees.
     pub fn end(&mut self, now_s: f64, truth: &Truth, [roll, pitch]: [f64; 2]) {
         let roll_off = (truth.roll_rad.to_degrees() - roll).abs();
         let pitch_off = (truth.pitch_rad.to_degrees() - pitch).abs();

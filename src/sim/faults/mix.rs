@@ -4,7 +4,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Time before the first fault, s: enough for the companion to find a real flight controller and to take control.
+/// Earliest start of a fault, s. By then the companion has found a real flight controller and has taken control.
 pub const FIRST_S: f64 = 12.0;
 /// Time at which all faults have ended, s.
 pub const LAST_S: f64 = 42.0;
@@ -13,19 +13,19 @@ pub const LAST_S: f64 = 42.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// Loss of datagrams, or of stretches of the stream.
+    /// Random datagrams, or parts of the stream, are lost.
     Loss,
     /// Random datagrams of the link arrive twice.
     Duplication,
     /// Random datagrams arrive after later ones.
     Reordering,
-    /// Datagrams are delayed, in spikes.
+    /// Random datagrams are delayed by 20 ms to 350 ms.
     Delay,
     /// Bits are flipped in datagrams.
     Corruption,
     /// Random datagrams lose their last bytes.
     Truncation,
-    /// Noise and frames of other systems come ten times as often.
+    /// Ten batches of noise, incomplete frames or frames of other systems precede each datagram.
     Flood,
     /// The link is down.
     Unplug,
@@ -33,27 +33,27 @@ pub enum FaultKind {
     Frozen,
     /// The pitot tube is blocked.
     Airspeed,
-    /// The angle of attack jumps.
+    /// The measured angle of attack has an offset of −0.25 to 0.25 rad.
     Alpha,
     /// The pitch rate is NaN.
     NotANumber,
-    /// The vehicle's clock jumps forward.
+    /// The vehicle's clock jumps forward by up to 10 s.
     Clock,
-    /// The vehicle restarts: its clock starts again.
+    /// The vehicle restarts, and its clock starts again.
     Reboot,
-    /// The client that sends the commands ends.
+    /// The client stops sending commands.
     Client,
-    /// The companion is not scheduled for stretches of up to 0.3 s: ticks come late, in bursts.
+    /// The companion is suspended for up to 0.3 s at a time. Its ticks come late and in bursts.
     Starvation,
-    /// The disk is full, so that recording ends.
+    /// The disk is full, and recording ends.
     Disk,
-    /// The companion is killed; another one starts without its state when the fault ends.
+    /// The companion is killed. When the fault ends, another one starts without its state.
     Killed,
 }
 
 impl FaultKind {
-    /// The kinds that campaigns and searches draw. A killed companion is excluded: including it would change the
-    /// flight of every seed.
+    /// The kinds that campaigns and searches draw. A killed companion is excluded, because it would change the flight
+    /// of every seed.
     pub const DRAWN: [FaultKind; 17] = [
         FaultKind::Loss,
         FaultKind::Duplication,
@@ -104,7 +104,7 @@ impl FaultKind {
         !matches!(self, Flood | Unplug | Frozen | NotANumber | Reboot | Client | Disk | Killed)
     }
 
-    /// Whether the fault ends: a clock jump and a full disk last until the end of the flight.
+    /// Whether the fault ends before the flight does. A clock jump and a full disk last until the end of the flight.
     pub fn has_length(self) -> bool {
         !matches!(self, FaultKind::Clock | FaultKind::Disk)
     }
@@ -125,14 +125,14 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether it is active at `now_s`.
+    /// Whether the fault is active at `now_s`, s.
     pub fn acts(&self, now_s: f64) -> bool {
         (self.from_s..self.to_s).contains(&now_s)
     }
 }
 
-/// The faults of flight `seed`: one to three, at random times, possibly overlapping. The first one's kind follows from
-/// the seed: consecutive seeds cycle through [`FaultKind::DRAWN`].
+/// The one to three faults of flight `seed`, at random times. Faults may overlap. Consecutive seeds cycle through
+/// [`FaultKind::DRAWN`] with the kind of the first fault.
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let count = random.random_range(1..=3);
@@ -148,7 +148,7 @@ pub fn draw(seed: u64) -> Vec<Fault> {
         .collect()
 }
 
-/// A fault of that kind at a random time.
+/// A fault of `kind` at a random time, of random duration and severity.
 pub(super) fn one(kind: FaultKind, random: &mut impl Rng) -> Fault {
     let from_s = random.random_range(FIRST_S..LAST_S - 8.0);
     let length = match kind {

@@ -1,7 +1,8 @@
-//! Flights under faults of link, sensors, clocks, processor and disk: drawn by seed, judged automatically.
+//! Flights under faults of link, sensors, clocks, processor and disk. The faults are drawn from a seed, and the flights
+//! are checked automatically.
 //!
-//! A case is a seed, a controller and a vehicle; [`CompanionFactory::fly`] flies it for 60 s in lockstep in this
-//! process, with the companion's own pilot and vehicle link and the shim's own aircraft.
+//! A case is a seed, a controller and a vehicle. [`CompanionFactory::fly`] flies a case for 60 s, in lockstep within
+//! this process. It uses the companion's pilot and vehicle link and the shim's aircraft.
 
 mod counterpart;
 mod flight;

@@ -1,4 +1,4 @@
-//! The flight rules: requirements on every flight under any faults, in signal temporal logic.
+//! The flight rules in signal temporal logic: requirements that every flight must meet, under any faults.
 
 use super::counterpart::ControllerMode;
 use super::judge::{ABOVE_STALL, OVERSHOOT_DEG};
@@ -9,7 +9,7 @@ use greylag_link::autopilot::Mode;
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
-/// Units of robustness: angle (degrees), altitude (m), time (s).
+/// Margins that count as a robustness of 1: angle (degrees), altitude (m), time (s).
 const UNIT_DEG: f64 = 30.0;
 const UNIT_M: f64 = 100.0;
 const UNIT_S: f64 = 5.0;
@@ -17,19 +17,20 @@ const UNIT_S: f64 = 5.0;
 const ALTITUDE_LOSS_M: f64 = 400.0;
 /// Time after which an exposure no longer explains a violation, s.
 const MEMORY_S: f64 = 3.0;
-/// Root mean square of a surface's fast movement, as a fraction of its travel, that counts as an oscillation.
+/// RMS of the high-pass filtered deflection of a surface that counts as an oscillation, −1..1 being the travel.
 const SWING: f64 = 0.5;
-/// Longest time for which a command is held, s: 50 ms, plus half a step for the arrival times of states.
+/// Longest time for which a command may be held, s: 50 ms, and half a step (5 ms) for the arrival times of states.
 const HELD_S: f64 = 0.055;
 /// Time within which an attitude must be reached, s.
 const REACHED_S: f64 = 5.0;
-/// Age of a decision after which it is disregarded, s: longer than an overloaded processor suspends the companion.
+/// Age above which a decision is disregarded, s. An overloaded processor suspends the companion for a shorter time.
 const STALE_S: f64 = 0.5;
 /// Interval in which a repeated report is suppressed, s.
 const COMPLAINED_S: f64 = 5.0;
-/// Time within which an oscillation must end: the guard needs a second to detect it, and then returns control.
+/// Time within which an oscillation must end, s. The guard needs 1 s to detect an oscillation, and then returns
+/// control.
 const SWING_S: f64 = 2.5;
-/// Tolerance for rounding of a surface step, and of an envelope limit (degrees).
+/// Rounding tolerance of a surface step (−1..1 being the travel) and of an envelope limit (degrees).
 const ROUNDING: f64 = 1e-9;
 
 /// Sample of a flight at one step.
@@ -41,20 +42,20 @@ pub struct Sample {
     pub age_s: f64,
     /// Time for which the command has been held over a gap of states, vehicle clock, s.
     pub held_s: f64,
-    /// Largest change of a surface command by that decision, −1..1 being the travel; 0 where it is not new.
+    /// Largest change of a surface command since the last sample, −1..1 being the travel; 0 without a new decision.
     pub moved: f64,
-    /// Whether the flight controller executes the companion's commands; always true for the shim.
+    /// Whether the flight controller executes the companion's commands. Always true for the shim.
     pub steered: bool,
     /// Whether the companion intends to control.
     pub engaged: bool,
-    /// Whether the flight controller's mode has shown the companion that it executes its commands.
+    /// Whether the companion knows from the flight controller's mode that its commands are executed.
     pub confirmed: bool,
-    /// Time since the last arrival from the vehicle, s.
+    /// Time since data last arrived from the vehicle, s.
     pub silent_s: f64,
     /// Time since the client's last setpoint, s.
     pub client_silent_s: f64,
-    /// Time for which the same attitude has been commanded and flown, without turbulence and without faults of link,
-    /// sensors, clock or processor, s.
+    /// Time for which the companion has controlled to the same commanded attitude, s. Turbulence, an exposure, or a
+    /// fault of link, sensors, clock or processor resets it to 0.
     pub steady_s: f64,
     /// Roll and pitch angle, degrees.
     pub attitude_deg: [f64; 2],
@@ -62,17 +63,17 @@ pub struct Sample {
     pub airspeed_mps: f64,
     /// Altitude loss since the start, m.
     pub lost_m: f64,
-    /// Root mean square of the fast movement of the most active surface, over about a second, as a fraction of its
-    /// travel; only for surfaces that the companion commands.
+    /// RMS, over about 1 s, of the high-pass filtered deflection of the more active of aileron and elevator, −1..1
+    /// being the travel. Surfaces that the companion does not command are excluded.
     pub swing: f64,
-    /// Whether the aircraft is exposed to a condition that its companion cannot prevent: uncommanded, without a
-    /// state, with a wrong sensor.
+    /// Whether the aircraft is exposed to a condition that its companion cannot prevent: no command arrives, no state
+    /// is usable, or a sensor is wrong.
     pub exposed: bool,
     /// Whether a fault of link, sensors, clock or processor is active.
     pub disturbed: bool,
     /// Whether a text was sent to the ground stations.
     pub spoke: bool,
-    /// Whether the companion is requested to fly, and no other pilot has taken control since.
+    /// Whether a client has requested the companion to fly and no other pilot has taken control since then.
     pub asked: bool,
     /// Altitude above mean sea level, m.
     pub altitude_m: f64,
@@ -102,7 +103,7 @@ impl Sample {
         self.decision.as_ref().is_some_and(holds)
     }
 
-    /// Attitude error, degrees, where an attitude is commanded.
+    /// Larger of the roll and pitch errors, degrees; `None` before the first decision.
     fn error_deg(&self) -> Option<f64> {
         let target = self.decision.as_ref()?.target;
         let off = (self.attitude_deg[0] - target.roll.to_degrees()).abs();
@@ -114,9 +115,9 @@ impl Sample {
 pub struct Policy {
     /// Name of the rule.
     pub id: &'static str,
-    /// Its requirement as text.
+    /// Requirement of the rule as text.
     pub asks: &'static str,
-    /// Whether it applies to flight controllers only, not to the shim.
+    /// Whether the rule applies to flight controllers only, not to the shim.
     pub of_controllers: bool,
     /// The formula that must always hold.
     pub always: Formula<Sample>,
@@ -132,33 +133,34 @@ fn decided(holds: impl Fn(&Decision) -> bool + Send + Sync + 'static) -> Rule {
     is(move |s| s.decided(&holds))
 }
 
-/// Holds unless the aircraft was exposed recently.
+/// The rule holds, or the aircraft was exposed within the last `MEMORY_S`.
 fn unless_exposed(rule: Rule) -> Rule {
     is(|s| s.exposed).once(MEMORY_S).or(rule)
 }
 
-/// The attitude error is below `most` degrees, where an attitude is commanded.
+/// The attitude error is below `most` degrees. The rule holds before the first decision.
 fn near(most: f64) -> Rule {
     Formula::atom(move |s: &Sample| s.error_deg().map_or(1.0, |e| (most - e) / most))
 }
 
-/// The same attitude has been flown for less than `seconds`.
+/// The companion has controlled to the same attitude for less than `seconds`.
 fn steady_for_less(seconds: f64) -> Rule {
     Formula::atom(move |s: &Sample| (seconds - s.steady_s) / UNIT_S)
 }
 
-/// The start of `event` is reported within a second, or was reported recently.
+/// A text is sent within 1 s after `event` starts, or one was sent in the last `COMPLAINED_S`.
 fn reported(event: Rule) -> Rule {
     let spoke = || is(|s| s.spoke);
     event.rises().implies(spoke().eventually(1.0).or(spoke().once(COMPLAINED_S)))
 }
 
-/// The condition on the pilot's decision ends within `seconds`, or the decisions end.
+/// The condition `state` ends within `seconds`, or the last decision becomes older than `STALE_S`.
 fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds: f64) -> Rule {
     is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
 }
 
-/// The angle `of` a target is between two limits of the envelope, degrees, where an attitude is commanded.
+/// The angle `of` a target is between the limits `ends` of the envelope, degrees. The rule holds while no attitude is
+/// commanded.
 fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rule {
     Formula::atom(move |s: &Sample| {
         let [least, most] = ends(&s.envelope);
@@ -224,7 +226,7 @@ fn of_commands() -> Vec<Policy> {
         ),
         policy(
             "held",
-            "a command is held over a gap of states for at most 0.06 s",
+            "a command is held over a gap of states for at most 0.055 s",
             Formula::atom(|s: &Sample| (HELD_S - s.held_s) / HELD_S),
         ),
     ]

@@ -1,4 +1,4 @@
-//! A flight under faults as data: faults, requests, air.
+//! Conditions of a flight under faults: faults, requests, wind, turbulence and parameters.
 
 use greylag_sitl::air::Turbulence;
 use greylag_sitl::plant::PlantOptions;
@@ -11,7 +11,7 @@ use greylag_link::autopilot::Mode;
 
 /// Largest number of faults, and of requests, in a random scenario.
 const MOST: usize = 4;
-/// Largest steady wind, m/s, and turbulence (curve of MIL-F-8785C) of a scenario.
+/// Largest horizontal wind component, m/s, and largest turbulence curve of MIL-F-8785C, in a random scenario.
 const WIND_MPS: f64 = 8.0;
 const TURBULENCE: u8 = 4;
 
@@ -49,7 +49,7 @@ pub enum Asking {
     Disarm,
     /// The client requests arming.
     Arm,
-    /// A ground station sets the flight controller's own loiter mode. No effect at the shim.
+    /// A ground station sets the flight controller's loiter mode. The request has no effect at the shim.
     TakeOver,
 }
 
@@ -62,14 +62,14 @@ impl Asking {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Setting {
-    /// Name of the parameter: `GL_` and so on.
+    /// Name of the parameter, for example `GL_LOAD_MAX`.
     pub name: String,
-    /// Its value as a multiple of the default.
+    /// Value of the parameter as a multiple of its default.
     pub times: f64,
 }
 
-/// The parameters that are varied, with the smallest and largest multiple of the default. The envelope is only
-/// narrowed: wider ones carry no guarantee.
+/// The parameters that are varied, with the smallest and largest multiple of the default. The limits of the envelope
+/// are only narrowed, because a wider envelope carries no guarantee.
 const SETTINGS: [(&str, [f64; 2]); 9] = [
     ("GL_OFFB_LOSS_S", [0.3, 3.0]),
     ("GL_VEH_LOSS_S", [0.3, 3.0]),
@@ -88,15 +88,15 @@ const SETTINGS: [(&str, [f64; 2]); 9] = [
 pub struct ControllerSetting {
     /// Name of the parameter in PX4 or ArduPilot.
     pub name: String,
-    /// Its value in the stack's unit.
+    /// Value of the parameter in the stack's unit.
     pub value: f64,
 }
 
 /// Values of flight-controller parameters.
 type Values = [(&'static str, &'static [f64])];
 
-/// PX4 parameters that are varied, with their values: right ones, wrong ones, and the stack's own defaults. The
-/// companion must refuse those with which it cannot fly safely.
+/// PX4 parameters that are varied, with their values: suitable values, unsuitable values and PX4's defaults. The
+/// companion must refuse values with which it cannot fly safely.
 const PX4_SETTINGS: &Values = &[
     ("COM_RC_IN_MODE", &[0.0, 1.0, 2.0, 3.0, 4.0]),
     ("COM_RC_LOSS_T", &[0.1, 0.5, 1.0, 5.0]),
@@ -138,7 +138,7 @@ const ARDUPILOT_SETTINGS: &Values = &[
 pub struct Scenario {
     /// The vehicle's end of the link.
     pub counterpart: Counterpart,
-    /// Seed of the random numbers that are not part of the scenario: noise, losses of a link.
+    /// Seed of the random numbers that are not part of the scenario: sensor noise and link faults.
     pub seed: u64,
     /// Steady wind, the velocity of the air over the ground, north-east-down, m/s.
     pub wind_ned_mps: [f64; 3],
@@ -158,7 +158,8 @@ pub struct Scenario {
     pub controller_parameters: Vec<ControllerSetting>,
 }
 
-/// Default legs of the client: turns both ways, a climb, a descent.
+/// Default legs of the client: start (s), roll and pitch (degrees). They contain turns to both sides, a climb and a
+/// descent.
 const LEGS: [(f64, f64, f64); 6] = [
     (0.0, 0.0, 3.0),
     (12.0, 35.0, 5.0),
@@ -185,7 +186,7 @@ impl Scenario {
         }
     }
 
-    /// A random scenario.
+    /// The flight of a random seed, with four random changes.
     pub fn drawn(counterpart: Counterpart, random: &mut impl Rng) -> Scenario {
         let mut scenario = Scenario::of_seed(counterpart, random.random_range(0..1_000_000));
         for _ in 0..4 {
@@ -228,7 +229,7 @@ impl Scenario {
                 fault.strength = (fault.strength + random.random_range(-0.3..0.3)).clamp(0.0, 1.0);
             }
             7 if changed.legs.len() > 1 => {
-                // the last leg stays level, because the end of the flight is judged against it
+                // the last leg stays level, because the check at the end of the flight requires it
                 let place = random.random_range(0..changed.legs.len() - 1);
                 let leg = &mut changed.legs[place];
                 leg.roll_deg = random.random_range(-60.0..60.0);
@@ -260,7 +261,8 @@ impl Scenario {
         self.controller_parameters.push(ControllerSetting { name: name.into(), value });
     }
 
-    /// All scenarios with one element less.
+    /// All simplifications of the scenario by one change. A fault, a request or a parameter is removed, the wind or the
+    /// turbulence is removed, the legs become the default ones, or the duration of a fault is halved.
     pub fn smaller(&self) -> Vec<Scenario> {
         let mut all = Vec::new();
         let mut with = |change: &dyn Fn(&mut Scenario)| {
@@ -298,14 +300,14 @@ impl Scenario {
         all
     }
 
-    /// The aircraft `plant` in the scenario's air.
+    /// The aircraft `plant` in the scenario's wind and turbulence.
     pub(super) fn air(&self, plant: &PlantOptions) -> PlantOptions {
         let mut plant = plant.clone();
         if self.wind_ned_mps != [0.0; 3] {
             plant.air.wind_ned_mps = self.wind_ned_mps;
         }
         if self.turbulence > 0 {
-            // the wind at twenty feet has no effect at the altitude of these flights
+            // the wind at 20 ft has no effect at the altitude of these flights
             let turbulence = Turbulence { wind_20ft_mps: 7.6, severity: self.turbulence };
             plant.air.turbulence = Some(turbulence);
             plant.seed = self.seed as u32;
@@ -314,7 +316,7 @@ impl Scenario {
     }
 }
 
-/// The requested mode of the companion, if it is one.
+/// The mode that `asking` requests from the companion; `None` if it requests no mode.
 pub(super) fn mode_of(asking: Asking) -> Option<Mode> {
     match asking {
         Asking::Offboard => Some(Mode::Offboard),

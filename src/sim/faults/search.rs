@@ -1,5 +1,5 @@
-//! Search for flights that violate a rule: each step varies the flight closest to a violation (PGFuzz, Kim et al.,
-//! NDSS 2021), and violating flights are reduced.
+//! Search for flights that violate a flight rule. A new flight varies one of those closest to a violation (PGFuzz, Kim
+//! et al., NDSS 2021) or is drawn at random. Violating flights are reduced.
 
 use std::ops::ControlFlow;
 
@@ -15,39 +15,42 @@ use super::scenario::Scenario;
 use greylag_flight::pilot::TICK_S;
 use greylag_num::stream::stream;
 
-/// Flights per round in parallel; the result is the same on any number of cores.
+/// Number of flights per round, which run in parallel. The number is fixed to make the result independent of the number
+/// of cores.
 const TOGETHER: u64 = 16;
-/// Fraction of flights drawn at random.
+/// Fraction of flights that are drawn at random instead of varied.
 const FRESH: f64 = 0.25;
-/// Largest number of rounds of a reduction.
+/// Largest number of reduction steps of a flight.
 const ROUNDS: usize = 8;
 /// Random stream of the search.
 const SEARCH: u64 = 61;
 
-/// Closest approach to the violation of a rule.
+/// The flight that came closest to the violation of a rule.
 #[derive(Clone, Debug)]
 pub struct Nearest {
     /// Name of the rule.
     pub policy: &'static str,
-    /// Its requirement as text.
+    /// Requirement of the rule as text.
     pub asks: &'static str,
-    /// Number of flights in which it was judged.
+    /// Number of flights to which the rule applied.
     pub flights: u64,
-    /// Number of flights that violated it.
+    /// Number of flights that violated the rule.
     pub broken: u64,
-    /// Smallest robustness of all flights, 1 at most; negative when violated.
+    /// Smallest robustness of all flights, −1..1; negative when violated, infinite if the rule applied to no flight.
     pub distance: f64,
-    /// Time of the minimum, s.
+    /// Time of the smallest robustness within its flight, s.
     pub at_s: f64,
-    /// The flight of that distance, reduced if it violates the rule.
+    /// The flight with the smallest robustness, reduced if it violates the rule. `None` if the rule applied to no
+    /// flight.
     pub scenario: Option<Scenario>,
 }
 
-/// Robustness and time (s) of its minimum of `scenario` for each applicable rule. A panic violates all.
+/// Flies `scenario` and returns the smallest robustness and its time, s, for each rule. `None` marks a rule that does
+/// not apply to the counterpart. A panic violates all applicable rules.
 ///
 /// # Errors
 ///
-/// If the aircraft cannot be loaded.
+/// If a flight cannot be set up; `FaultsError` lists the reasons.
 pub fn distances(
     factory: &CompanionFactory,
     rules: &[Policy],
@@ -57,7 +60,8 @@ pub fn distances(
     Ok(judged(rules, scenario.counterpart, &samples, &found))
 }
 
-/// Robustness of a flight with `counterpart` from its samples and findings.
+/// Smallest robustness and its time, s, for each rule, from the samples and findings of a flight with `counterpart`.
+/// `None` marks a rule that does not apply to the counterpart.
 pub fn judged(
     rules: &[Policy],
     counterpart: Counterpart,
@@ -80,12 +84,13 @@ fn nearest(rule: &Policy, samples: &[Sample], panicked: bool) -> (f64, f64) {
     (distance, place as f64 * TICK_S)
 }
 
-/// Flies `flights` flights with companions of `factory` at the `counterparts`, steering towards violations of
-/// `rules`. `progress` receives the numbers of flights and violations so far and can cancel the search.
+/// Flies `flights` flights with companions of `factory` and searches for violations of the flight rules. Random flights
+/// use one of the `counterparts`. `progress` receives the number of flights and of violated rules so far, and can
+/// cancel the search.
 ///
 /// # Errors
 ///
-/// If the aircraft cannot be loaded.
+/// If a flight cannot be set up; `FaultsError` lists the reasons.
 pub fn search(
     factory: &CompanionFactory,
     counterparts: &[Counterpart],
@@ -151,7 +156,7 @@ impl Nearest {
         }
     }
 
-    /// Removes everything from the scenario without which rule `k` is still violated.
+    /// Simplifies the scenario step by step while rule `k` stays violated.
     fn shrink(
         &mut self,
         factory: &CompanionFactory,

@@ -1,8 +1,9 @@
 //! Signal temporal logic over sampled flights: the robustness of a formula.
 //!
-//! Robust semantics (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued Signals, FORMATS 2010):
-//! a formula has a value at each sample, positive where it holds and negative where it is violated, whose magnitude
-//! is the margin. Windows that extend past the end of the flight are cut off there.
+//! A formula has a robustness at each sample (Donzé and Maler, Robust Satisfaction of Temporal Logic over Real-Valued
+//! Signals, FORMATS 2010). The robustness is positive where the formula holds and negative where it is violated. Its
+//! magnitude is the margin. `Eventually` holds if its window extends past the end of the flight. For `Once`, the time
+//! before the first sample counts as violated.
 
 use std::collections::VecDeque;
 
@@ -14,20 +15,20 @@ pub enum Formula<S> {
     Atom(Box<dyn Fn(&S) -> f64 + Send + Sync>),
     /// Negation: the formula does not hold.
     Not(Box<Formula<S>>),
-    /// Conjunction: all hold.
+    /// Conjunction: all formulas hold.
     All(Vec<Formula<S>>),
-    /// Disjunction: one of them holds.
+    /// Disjunction: at least one formula holds.
     Any(Vec<Formula<S>>),
     /// Eventually: the formula holds at some sample within this time from now, s.
     Eventually(f64, Box<Formula<S>>),
     /// Once: the formula has held at some sample within this past time, s.
     Once(f64, Box<Formula<S>>),
-    /// Rise: it holds now and did not at the previous sample.
+    /// Rise: the formula holds now and did not hold at the previous sample. The first sample is no rise.
     Rises(Box<Formula<S>>),
 }
 
 impl<S> Formula<S> {
-    /// A robustness scaled and clamped to −1..1.
+    /// A statement with the robustness `distance`, which is clamped to −1..1.
     pub fn atom(distance: impl Fn(&S) -> f64 + Send + Sync + 'static) -> Self {
         Formula::Atom(Box::new(distance))
     }
@@ -52,17 +53,17 @@ impl<S> Formula<S> {
         Formula::All(vec![self, other])
     }
 
-    /// It holds at some sample of the next `seconds`.
+    /// Eventually: `self` holds at some sample within the next `seconds`.
     pub fn eventually(self, seconds: f64) -> Self {
         Formula::Eventually(seconds, Box::new(self))
     }
 
-    /// It has held at some sample of the last `seconds`.
+    /// Once: `self` has held at some sample within the last `seconds`.
     pub fn once(self, seconds: f64) -> Self {
         Formula::Once(seconds, Box::new(self))
     }
 
-    /// It holds now and did not at the previous sample.
+    /// Rise: `self` holds now and did not hold at the previous sample.
     pub fn rises(self) -> Self {
         Formula::Rises(Box::new(self))
     }
@@ -96,7 +97,7 @@ impl<S> Formula<S> {
         }
     }
 
-    /// The smallest robustness of the flight, with its sample; `None` without samples.
+    /// The index of the sample with the smallest robustness, and this robustness. `None` without samples.
     pub fn least(&self, samples: &[S]) -> Option<(usize, f64)> {
         self.distances(samples).into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -119,9 +120,9 @@ fn together<S>(
     sum
 }
 
-/// Maximum of each value and the `before` values before it; `beyond` replaces those before the first.
+/// Moving maximum of each value and the `before` values that precede it. `beyond` is the value before the first.
 fn largest_of_the_last(values: &[f64], before: usize, beyond: f64) -> Vec<f64> {
-    // indices with falling values: the first is the maximum of the window
+    // indices with decreasing values; the first index has the maximum of the window
     let mut falling = VecDeque::<usize>::new();
     let mut largest = Vec::with_capacity(values.len());
     for (place, value) in values.iter().enumerate() {
@@ -149,7 +150,7 @@ mod tests {
     #[test]
     fn windows_look_ahead_and_back() {
         let flight = [0.1, -0.5, 0.3, -0.2, -0.4];
-        // two samples on; beyond the end nothing is held against the flight
+        // a window of two samples; a window past the end of the flight holds
         assert_eq!(value().eventually(0.02).distances(&flight), [0.3, 0.3, 0.3, 1.0, 1.0]);
         assert_eq!(value().once(0.02).distances(&flight), [0.1, 0.1, 0.3, 0.3, 0.3]);
         assert_eq!(value().once(0.0).distances(&flight), flight);
@@ -158,7 +159,7 @@ mod tests {
 
     #[test]
     fn an_event_is_answered_in_time_or_not() {
-        // 1: asked, 2: answered
+        // 1: request, 2: reply
         let answered = Formula::is(|x: &f64| *x == 1.0)
             .rises()
             .implies(Formula::is(|x: &f64| *x == 2.0).eventually(0.02));

@@ -1,11 +1,11 @@
-//! A link with the active faults applied.
+//! One direction of a simulated link, to which the active faults are applied.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::mix::{Fault, FaultKind};
 
-/// One direction of a link, step by step.
+/// One direction of a link, in steps of 10 ms.
 pub struct Wire {
     random: ChaCha8Rng,
     /// Batches in transit: arrival step and bytes.
@@ -13,7 +13,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// A link of flight `seed`; each `direction` has its own random numbers.
+    /// A link of the flight with `seed`. Each `direction` has its own random stream.
     pub fn new(seed: u64, direction: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(10 + direction);
@@ -53,7 +53,7 @@ impl Wire {
         (0..copies).for_each(|_| self.under_way.push((arrives, bytes.clone())));
     }
 
-    /// The batches that arrive at `step`, in order of arrival.
+    /// The batches that have arrived by `step`, in the order in which they were sent.
     pub fn receive(&mut self, step: u64) -> Vec<Vec<u8>> {
         let (now, later) =
             std::mem::take(&mut self.under_way).into_iter().partition(|(at, _)| *at <= step);

@@ -12,7 +12,8 @@ pub(super) type Effect = (&'static str, Vec<Estimate>);
 
 const SOURCE: &str = "central difference of JSBSim's loads";
 
-/// Clamps coefficients to the plausible range for an aircraft of that size; clamping is reported.
+/// Clamps coefficients to the plausible range for an aircraft of `size`. Clamped coefficients are reported in
+/// `left_out`.
 fn bounded(effect: &str, estimates: &mut [Estimate], size: &Size, left_out: &mut Vec<String>) {
     let coefficients = describe(effect).map_or(&[][..], |about| about.coefficients);
     for estimate in estimates {
@@ -86,7 +87,7 @@ pub(super) fn effects(
 const NO_RATE: f64 = 1e-3;
 
 impl Beside {
-    /// Adds its effects, and subtracts their contribution from the linear coefficients.
+    /// Adds the effects to `all`. Linear coefficients take their values without these effects.
     fn put(&self, all: &mut Vec<Effect>) {
         let [lift, pitch] = [self.alpha_rate[2], self.alpha_rate[4]];
         if lift.abs() > NO_RATE || pitch.abs() > NO_RATE {

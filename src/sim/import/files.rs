@@ -10,7 +10,8 @@ use greylag_model::textbook::{Estimate, incidence_limits, numbers};
 use greylag_num::{Grid, Table};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY, standard_density};
 
-/// Deviation from linearity, as a fraction of the pitching moment's variation, below which it is written as a line.
+/// RMS deviation of the pitching moment from a line, as a fraction of its standard deviation, up to which only the line
+/// is written.
 const STRAIGHT: f64 = 1e-3;
 
 /// Text of the airframe file.
@@ -67,8 +68,7 @@ pub(super) fn airframe(
     out
 }
 
-/// Descent angle, rad, at the reference airspeed with idle throttle if full throttle does not hold level flight; else
-/// zero.
+/// Descent angle at the reference airspeed with idle throttle, rad. Zero if full throttle holds level flight.
 fn descent(subject: &Subject, polar: &Polar, thrust: &[Estimate], [alpha, lift]: [f64; 2]) -> f64 {
     let v = subject.start.airspeed_mps;
     let density = standard_density(subject.start.altitude_m);
@@ -154,7 +154,8 @@ fn thrust_table(table: &Grid) -> String {
     )
 }
 
-/// Tables of lift and drag over incidence, and of the nonlinear part of the pitching moment where it has one.
+/// Tables of lift and drag over incidence. A third table holds the nonlinear part of the pitching moment if there is
+/// one.
 fn tables(polar: &Polar) -> String {
     let mut out = String::new();
     let [zero, slope, bent] = line(polar);

@@ -24,7 +24,8 @@ pub(super) fn line(polar: &Polar) -> [f64; 3] {
     [first, slope, (left / square(&|k| moments[k] - middle).max(1e-30)).sqrt()]
 }
 
-/// Frequency and damping of the second-order filter whose step response is closest to `observed`.
+/// Frequency (rad/s) and damping ratio of the second-order filter whose response to a step of `end` is closest to
+/// `observed`, sampled every 0.01 s.
 pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     let miss = |frequency: f64, damping: f64| {
         let Surface { filter: [b, a1, a2], .. } =
@@ -42,12 +43,13 @@ pub(super) fn second_order(observed: &[f64], end: f64) -> [f64; 2] {
     all.min_by(|a, b| miss(a[0], a[1]).total_cmp(&miss(b[0], b[1]))).unwrap_or([50.0, 0.7])
 }
 
-/// Fraction of a step below which the throttle has no effect, as in a glider.
+/// Fraction of a throttle step below which the response counts as zero, as in a glider.
 const NO_ANSWER: f64 = 0.01;
 /// Time constant used for a throttle that has no effect, s.
 const USUAL_LAG_S: f64 = 0.2;
 
-/// Time constant (s) of the step response `observed`, from the time to 63 % of its end.
+/// Time constant (s) of the response `observed` to a throttle step of 0.5, sampled every 0.01 s, from the time to 63 %
+/// of the step.
 pub(super) fn first_order(observed: &[f64]) -> f64 {
     let end = 0.5;
     match observed.iter().position(|x| *x >= 0.632 * end) {
@@ -63,7 +65,7 @@ pub(super) fn first_order(observed: &[f64]) -> f64 {
     }
 }
 
-/// Range of time constants for the thrust, s: from one step to the effect's largest.
+/// Range of thrust time constants that are tried, s: from one step to the largest value of the effect.
 const THRUST_LAGS_S: [f64; 2] = [0.01, 10.0];
 /// Residual of a step response, as a fraction of the step, above which a first-order lag does not describe it.
 const NO_LAG: f64 = 0.5;
@@ -84,7 +86,7 @@ pub(super) struct ThrustLag {
 
 /// The lag that fits the step response `raised` best, validated on the response `waved` to a sine. Each response lists
 /// thrust (N) and throttle position after each `step` (s). The steady thrust is `slope` δ + `curve` δ² and a constant.
-/// `None` if the thrust does not change, or if a model without a lag fits as well.
+/// `None` if the thrust does not change, or if the lag is at most two steps.
 pub(super) fn thrust_lag(
     [raised, waved]: [&[[f64; 2]]; 2],
     step: f64,

@@ -4,7 +4,7 @@ use greylag_sitl::plant::{Inputs, PlantError, Start};
 
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject};
 
-/// Relative change between two incidences below which a derivative is constant.
+/// Relative change between two incidences up to which a derivative counts as constant.
 const CONSTANT: f64 = 0.02;
 
 /// Derivatives linear in the lift coefficient.
@@ -12,7 +12,7 @@ const CONSTANT: f64 = 0.02;
 pub(super) struct WithLift {
     /// Clr, Clβ, Cnp, Cnβ at zero lift.
     pub(super) without: [f64; 4],
-    /// Their slopes over the lift coefficient.
+    /// Slopes of these derivatives over the lift coefficient.
     pub(super) by_lift: [f64; 4],
 }
 
@@ -24,8 +24,8 @@ pub(super) struct AileronOverIncidence {
 }
 
 impl Subject<'_> {
-    /// Clδa and Cnδa at two incidences, where the aileron is at `unit` (rad) at [`COMMAND`]; `None` where they are
-    /// nearly equal.
+    /// Clδa and Cnδa from two incidences. `unit` is the aileron deflection (rad) at [`COMMAND`]. `None` if the
+    /// derivatives are nearly equal at both incidences.
     pub(super) fn aileron_over_incidence(
         &mut self,
         unit: f64,
@@ -45,7 +45,7 @@ impl Subject<'_> {
         Ok(changes.then_some(AileronOverIncidence { without, by_incidence }))
     }
 
-    /// Clr, Clβ, Cnp and Cnβ at two incidences; `None` where they are nearly equal.
+    /// Clr, Clβ, Cnp and Cnβ from two incidences. `None` if the derivatives or the lift coefficients are nearly equal.
     pub(super) fn lateral_with_lift(&mut self) -> Result<Option<WithLift>, PlantError> {
         let mut at = [[0.0; 5]; 2];
         for (own, sign) in at.iter_mut().zip([-1.0, 1.0]) {
@@ -73,7 +73,7 @@ impl Subject<'_> {
         let most = |k: [usize; 2]| {
             k.map(|k| low[k].abs().max(high[k].abs())).into_iter().fold(0.0, f64::max)
         };
-        // roll due to yaw rate and yaw due to roll rate are of one size, as are those due to sideslip
+        // roll due to yaw rate and yaw due to roll rate have one scale, as have the moments due to sideslip
         let scale = [most([0, 2]), most([1, 3]), most([0, 2]), most([1, 3])];
         let changes = (0..4).any(|k| (high[k] - low[k]).abs() > CONSTANT * scale[k]);
         Ok((changes && lift.abs() > 1e-3).then_some(WithLift { without, by_lift }))

@@ -6,7 +6,7 @@ use super::propulsion::{LBF_FT, NO_ARM};
 use super::{ALPHA, ANGLE, COMMAND, RATE, Subject, at_command};
 use greylag_num::least_squares;
 
-/// Throttle values at which the engines are settled.
+/// Throttle values at which the settled engines are measured.
 const THROTTLES: [f64; 3] = [0.2, 0.6, 1.0];
 /// Fraction of a surface's moment that full throttle must add to count as slipstream.
 const NO_SLIPSTREAM: f64 = 0.01;
@@ -15,12 +15,12 @@ const NO_MOMENTUM: f64 = 1e-4;
 /// Distance of the thrust from the hub that counts as zero, chords per radian.
 const NO_OFFSET: f64 = 1e-2;
 
-/// Propeller effects of the aircraft.
+/// Propeller effects of the aircraft; `None` for an effect that counts as zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Propeller {
     /// Elevator effectiveness without thrust, 1/rad, and its slope over thrust divided by dynamic pressure and area.
     pub(super) elevator: Option<[f64; 2]>,
-    /// The same two coefficients of yawing moment and rudder.
+    /// Rudder effectiveness in yaw without thrust, 1/rad, and its slope, as for the elevator.
     pub(super) rudder: Option<[f64; 2]>,
     /// Angular momentum at idle and its increase at full throttle, N m s.
     pub(super) gyro: Option<[f64; 2]>,
@@ -82,8 +82,9 @@ impl Subject<'_> {
         Ok((thrust, [moment("moments/m-prop-lbsft"), moment("moments/n-prop-lbsft")]))
     }
 
-    /// Slope of the moment coefficient `of` over a surface that `set` commands to ± `unit` (rad): without thrust, and
-    /// over thrust divided by dynamic pressure and area.
+    /// Slope of the moment coefficient `of` over a surface: without thrust, and its slope over thrust divided by
+    /// dynamic pressure and area. `set` commands the surface to ±`COMMAND`, at which its deflection is ±`unit` (rad).
+    /// `None` if there is no slipstream.
     fn slipstream(
         &mut self,
         base: &Start,

@@ -1,4 +1,4 @@
-//! Propulsion of an aircraft: settled thrust, its lag, its moments.
+//! Propulsion of an imported aircraft: settled thrust, thrust lag and moments.
 
 use greylag_sitl::plant::{PlantError, Start};
 
@@ -8,11 +8,12 @@ use greylag_model::textbook::Estimate;
 use greylag_num::{Grid, least_squares};
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, STANDARD_GRAVITY};
 
-/// Fraction of the largest thrust above which the rms residual of the thrust polynomial is reported.
+/// RMS residual of the thrust polynomial, as a fraction of the largest thrust, above which it is reported.
 const REPORTED_FROM: f64 = 0.02;
 /// Throttle before and after the step that measures the engine's lag.
 const THRUST_STEP: [f64; 2] = [0.4, 0.7];
-/// Fraction of that step above which the response is reported not to be a first-order lag.
+/// RMS residual, as a fraction of the change of thrust, above which the response is reported not to be a first-order
+/// lag.
 const LAG_REPORTED_FROM: f64 = 0.1;
 /// Observation time of the step response, s.
 const STEP_S: f64 = 20.0;
@@ -31,20 +32,20 @@ pub(super) const LBF_FT: f64 = 1.355_817_948_331_4;
 
 /// Propulsion parameters.
 pub(super) struct Propulsion {
-    /// Polynomial of the settled thrust over throttle and airspeed.
+    /// Coefficients of the settled thrust as a polynomial of throttle and airspeed.
     pub(super) thrust: Vec<Estimate>,
-    /// Settled thrust (N, at sea-level density), where it is a function of throttle and airspeed.
+    /// Settled thrust (N, at sea-level density); `None` if it is no function of throttle and airspeed alone.
     pub(super) table: Option<Grid>,
-    /// Time constant from throttle position to thrust, s.
+    /// Time constant from throttle position to thrust, s; `None` without a first-order lag.
     pub(super) lag: Option<f64>,
-    /// Rolling moment at full throttle, to the left, N m.
+    /// Rolling moment at full throttle, positive to the left, N m; `None` if negligible.
     pub(super) torque: Option<f64>,
-    /// Vertical offset of the thrust below the centre of gravity, m.
+    /// Vertical offset of the thrust, positive below the centre of gravity, m; `None` if negligible.
     pub(super) arm: Option<f64>,
 }
 
 impl Subject<'_> {
-    /// Measures propulsion, settled and after a throttle step.
+    /// Measures settled thrust and moments, and the thrust after a throttle step.
     pub(super) fn propulsion(
         &mut self,
         left_out: &mut Vec<String>,
@@ -100,8 +101,8 @@ impl Subject<'_> {
         })
     }
 
-    /// Settled thrust over throttle and airspeed, N at sea-level density; `None` where the engines do not hold the
-    /// throttle commanded.
+    /// Settled thrust over throttle and airspeed, N at sea-level density; `None` if the engines do not hold the
+    /// commanded throttle or the airspeed changes.
     fn thrust_table(&mut self) -> Result<Option<Grid>, PlantError> {
         let airspeeds = SPEEDS.map(|part| part * self.start.airspeed_mps);
         let mut rows = Vec::with_capacity(THROTTLES.len());
@@ -121,7 +122,8 @@ impl Subject<'_> {
         Ok(Grid::new(&THROTTLES, &airspeeds, &rows).ok())
     }
 
-    /// Time constant (s) from throttle position to thrust, if there is one; `thrust` is the settled thrust.
+    /// Time constant (s) from throttle position to thrust; `None` if the thrust has no first-order lag. `thrust` holds
+    /// the coefficients of the settled thrust.
     fn thrust_lag(
         &mut self,
         thrust: &[Estimate],

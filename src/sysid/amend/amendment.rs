@@ -1,4 +1,4 @@
-//! The amendment: tunes the prior coefficients, then adds effects one by one, each judged by held-out flights.
+//! The amendment of a model: tunes its coefficients, then adds effects that improve the prediction of held-out flights.
 
 mod selection;
 
@@ -25,20 +25,20 @@ use selection::{Ask, Selection};
 /// An effect to add, with an optional starting point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Added {
-    /// Identifier of the effect in the catalogue, or that of an effect file.
+    /// Identifier of the effect in the catalogue or in an effect file.
     pub id: String,
-    /// Starting values of its coefficients, in their order, where they are known.
+    /// Starting values of the effect's coefficients, in their order; `None` for the default starting values.
     pub start: Option<Vec<f64>>,
 }
 
 impl Added {
-    /// A diagnosis's candidate, started at the values that the diagnosis estimated.
+    /// A candidate of a diagnosis, with the estimates of the diagnosis as starting values.
     pub fn of(candidate: &Candidate) -> Added {
         let of = |name: &str| candidate.parameters.iter().find(|p| p.name == name);
         Added::near(&candidate.id, |name| of(name).map(|p| p.value))
     }
 
-    /// The effect `id`, started at `value` of each coefficient's name if that is known for all of them.
+    /// The effect `id`. Its starting values are `value` of each coefficient's name, if this is known for all coefficients.
     pub fn near(id: &str, value: impl Fn(&str) -> Option<f64>) -> Added {
         let coefficients = catalogue::describe(id).map(|about| about.coefficients);
         let start = coefficients.and_then(|all| all.iter().map(|c| value(c.name)).collect());
@@ -46,7 +46,7 @@ impl Added {
     }
 }
 
-/// Treatment of an effect that the judgement rejects.
+/// Treatment of an effect that the held-out flights or its estimates reject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// The effect is left out of the model.
@@ -58,35 +58,34 @@ pub enum Refused {
 /// Prior knowledge of the model's coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Prior {
-    /// The values of the model file with their standard deviations.
+    /// Values and standard deviations of the model file.
     #[default]
     File,
-    /// Only the physically possible range.
+    /// Only the physically possible range of each coefficient.
     Bounds,
 }
 
 /// Options of an amendment.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Effects to add, in this order; empty to tune the prior only.
+    /// Effects to add, in this order; empty to fit only the model's coefficients.
     pub effects: Vec<Added>,
     /// Prior on the model's coefficients.
     pub prior: Prior,
-    /// Treatment of effects that the judgement rejects.
+    /// Treatment of rejected effects.
     pub refused: Refused,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// Whether the model's other conventions are tried as well.
+    /// Whether alternatives to the model's conventions are tried.
     pub conventions: bool,
     /// Constants estimated for each flight in addition to its sensor errors.
     pub per_flight: PerFlight,
-    /// The model tuned to the same flights without any effect ([`tune`](super::tune)), if that has been computed
-    /// already.
+    /// Fit of the model without added effects to the same flights ([`tune`](super::tune)); `None` to compute it.
     pub tuned: Option<Fit>,
 }
 
 impl Options {
-    /// Horizon at which improvement is judged, s.
+    /// Horizon of the free runs at which fits are compared, s.
     pub const JUDGED_AT_S: f64 = JUDGED_AT_S;
 }
 
@@ -105,19 +104,19 @@ impl Default for Options {
     }
 }
 
-/// An amendment with the models it compares.
+/// Result of an amendment, and the models that it compares.
 #[derive(Clone, Debug)]
 pub struct Amended {
-    /// The amendment's result, as `amend.json` holds it.
+    /// The amendment's result, as written to `amend.json`.
     pub amendment: Amendment,
-    /// The model with its prior tuned and the accepted effects.
+    /// The model with the accepted effects and all coefficients fitted.
     pub model: GreyBox,
-    /// The model with its prior tuned and no effect added.
+    /// The model with its coefficients fitted and no effect added.
     pub tuned: GreyBox,
 }
 
 impl Amended {
-    /// Coefficients set to zero because an effect that joined replaces their term, each with that effect.
+    /// Coefficients set to zero because an added effect replaces their term, each with the identifier of this effect.
     pub fn dropped(&self) -> Vec<(String, &'static str)> {
         dropped(&self.tuned, &self.model)
     }
@@ -130,11 +129,13 @@ fn dropped(before: &GreyBox, after: &GreyBox) -> Vec<(String, &'static str)> {
     named.filter_map(|c| Some((c.name.clone(), after.replaced(&c.name)?))).collect()
 }
 
-/// Fits `model` with the effects of `options` to `flights` and judges it on `held_out`; reports to `progress`, which
-/// may cancel.
+/// Fits `model` with the effects of `options` to `flights`. Free runs over `held_out` decide which effects are accepted.
+///
+/// `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// An effect cannot join the model, the flights do not allow a fit, or `progress` cancelled.
+/// An effect cannot join the model, a flight's sampling interval is not usable, the flights do not allow a fit (see
+/// `AmendError`), or `progress` cancelled.
 pub fn amend(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -152,7 +153,7 @@ pub fn amend(
     Ok(amended)
 }
 
-/// As `amend`, for flights that are already corrected by the constants in the model's file.
+/// Amendment with flights that are already corrected with the constants in the model's file.
 fn of_right(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -213,15 +214,15 @@ fn of_right(
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 
-/// Flights to fit to, corrected by the constants in the model's file.
+/// Flights of the fit, corrected with the constants in the model's file.
 struct Right {
     flights: Vec<Reconstruction>,
     asked: PerFlight,
     notes: Vec<String>,
 }
 
-/// Corrects `flights` for the misalignment and the sensor errors in the file of `model`, unless misalignment is to be
-/// estimated. If the file has trims of any of the flights, trims are estimated for each flight.
+/// Corrects `flights` for the misalignment and the sensor errors in the file of `model`, unless the fit estimates the
+/// misalignment. If the file has trims of any of `flights`, trims are estimated for each flight.
 fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> Right {
     let mut notes = Vec::new();
     let (flights, named) = match asked.askew_deg {
@@ -245,8 +246,9 @@ fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> R
     Right { flights, asked, notes }
 }
 
-/// The `fit` with its scores `after`, and a note on its installation, which is kept only if the error of the held-out
-/// flights is not larger with it.
+/// The `fit` with its scores `after`, and a note on the installation that the fit has estimated.
+///
+/// The installation is kept only if it does not increase the error of the held-out flights.
 fn installed(
     mut fit: Fit,
     after: Vec<HorizonScore>,
@@ -261,10 +263,10 @@ fn installed(
     let (said, [a, b]) = match errors {
         Some((a, b)) if a <= b => ("kept as [installation]", [a, b]),
         Some((a, b)) => ("not kept", [a, b]),
-        None => ("not kept, for no flight held out can judge it", [f64::NAN; 2]),
+        None => ("not kept, because no held-out flight can validate it", [f64::NAN; 2]),
     };
     let note = format!(
-        "The measured axes of the flights fitted stand askew in common ({words}), which is {said}: the error of the flights \
+        "The measured axes of the fitted flights have a common misalignment ({words}), which is {said}: the error of the flights \
          held out is {a:.5} with it, {b:.5} without."
     );
     if a <= b {
@@ -284,18 +286,17 @@ pub(super) fn joined(model: &mut GreyBox, added: &Added) -> Result<(), AmendErro
     Ok(model.join_most(&added.id, &start)?)
 }
 
-/// The usual starting point of an effect; without any, zero or the bound nearest to it.
+/// Default starting values of an effect. If none are listed, each value is zero or the bound nearest to zero.
 fn usual_start(about: &Description) -> Vec<f64> {
     let starts = about.entry.map_or(&[][..], |e| e.starts);
     let nearest = |c: &Coefficient| 0.0_f64.clamp(c.bounds.0, c.bounds.1);
-    // an effect file lists its own values first; the catalogue lists the usual amount in the middle
+    // an effect file lists its default first, the catalogue lists the typical size in the middle
     let own = Kind::from_id(about.id).is_some_and(|kind| kind.written().is_some());
     let listed = starts.get(if own { 0 } else { starts.len() / 2 }).map(|s| s.to_vec());
     listed.unwrap_or_else(|| about.coefficients.iter().map(nearest).collect())
 }
 
-/// Notes for the reader of an amendment of `model`: on the fit, on coefficients left unchanged, on contradictions
-/// between flights.
+/// Notes on an amendment of `model`: on the fit, on coefficients that are not fitted, on contradictions between flights.
 fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     let mut notes = fit.notes.clone();
     notes.extend(
@@ -319,7 +320,7 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
     notes
 }
 
-/// Splits a flight into its first two thirds, to fit, and its last third, to judge.
+/// Splits a flight into its first two thirds, for the fit, and its last third, held out.
 pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
     let total: usize = flight.segments.iter().map(|s| s.instants.len()).sum();
     let mut left = total * 2 / 3;

@@ -1,4 +1,4 @@
-//! Modelling conventions: choices other than effects, which no coefficient can compensate.
+//! Modelling conventions: integrator, force axes and air density. No coefficient can compensate a wrong convention.
 
 use serde::Serialize;
 
@@ -8,15 +8,16 @@ use greylag_model::{GreyBox, Integrator};
 use greylag_physics::atmosphere::Density;
 use greylag_physics::rigid_body::ForceAxes;
 
-/// Standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
+/// Number of standard errors of the cost difference beyond which two fits differ significantly (two-sided 95 %, Vuong 1989).
 const CLEARLY: f64 = 1.96;
 /// Relative change of the held-out error that counts as large.
 const MUCH: f64 = 0.1;
 
-/// Standard errors by which `other` follows the shots more closely than `fit`: the mean difference of the shots' costs,
-/// less two in total for each additional coefficient (Akaike), over the standard error of that mean (Vuong 1989). Each
-/// fit's weights favour that fit, so a cost is the mean of those under both weights. Zero if fewer than three shots are
-/// common to both.
+/// Number of standard errors by which `other` follows the shots more closely than `fit`.
+///
+/// The number is the mean decrease of the shots' costs divided by its standard error (Vuong 1989). The total decrease is
+/// first reduced by 2 for each additional coefficient (Akaike). The weights of a fit favour this fit. The cost of a shot is
+/// therefore the mean of its costs with the weights of both fits. Zero if the fits have fewer than three shots in common.
 pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
     let cost = |left: &Left| -> f64 {
         let weigh = |squares: &[f64; 8], weights: &[f64; 8]| -> f64 {
@@ -45,11 +46,11 @@ pub(super) fn closer(fit: &Fit, other: &Fit) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convention {
-    /// How the model steps through time.
+    /// Integrator of the equations of motion.
     Integrator,
-    /// Axes in which its aerodynamic forces act.
+    /// Axes of the aerodynamic forces: stability or wind axes.
     ForceAxes,
-    /// Its air density; a constant one may give way to the standard atmosphere.
+    /// Air density; the standard atmosphere is the alternative to a constant density.
     Density,
 }
 
@@ -58,7 +59,7 @@ impl Convention {
     pub const ALL: [Convention; 3] =
         [Convention::Integrator, Convention::ForceAxes, Convention::Density];
 
-    /// Key path of the convention in a model file, its table first.
+    /// Keys of the convention in a model file, from the outer table to the value.
     pub fn key(self) -> &'static [&'static str] {
         match self {
             Convention::Integrator => &["integrator"],
@@ -67,7 +68,7 @@ impl Convention {
         }
     }
 
-    /// The convention of `model` in the model file's spelling; "constant" for a density of its own.
+    /// The convention of `model`, spelled as in a model file; "constant" for a stated air density.
     pub fn of(self, model: &GreyBox) -> &'static str {
         match self {
             Convention::Integrator => match model.integrator {
@@ -85,10 +86,11 @@ impl Convention {
         }
     }
 
-    /// Whether the alternative is adopted. It fits its own flights more closely by `closer` standard errors; `error` is
-    /// the held-out error without and with it. Integrator and axes are choices of the simulator or the author and need
-    /// positive evidence. Air density does decrease with height, so the standard atmosphere is adopted unless the data
-    /// contradict it.
+    /// Whether the alternative is adopted. The alternative follows the shots more closely by `closer` standard errors; `error`
+    /// holds the held-out errors without and with the alternative.
+    ///
+    /// Integrator and axes are choices of a simulator or an author: their alternatives need positive evidence. Air density
+    /// decreases with height: the standard atmosphere is adopted unless the data contradict it.
     pub(super) fn is_borne_out(self, closer: f64, error: [f64; 2]) -> bool {
         let fall = 1.0 - error[1] / error[0];
         match self {
@@ -99,7 +101,7 @@ impl Convention {
         }
     }
 
-    /// `model` with the alternative convention; `None` if there is none to try.
+    /// `model` with the alternative convention; `None` if the convention has no alternative.
     pub(super) fn other(self, model: &GreyBox) -> Option<GreyBox> {
         let mut other = model.clone();
         match self {
@@ -127,14 +129,14 @@ impl Convention {
 pub struct Tried {
     /// The convention that was changed.
     pub convention: Convention,
-    /// The model's own choice, in the model file's spelling.
+    /// The convention of the given model, spelled as in a model file.
     pub from: &'static str,
-    /// The alternative, in the model file's spelling.
+    /// The alternative, spelled as in a model file.
     pub to: &'static str,
-    /// Held-out free-run error at the horizon of judgement without and with the alternative, all coefficients
-    /// refitted; NaN where no run reaches the horizon or the fit fails.
+    /// Held-out free-run errors without and with the alternative, at the longest horizon up to 5 s that a run reaches, after a
+    /// refit of all coefficients. NaN if there is no such horizon or the fit fails.
     pub error: [f64; 2],
-    /// Standard errors by which the alternative fits its own flights more closely; NaN if the fit fails.
+    /// Number of standard errors by which the alternative follows the fitted flights more closely; NaN if the fit fails.
     pub closer: f64,
     /// Whether the amended model adopts the alternative.
     pub kept: bool,

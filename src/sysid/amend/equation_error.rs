@@ -1,4 +1,4 @@
-//! Equation error in weak form: a first fit that converges from poor starting values.
+//! Equation-error fit in weak form: it converges from poor values and provides starting values for the output-error fit.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -8,19 +8,19 @@ use super::parameters::{self, Free};
 use crate::weak_form::windows;
 use greylag_model::GreyBox;
 
-/// Number of fitted channels: three forces (NaN without an accelerometer), three moments.
+/// Number of fitted channels: three forces (NaN without accelerometers) and three moments.
 const CHANNELS: usize = 6;
 /// Largest number of iterations of one search.
 const ITERATIONS: usize = 5;
-/// Iterations of each starting point before they are compared.
+/// Number of iterations from each starting point before the starting points are compared.
 const TRIAL: usize = 2;
-/// Convergence tolerance on the weighted sum of squares: a tenth of a standard deviation.
+/// Convergence tolerance: decrease of the weighted sum of squares for a change by a tenth of a standard deviation.
 const COST_TOLERANCE: f64 = 0.01;
-/// Windows overlap by half, so each counts as half a sample.
+/// Number of independent samples for which a window counts: windows overlap by half.
 const INDEPENDENT_FRACTION: f64 = 0.5;
 
-/// Estimates the free coefficients from forces and moments in weak form; the best result over the catalogue's
-/// starting points for shape constants of added effects.
+/// Estimates the free coefficients from forces and moments in weak form. The result is the best one over the catalogue's
+/// starting values for shape constants of added effects.
 pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f64> {
     let starts = starts(free);
     let trials = if starts.len() > 1 { TRIAL } else { 0 };
@@ -31,7 +31,7 @@ pub(super) fn start(model: &GreyBox, free: &[Free], flights: &[Flight]) -> Vec<f
     search(model, free, flights, theta, ITERATIONS).1
 }
 
-/// Starting points: the model's own values, and those of the catalogue for the shape constants of added effects.
+/// Starting points: the prior means, with the catalogue's starting values for the shape constants of added effects.
 fn starts(free: &[Free]) -> Vec<Vec<f64>> {
     let mut starts: Vec<Vec<f64>> = vec![free.iter().map(|f| f.prior).collect()];
     for (k, f) in free.iter().enumerate().filter(|(_, f)| f.added && !f.linear) {
@@ -78,7 +78,7 @@ fn residuals(model: &GreyBox, flights: &[Flight]) -> Residuals {
     all
 }
 
-/// Gauss–Newton search from `theta`: its cost and the coefficients.
+/// Gauss–Newton search from `theta`: smallest cost and the coefficients at this cost.
 fn search(
     model: &GreyBox,
     free: &[Free],
@@ -130,7 +130,7 @@ fn misfit(r: &Residuals) -> f64 {
 struct Step {
     /// Change of each free coefficient.
     change: DVector<f64>,
-    /// Decrease of the weighted sum of squares that the linear model predicts.
+    /// Decrease of the weighted sum of squares that the linearised model predicts.
     gain: f64,
 }
 

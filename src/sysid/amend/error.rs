@@ -10,10 +10,10 @@ pub enum AmendError {
     /// An effect cannot join the model.
     #[error("cannot amend the model: {0}")]
     Effect(#[from] JoinError),
-    /// A flight cannot be resampled to the models' clock.
+    /// The sampling interval of a flight is not usable.
     #[error("cannot amend the model: {0}")]
     Flight(#[from] ClockError),
-    /// There is too little flight to fit to.
+    /// The usable parts of the flights are too short for a fit.
     #[error(
         "cannot fit {model}: {flown_s:.0} s in the air without gaps, where {needed_s:.0} s are the \
          least; fly two or three flights of a minute with doublets on every control"
@@ -23,18 +23,18 @@ pub enum AmendError {
         model: String,
         /// Usable duration of the flights, s.
         flown_s: f64,
-        /// Least duration that a fit needs, s.
+        /// Smallest duration for a fit, s.
         needed_s: f64,
     },
-    /// There are too few flights to leave one out.
+    /// There are too few flights for leave-one-out cross-validation.
     #[error(
         "cannot leave out one flight after the other: {flights} are long enough to be predicted, and {needed} are the least; name more logs, \
          or cut one into parts with `greylag logs convert`"
     )]
     TooFewFlights {
-        /// Number of flights given.
+        /// Number of flights that are long enough to be predicted, or of all flights if even these are too few.
         flights: usize,
-        /// Least number of flights needed.
+        /// Smallest number of flights for the cross-validation.
         needed: usize,
     },
     /// No coefficient is free.
@@ -48,8 +48,8 @@ pub enum AmendError {
     },
     /// The flights do not excite any free coefficient.
     #[error(
-        "cannot fit {model}: these flights tell no coefficient better than the model file does, for \
-         the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
+        "cannot fit {model}: these flights determine no coefficient better than the model file does, \
+         because the aircraft hardly leaves trim; fly doublets or multisines on aileron, elevator and \
          throttle, and turns at several speeds"
     )]
     NoExcitation {
@@ -67,12 +67,12 @@ pub enum AmendError {
         model: String,
         /// Number of iterations made.
         iterations: usize,
-        /// Largest change in the last iteration, in standard deviations.
+        /// Largest change of a parameter in the last iteration, in its standard deviations.
         change: f64,
-        /// The parameter with that largest change.
+        /// The parameter with the largest change.
         parameter: String,
     },
-    /// Free runs diverge from the flights at once.
+    /// Free runs diverge from the flights too early for a fit.
     #[error(
         "cannot fit {model}: its free runs leave the flights within {reach_s:.1} s, too early to \
          learn from; begin with a model closer to this aircraft, or check signs and units of the log"
@@ -92,8 +92,8 @@ pub enum AmendError {
         /// Name of the model.
         model: String,
     },
-    /// The progress listener cancelled.
-    // not transparent: this error itself must stand in the chain of causes
+    /// The progress listener cancelled the amendment.
+    // not transparent: `Cancelled` must appear in the chain of error sources
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

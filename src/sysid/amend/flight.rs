@@ -1,4 +1,4 @@
-//! A flight with the priors of its sensors' remaining errors.
+//! A flight prepared for a fit, with priors for the sensor errors that remain after reconstruction.
 
 use crate::diagnose::search::clocks::{BLURRED, Doubt};
 use crate::flight_path::reconstruction::Reconstruction;
@@ -8,42 +8,42 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 
 /// Number of sensor constants estimated for each flight.
 pub(super) const SENSORS: usize = 8;
-/// Index of the actuators' delay among them, s.
+/// Index of the actuators' delay (s) among the sensor constants.
 pub(super) const SKEW: usize = 0;
-/// Index of the state that each constant after the delay offsets; that of the airspeed is relative.
+/// Index of the state to which each constant after the delay is added. The constant of the airspeed is relative.
 pub(super) const OFFSETS: [usize; SENSORS - 2] = [2, 3, 4, 5, 6, 7];
-/// Index of the actuators' blur, the last constant: half the variance, in squared samples, of the interval over which
-/// a recorded deflection is averaged.
+/// Index of the actuators' blur, the last sensor constant. The blur is half the variance, in squared sampling intervals, of
+/// the averaging interval of a recorded deflection.
 pub(super) const BLUR: usize = SENSORS - 1;
 /// Index of the airspeed among the eight states.
 pub(super) const AIRSPEED: usize = 2;
 
-/// Least standard deviation of the actuators' delay estimated from forces, s (against simulated truth its root mean
-/// square error is 0.3 ms).
+/// Smallest standard deviation of the actuators' delay estimated from forces, s. The root mean square error of this delay
+/// against simulated truth is 0.3 ms.
 pub(super) const SKEW_LEAST: f64 = 5e-4;
-/// Prior standard deviation of the actuators' delay against the gyros, s, for a 95 % interval of ±1.5 samples: each of
-/// the two is recorded 0 to 10 ms late.
+/// Prior standard deviation of the actuators' delay relative to the gyros, s. The 95 % interval is ±1.5 samples: actuators
+/// and gyros are each recorded 0 to 10 ms late.
 const SKEW_SD: f64 = 7.7e-3;
-/// Prior standard deviations where the reconstruction gives none: airspeed scale (relative), body rates (rad/s), α
-/// and β (rad).
+/// Prior standard deviations if the reconstruction states none: airspeed scale (relative), body rates (rad/s), α and β
+/// (rad).
 const DOUBT: [f64; 6] = [0.003, 2e-4, 2e-4, 2e-4, 0.002, 0.002];
-/// The reconstruction's names of those constants, in the same order.
+/// Names of these constants in the reconstruction, in the order of `DOUBT`.
 const NAMES: [&str; 6] =
     ["airspeed_scale", "gyro_bias_p", "gyro_bias_q", "gyro_bias_r", "alpha_bias", "beta_bias"];
 
 /// Constants estimated for one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Own {
-    /// Its sensors' constants, in the order of [`Flight::doubt`].
+    /// Sensor constants, in the order of [`Flight::doubt`].
     pub sensors: [f64; SENSORS],
-    /// Misalignment of its measured axes, rad; zero unless it is estimated.
+    /// Misalignment of the measured axes, rad; zero unless it is estimated.
     pub askew: [f64; askew::NAMES.len()],
-    /// Its trims; zero unless they are estimated.
+    /// Trims, dimensionless; zero unless they are estimated.
     pub trims: [f64; TRIMS.len()],
 }
 
 impl Own {
-    /// The `sensors`' constants alone; misalignment and trims are zero.
+    /// Constants with the given `sensors`, zero misalignment and zero trims.
     pub fn of(sensors: [f64; SENSORS]) -> Own {
         Own { sensors, askew: Default::default(), trims: Default::default() }
     }
@@ -55,7 +55,7 @@ impl Own {
         self.sensors.into_iter().chain(askew).chain(trims)
     }
 
-    /// Adds `step` to those unknowns, in the same order.
+    /// Adds `step` to the unknowns that `asked` selects, in the order of `Self::unknowns`.
     pub fn step(&mut self, asked: &PerFlight, step: &[f64]) {
         let askew = self.askew.iter_mut().take(asked.angles());
         let all = self.sensors.iter_mut().chain(askew).chain(&mut self.trims);
@@ -66,17 +66,17 @@ impl Own {
 /// A flight prepared for the fit.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// The flight on the models' clock, deflections as recorded.
+    /// The resampled flight, with deflections as recorded.
     pub prepared: Prepared,
-    /// Prior means and standard deviations: the actuators' delay (s), the airspeed's scale (relative), the biases of
-    /// p, q, r (rad/s), α and β (rad) that remain after reconstruction, and the actuators' blur (squared samples).
+    /// Prior mean and standard deviation of each sensor constant after reconstruction: actuators' delay (s), airspeed scale
+    /// (relative), biases of p, q, r (rad/s), α and β (rad), actuators' blur (squared sampling intervals).
     pub doubt: [[f64; 2]; SENSORS],
     /// Uncertainty of the measured forces and moments.
     pub(super) forces: Doubt,
 }
 
 impl Flight {
-    /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
+    /// Resamples `flight` to a multiple of the model step and keeps the parts with an airspeed of at least `slowest` (m/s).
     ///
     /// # Errors
     /// The sampling interval of `flight` lies outside 1e-6 to 1 s.

@@ -1,4 +1,4 @@
-//! Uncertainty of the coefficients: posterior covariance, corrected for correlated errors.
+//! Uncertainty of the estimates: posterior covariance, corrected for correlated residuals.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,12 +18,14 @@ impl Covariance {
     }
 }
 
-/// The covariance at the optimum from `information` (the prior's included, whose diagonal is `prior`) and `scores`,
-/// the gradients of the data's cost over blocks of data taken as independent.
+/// The covariance at the optimum; `None` if `information` is not positive definite.
 ///
-/// The inverse information is the covariance if the weights are right; with many blocks, the sandwich estimator needs
-/// no such assumption. With few blocks the sandwich is biased low and uncertain, so each unknown's variance is the
-/// larger of the two, the sandwich multiplied by B/(B − 1).
+/// `information` includes the prior, and `prior` is the diagonal of the prior's information. `scores` are the gradients of
+/// the data's cost over blocks of data that are treated as independent.
+///
+/// The inverse information is the covariance if the weights are correct. The sandwich estimator does not need this
+/// assumption, but it is biased low and uncertain for few blocks. The variance of each unknown is the larger of the two
+/// variances, with the sandwich estimator multiplied by B/(B − 1) for B blocks.
 pub(super) fn covariance(
     information: &DMatrix<f64>,
     prior: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! Acceptance of an effect: by free runs over held-out flights, and by the estimates of its coefficients.
+//! Acceptance of an effect from free runs over held-out flights and from the estimates of its coefficients.
 
 use super::amendment::{Added, Refused};
 use super::error::AmendError;
@@ -9,25 +9,25 @@ use super::result::{AddedEffect, Parameter};
 use crate::compare::{HorizonScore, free_run};
 use greylag_model::GreyBox;
 
-/// Horizon at which improvement is judged, s.
+/// Horizon of the free runs at which fits are compared, s.
 pub const JUDGED_AT_S: f64 = 5.0;
-/// Least relative fall of the held-out error for an effect to join.
+/// Smallest relative decrease of the held-out error for which an effect is accepted.
 pub(super) const IMPROVED: f64 = 0.01;
-/// An effect that lowers the held-out error below this share of the previous one joins although the search has not
-/// converged with it: convergence may need further effects.
+/// An effect that reduces the held-out error below this share of the previous error is accepted although the search has not
+/// converged with it. Convergence may need further effects.
 pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
-/// At least one coefficient of an effect must differ from zero by this many standard deviations.
+/// At least one coefficient of an effect must differ from zero by this number of standard deviations.
 const CLEAR: f64 = 1.96;
-/// The same for effects of more than three coefficients, of which one exceeds `CLEAR` by chance.
+/// The same number for effects of more than three coefficients: with many coefficients, one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
-/// Flights disagree if one flight's estimate differs from the common one by this many standard deviations and by
-/// [`DISAGREE_SHARE`] too.
+/// Flights disagree if the estimate of one flight differs from the common estimate by more than this number of standard
+/// deviations, and by more than [`DISAGREE_SHARE`].
 const DISAGREE: f64 = 4.0;
-/// Least relative difference at which flights disagree.
+/// Relative difference of estimates above which flights can disagree.
 const DISAGREE_SHARE: f64 = 0.3;
 
 impl AddedEffect {
-    /// The record of the requested effect `id` before it is judged.
+    /// The record of the requested effect `id` before its fit.
     pub fn asked_for(id: &str) -> AddedEffect {
         let about = parameters::describe(id).map(|(about, _)| about);
         AddedEffect {
@@ -40,11 +40,11 @@ impl AddedEffect {
     }
 }
 
-/// Judge of fits by free runs over flights that they were not fitted to.
+/// Evaluation of fits by free runs over held-out flights.
 pub struct Judge<'a> {
     /// Held-out flights.
     pub test: &'a [Flight],
-    /// Horizons of the free runs, s; the longest one up to `JUDGED_AT_S` judges.
+    /// Horizons of the free runs, s. Fits are compared at the longest one up to `JUDGED_AT_S`.
     pub horizons_s: &'a [f64],
 }
 
@@ -52,14 +52,15 @@ pub struct Judge<'a> {
 pub type Kept = (Fit, Vec<HorizonScore>);
 
 impl Judge<'_> {
-    /// Free runs of `model` over the flights, one score for each horizon.
+    /// Free-run errors of `model` over the held-out flights, one entry for each horizon.
     pub fn scores(&self, model: &GreyBox) -> Vec<HorizonScore> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
         let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
-    /// Judges an effect; returns its record, and the fit with it if it is accepted.
+    /// Decides on the effect `added` from its fit and the held-out scores `before`. Returns the effect's record, and the fit with
+    /// its scores if the effect is accepted.
     pub fn verdict(
         &self,
         added: &Added,
@@ -112,12 +113,12 @@ fn failed(why: &AmendError) -> bool {
     matches!(why, AmendError::NotConverged { .. } | AmendError::Singular { .. })
 }
 
-/// The error at the horizon of judgement, if any run reaches it.
+/// The scaled free-run error at the longest horizon up to [`JUDGED_AT_S`] that a run reaches.
 pub fn judged(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.rmse_scaled)
 }
 
-/// The horizon of judgement, s: the longest one up to [`JUDGED_AT_S`] that a run reaches.
+/// The longest horizon up to [`JUDGED_AT_S`] that a run reaches, s.
 pub fn judged_at(scores: &[HorizonScore]) -> Option<f64> {
     judge_of(scores).map(|s| s.horizon_s)
 }
@@ -127,18 +128,19 @@ fn judge_of(scores: &[HorizonScore]) -> Option<&HorizonScore> {
     reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))
 }
 
-/// Whether the error falls from `before` to `after` by more than the least relevant share.
+/// Whether the error `after` is lower than `before` by more than 1 %.
 pub fn better(after: &[HorizonScore], before: &[HorizonScore]) -> bool {
     judged(after).zip(judged(before)).is_some_and(|(a, b)| a < (1.0 - IMPROVED) * b)
 }
 
-/// Whether each coefficient of the effect `id` is confounded with a coefficient of the model itself.
+/// Whether every coefficient of the effect `id` is confounded with a coefficient of the model before the effect was added.
 pub fn doubled(id: &str, parameters: &[Parameter]) -> bool {
     let mut own = own(id, parameters).peekable();
     own.peek().is_some() && own.all(|p| p.same_as.is_some())
 }
 
-/// The model's own coefficients that are confounded with the effect `id`, in words; empty if there are none.
+/// Phrase that names the model's coefficients confounded with the effect `id`. Empty unless every coefficient of the effect
+/// is confounded.
 fn confounded_with_model(id: &str, parameters: &[Parameter]) -> String {
     if !doubled(id, parameters) {
         return String::new();
@@ -146,7 +148,7 @@ fn confounded_with_model(id: &str, parameters: &[Parameter]) -> String {
     let mut said: Vec<&str> = own(id, parameters).filter_map(|p| p.same_as.as_deref()).collect();
     said.sort_unstable();
     said.dedup();
-    format!(", for {} of the model itself can say nearly the same", said.join(", "))
+    format!(", because it is confounded with {} of the model", said.join(", "))
 }
 
 /// The coefficients of the added effect `id`.
@@ -183,14 +185,14 @@ pub fn objections(id: &str, parameters: &[Parameter]) -> Vec<String> {
     objections
 }
 
-/// Advice on the model's own coefficients that end at a bound, in words.
+/// Advice, in words, on coefficients that end at a bound and do not belong to an added effect.
 pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
     let ended = parameters.iter().filter(|p| p.at_bound && !p.added);
     ended
         .map(|p| {
             let cure = match p.value == 0.0 {
                 true => format!(
-                    "the flights want the other sign or do not tell it from the rest; check the sign of that control in \
+                    "the flights give the opposite sign or do not separate it from the rest; check the sign of that control in \
                      the mapping, or hold {} by a smaller sd in the model file",
                     p.name
                 ),
@@ -205,14 +207,14 @@ pub fn at_bounds(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// A range up to twice the bound.
+/// A range of ± twice the bound, in the syntax of the option `--bound`.
 fn wider(bound: f64) -> String {
     let far = 2.0 * bound.abs();
     format!("-{far}..{far}")
 }
 
-/// Coefficients whose fitted sign is significantly opposite to their prior's, by more than the prior's width, in
-/// words.
+/// Notes on coefficients whose sign is significantly opposite to that of their prior mean, with a change of more than the
+/// prior standard deviation.
 pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
     let turned = |p: &&Parameter| {
         !p.added
@@ -233,7 +235,7 @@ pub fn against_prior(parameters: &[Parameter]) -> Vec<String> {
         .collect()
 }
 
-/// The flight whose own estimate is incompatible with the common one, and that estimate.
+/// The first flight whose estimate contradicts the estimate from all flights, with its estimate.
 fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     let far = |value: f64, sd: f64| {
         let off = (value - p.value).abs();
@@ -243,7 +245,7 @@ fn outlier(p: &Parameter) -> Option<(&str, f64)> {
     found.map(|e| (e.flight.as_str(), e.value))
 }
 
-/// Coefficients whose estimate from one flight contradicts that from all flights, in words.
+/// Notes on coefficients whose estimate from one flight contradicts the estimate from all flights.
 pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
     let named = parameters.iter().filter(|p| !p.added);
     named

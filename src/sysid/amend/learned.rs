@@ -1,11 +1,10 @@
-//! Constants that a fit has estimated for each flight and for the installation that the flights share, as written to the
-//! model's file.
+//! Constants of the flights and of the common installation that a fit has estimated, as written to the model's file.
 
 use super::flight::{OFFSETS, Own, SENSORS, SKEW};
 use crate::per_flight::PerFlight;
 use greylag_model::{FlightConstants, Known};
 
-/// A mean over flights is taken as a constant of the installation if it exceeds this many of its standard errors.
+/// A mean over flights becomes a constant of the installation if it exceeds this number of standard errors.
 const CLEAR: f64 = 2.0;
 /// Source of the constants, as written to the model's file.
 const BY: &str = "greylag amend";
@@ -16,7 +15,7 @@ pub(super) struct Learned<'a> {
     pub name: &'a str,
     /// Estimated constants of the flight.
     pub own: &'a Own,
-    /// Standard deviations of the unknowns among them.
+    /// Standard deviations of the unknowns, in the order of [`Own::unknowns`].
     pub sd: &'a [f64],
 }
 
@@ -31,9 +30,10 @@ impl Learned<'_> {
     }
 }
 
-/// Constants for the model's file after a fit to `flights` with the constants `asked`; `before` holds those of the file
-/// so far. Each flight keeps its own constants. The installation has the means over the flights that differ significantly
-/// from zero.
+/// Constants for the model's file after a fit to `flights` with the per-flight constants `asked`. `before` holds the previous
+/// constants of the file.
+///
+/// Each flight has its constants. The installation has the mean misalignment angles that differ significantly from zero.
 pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> Known {
     let anew = asked.angles() > 0;
     if !anew && !asked.has_trims() {
@@ -59,7 +59,7 @@ pub(super) fn known(before: &Known, flights: &[Learned], asked: &PerFlight) -> K
     all
 }
 
-/// The constants without trims, which are not valid with changed coefficients.
+/// The constants without trims. Trims are not valid after a change of coefficients.
 fn without_trims(known: &Known) -> Known {
     let mut kept = known.clone();
     kept.flights.values_mut().for_each(|own| own.trims = None);
@@ -67,7 +67,7 @@ fn without_trims(known: &Known) -> Known {
     kept
 }
 
-/// Constants of the installation, the means over `flights`; `None` if none differs significantly from zero.
+/// Misalignment of the installation: mean angles over `flights`. `None` if no mean differs significantly from zero.
 fn installation(flights: &[Learned]) -> Option<FlightConstants> {
     let angles: Vec<_> = flights.iter().map(Learned::angles_deg).collect();
     let axes: [f64; 3] =
@@ -80,8 +80,8 @@ fn installation(flights: &[Learned]) -> Option<FlightConstants> {
     Some(FlightConstants { source, axes_deg: Some(axes), trims: None, sensors: None })
 }
 
-/// The mean of `estimates`, each with its standard deviation; zero unless it exceeds twice its standard error. That error
-/// follows from the standard deviations or from the scatter of the estimates, whichever is larger.
+/// The mean of `estimates` (value and standard deviation), or zero if the mean is at most twice its standard error. The
+/// standard error follows from the standard deviations or from the scatter of the estimates, whichever is larger.
 fn common(estimates: &[[f64; 2]]) -> f64 {
     let n = estimates.len() as f64;
     let mean = estimates.iter().map(|[x, _]| x).sum::<f64>() / n;
@@ -92,7 +92,7 @@ fn common(estimates: &[[f64; 2]]) -> f64 {
     if mean.abs() > CLEAR * error { mean } else { 0.0 }
 }
 
-/// An installation in words: its angles.
+/// Misalignment angles of an installation in words.
 pub(super) fn in_words(installation: &FlightConstants) -> String {
     let named = ["roll", "pitch", "yaw"].into_iter().zip(installation.axes_deg.unwrap_or_default());
     let turned: Vec<String> =
@@ -107,7 +107,7 @@ mod tests {
     #[test]
     fn a_mean_is_common_only_where_flights_agree_on_it() {
         assert_eq!(common(&[[-9.0, 1.0], [-11.0, 1.0]]), -10.0);
-        // 2° in one flight and none in the other are no installation
+        // 2° in one flight and 0° in the other do not give an angle of the installation
         assert_eq!(common(&[[2.0, 0.1], [0.0, 0.1]]), 0.0);
         assert_eq!(common(&[[1.0, 1.0]]), 0.0);
     }

@@ -1,5 +1,4 @@
-//! Selection of a model's structure by leave-one-out cross-validation: each flight is predicted by a fit to all
-//! others.
+//! Selection of a model's structure by leave-one-out cross-validation: a fit to all other flights predicts each flight.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -18,15 +17,15 @@ use crate::progress::{Progress, ignore_progress, report};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// Least number of flights of which one can be left out.
+/// Smallest number of flights for leave-one-out cross-validation.
 pub const LEAST_FLIGHTS: usize = 3;
 
 /// A candidate structure.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// Its description, as a user would request it.
+    /// Description of the structure, in the terms of the user's request.
     pub name: String,
-    /// The part of it that is fitted.
+    /// The fitted part of the structure.
     pub fitted: Fitted,
 }
 
@@ -42,7 +41,7 @@ pub enum Fitted {
         /// Constants estimated for each flight.
         per_flight: PerFlight,
     },
-    /// The model's coefficients with physical bounds as their only prior, those of value zero included.
+    /// All coefficients of the model, including those with the value zero. Their only prior are the physical bounds.
     FromScratch,
 }
 
@@ -51,32 +50,32 @@ pub enum Fitted {
 pub struct Scored {
     /// Description of the structure.
     pub structure: String,
-    /// Number of free coefficients plus constants of one flight.
+    /// Number of free coefficients plus the number of constants of one flight.
     pub free: usize,
     /// The flights that are long enough to be predicted.
     pub flights: Vec<String>,
-    /// Scaled free-run error of each of them under the fit to all others; NaN where that fit failed.
+    /// Scaled free-run error of each of `flights` with the fit to all other flights; NaN if the fit failed.
     pub errors: Vec<f64>,
-    /// Mean of `errors`; infinite where a fit failed.
+    /// Mean of `errors`; infinite if a fit failed.
     pub mean: f64,
     /// Standard error of the mean over the flights.
     pub standard_error: f64,
-    /// Standard error of the mean paired difference to the best structure.
+    /// Standard error of the mean paired difference from the best structure.
     pub beside_best: f64,
-    /// Whether it is chosen: the simplest one within one standard error of the best.
+    /// Whether the structure is chosen: the simplest structure within one standard error of the best.
     pub chosen: bool,
 }
 
-/// Leaves out each of `flights` in turn and scores each of `structures` of `model` on it; forecasts without
-/// aerodynamics follow as baselines, which are never chosen.
+/// Leaves out each of `flights` in turn and computes the error of each of `structures` of `model` on this flight. Forecasts
+/// without aerodynamics follow as baselines and are never chosen.
 ///
-/// The one chosen has the fewest free coefficients among those whose mean error exceeds the best one's by at most one
-/// standard error of the difference, taken flight by flight, or by 1 % (the rule of Breiman et al., Classification and Regression
-/// Trees, 1984, section 3.4.3, in pairs).
+/// The chosen structure has the fewest free coefficients among all whose mean error exceeds that of the best structure by at
+/// most one standard error of the paired difference, or by 1 % (the rule of Breiman et al., Classification and Regression
+/// Trees, 1984, section 3.4.3, with paired differences).
 ///
 /// # Errors
-/// Fewer than [`LEAST_FLIGHTS`] are long enough for the shortest horizon, a flight cannot be resampled, an effect cannot
-/// join the model, or `progress` cancelled.
+/// Fewer than [`LEAST_FLIGHTS`] flights are long enough for the shortest horizon, the sampling interval of a flight is not
+/// usable, an effect cannot join the model, or `progress` cancelled.
 pub fn leave_one_out(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -93,7 +92,7 @@ pub fn leave_one_out(
     };
     let right = ready(&put_right(&model.known, flights).0)?;
     let ready = ready(flights)?;
-    // every structure is judged at the same horizon, the longest one that all judging flights reach
+    // the errors of all structures are taken at one horizon, the longest one that all predicted flights reach
     let reached = |f: &Flight| judged_at(&scores(model, std::slice::from_ref(f), horizons_s));
     let reached: Vec<Option<f64>> = ready.iter().map(reached).collect();
     let at = reached.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -119,17 +118,17 @@ pub fn leave_one_out(
 
 /// The flights of a cross-validation.
 struct Set<'a> {
-    /// All flights as they are predicted.
+    /// All flights, uncorrected, for the prediction.
     judged: &'a [Flight],
-    /// The same flights corrected by their constants in the model's file, as used in the fit.
+    /// The same flights corrected with their constants in the model's file, for the fits.
     fitted: &'a [Flight],
-    /// Indices of those long enough to be predicted; the others are only used in fits.
+    /// Indices of the flights that are long enough to be predicted. The other flights are only used in fits.
     judges: &'a [usize],
-    /// The horizon, s.
+    /// Horizon of the errors, s.
     at: f64,
 }
 
-/// Baseline forecasts: the state held, straight flight, and a linear model fitted to the other flights.
+/// Errors of the baseline forecasts: held state, straight flight, and a linear model fitted to the other flights.
 fn black_boxes(model: &GreyBox, set: &Set) -> Vec<Scored> {
     let prepared: Vec<Prepared> = set.judged.iter().map(|f| f.prepared.clone()).collect();
     let names = ["hold the state", "fly straight on", "linear (ARX), fitted to the others"];
@@ -157,7 +156,7 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of the flight number `left` by the fit to the others; NaN where that fails.
+/// Error of flight number `left` with the fit to all other flights; NaN if the fit fails.
 fn error_of(model: &GreyBox, set: &Set, left: usize, fitted: &Fitted) -> Result<f64, AmendError> {
     let anew = matches!(fitted, Fitted::Coefficients { per_flight, .. } if per_flight.angles() > 0);
     let flights = if anew { set.judged } else { set.fitted };
@@ -186,7 +185,7 @@ fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
     Ok(with)
 }
 
-/// Number of constants that the flights determine in a structure.
+/// Number of free coefficients of a structure, plus the number of constants of one flight.
 fn free(model: &GreyBox, fitted: &Fitted) -> Result<usize, AmendError> {
     Ok(match fitted {
         Fitted::Nothing => 0,
@@ -223,8 +222,7 @@ fn mean_with_error(x: &[f64]) -> [f64; 2] {
     [mean, (variance / n).sqrt()]
 }
 
-/// Marks the simplest structure within one standard error of the best, or within the least improvement for which an
-/// effect joins.
+/// Marks the simplest structure whose mean error is within one standard error of the best, or within 1 %.
 fn choose(all: &mut [Scored]) {
     let best = all.iter().min_by(|a, b| a.mean.total_cmp(&b.mean)).cloned();
     let Some(best) = best.filter(|b| b.mean.is_finite()) else { return };
@@ -261,9 +259,9 @@ mod tests {
             of("failed", 5, &[0.1, f64::NAN, 0.1]),
         ];
         choose(&mut all);
-        // 0.2500 beside 0.2467: the difference, 0.003 on average, has a standard error of 0.014
+        // mean errors 0.2500 and 0.2467: the mean difference of 0.003 has a standard error of 0.014
         assert_eq!(all.map(|s| s.chosen), [false, true, false, false]);
-        // clearly better, flight by flight, though the flights differ much more from one another
+        // significantly better in each flight, although the flights differ much more from one another
         let mut all = [of("tuned", 20, &[0.20, 0.30, 0.40]), of("more", 30, &[0.10, 0.21, 0.29])];
         choose(&mut all);
         assert_eq!(all.map(|s| s.chosen), [false, true]);

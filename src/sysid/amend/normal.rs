@@ -1,4 +1,4 @@
-//! Normal equations of a shot, with the errors of its initial state eliminated.
+//! Derivatives of a shot's residuals, and normal equations with the errors of the initial state eliminated.
 
 use std::borrow::Cow;
 
@@ -11,15 +11,15 @@ use crate::per_flight::{PerFlight, trims};
 use greylag_model::GreyBox;
 use greylag_physics::Controls;
 
-/// Finite-difference steps of the initial state, in the units of the state.
+/// Finite-difference steps of the initial state, in the units of the state (rad, m/s, rad/s).
 const STATE_STEP: [f64; 8] = [1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5];
-/// Finite-difference step of the actuators' delay, s: half a sample, over which interpolation is smooth.
+/// Finite-difference step of the actuators' delay, s: half a sampling interval at 100 Hz.
 const SKEW_STEP: f64 = 5e-3;
 
-/// Finite-difference step of the actuators' blur, squared samples.
+/// Finite-difference step of the actuators' blur, in squared sampling intervals.
 const BLUR_STEP: f64 = 0.05;
 
-/// Finite-difference step of a trim, as a share of its prior width.
+/// Finite-difference step of a trim, relative to its prior standard deviation.
 const TRIM_STEP: f64 = 1e-3;
 
 /// Current point of the search.
@@ -29,14 +29,14 @@ pub(super) struct Place {
     pub theta: Vec<f64>,
     /// Constants of each flight.
     pub own: Vec<Own>,
-    /// Error of each shot's initial state.
+    /// Error of each shot's initial state, in the units of the state.
     pub starts: Vec<[f64; 8]>,
 }
 
-/// Weights of the residuals.
+/// Weights of a shot's residuals and of its initial state's errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
-    /// Inverse variance of each state's residual, divided by the common correlation length.
+    /// Inverse variance of each state's residual, divided by the common correlation length (samples).
     pub output: [f64; 8],
     /// Inverse variance of the initial state's errors.
     pub start: [f64; 8],
@@ -47,16 +47,16 @@ pub(super) type Acting = Vec<Vec<Vec<Controls>>>;
 
 /// Perturbed models for the derivative with respect to one coefficient.
 struct Variant {
-    /// The lower model; the present model if `None`.
+    /// The model with the smaller value; `None` for the present model.
     low: Option<Side>,
     high: Side,
-    /// Difference of the coefficient between the two models.
+    /// Difference of the coefficient between both models.
     between: f64,
 }
 
 struct Side {
     model: GreyBox,
-    /// Acting deflections, if they differ from those under the present model.
+    /// Acting deflections; `None` if they are those under the present model.
     acting: Option<Acting>,
 }
 
@@ -77,7 +77,7 @@ pub(super) fn acting(model: &GreyBox, flights: &[Flight], place: &Place) -> Acti
     moved(model, flights, place, SKEW, 0.0)
 }
 
-/// As [`acting`], with the sensor constant `which` increased by `by`.
+/// Acting deflections of every flight under `model`, with the sensor constant `which` increased by `by`.
 fn moved(model: &GreyBox, flights: &[Flight], place: &Place, which: usize, by: f64) -> Acting {
     let one = |(f, own): (&Flight, &Own)| {
         let mut s = own.sensors;
@@ -116,13 +116,13 @@ impl Neighbourhood {
     }
 }
 
-/// Normal equations of a shot in the free coefficients and the constants of its flight.
+/// Normal equations of a shot for the free coefficients and the constants of the shot's flight.
 pub(super) struct Normal {
     /// Information matrix after elimination of the initial state.
     pub information: DMatrix<f64>,
     /// Gradient after elimination of the initial state.
     pub gradient: DVector<f64>,
-    /// Inverse information of the initial state, its coupling to the other unknowns, its gradient.
+    /// Inverse information of the initial state. The next two fields are its coupling to the other unknowns and its gradient.
     inverse: SMatrix<f64, 8, 8>,
     coupling: DMatrix<f64>,
     start_gradient: SVector<f64, 8>,
@@ -138,14 +138,14 @@ impl Normal {
     }
 }
 
-/// Half the weighted sum of squares of a shot, the errors of its initial state included.
+/// Half the weighted sum of squares of a shot's residuals and of its initial state's errors.
 pub(super) fn cost(shot: &Shot, residuals: &[[f64; 8]], start: &[f64; 8], w: &Weights) -> f64 {
     let square = |x: &[f64; 8], w: &[f64; 8]| (0..8).map(|k| w[k] * x[k] * x[k]).sum::<f64>();
     let output: f64 = residuals.iter().map(|r| square(r, &w.output)).sum();
     0.5 * (shot.weight * output + square(start, &w.start))
 }
 
-/// `model` with the trims of a flight; unchanged if these are all zero.
+/// `model` with the trims of a flight; unchanged if all trims are zero.
 pub(super) fn of_flight<'a>(model: &'a GreyBox, own: &Own) -> Cow<'a, GreyBox> {
     if own.trims.iter().all(|trim| *trim == 0.0) {
         return Cow::Borrowed(model);
@@ -171,8 +171,8 @@ pub(super) fn run(
     shooting::residuals(flight, shot, own, &model.scale(), &path)
 }
 
-/// Derivatives of the residuals of shot `index`: columns for the free coefficients, the flight's constants and its
-/// initial state; eight rows for each sample.
+/// Derivatives of the residuals of shot `index`. The columns are the free coefficients, the flight's constants and the
+/// initial state. Each sample has eight rows.
 pub(super) fn jacobian(
     around: &Neighbourhood,
     flights: &[Flight],
@@ -245,7 +245,7 @@ pub(super) fn normal(
     eliminate(&j, &r, from, w)
 }
 
-/// Derivatives by the sensors' offsets: the direct effect less that through the initial state.
+/// Derivatives with respect to the sensors' offsets: the direct effect less the effect through the initial state.
 fn sensor_columns(
     j: &mut DMatrix<f64>,
     [count, starts]: [usize; 2],
@@ -266,7 +266,8 @@ fn sensor_columns(
     }
 }
 
-/// Derivatives by the misalignment angles, in the same way, in the columns from `first` on.
+/// Derivatives with respect to the misalignment angles, in the columns from `first` on: the direct effect less the effect
+/// through the initial state.
 fn askew_columns(
     j: &mut DMatrix<f64>,
     [first, starts]: [usize; 2],
@@ -287,7 +288,7 @@ fn askew_columns(
 
 fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -> Normal {
     let m = j.ncols() - 8;
-    // an explicit transpose: matrix products are blocked, tr_mul is not
+    // an explicit transpose is faster: matrix products are blocked, `tr_mul` is not
     let across = j.transpose();
     let all = &across * j;
     let gradient = &across * r;
@@ -297,7 +298,7 @@ fn eliminate(j: &DMatrix<f64>, r: &DVector<f64>, from: &[f64; 8], w: &Weights) -
         own[(k, k)] += w.start[k];
         start_gradient[k] += w.start[k] * from[k];
     }
-    // positive definite because of the prior, unless there is a NaN; the search then ends
+    // positive definite because of the prior; NaN values end the search
     let inverse = own.try_inverse().unwrap_or_else(|| SMatrix::from_element(f64::NAN));
     let coupling = all.view((0, m), (m, 8)).into_owned();
     let through = &coupling * inverse;

@@ -1,9 +1,9 @@
-//! Output-error estimation by multiple shooting: fits the coefficients so that free runs follow the flights.
+//! Output-error estimation by multiple shooting: fits the coefficients such that short free runs follow the flights.
 //!
-//! Each shot starts from a reconstructed state, whose error is an unknown eliminated from the normal equations; the
-//! sensors' remaining biases and the actuators' delay are unknowns of each flight. Residuals are weighted by their
-//! variance and by one common correlation length, both re-estimated during the search. Priors are Gaussian, with
-//! [`Named::width`](greylag_model::Named::width).
+//! Each shot starts from a reconstructed state. The error of this state is an unknown that is eliminated from the normal
+//! equations. The sensors' remaining biases and the actuators' delay are unknowns of each flight. The weights of the
+//! residuals follow from their variances and one common correlation length, which are re-estimated during the search. Priors
+//! are Gaussian, with the standard deviation [`Named::width`](greylag_model::Named::width).
 
 mod estimates;
 mod gauss_newton;
@@ -25,31 +25,31 @@ use crate::progress::{Cancelled, Progress, report};
 use greylag_model::GreyBox;
 use greylag_num::statistics::quantile;
 
-/// Least usable duration of the flights, s.
+/// Smallest usable duration of all flights together, s.
 pub const LEAST_S: f64 = 10.0;
-/// Convergence tolerance: largest change of a coefficient in its standard deviations.
+/// Convergence tolerance of the steps with the same derivatives: largest change of a coefficient in its standard deviations.
 const STEP_TOLERANCE: f64 = 0.03;
-/// Derivatives are renewed until the renewal changes no coefficient by more than this many standard deviations.
+/// Derivatives are renewed until a renewal changes no coefficient by more than this number of standard deviations.
 const RENEWED: f64 = 0.1;
-/// The same tolerance for all shot lengths but the last.
+/// Tolerance in the sense of `RENEWED` for all shot lengths except the last.
 const NEAR: f64 = 5.0;
 /// Largest number of steps with the same derivatives.
 const INNER: usize = 6;
 /// Standard deviations of the residuals assumed at the start, in the units of the state.
 const COARSE: [f64; 8] = [0.02, 0.02, 0.4, 0.05, 0.05, 0.05, 0.02, 0.02];
-/// Least standard deviations of a reconstructed state's errors, in the units of the state.
+/// Prior standard deviations of a reconstructed state's errors, in the units of the state.
 const START: [f64; 8] = [3e-3, 3e-3, 0.15, 5e-3, 5e-3, 5e-3, 3e-3, 3e-3];
 
 /// Options of a fit.
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    /// Ids of the model's effects that are new: their coefficients have no prior but their bounds.
+    /// Identifiers of the added effects in the model. Their coefficients have only their bounds as a prior.
     pub added: Vec<String>,
-    /// Lengths of the shots, s, fitted one after the other.
+    /// Lengths of the shots, s. The fit uses one length after the other.
     pub lengths_s: Vec<f64>,
     /// Largest number of renewals of the derivatives for the last length.
     pub renewals: usize,
-    /// Constants estimated for each flight beside those of its sensors.
+    /// Constants estimated for each flight in addition to its sensor errors.
     pub per_flight: PerFlight,
 }
 
@@ -73,15 +73,16 @@ pub struct Fit {
     pub residual_sd: [f64; 8],
     /// Number of shots of the last length.
     pub shots: usize,
-    /// Number of them that are down-weighted or cut short.
+    /// Number of shots of the last length that are down-weighted or cut short.
     pub weakened: usize,
     /// Residuals of each shot of the last length.
     pub(super) left: Vec<Left>,
-    /// Weights of those residuals.
+    /// Weights of the residuals in `left`.
     pub(super) weights: Weights,
     /// Number of iterations made.
     pub iterations: usize,
-    /// The parameter that had not converged when the search ended, in words; all intervals are widened by its change.
+    /// Sentence on the parameter that had not converged when the search ended; `None` if all converged. All intervals are widened
+    /// by the last change of this parameter.
     pub unsettled: Option<String>,
     /// Notes for the reader.
     pub notes: Vec<String>,
@@ -92,17 +93,17 @@ pub struct Fit {
 pub(super) struct Left {
     /// Indices of flight, segment and first sample.
     pub shot: [usize; 3],
-    /// Sum of the squared residuals of each state.
+    /// Sum of the squared residuals of each state, in the unit of the state squared.
     pub output: [f64; 8],
-    /// Squared errors of the initial state.
+    /// Squared errors of the initial state, in the unit of the state squared.
     pub start: [f64; 8],
 }
 
-/// Fits the free coefficients of `model` to `flights`; reports to `progress`, which may cancel.
+/// Fits the free coefficients of `model` to `flights`. `progress` receives the stages and may cancel.
 ///
 /// # Errors
-/// There is too little flight, nothing is free, nothing is excited, runs diverge at once, the search does not
-/// converge, or `progress` cancelled.
+/// The flights are shorter than `LEAST_S`, no coefficient is free, the flights excite none, free runs diverge too early,
+/// the search does not converge or its equations are singular, or `progress` cancelled.
 pub fn fit(
     model: &GreyBox,
     flights: &[Flight],
@@ -146,7 +147,7 @@ pub fn fit(
             search.start_from_the_closer(&given, *length_s);
         }
         search.shots_of(*length_s)?;
-        // only the last length decides the figures
+        // only the last length determines the result
         match k + 1 == options.lengths_s.len() {
             true => search.settle(options.renewals, RENEWED, &step)?,
             false => search.settle(options.renewals.min(2), NEAR, &step)?,
@@ -161,8 +162,8 @@ pub fn fit(
     search.finish(model, &held)
 }
 
-/// The actuators' delays estimated with an effect on the deflections in the model, since free runs cannot distinguish
-/// the two.
+/// The actuators' delays, estimated together with an input effect of the model: free runs cannot distinguish a delay of the
+/// record from a delay of the actuators.
 fn clocks(
     model: &GreyBox,
     free: &[Free],
@@ -184,24 +185,24 @@ fn values(model: &GreyBox, free: &[Free]) -> Vec<f64> {
 struct Search<'a> {
     /// The model, with trim terms if trims are estimated.
     base: &'a GreyBox,
-    /// Constants estimated for each flight beside those of its sensors.
+    /// Constants estimated for each flight in addition to its sensor errors.
     asked: PerFlight,
     flights: &'a [Flight],
     free: Vec<Free>,
     shots: Vec<Shot>,
-    /// Derivatives of each shot's residuals, which may be older than the present point.
+    /// Derivatives of each shot's residuals, possibly at an earlier point of the search.
     jacobians: Vec<DMatrix<f64>>,
     /// Number of shots cut short because their runs diverge.
     short: usize,
     place: Place,
-    /// Prior means and standard deviations of the sensors' constants of each flight.
+    /// Prior mean and standard deviation of each sensor constant of each flight.
     expected: Vec<[[f64; 2]; SENSORS]>,
     weights: Weights,
     iterations: usize,
-    /// Largest change of the last step in standard deviations, and the coefficient's index.
+    /// Largest change of a coefficient in the last step, in its standard deviations, and the coefficient's index.
     change: (f64, usize),
-    /// Whether that step was rejected: however much it is damped, the cost does not fall, for example because the cost
-    /// jumps where a run begins to stall.
+    /// Whether the last step was rejected because the cost did not decrease with any damping. The cost jumps, for example, where
+    /// a run begins to stall.
     stuck: bool,
 }
 
@@ -216,7 +217,7 @@ impl<'a> Search<'a> {
         let expected: Vec<_> = flights.iter().map(|f| f.doubt).collect();
         let own = flights.iter().map(|f| Own::of(f.doubt.map(|[mean, _]| mean))).collect();
         let inverse = |sd: [f64; 8]| sd.map(|x| x.powi(-2));
-        // residuals of a coarse model are correlated over about a fifth of a second
+        // residuals of an inaccurate model are correlated over about a fifth of a second
         let weights = Weights { output: inverse(COARSE).map(|w| w / 20.0), start: inverse(START) };
         Search {
             base,
@@ -244,7 +245,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Cuts the flights into shots and shortens those that the present model cannot follow.
+    /// Cuts the flights into shots of `length_s` (s), and shortens the shots in which the present model diverges.
     fn shots_of(&mut self, length_s: f64) -> Result<(), AmendError> {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];
@@ -265,7 +266,7 @@ impl<'a> Search<'a> {
         self.short = 0;
         for (shot, reach) in self.shots.iter_mut().zip(&reach) {
             if *reach < shot.steps {
-                // well before it diverges, the run still carries information
+                // the first three quarters of the run before divergence still contain information
                 shot.steps = reach * 3 / 4;
                 self.short += 1;
             }
@@ -289,9 +290,11 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Iterates to convergence, weights included. The derivatives, the most expensive part, are renewed once the
-    /// search has converged under the old ones, until a renewal changes nothing by more than `tolerance` standard
-    /// deviations. `step` receives the share of the renewals that is done.
+    /// Iterates estimates and weights to convergence.
+    ///
+    /// The derivatives are the most expensive part. They are renewed after the search has converged with the old derivatives,
+    /// until a renewal changes no coefficient by more than `tolerance` standard deviations. `step` receives the share of the
+    /// renewals that is done.
     fn settle(
         &mut self,
         renewals: usize,
@@ -349,7 +352,7 @@ impl<'a> Search<'a> {
         self.shots.par_iter().zip(&place.starts).map(one).collect()
     }
 
-    /// Half the sum of all weighted squares.
+    /// Half the weighted sum of squares of residuals, initial-state errors and deviations from the prior means.
     fn cost(&self, place: &Place) -> f64 {
         let residuals = self.residuals_at(place);
         let data: f64 = (self.shots.iter().zip(&residuals).zip(&place.starts))

@@ -6,22 +6,22 @@ use greylag_physics::effects::Description;
 use greylag_physics::formula::register;
 use greylag_physics::inputs;
 
-/// Coefficients of added effects that are held at their starting values: fractions that cannot be identified beside
-/// the shape they scale.
+/// Coefficients of added effects that are held at their starting values: fractions that cannot be identified together with
+/// the shape that they scale.
 const HELD: &[&str] = &["lift_stall.k"];
-/// Effects without a formula of their own (curves). Their ordinates have a narrow prior about their starting values, which
-/// decides where few data lie.
+/// Effects that are curves without a formula. Their ordinates have a narrow prior about their starting values. This prior
+/// determines the curve in ranges with few data.
 pub(super) const SLIGHT: &[&str] = &["lift_curve", "drag_curve"];
-/// Prior width of an ordinate of those effects, as a share of its range.
+/// Prior standard deviation of an ordinate of a curve, as a share of the range of its bounds.
 const SLIGHT_SHARE: f64 = 0.1;
-/// Pairs of such an effect and the effect whose shape it takes over: the constants of that formula are held, since
-/// the curve can represent any change of them.
+/// Pairs of a curve and an effect with a formula of the same shape. The shape constants of the formula are held, because the
+/// curve can represent any change of them.
 const TAKES_OVER: &[(&str, &str)] = &[("lift_curve", "lift_stall")];
-/// Finite-difference step of a coefficient with a prior, as a share of its prior width.
+/// Finite-difference step of a coefficient with a prior, as a share of its prior standard deviation.
 const STEP: f64 = 1e-3;
 /// Finite-difference step of a shape constant or of an input effect's constant, as a share of its value.
 const SHAPE_STEP: f64 = 0.02;
-/// Largest change of such a constant in one iteration, as a share of its value.
+/// Largest change of a shape constant in one iteration, as a share of its value.
 const SHAPE_STRIDE: f64 = 0.4;
 
 /// A coefficient that the fit estimates.
@@ -33,23 +33,23 @@ pub(super) struct Free {
     pub name: String,
     /// Meaning, with its unit.
     pub meaning: &'static str,
-    /// Prior mean and standard deviation.
+    /// Prior mean; `width` is the prior standard deviation.
     pub prior: f64,
     pub width: f64,
     /// Physically possible range.
     pub bounds: (f64, f64),
-    /// Finite-difference step of its derivatives.
+    /// Finite-difference step of the derivatives with respect to the coefficient.
     pub step: f64,
     /// Largest change in one iteration.
     pub stride: f64,
-    /// Whether the model is linear in it.
+    /// Whether the model is linear in the coefficient.
     pub linear: bool,
-    /// Whether it belongs to an input effect, between measured and acting deflections.
+    /// Whether the coefficient belongs to an input effect, which converts measured to acting deflections.
     pub input: bool,
-    /// Whether it changes the acting deflections for given measured ones, or the state of a formula's lags and
-    /// delays.
+    /// Whether the coefficient changes the acting deflections for given measured deflections, or the state of a formula's lags
+    /// and delays.
     pub acting: bool,
-    /// Whether it belongs to an effect that is being added.
+    /// Whether the coefficient belongs to an added effect.
     pub added: bool,
 }
 
@@ -63,10 +63,11 @@ fn remembers(id: &str) -> bool {
     register::find(id).is_some_and(|effect| !effect.memories().is_empty())
 }
 
-/// The free coefficients of `model`; `added` are the ids of new effects.
+/// The free coefficients of `model`; `added` are the identifiers of added effects.
 ///
-/// A coefficient with a prior is held if its width is zero; one of a new effect has no prior but its bounds, or a
-/// share of them. Constants of a formula whose shape a curve takes over are held.
+/// A coefficient with a prior is held if its prior standard deviation is zero. The prior standard deviation of a coefficient
+/// of an added effect is the range of its bounds, or a share of this range for a curve. The shape constants of a formula are
+/// held if a curve replaces its shape.
 pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
     let linear = model.linear();
     let named = model.coefficients().iter().zip(linear).enumerate();
@@ -111,8 +112,8 @@ pub(super) fn free(model: &GreyBox, added: &[&str]) -> Vec<Free> {
         .collect()
 }
 
-/// `model` with physical bounds as its only prior: every coefficient that the model is linear in has a prior as wide
-/// as its bounds, zero or not.
+/// `model` with physical bounds as its only prior. Every coefficient in which the model is linear, zero or not, has the range
+/// of its bounds as prior standard deviation.
 pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     let linear = model.linear();
     let names: Vec<&str> = model.coefficients().iter().map(|c| c.name.as_str()).collect();
@@ -127,7 +128,7 @@ pub(super) fn from_scratch(model: &GreyBox) -> GreyBox {
     model.clone().with_widths(range)
 }
 
-/// Coefficients of `model` that no fit changes, because they are zero and their file states no standard deviation.
+/// Names of the coefficients of `model` that no fit changes: they are zero, and their file states no standard deviation.
 pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     let held = model.coefficients().iter().filter(|c| c.width() == 0.0 && c.sd.is_none());
     let known =
@@ -135,7 +136,7 @@ pub(super) fn held_at_zero(model: &GreyBox) -> Vec<String> {
     known.map(|c| c.name.clone()).collect()
 }
 
-/// Effects of `model` whose shape constants are held, each with the curve that takes their shape over.
+/// Effects of `model` whose shape constants are held, each with the curve that replaces its shape.
 pub(super) fn taken_over(model: &GreyBox) -> impl Iterator<Item = (&'static str, &'static str)> {
     let both = TAKES_OVER.iter().filter(|(by, of)| model.has(by) && model.has(of));
     both.map(|(by, of)| (*of, *by))
@@ -152,8 +153,10 @@ pub(super) fn with(model: &GreyBox, free: &[Free], values: &[f64]) -> GreyBox {
     changed
 }
 
-/// The models perturbed in coefficient `place` of `values`, and the difference between them: central for coefficients
-/// that the model is not linear in, else one-sided with `None` for the present model.
+/// Models with the free coefficient number `place` perturbed about `values`, and the difference of the coefficient.
+///
+/// Differences are one-sided for coefficients in which the model is linear; the first model is then `None`. They are central
+/// for all other coefficients.
 pub(super) fn beside(
     model: &GreyBox,
     free: &[Free],

@@ -1,4 +1,4 @@
-//! Quick estimates by equation error, before free runs have been fitted.
+//! Fast estimates: a fit without added effects, and equation-error estimates with added effects.
 
 use rayon::prelude::*;
 
@@ -14,19 +14,19 @@ use crate::flight_path::reconstruction::Reconstruction;
 use crate::progress::Progress;
 use greylag_model::GreyBox;
 
-/// A model estimated by equation error alone, from forces and moments without free runs.
+/// A model estimated by equation error only, from forces and moments without free runs.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// The estimated model.
     pub model: GreyBox,
-    /// Its free-run errors on the flights held out, at the horizons of [`Options`].
+    /// Free-run errors of the model on the held-out flights, at the default horizons of [`Options`].
     pub after: Vec<HorizonScore>,
 }
 
-/// Tunes `model` to `flights`, no effect added: the value of [`Options::tuned`].
+/// Fits the coefficients of `model` to `flights` without added effects: the value of [`Options::tuned`].
 ///
 /// # Errors
-/// The flights do not allow a fit, or `progress` cancelled.
+/// The flights do not allow a fit (see `AmendError`), or `progress` cancelled.
 pub fn tune(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -35,7 +35,7 @@ pub fn tune(
     output_error::fit(model, &ready(model, flights)?, &FitOptions::default(), progress)
 }
 
-/// Estimates `model` with `effects` by equation error over `flights` and scores its free runs on `held_out`.
+/// Estimates `model` with `effects` by equation error over `flights`, and computes its free-run errors on `held_out`.
 ///
 /// # Errors
 /// An effect cannot join the model, or the sampling interval of a flight is not usable.

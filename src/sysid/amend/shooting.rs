@@ -1,4 +1,4 @@
-//! Shots: short free runs from reconstructed states on recorded deflections.
+//! Shots: short free runs that start at reconstructed states and use recorded deflections.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,25 +10,25 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Memory};
 use greylag_physics::{Controls, State};
 
-/// A run has diverged once its scaled error exceeds this.
+/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this bound.
 const LEFT: f64 = 0.7;
 /// Shortest shot that is fitted, s.
 pub(super) const SHORTEST_S: f64 = 0.4;
 
-/// A shot: a stretch of a flight that the model flies freely.
+/// A shot: a part of a segment that a free run of the model covers.
 #[derive(Clone, Debug)]
 pub(super) struct Shot {
     pub flight: usize,
     pub segment: usize,
-    /// Its first sample in the segment.
+    /// Index of the initial sample in the segment.
     pub start: usize,
-    /// Number of compared samples, those after the first.
+    /// Number of compared samples; the initial sample is not compared.
     pub steps: usize,
-    /// Weight in the cost; 1 for a shot that the model can follow.
+    /// Weight in the cost, 0 to 1; less than 1 for an outlying shot.
     pub weight: f64,
 }
 
-/// Cuts the flights into shots of about `length_s`.
+/// Cuts the flights into shots of about `length_s` (s).
 pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
     let mut shots = Vec::new();
     for (flight, Flight { prepared, .. }) in flights.iter().enumerate() {
@@ -50,8 +50,8 @@ pub(super) fn cut(flights: &[Flight], length_s: f64) -> Vec<Shot> {
     shots
 }
 
-/// Deflections that act during each model step of each segment of a flight under `model`, the record corrected for
-/// the delay and blur in `sensors`.
+/// Deflections that act during each model step of each segment of a flight under `model`. The recorded deflections are
+/// corrected for the delay and blur in `sensors`.
 pub(super) fn acting(
     model: &GreyBox,
     flight: &Prepared,
@@ -82,8 +82,8 @@ fn act(
     (0..segment.len() * flight.substeps).map(one).collect()
 }
 
-/// Deflections at `place` (samples) by cubic interpolation, whose derivative is continuous, less `blur` times the
-/// second difference, which undoes the recording's average.
+/// Deflections at `place` (in samples) by cubic interpolation with a continuous derivative. `blur` times the second difference
+/// is subtracted to correct for the averaging by the recorder.
 fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     let last = segment.len() as f64 - 1.0;
     let place = place.clamp(0.0, last);
@@ -105,12 +105,12 @@ fn between(segment: &[Instant], place: f64, blur: f64) -> Controls {
     }
 }
 
-/// Change of the state for a unit of each misalignment angle.
+/// Changes of the state per rad of each misalignment angle.
 pub(super) fn turned(flight: &Prepared, state: &[f64; 8]) -> [[f64; 8]; askew::NAMES.len()] {
     askew::state(&flight.turning, state)
 }
 
-/// Offsets that a flight's sensors add to the state, with the constants and axes of `own`.
+/// Errors that a flight's sensors add to the state, from the sensor constants and misalignment angles of `own`.
 pub(super) fn offset(flight: &Prepared, own: &Own, state: &[f64; 8]) -> [f64; 8] {
     let sensors = &own.sensors;
     let mut offset = [0.0; 8];
@@ -126,14 +126,14 @@ pub(super) fn offset(flight: &Prepared, own: &Own, state: &[f64; 8]) -> [f64; 8]
     offset
 }
 
-/// Initial state of a shot: the reconstruction, less the sensors' offsets, plus `from`.
+/// Initial state of a shot: reconstructed state less the sensors' errors plus `from`.
 pub(super) fn start(shot: &Shot, flight: &Prepared, own: &Own, from: &[f64; 8]) -> [f64; 8] {
     let measured = flight.segments[shot.segment][shot.start].state.to_array();
     let offset = offset(flight, own, &measured);
     std::array::from_fn(|k| measured[k] - offset[k] + from[k])
 }
 
-/// States of a run after each sample; fewer than the shot's samples if the run diverges.
+/// States of a free run at the compared samples of a shot; fewer states if the run diverges.
 pub(super) fn fly(
     model: &GreyBox,
     flight: &Prepared,
@@ -151,7 +151,7 @@ pub(super) fn fly(
         steps.iter().fold(state, |s, controls| model.step(&s, controls, altitude, memory))
     };
     if let Some(before) = shot.start.checked_sub(1) {
-        // the integrator remembers the step before
+        // the integrator uses the acceleration of the preceding step
         advance(before, segment[before].state, &mut memory);
     }
     let mut state = State::from_array(start);
@@ -161,7 +161,7 @@ pub(super) fn fly(
         let now = state.to_array();
         let error = error(&segment[k + 1].state.to_array(), &now);
         let mean = error.iter().zip(&scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0;
-        // a NaN ends the run too
+        // NaN also ends the run
         if mean.is_nan() || mean > LEFT * LEFT {
             break;
         }
@@ -170,15 +170,15 @@ pub(super) fn fly(
     path
 }
 
-/// Predicted − measured, roll wrapped to ±π. Weak form and report use the opposite sign.
+/// Predicted − measured states, in the units of the state, with roll wrapped to ±π. Weak form and report use the opposite sign.
 pub(super) fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error
 }
 
-/// Predicted − measured after each sample of a shot, the sensors' offsets included; after divergence the last error
-/// is held. `scale` is x_c.
+/// Predicted − measured at the compared samples of a shot, with the sensors' errors added to the prediction. The last error
+/// before divergence is held. `scale` is x_c.
 pub(super) fn residuals(
     flight: &Prepared,
     shot: &Shot,
@@ -187,7 +187,7 @@ pub(super) fn residuals(
     path: &[[f64; 8]],
 ) -> Vec<[f64; 8]> {
     let segment = &flight.segments[shot.segment];
-    // a run that diverges at its first step gets the error at which a run counts as diverged
+    // a run that diverges in its first step has the errors at which a run counts as diverged
     let mut last = scale.map(|x| LEFT * x);
     (0..shot.steps)
         .map(|k| {
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_record_of_means_is_undone() {
-        // 3 Hz at 100 samples a second; a record late by half a sample that is the mean of the two beside it
+        // 3 Hz at 100 samples a second; each record is the mean of two adjacent samples and therefore half a sample late
         let true_value = |k: usize| (0.19 * k as f64).sin();
         let instant = |k: usize| {
             let aileron = 0.5 * (true_value(k) + true_value(k.saturating_sub(1)));
@@ -231,7 +231,7 @@ mod tests {
                 |k: usize| (between(&record, k as f64 + 0.5, blur).aileron - true_value(k)).abs();
             (10..50).map(error).fold(0.0, f64::max)
         };
-        // the mean takes (0.19)²/8 = 0.5 %; undone to second order, 0.19⁴ · 5/128 = 5e-5 is left
+        // the mean reduces the amplitude by (0.19)²/8 = 0.5 %; after the second-order correction, 0.19⁴ · 5/128 = 5e-5 remain
         assert!(worst(0.0) > 4e-3, "{}", worst(0.0));
         assert!(worst(0.125) < 2e-4, "{}", worst(0.125));
     }

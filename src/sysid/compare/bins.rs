@@ -1,4 +1,4 @@
-//! Mean residuals over the regime variables, with intervals and support.
+//! Mean residuals of a channel in bins of the regime variables, with 95 % intervals and numbers of independent samples.
 
 use super::bootstrap::{self, BLOCK_S, Block};
 use super::doubt::{self, NORMAL_95, Shift};
@@ -8,14 +8,14 @@ use crate::weak_form::prepared::Prepared;
 use crate::weak_form::windows::Series;
 use greylag_num::statistics::{mean, quantile};
 
-/// Fewest independent samples that support a bin.
+/// Smallest number of independent samples with which a bin counts as supported.
 pub const SUPPORT: usize = 20;
-/// Number of bins intended between the outermost edges.
+/// Intended number of bins between the outermost edges.
 const BINS: f64 = 8.0;
-/// Number of bins intended along each side of the α–β map.
+/// Intended number of bins along each side of the α–β map.
 const MAP_BINS: f64 = 10.0;
 
-/// Residual of a window with its regime, over all flights.
+/// Residual of one channel in one window, with the window's regime variables.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
     /// Measured − model, in the channel's unit.
@@ -24,13 +24,13 @@ pub struct Residual {
     pub measured: f64,
     /// Index of the window's flight.
     pub flight: usize,
-    /// Index of its bootstrap block, ascending.
+    /// Index of the window's bootstrap block, ascending over all flights.
     pub block: usize,
-    /// Values of the regime variables, in the order of [`RegimeVariable::CONTINUOUS`].
+    /// Values of the regime variables, in the order and units of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
-    /// Number of independent samples it represents: the stride over the kernel's length.
+    /// Number of independent samples that the window represents: stride of the windows divided by the kernel's length.
     pub weight: f64,
-    /// Change of the residual for one standard deviation of each of the flight's sensor errors.
+    /// Change of the residual for one standard deviation of each sensor constant of the flight, in the channel's unit.
     pub shift: Shift,
 }
 
@@ -64,13 +64,15 @@ pub fn residuals(
     all
 }
 
-/// Number of independent samples in `residuals`.
+/// Number of independent samples in `residuals`, rounded down.
 pub fn independent<'a>(residuals: impl Iterator<Item = &'a Residual>) -> usize {
     residuals.map(|r| r.weight).sum::<f64>().floor() as usize
 }
 
-/// Mean residual and its 95 % interval: block bootstrap, widened by the uncertainty of the sensor errors; `path`
-/// selects the bootstrap's random stream.
+/// Mean residual and its 95 % interval.
+///
+/// The interval is that of the block bootstrap, widened by the uncertainty of the sensor errors. `seed` and `path` select
+/// the bootstrap's random stream.
 pub fn mean_interval<'a>(
     residuals: impl Iterator<Item = &'a Residual> + Clone,
     seed: u64,
@@ -86,7 +88,7 @@ pub fn mean_interval<'a>(
     (mean, [mean - (mean - low).hypot(doubt), mean + (high - mean).hypot(doubt)])
 }
 
-/// Bins over every variable that varies in the flights.
+/// Bins over every regime variable that varies in the flights, and over the flights if there are several.
 pub fn all(
     residuals: &[Residual],
     flights: &[Prepared],
@@ -150,7 +152,7 @@ fn by_flight(residuals: &[Residual], flights: &[Prepared], seed: u64, channel: u
     }
 }
 
-/// Statistics of a bin; the caller sets its edges.
+/// Statistics of a bin. The caller sets the edges and the centre.
 fn statistics(members: &[&Residual], seed: u64, path: &[u64]) -> Bin {
     let (mean, interval) = mean_interval(members.iter().copied(), seed, path);
     let independent = independent(members.iter().copied());
@@ -184,13 +186,14 @@ fn explained(groups: &[Vec<&Residual>]) -> f64 {
     if share.is_finite() && count > k { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Share of the samples in each end bin: enough for support, within 2 to 20 %.
+/// Share of the samples in each end bin: 1.2 times the share that supports a bin, limited to 2 to 20 %.
 fn tail(independent: usize) -> f64 {
     (1.2 * SUPPORT as f64 / independent as f64).clamp(0.02, 0.2)
 }
 
-/// Share of the variance that a straight line over `values` explains; bins are too coarse where a few extreme values
-/// carry the error.
+/// Share of the variance that a straight line over `values` explains, adjusted for its two parameters.
+///
+/// Bins are too coarse if a few extreme values cause most of the variance.
 fn along_a_line(values: &[f64], residuals: &[Residual]) -> f64 {
     let (mx, my) =
         (mean(values), residuals.iter().map(|r| r.value).sum::<f64>() / values.len() as f64);
@@ -218,7 +221,7 @@ fn edges(values: &[f64], bins: f64, tail: f64) -> Option<Vec<f64>> {
     Some((first..=last).map(|k| k as f64 * width).collect())
 }
 
-/// The nearest of 1, 2 or 5 times a power of ten.
+/// `width` rounded to 1, 2 or 5 times a power of ten.
 fn round_width(width: f64) -> f64 {
     let power = 10_f64.powf(width.log10().floor());
     let lead = width / power;
@@ -234,7 +237,7 @@ fn round_width(width: f64) -> f64 {
         }
 }
 
-/// Mean residual over α and β.
+/// Mean residual in cells of α and β.
 pub fn map(residuals: &[Residual]) -> Map {
     let (alpha, beta) = (side(residuals, 0), side(residuals, 1));
     let (columns, rows) = (alpha.len() - 1, beta.len() - 1);
@@ -261,8 +264,10 @@ pub fn map(residuals: &[Residual]) -> Map {
     Map { alpha_deg: alpha, beta_deg: beta, cells }
 }
 
-/// Edges of one side of the map: those between the 2 % and 98 % quantiles, and one more cell at each end. Values beyond
-/// lie outside the map. A nearly constant variable has a single cell of 1°.
+/// Edges of the map's cells along regime variable `v` (0: α, 1: β), °.
+///
+/// The edges lie between the 2 % and 98 % quantiles. One more cell is added at each end, and values beyond it are left out
+/// of the map. A nearly constant variable has a single cell of 1°.
 fn side(residuals: &[Residual], v: usize) -> Vec<f64> {
     let values: Vec<f64> = residuals.iter().map(|r| r.regime[v]).collect();
     let mut edges = edges(&values, MAP_BINS, 0.02).filter(|e| e.len() > 1).unwrap_or_default();
@@ -291,7 +296,7 @@ mod tests {
     #[test]
     fn a_step_over_alpha_is_explained_by_alpha_and_not_by_time() {
         let residual = |i: usize| {
-            // a permutation, so that alpha and time are unrelated
+            // a permutation: alpha and time are not correlated
             let alpha = (i * 37 % 100) as f64 / 10.0;
             let mut regime = [0.0; 13];
             (regime[0], regime[12]) = (alpha, i as f64);

@@ -1,4 +1,4 @@
-//! Block bootstrap of a mean, for samples that follow one another in time.
+//! Block bootstrap of the mean of samples that are correlated in time.
 
 use rand::RngExt;
 
@@ -19,7 +19,7 @@ pub struct Block {
     pub count: f64,
 }
 
-/// Groups pairs `(block, value)`, ascending in block, into blocks.
+/// Sums the values of each block. The pairs `(block, value)` must be in ascending order of the block's index.
 pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     let mut current = None;
@@ -36,8 +36,9 @@ pub fn blocks(values: impl Iterator<Item = (usize, f64)>) -> Vec<Block> {
     blocks
 }
 
-/// 95 % percentile interval of the mean by resampling whole `blocks`; `seed` and `path` select the random stream. NaN
-/// for fewer than two blocks.
+/// 95 % percentile interval of the mean by resampling whole `blocks`. NaN for fewer than two blocks.
+///
+/// `seed` and `path` select the random stream.
 pub fn interval(blocks: &[Block], seed: u64, path: &[u64]) -> [f64; 2] {
     if blocks.len() < 2 {
         return [f64::NAN; 2];
@@ -63,8 +64,8 @@ mod tests {
 
     #[test]
     fn intervals_cover_the_mean_of_blocky_noise_about_as_often_as_they_say() {
-        // 5 equal samples a block: an interval that took samples for independent would be
-        // sqrt(5) too narrow and cover about 62 %
+        // 5 equal samples a block: an interval that treated the samples as independent would be too narrow by the factor
+        // sqrt(5) and cover the mean in about 62 %
         let covered = (0..200)
             .filter(|&trial| {
                 let mut random = stream(trial, &[1]);
@@ -74,7 +75,7 @@ mod tests {
                 low <= 0.0 && 0.0 <= high
             })
             .count();
-        // 95 % nominal; percentile intervals of 60 blocks are a little narrow; 3 binomial sd is 5 %
+        // nominal coverage 95 %; intervals from 60 blocks are slightly too narrow; 3 binomial standard deviations are 5 %
         assert!((178..=200).contains(&covered), "{covered} of 200");
         assert!(interval(&blocks([(3, 1.0)].into_iter()), 1, &[]).iter().all(|x| x.is_nan()));
     }

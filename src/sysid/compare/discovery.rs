@@ -2,8 +2,8 @@
 //!
 //! A cell is a channel in a bin of a regime variable. A model has several hundred cells. By chance, one in twenty of them
 //! has a 95 % interval that excludes zero. Benjamini and Hochberg's procedure (J. R. Stat. Soc. B 57, 1995, p. 289) limits
-//! the expected share of such cells among the reported ones to the given level. Cells that share windows depend
-//! positively on one another, which the procedure allows (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p. 1165).
+//! the expected share of such cells among the reported ones to 5 %. Cells that share windows are positively dependent.
+//! The procedure remains valid under positive dependence (Benjamini and Yekutieli, Ann. Stat. 29, 2001, p. 1165).
 
 use super::doubt::NORMAL_95;
 use super::result::{Bin, RegimeBins};
@@ -11,7 +11,7 @@ use super::result::{Bin, RegimeBins};
 /// False discovery rate among the cells reported as failing.
 pub const FALSE_SHARE: f64 = 0.05;
 
-/// Computes the q-value of every supported cell of a model; the others keep NaN.
+/// Sets the q-value of every supported cell of a model. The q-values of other cells stay NaN.
 pub fn control(channels: &mut [Vec<RegimeBins>]) {
     let mut cells: Vec<&mut Bin> = channels
         .iter_mut()
@@ -28,13 +28,14 @@ pub fn control(channels: &mut [Vec<RegimeBins>]) {
     }
 }
 
-/// Whether a cell is one of those in which the model fails.
+/// Whether the model fails in a cell: the q-value is at most `FALSE_SHARE`.
 pub fn found(bin: &Bin) -> bool {
     bin.q_value <= FALSE_SHARE
 }
 
-/// Two-sided p-value of a zero mean, taking the half of the interval that faces zero as 1.96 standard deviations of a
-/// normal distribution.
+/// Two-sided p-value of the hypothesis that the mean is zero.
+///
+/// The half of the 95 % interval that faces zero is taken as 1.96 standard deviations of a normal distribution.
 fn p_value(bin: &Bin) -> f64 {
     let [low, high] = bin.interval;
     let half = if bin.mean > 0.0 { bin.mean - low } else { high - bin.mean };
@@ -49,7 +50,7 @@ mod tests {
     use crate::weak_form::channels::RegimeVariable;
     use greylag_num::stream::stream;
 
-    /// Cells of noise of unit standard deviation, the first `real` of them about 4.
+    /// Cells whose means have unit standard deviation; the first `real` cells have the expected mean 4, the others 0.
     fn cells(trial: u64, real: usize) -> Vec<RegimeBins> {
         let mut random = stream(trial, &[3]);
         let mut bin = |k: usize| {
@@ -85,9 +86,9 @@ mod tests {
             shares += wrong as f64 / named.len().max(1) as f64;
             hits += named.len() - wrong;
         }
-        // 0.05 × 180 / 200 is what is expected; its standard error over 200 trials is 0.004
+        // the expected share is 0.05 × 180 / 200; its standard error over 200 trials is 0.004
         assert!(shares / 200.0 < 0.06, "{}", shares / 200.0);
-        // without this control, 95 % intervals would name 9 false cells a trial, a third of all named
+        // without the procedure, 95 % intervals would report 9 false cells a trial, a third of all reported cells
         assert!(hits as f64 / (200.0 * 20.0) > 0.85, "{hits}");
     }
 

@@ -1,8 +1,8 @@
 //! Effect of uncertain sensor errors on each channel's residual.
 //!
-//! An error of a bias estimated by the reconstruction shifts every window of its flight alike, so a bootstrap over
-//! windows does not cover it. The constants are taken as independent, with the standard deviations of the
-//! reconstruction.
+//! The error of an estimated sensor bias shifts the residuals of all windows of a flight equally. A bootstrap over windows
+//! does not cover this shift. The sensor constants are treated as independent, with the standard deviations that the
+//! reconstruction states.
 
 use crate::flight_path::reconstruction::{Instant, Nuisance};
 use crate::weak_form::channels::ChannelId;
@@ -15,7 +15,8 @@ use greylag_physics::{Controls, State};
 /// Half width of a 95 % interval in standard deviations of a normal distribution.
 pub const NORMAL_95: f64 = 1.96;
 
-/// Applies an error of the given size to an instant; receives the rate of the controls, 1/s.
+/// Adds an error of a sensor constant to an instant. Arguments: the instant, the rates of the controls (rad/s, throttle 1/s),
+/// the size of the error in the constant's unit.
 type Move = fn(&mut Instant, &Controls, f64);
 
 /// Sensor constants that shift a residual.
@@ -38,7 +39,7 @@ const CONSTANTS: [(&str, Move); COUNT] = [
         i.controls.rudder += rate.rudder * by;
     }),
 ];
-/// Number of those constants.
+/// Number of sensor constants that shift a residual.
 pub const COUNT: usize = 12;
 
 /// Shift of a residual for one standard deviation of each constant, in the channel's unit.
@@ -46,8 +47,8 @@ pub type Shift = [f64; COUNT];
 
 /// Shifts of every channel's residual, `[window][channel]` in the order of [`ChannelId::ALL`].
 ///
-/// They are evaluated at the middle of each window, where the kernel is largest. Zero for a constant that `nuisances`
-/// does not hold.
+/// The shifts are evaluated at the middle of each window, where the kernel is largest. The shift of a constant that
+/// `nuisances` lacks is 0.
 pub fn shifts(
     model: &GreyBox,
     flight: &Prepared,
@@ -78,7 +79,7 @@ pub fn shifts(
     flight.windows.iter().map(|window| of_window(flight.samples(window))).collect()
 }
 
-/// Rates of the controls at sample `k`, 1/s, by central difference.
+/// Rates of the controls at sample `k` (rad/s, throttle 1/s), by central difference.
 fn controls_rate(samples: &[Instant], k: usize) -> Controls {
     let (a, b) = (&samples[k.saturating_sub(1)], &samples[(k + 1).min(samples.len() - 1)]);
     let time = b.time_s - a.time_s;
@@ -92,8 +93,9 @@ fn controls_rate(samples: &[Instant], k: usize) -> Controls {
     }
 }
 
-/// Standard deviation that the constants add to a mean of residuals, from pairs of flight and shift: shifts add up
-/// within a flight and are independent between flights.
+/// Standard deviation of a mean of residuals due to the constants' errors. `shifts` holds pairs of flight index and shift.
+///
+/// Shifts add up within a flight and are independent between flights.
 pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     let mut sums: Vec<Shift> = Vec::new();
     let mut count = 0.0;
@@ -108,7 +110,7 @@ pub fn deviation<'a>(shifts: impl Iterator<Item = (usize, &'a Shift)>) -> f64 {
     if square.is_finite() { square.sqrt() } else { 0.0 }
 }
 
-/// Root mean square over windows of the residual's standard deviation from all constants.
+/// Root mean square, over windows, of the residual's standard deviation due to the errors of all constants.
 pub fn level<'a>(shifts: impl Iterator<Item = &'a Shift>) -> f64 {
     let squares: Vec<f64> = shifts.map(|s| s.iter().map(|x| x * x).sum()).collect();
     if squares.is_empty() { 0.0 } else { mean(&squares).sqrt() }
@@ -122,9 +124,9 @@ mod tests {
     fn one_flight_adds_up_and_several_average_out() {
         let mut shift = [0.0; COUNT];
         (shift[6], shift[8]) = (3.0, 4.0);
-        // Ten windows of one flight move together; two constants add in squares.
+        // Ten windows of one flight shift equally; the squares of two constants' shifts add up.
         assert_eq!(deviation((0..10).map(|_| (0, &shift))), 5.0);
-        // Four flights with errors of their own: half of that.
+        // Four flights with independent errors: half the standard deviation.
         let four = deviation((0..40).map(|i| (i % 4, &shift)));
         assert!((four - 2.5).abs() < 1e-12, "{four}");
         assert_eq!(deviation(std::iter::empty()), 0.0);

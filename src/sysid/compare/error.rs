@@ -12,7 +12,7 @@ pub enum CompareError {
     /// No flight is given.
     #[error("nothing to compare with: name at least one flight log (--log)")]
     NoLog,
-    /// No log holds a usable flight.
+    /// No log holds a usable flight; the value is the reason for each log.
     #[error(
         "no flight to compare with: {0}; give a log in which the aircraft flies for some seconds without gaps"
     )]
@@ -20,11 +20,11 @@ pub enum CompareError {
     /// The sampling interval of a flight is not usable.
     #[error(transparent)]
     Clock(#[from] ClockError),
-    /// The horizon is outside the range that can be flown.
+    /// A horizon, s, is outside the range 0.01 to 600 s.
     #[error("horizon {0} s cannot be flown: give horizons from 0.01 to 600 s")]
     Horizon(f64),
-    /// The progress listener cancelled.
-    // not transparent: this error itself must stand in the chain of causes
+    /// The progress listener cancelled the comparison.
+    // not transparent: `Cancelled` must appear in the chain of error sources
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

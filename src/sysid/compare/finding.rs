@@ -1,5 +1,5 @@
-//! The worst regime of a channel: the variable that best separates the residual, with the range in which the model
-//! fails.
+//! The worst regime of a channel: the variable that explains most of the residual's variance, and the range of this variable
+//! in which the model fails.
 
 use super::bins::{self, Residual, SUPPORT};
 use super::discovery;
@@ -9,38 +9,42 @@ use crate::weak_form::prepared::Prepared;
 
 /// A variable must explain at least this share of the residual's variance to define a regime.
 const SHARE_FLOOR: f64 = 0.1;
-/// Time, altitude and flight must explain this much more than any other variable to define a regime.
+/// Time, altitude or flight must explain a share of the variance that is larger by this than that of any other variable to
+/// define a regime.
 const CIRCUMSTANCE_MARGIN: f64 = 0.15;
-/// A residual follows a variable that explains at least this much of its variance.
+/// A residual follows a variable that explains more than this share of its variance.
 const FOLLOWS: f64 = 0.5;
-/// A bin belongs to the worst range if its mean is at least this part of the worst bin's.
+/// An adjacent bin belongs to the worst range if its mean is at least this fraction of the worst bin's mean.
 const RANGE_PART: f64 = 0.5;
-/// Fewest independent samples for a flight to count as showing a regime.
+/// Smallest number of independent samples of a flight that can show a regime.
 const FLIGHT_SUPPORT: usize = 5;
 
 /// Trend of the residual along the variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trend {
-    /// The magnitude grows with the variable.
+    /// The magnitude of the residual grows with the variable.
     Grows,
-    /// The magnitude falls with the variable.
+    /// The magnitude of the residual falls with the variable.
     Falls,
-    /// The sign changes along the variable.
+    /// The sign of the residual changes along the variable.
     Reverses,
-    /// The error has no such trend.
+    /// The residual has none of these trends.
     None,
 }
 
 /// The worst regime with the residual's trend.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The regime, with its range and mean residual.
+    /// The regime with its range and mean residual.
     pub regime: Regime,
     /// Trend along its variable.
     pub trend: Trend,
 }
 
-/// The worst regime of a channel; `None` if the mean residual of no bin with enough samples differs from zero.
+/// The worst regime of a channel.
+///
+/// If no variable defines a regime, the regime is the whole of the flights. `None` if the mean residual of the whole flights
+/// does not differ from zero either, or has too few samples.
 pub fn worst(
     residuals: &[Residual],
     bins: &[RegimeBins],
@@ -70,7 +74,7 @@ pub fn worst(
     Some(Finding { regime, trend })
 }
 
-/// The variable that a residual mainly follows, whether or not some range of it is supported.
+/// The variable that a residual mainly follows, even if none of its bins has enough samples.
 pub fn follows(bins: &[RegimeBins]) -> Option<RegimeVariable> {
     most_informative(bins).filter(|b| b.explained > FOLLOWS).map(|b| b.variable)
 }
@@ -79,7 +83,8 @@ fn excludes_zero([low, high]: [f64; 2]) -> bool {
     low > 0.0 || high < 0.0
 }
 
-/// The variable that explains most; time, altitude and flight must exceed the others by `CIRCUMSTANCE_MARGIN`.
+/// Bins of the variable that explains the largest share of the variance. Time, altitude and flight must exceed the others by
+/// `CIRCUMSTANCE_MARGIN`.
 fn most_informative(bins: &[RegimeBins]) -> Option<&RegimeBins> {
     use RegimeVariable::{Altitude, Flight, Time};
     let worth = |b: &RegimeBins| {
@@ -98,14 +103,14 @@ fn is_constant(residuals: &[Residual], decisive: &RegimeBins) -> bool {
     decisive.explained * (square - mean * mean) < 0.1 * mean * mean
 }
 
-/// First and last of the adjacent bins around the most significant failure.
+/// Indices of the first and last of the adjacent bins around the bin that differs most significantly from zero.
 fn range(bins: &[Bin]) -> Option<(usize, usize)> {
     let sure = |b: &Bin| b.interval[0].abs().min(b.interval[1].abs());
     let peak = (0..bins.len())
         .filter(|&k| discovery::found(&bins[k]))
         .max_by(|&a, &b| sure(&bins[a]).total_cmp(&sure(&bins[b])))?;
     let worst = bins[peak].mean;
-    // neighbours with few samples may join: together with the worst bin they have enough
+    // adjacent bins with few samples may join the range: together with the worst bin they have enough samples
     let alike = |k: usize| bins[k].label.is_empty() && bins[k].mean / worst >= RANGE_PART;
     let from = (0..peak).rev().take_while(|&k| alike(k)).last().unwrap_or(peak);
     let to = (peak + 1..bins.len()).take_while(|&k| alike(k)).last().unwrap_or(peak);
@@ -115,7 +120,7 @@ fn range(bins: &[Bin]) -> Option<(usize, usize)> {
 fn lies_in(r: &Residual, variable: RegimeVariable, low: f64, high: f64) -> bool {
     let place = RegimeVariable::CONTINUOUS.iter().position(|v| *v == variable);
     let x = place.map_or(r.flight as f64, |v| r.regime[v]);
-    // an open end is NaN, which no number is below or above
+    // an open end is NaN, and comparisons with NaN are false
     !(x < low || x >= high)
 }
 
@@ -146,14 +151,15 @@ fn regime(
     }
 }
 
-/// (model − measured) / measured in %; NaN unless nine in ten measured values have one sign.
+/// (model − measured) / measured, from the means over the windows, %. NaN unless nine in ten measured values have the sign of
+/// their mean.
 fn relative_percent(inside: &[&Residual], mean: f64) -> f64 {
     let measured = inside.iter().map(|r| r.measured).sum::<f64>() / inside.len() as f64;
     let same = inside.iter().filter(|r| r.measured * measured > 0.0).count() as f64;
     if same >= 0.9 * inside.len() as f64 { -100.0 * mean / measured } else { f64::NAN }
 }
 
-/// Trend of the supported bins' means along the variable.
+/// Trend of the supported bins' means along the variable; none for fewer than four supported bins.
 fn trend(bins: &[Bin]) -> Trend {
     let known: Vec<&Bin> = bins.iter().filter(|b| b.supported).collect();
     if known.len() < 4 {
@@ -174,7 +180,7 @@ fn trend(bins: &[Bin]) -> Trend {
     }
 }
 
-/// Weighted correlation of the bins' centres with `y`.
+/// Correlation of the bins' centres with `y`, weighted by the numbers of independent samples.
 fn correlation(bins: &[&Bin], y: impl Fn(&Bin) -> f64) -> f64 {
     let weight = |b: &Bin| b.independent as f64;
     let total: f64 = bins.iter().map(|b| weight(b)).sum();

@@ -1,4 +1,4 @@
-//! The part of a comparison's result on one flight.
+//! Result of a comparison for one flight: samples, estimated sensor errors, trace.
 
 use crate::compare::result::{FlightResult, FlightTrace, NuisanceResult};
 use crate::flight_path::reconstruction::{Instant, Nuisance, Reconstruction};

@@ -1,4 +1,4 @@
-//! Baseline forecasts without aerodynamics.
+//! Baseline forecasts without aerodynamics: held state, straight flight, linear model (ARX).
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -8,13 +8,13 @@ use super::result::HorizonScore;
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::prepared::Prepared;
 
-/// Regressors of the linear model: the eight states, the four deflections, one.
+/// Number of regressors of the linear model: eight states, aileron, elevator, throttle, rudder and a constant.
 const REGRESSORS: usize = 13;
 /// Singular values below this share of the largest are treated as zero, for example those of a rudder that never
 /// moves.
 const RANK: f64 = 1e-9;
 
-/// Free-run error of a baseline forecast, over the same starts as those of the models.
+/// Free-run error of a baseline forecast, with the same starts as the free runs of the models.
 #[derive(Clone, Debug, Serialize)]
 pub struct ForecastResult {
     /// Name of the forecast.
@@ -27,10 +27,10 @@ pub struct ForecastResult {
 enum Forecast {
     /// The initial state is held.
     Hold,
-    /// Attitude, airspeed and flow angles are held at the initial values, rates are zero.
+    /// Attitude, airspeed and flow angles are held at their initial values. The body rates are zero.
     Straight,
-    /// A first-order linear model with the deflections as inputs (ARX), fitted by least squares. `forecasts` fits it to
-    /// the flights it is judged on, so its error is optimistic there.
+    /// A first-order linear model with the controls as inputs (ARX), fitted by least squares. The function `forecasts` fits
+    /// this model to the same flights on which it computes the error. This error is therefore optimistic.
     Linear(DMatrix<f64>),
 }
 
@@ -43,7 +43,7 @@ impl Forecast {
         }
     }
 
-    /// The state `dt` (s) after `state`, the deflections being those of `at`.
+    /// The state `dt` (s) after `state`, with the controls of `at`.
     fn next(&self, state: &[f64; 8], at: &Instant, dt: f64) -> [f64; 8] {
         match self {
             Forecast::Hold => *state,
@@ -58,7 +58,7 @@ impl Forecast {
         }
     }
 
-    /// One run from sample `start` of `segment`, sampled after each number of samples in `looks`.
+    /// One run from sample `start` of `segment`. The run is sampled after each number of steps in `looks`.
     fn run(
         &self,
         segment: &[Instant],
@@ -91,7 +91,8 @@ fn regressors(state: &[f64; 8], at: &Instant) -> [f64; REGRESSORS] {
     [roll, pitch, airspeed, p, q, r, alpha, beta, c.aileron, c.elevator, c.throttle, rudder, 1.0]
 }
 
-/// Coefficients of the rates of the eight states with respect to the regressors, by least squares over all `flights`.
+/// Coefficients of the rates of the eight states with respect to the regressors, by least squares over all `flights`. `None`
+/// if a coefficient is not finite.
 fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
     let mut gram = DMatrix::<f64>::zeros(REGRESSORS, REGRESSORS);
     let mut moments = DMatrix::<f64>::zeros(REGRESSORS, 8);
@@ -111,16 +112,16 @@ fn linear(flights: &[Prepared]) -> Option<DMatrix<f64>> {
     slopes.iter().all(|x| x.is_finite()).then_some(slopes)
 }
 
-/// Errors of all forecasts at the `horizons` (s), states over `scale`; the linear model is fitted to the same
-/// flights.
+/// Free-run errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The
+/// linear model is fitted to the same flights.
 pub fn forecasts(flights: &[Prepared], scale: [f64; 8], horizons: &[f64]) -> Vec<ForecastResult> {
     let linear = linear(flights).map(Forecast::Linear);
     let all = [Forecast::Hold, Forecast::Straight].into_iter().chain(linear);
     results(all, flights, scale, horizons)
 }
 
-/// Errors of all forecasts on `flights` at the `horizons` (s), states over `scale`; the linear model is fitted to the
-/// flights `seen`.
+/// Free-run errors of all forecasts on `flights` at the `horizons` (s). The errors of the states are divided by `scale`. The
+/// linear model is fitted to the flights `seen`.
 pub fn on_unseen(
     seen: &[Prepared],
     flights: &[Prepared],
@@ -147,7 +148,7 @@ fn results(
     .collect()
 }
 
-/// The runs of one flight, from the same starts as those of the models.
+/// The runs of one flight, with the same starts as the free runs of the models.
 fn flown(
     forecast: &Forecast,
     flight: &Prepared,
@@ -171,7 +172,7 @@ mod tests {
     use greylag_logs::Sampling;
     use greylag_physics::{Controls, State};
 
-    /// 20 s at 100 Hz in which each state follows its own linear law, the elevator moving.
+    /// 20 s at 100 Hz of linear pitch dynamics with a sinusoidal elevator; all other states are constant.
     fn flight() -> Prepared {
         let mut state = State::NEUTRAL.to_array();
         let instants = (0..2000).map(|k| {
@@ -211,9 +212,9 @@ mod tests {
         let all = forecasts(&[flight()], [1.0; 8], &[1.0, 5.0]);
         let at_5: Vec<f64> = all.iter().map(|f| f.free_run[1].rmse_scaled).collect();
         let [hold, straight, linear] = at_5[..] else { panic!("{at_5:?}") };
-        // pitch goes up and down by a tenth of a radian; throttle and airspeed never move
+        // pitch oscillates by 0.1 rad; throttle and airspeed are constant
         assert!(hold > 0.01 && straight > 0.01 && linear < 1e-6, "{at_5:?}");
-        // 20 s hold 7 starts, one every 3 s
+        // 20 s contain 7 starts, one every 3 s
         assert_eq!(all[0].free_run[0].runs, 7);
     }
 

@@ -12,10 +12,10 @@ use greylag_model::{GreyBox, Memory};
 use greylag_num::statistics::{mean, quantile};
 use greylag_physics::State;
 
-/// Time between starts, s.
+/// Time between the starts of two free runs, s.
 pub const START_EVERY_S: f64 = 3.0;
-/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this. At 1
-/// the error of every state equals its scale: 1 rad, V0, 2 V0/b and so on.
+/// A run has diverged once its scaled error (root mean square over the states of error / x_c) exceeds this bound. The scaled
+/// error is 1, for example, if the error of every state equals its scale x_c: 1 rad, V0, 2 V0/b and so on.
 pub const DIVERGENCE_BOUND: f64 = 1.0;
 /// Number of points of the growth curve.
 pub const GROWTH_POINTS: usize = 25;
@@ -27,17 +27,17 @@ pub(super) type Look = Option<[[f64; 8]; 2]>;
 pub struct Runs {
     /// Sampled times, s after the start, ascending.
     times: Vec<f64>,
-    /// Samples of each run, up to the end of the flight.
+    /// Samples of each run, up to the end of its segment.
     runs: Vec<Vec<Look>>,
     scale: [f64; 8],
 }
 
-/// The predicted states of runs restarted every [`START_EVERY_S`], laid out as
-/// [`FlightTrace`](super::result::FlightTrace).
+/// The predicted states of runs restarted every [`START_EVERY_S`], at the times of
+/// [`FlightTrace`](super::result::FlightTrace) and in the order and units of `State::NAMES`.
 pub type Trace = [Vec<f64>; 8];
 
 /// Free runs of `model` over all `flights`, sampled at the `horizons` (s) and at the points of the growth curve up to the
-/// longest horizon. Constants of a flight that the model's file states are applied to that flight.
+/// longest horizon. If the model's file states constants of a flight, they are applied to that flight.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
     let longest = horizons.iter().copied().fold(0.0, f64::max);
     let growth = (1..=GROWTH_POINTS).map(|k| longest * k as f64 / GROWTH_POINTS as f64);
@@ -105,8 +105,9 @@ pub struct Path {
     pub states: Trace,
 }
 
-/// Integrates `model` from the measured state at the sample nearest to `time_s`, for `seconds` or until the flight ends or
-/// the run diverges. `None` if no segment contains `time_s`.
+/// Integrates `model` from the measured state at the sample nearest to `time_s` (s on the log's clock).
+///
+/// The run ends after `seconds` (s), at the end of the segment or when it diverges. `None` if no segment contains `time_s`.
 pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64) -> Option<Path> {
     let known = KnownFlight::of(model, flight);
     let (model, flight) = known.as_ref().map_or((model, flight), |k| (&k.model, &k.flight));
@@ -130,7 +131,8 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     Some(path)
 }
 
-/// One run from sample `start`: its samples, and its path over the first `keep` samples.
+/// One run from sample `start`: the states after each number of steps in `looks`, and the predicted states of the first `keep`
+/// samples.
 fn run(
     model: &GreyBox,
     flight: &Prepared,
@@ -146,7 +148,7 @@ fn run(
         flight.advance(model, state, [&segment[k], next], memory)
     };
     if let Some(before) = start.checked_sub(1) {
-        // the integrator uses the acceleration of the step before
+        // the integrator uses the acceleration of the preceding step
         advance(before, segment[before].state, &mut memory);
     }
     let last = looks.last().map_or(0, |l| (start + l).min(segment.len() - 1));
@@ -173,20 +175,21 @@ fn run(
     (seen, path)
 }
 
-/// Predicted − measured, roll wrapped to ±π. Weak form and report use the opposite sign.
+/// Predicted − measured states, in the units of `State::NAMES`, with roll wrapped to ±π. Weak form and report use the opposite
+/// sign.
 pub fn error(measured: &[f64; 8], predicted: &[f64; 8]) -> [f64; 8] {
     let mut error: [f64; 8] = std::array::from_fn(|k| predicted[k] - measured[k]);
     error[0] = (error[0] + PI).rem_euclid(TAU) - PI;
     error
 }
 
-/// Root mean square of error / x_c over the eight states; NaN if the error of one is NaN.
+/// Root mean square of error / x_c over the eight states; NaN if the error of any state is NaN.
 pub(super) fn scaled(error: &[f64; 8], scale: &[f64; 8]) -> f64 {
     (error.iter().zip(scale).map(|(e, x)| (e / x).powi(2)).sum::<f64>() / 8.0).sqrt()
 }
 
 impl Runs {
-    /// Combines `runs`, each sampled at the `times` (s), states over `scale`.
+    /// Combines `runs`, each sampled at the `times` (s). `scale` is the scale x_c of each state.
     pub(super) fn new(times: Vec<f64>, runs: Vec<Vec<Look>>, scale: [f64; 8]) -> Runs {
         Runs { times, runs, scale }
     }
@@ -196,7 +199,7 @@ impl Runs {
         place.map_or(Vec::new(), |k| self.runs.iter().filter_map(|r| r.get(k).copied()).collect())
     }
 
-    /// Scaled error of each run at one time; a diverged run counts with [`DIVERGENCE_BOUND`].
+    /// Scaled error of each run at one time. The error of a diverged run is [`DIVERGENCE_BOUND`].
     fn errors(&self, looks: &[Look]) -> Vec<f64> {
         let one = |look: &Look| match look {
             Some([measured, predicted]) => scaled(&error(measured, predicted), &self.scale),
@@ -205,7 +208,7 @@ impl Runs {
         looks.iter().map(one).collect()
     }
 
-    /// The score at a horizon, s.
+    /// The errors at `horizon_s` (s), one of the sampled times.
     pub fn score(&self, horizon_s: f64) -> HorizonScore {
         let looks = self.at(horizon_s);
         let diverged = looks.iter().filter(|l| l.is_none()).count();
@@ -237,10 +240,10 @@ impl Runs {
         self.times.iter().map(point).filter(|p| p.runs > 0).collect()
     }
 
-    /// RMSE, R² and Theil's U with its shares for one state.
+    /// RMSE, R² and Theil's U with its shares for state number `k`.
     fn state_score(&self, k: usize, runs: &[[[f64; 8]; 2]]) -> StateScore {
         let measured: Vec<f64> = runs.iter().map(|r| r[0][k]).collect();
-        // from the error, so that a roll error across ±180° is the smaller angle
+        // measured plus wrapped error: a roll error across ±180° is then the smaller angle
         let predicted: Vec<f64> = runs.iter().map(|r| r[0][k] + error(&r[0], &r[1])[k]).collect();
         let errors: Vec<f64> = predicted.iter().zip(&measured).map(|(a, b)| a - b).collect();
         let rmse = root_mean_square(&errors);
@@ -298,7 +301,7 @@ mod tests {
         assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
         assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
         assert_eq!(score.states[2].rmse, 0.0);
-        // a roll of 179° predicted as −179° is 2° off
+        // a roll of 179° predicted as −179° has an error of 2°
         let e = error(&[179_f64.to_radians(); 8], &[-179_f64.to_radians(); 8]);
         assert!((e[0] - 2_f64.to_radians()).abs() < 1e-9);
     }

@@ -5,7 +5,8 @@ use super::result::{HorizonScore, KnownUse};
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// The constants of `flights` in the file of `model`, with the free-run errors without them; `None` if there are none.
+/// Flights with constants in the file of `model`, and the free-run errors without these constants at `horizons_s` (s). `None`
+/// if the file has no constants for these flights.
 pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option<KnownUse> {
     let (own, shared): (Vec<&Prepared>, Vec<_>) =
         flights.iter().partition(|f| model.known.names(&f.name));
@@ -23,7 +24,8 @@ pub fn used(model: &GreyBox, flights: &[Prepared], horizons_s: &[f64]) -> Option
 }
 
 impl KnownUse {
-    /// Sentence on the constants used, with the error `with` and without them at the longest horizon that a run reaches.
+    /// Sentence on the constants used, with the errors `with` and without the constants at the longest horizon that a run
+    /// reaches. `None` if no run reaches any horizon.
     pub fn sentence(&self, with: &[HorizonScore]) -> Option<String> {
         let both = with.iter().zip(&self.without).rfind(|(a, b)| a.runs > 0 && b.runs > 0)?;
         let mut what = Vec::new();
@@ -35,7 +37,7 @@ impl KnownUse {
         }
         let (with, without) = both;
         Some(format!(
-            "What the model's file knows of the flights is used ({}): the error over {} s is {:.5} with it, {:.5} without.",
+            "The flights' constants in the model's file are used ({}): the error over {} s is {:.5} with it, {:.5} without.",
             what.join("; "),
             with.horizon_s,
             with.rmse_scaled,

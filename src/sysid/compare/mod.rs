@@ -1,4 +1,4 @@
-//! Models against flights: the error of free runs, and the channels and regimes in which a model fails.
+//! Comparison of models with flights: free-run errors, and the channels and regimes in which a model fails.
 //!
 //! The method is described in `docs/explanation/comparison.md`. Models are compared as given, without tuning. The
 //! diagnosis of missing effects regresses on [`columns`](crate::weak_form::windows::columns).

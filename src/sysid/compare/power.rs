@@ -1,24 +1,24 @@
-//! Mean squares of a channel: measured, left over, noise.
+//! Mean squares of a channel: measured values, residuals and noise.
 
 use super::bins::Residual;
 
-/// An unexplained share has a meaning only if at least this part of the channel's variance exceeds the noise.
+/// The unexplained share is defined only if the channel's variance beyond noise is more than this share of its total variance.
 const EXCITED: f64 = 0.05;
 
-/// Mean squares of a channel.
+/// Mean squares of a channel, in its unit squared.
 pub struct Power {
     /// Variance of the measured channel.
     pub measured: f64,
     /// Mean square of the residual.
     pub residual: f64,
-    /// Variance that noise accounts for.
+    /// Variance of the sensor noise.
     pub noise: f64,
-    /// Share of the mean square residual that is its mean.
+    /// Share of the mean square residual due to the mean residual, 0 to 1.
     pub offset: f64,
 }
 
 impl Power {
-    /// Mean squares of the channel with these `residuals`, whose noise has the variance `noise`.
+    /// Mean squares of the channel with `residuals` and the noise variance `noise`.
     pub fn of(residuals: &[Residual], noise: f64) -> Power {
         let count = residuals.len() as f64;
         let mean = residuals.iter().map(|r| r.measured).sum::<f64>() / count;
@@ -32,7 +32,7 @@ impl Power {
         }
     }
 
-    /// Unexplained share of the variance beyond noise; NaN if the channel is not excited.
+    /// Unexplained share of the variance beyond noise; NaN if the variance hardly exceeds the noise.
     pub fn unexplained(&self) -> f64 {
         let signal = self.measured - self.noise;
         if signal > EXCITED * self.measured {

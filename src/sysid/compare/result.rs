@@ -1,7 +1,7 @@
 //! The result of a comparison, as plain data for the terminal, the JSON and the report.
 //!
-//! Residuals are measured − model: a positive one means that the model is too low. A number that does not exist is
-//! NaN, which JSON writes as `null`.
+//! Residuals are measured − model: a positive residual means that the model is too low. An undefined number is NaN, written
+//! as `null` in JSON.
 
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct Comparison {
     pub seed: u64,
     /// Short answer in sentences, with their numbers.
     pub answer: Answer,
-    /// Findings in sentences: those of the first model, the most important ones first.
+    /// Findings on the first model in sentences, in descending order of importance.
     pub sentences: Vec<String>,
     /// The models, in the order of the command line.
     pub models: Vec<ModelResult>,
@@ -30,7 +30,7 @@ pub struct Comparison {
     pub flights: Vec<FlightResult>,
     /// Settings that the figures depend on.
     pub settings: Settings,
-    /// Notes for the reader: what was skipped, assumed or lost.
+    /// Notes on skipped flights, assumptions and lost accuracy.
     pub notes: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ pub struct Settings {
     pub start_every_s: f64,
     /// Horizons of the free runs, s.
     pub horizons_s: Vec<f64>,
-    /// A free run has diverged once its scaled error exceeds this.
+    /// A free run has diverged once its scaled error exceeds this bound.
     pub divergence_bound: f64,
     /// Length of the Hann kernel of the weak form, s.
     pub kernel_s: f64,
@@ -70,7 +70,7 @@ pub struct Settings {
     pub block_s: f64,
     /// Number of resamples of the bootstrap.
     pub resamples: usize,
-    /// Fewest independent samples that support a bin.
+    /// Smallest number of independent samples with which a bin counts as supported.
     pub support: usize,
 }
 
@@ -79,18 +79,18 @@ pub struct Settings {
 pub struct ModelResult {
     /// Name of the model, from its file.
     pub name: String,
-    /// Findings in sentences, the most important ones first.
+    /// Findings in sentences, in descending order of importance.
     pub sentences: Vec<String>,
     /// Free-run error at each horizon.
     pub free_run: Vec<HorizonScore>,
-    /// Constants of the flights in the model's file, if it has any; `free_run` uses them.
+    /// Constants of the flights in the model's file, which `free_run` uses; `None` if the file has none for these flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownUse>,
     /// Growth of the free-run error with time, from the start to the longest horizon.
     pub growth: Vec<GrowthPoint>,
-    /// Channels D, L, Y, l, m, n and the rates of V, α, β, as far as the logs allow.
+    /// Channels D, L, Y, l, m, n and the rates of V, α, β that the logs measure.
     pub channels: Vec<ChannelResult>,
-    /// Its predictions over time, one entry a flight, in the order of [`Comparison::flights`].
+    /// Predictions over time, one entry a flight, in the order of [`Comparison::flights`].
     #[serde(skip)]
     pub traces: Vec<ModelTrace>,
 }
@@ -98,7 +98,7 @@ pub struct ModelResult {
 /// Constants of the flights in a model's file, and the errors of its free runs without them.
 #[derive(Clone, Debug, Serialize)]
 pub struct KnownUse {
-    /// Flights with constants of their own in the file (`[flights.NAME]`).
+    /// Flights with a table `[flights.NAME]` in the file.
     pub flights: Vec<String>,
     /// Other flights, for which the file's `[installation]` is used.
     pub by_installation: Vec<String>,
@@ -106,19 +106,19 @@ pub struct KnownUse {
     pub without: Vec<HorizonScore>,
 }
 
-/// Free-run error at one horizon: at that time after the start, over all starts.
+/// Free-run errors at one horizon over all runs that reach it.
 #[derive(Clone, Debug, Serialize)]
 pub struct HorizonScore {
     /// Time after the start, s.
     pub horizon_s: f64,
-    /// Number of runs for which the flights are long enough.
+    /// Number of runs that reach the horizon before their segment ends, including diverged runs.
     pub runs: usize,
     /// Number of those runs that have diverged by then.
     pub diverged: usize,
-    /// `diverged / runs`, 0..1.
+    /// `diverged / runs`, 0 to 1; NaN without runs.
     pub divergence_rate: f64,
-    /// Root mean square, over runs, of the scaled error: the root mean square over the eight states
-    /// of error / x_c (eq. 21). A diverged run counts with the divergence bound.
+    /// Root mean square, over runs, of the scaled error: the root mean square over the eight states of error / x_c (eq. 21). The
+    /// scaled error of a diverged run is the divergence bound.
     pub rmse_scaled: f64,
     /// Errors of each state over the runs that did not diverge.
     pub states: Vec<StateScore>,
@@ -133,16 +133,16 @@ pub struct StateScore {
     pub rmse: f64,
     /// Root mean square error divided by x_c.
     pub rmse_scaled: f64,
-    /// Coefficient of determination over the runs: 1 − mean square error / variance of the measured state at
-    /// that time. 1 is perfect; at 0 or below the measured mean is the better forecast.
+    /// Coefficient of determination over the runs: 1 − mean square error / variance of the measured state at the horizon. 1 is
+    /// perfect; at 0 or below, the mean of the measured states would be at least as good a forecast.
     pub r2: f64,
     /// Theil's U: RMSE / (RMS of measured + RMS of predicted), 0 (perfect) to 1.
     pub theil_u: f64,
     /// Share of the mean square error due to a constant offset, 0..1.
     pub bias_share: f64,
-    /// Share due to a difference in the amount of variation, 0..1.
+    /// Share of the mean square error due to different standard deviations of predicted and measured state, 0..1.
     pub variance_share: f64,
-    /// Share due to lack of correlation, 0..1; the three shares add up to 1.
+    /// Share of the mean square error due to lack of correlation, 0..1. The three shares add up to 1.
     pub covariance_share: f64,
 }
 
@@ -157,13 +157,13 @@ pub struct GrowthPoint {
     pub diverged: usize,
     /// Scaled error at this time, as [`HorizonScore::rmse_scaled`].
     pub rmse_scaled: f64,
-    /// Median over runs of the scaled error; a diverged run counts with the bound.
+    /// Median over runs of the scaled error. The scaled error of a diverged run is the divergence bound.
     pub median_scaled: f64,
-    /// 90 % quantile over runs of the scaled error; a diverged run counts with the bound.
+    /// 90 % quantile over runs of the scaled error. The scaled error of a diverged run is the divergence bound.
     pub p90_scaled: f64,
 }
 
-/// One channel of one model over all flights, in weak form: averages over the kernel.
+/// One channel of one model over all flights, in weak form: values are averages over the kernel.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChannelResult {
     /// Identifier of the channel.
@@ -178,22 +178,21 @@ pub struct ChannelResult {
     pub measured_sd: f64,
     /// Root mean square residual, in `unit`.
     pub residual_rms: f64,
-    /// Standard deviation of the residual that sensor noise accounts for, in `unit`.
+    /// Standard deviation of the residual due to sensor noise, in `unit`.
     pub noise_sd: f64,
-    /// Mean square residual less noise, divided by the measured variance less noise, 0 (the model
-    /// explains everything) upwards (over 1: worse than a constant). NaN if the flights do not move
-    /// the channel above the noise.
+    /// Mean square residual less noise, divided by the measured variance less noise. At 0 the model explains all variance
+    /// beyond noise; above 1 the model is worse than a constant. NaN if the measured variance hardly exceeds the noise.
     pub unexplained_fraction: f64,
-    /// Rate of the scaled state error (error / x_c) caused by the residual beyond noise, RMS, 1/s. Comparable between
-    /// channels.
+    /// RMS rate of the scaled state error (error / x_c) that the residual beyond noise causes, 1/s. The values of different
+    /// channels are comparable.
     pub effect_per_s: f64,
     /// Share of the mean square residual due to a constant offset, 0..1.
     pub offset_share: f64,
     /// The worst regime in one sentence.
     pub worst_regime: String,
-    /// Reason why these flights cannot judge the model in this channel; `None` if they can.
+    /// Reason why these flights do not suffice to assess the model in this channel; `None` if they suffice.
     pub abstained: Option<&'static str>,
-    /// The worst regime as numbers; `None` if no supported regime differs from zero.
+    /// The worst regime as numbers; `None` if the mean residual of no supported regime differs from zero.
     pub regime: Option<Regime>,
     /// Mean residual over each regime variable.
     pub bins: Vec<RegimeBins>,
@@ -201,14 +200,14 @@ pub struct ChannelResult {
     pub map: Map,
 }
 
-/// Whether a comparison can judge a model in one channel.
+/// Whether the flights suffice to assess a model in one channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Abstention {
-    /// Channel that is judged.
+    /// Channel that is assessed.
     pub channel: ChannelId,
-    /// Why the flights cannot judge the model here; `None` where they can.
+    /// Reason why the flights do not suffice; `None` if they suffice.
     pub why: Option<&'static str>,
-    /// Whether a regime with enough samples differs from the model beyond doubt.
+    /// Whether the mean residual differs significantly from zero in a regime with enough samples.
     pub sure_error: bool,
 }
 
@@ -221,10 +220,10 @@ pub struct RegimeBins {
     pub name: &'static str,
     /// Display unit of the variable: `°`, `°/s`, `m/s`, `m`, `s`, or empty.
     pub unit: &'static str,
-    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, adjusted for
-    /// their number of parameters, 0..1.
+    /// Share of the residual's variance that the bins or a straight line explain, whichever is larger, 0..1. The share is
+    /// adjusted for the number of parameters.
     pub explained: f64,
-    /// Bins in ascending order; for the variable flight, one each in the flights' order.
+    /// Bins in ascending order of the variable; for the variable flight, one bin a flight in the order of the flights.
     pub bins: Vec<Bin>,
 }
 
@@ -233,9 +232,9 @@ pub struct RegimeBins {
 pub struct Bin {
     /// Lower edge in the variable's unit; for the variable flight, the flight's index − 0.5. NaN if open.
     pub low: f64,
-    /// Upper edge; NaN if open.
+    /// Upper edge in the variable's unit; for the variable flight, the flight's index + 0.5. NaN if open.
     pub high: f64,
-    /// Mean of the variable over the bin's windows.
+    /// Mean of the variable over the bin's windows, in the variable's unit.
     pub center: f64,
     /// Name of the flight if the bins are flights; otherwise empty.
     pub label: String,
@@ -244,14 +243,14 @@ pub struct Bin {
     /// 95 % interval of the mean: block bootstrap, widened by the uncertainty of the sensor errors estimated by the
     /// reconstruction.
     pub interval: [f64; 2],
-    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model at least as
-    /// significant as this one; NaN without support. The model fails in cells of at most 0.05.
+    /// Benjamini–Hochberg q-value, 0..1: expected share of false discoveries among the cells of the model that are at least as
+    /// significant as this cell. NaN without support. The model fails in cells with a q-value of at most 0.05.
     pub q_value: f64,
     /// Mean of the measured channel, in its unit.
     pub measured: f64,
-    /// Number of independent samples: kernel lengths that the windows cover.
+    /// Number of independent samples: number of kernel lengths that the windows cover.
     pub independent: usize,
-    /// Whether there are enough independent samples ([`Settings::support`]); draw grey otherwise.
+    /// Whether there are enough independent samples ([`Settings::support`]).
     pub supported: bool,
 }
 
@@ -288,20 +287,20 @@ pub struct Regime {
     pub variable: Option<RegimeVariable>,
     /// Lower end in `unit`; NaN if open.
     pub low: f64,
-    /// Upper end; NaN if open.
+    /// Upper end in `unit`; NaN if open.
     pub high: f64,
     /// Unit of the ends.
     pub unit: &'static str,
-    /// Mean residual (measured − model) there, in the channel's unit.
+    /// Mean residual (measured − model) in the regime, in the channel's unit.
     pub mean: f64,
     /// 95 % interval of `mean`.
     pub interval: [f64; 2],
-    /// Relative error, model − measured over the measured mean there, %; NaN if the measured channel passes through
-    /// zero there.
+    /// Relative error (model − measured) / measured in the regime, from the means, %. NaN if the measured channel changes its
+    /// sign there.
     pub relative_percent: f64,
     /// Number of independent samples.
     pub independent: usize,
-    /// Names of the flights that show it.
+    /// Names of the flights in which the mean residual has the same sign, with enough samples.
     pub flights: Vec<String>,
 }
 
@@ -332,22 +331,22 @@ pub struct NuisanceResult {
     pub name: String,
     /// Estimate, in `unit`.
     pub value: f64,
-    /// Its standard deviation, in `unit`.
+    /// Standard deviation of the estimate, in `unit`.
     pub sd: f64,
     /// Unit of the values.
     pub unit: &'static str,
-    /// Prior mean; absent if it was not estimated along with the path.
+    /// Prior mean, in `unit`; `None` if the quantity was not estimated together with the path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<f64>,
-    /// Prior standard deviation.
+    /// Prior standard deviation, in `unit`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior_sd: Option<f64>,
-    /// Change from the prior mean, in standard deviations of the prior.
+    /// Estimate less prior mean, in prior standard deviations; `None` without a prior.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moved_sd: Option<f64>,
 }
 
-/// A flight over time. All lists have one length; a row of NaN stands between segments.
+/// A flight over time. All lists have the same length. A row of NaN follows each segment.
 #[derive(Clone, Debug, Default)]
 pub struct FlightTrace {
     /// Time on the log's clock, s, ascending.
@@ -361,8 +360,8 @@ pub struct FlightTrace {
 /// A model's predictions for one flight.
 #[derive(Clone, Debug, Default)]
 pub struct ModelTrace {
-    /// States of free runs restarted from the reconstruction every [`Settings::start_every_s`], at the times of
-    /// [`FlightTrace::time_s`]; NaN where there is none.
+    /// States of free runs that restart from the reconstruction every [`Settings::start_every_s`], at the times of
+    /// [`FlightTrace::time_s`]; NaN between segments and after divergence.
     pub states: [Vec<f64>; 8],
     /// The channels in weak form.
     pub channels: Vec<ChannelTrace>,
@@ -373,8 +372,8 @@ pub struct ModelTrace {
 pub struct ChannelTrace {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Middle of each window, s on the log's clock, ascending. Between segments, a row of NaN values stands one sample
-    /// before the next segment's first window.
+    /// Middle of each window, s on the log's clock, ascending. A row of NaN values separates two segments. Its time is one
+    /// sample before the first window of the next segment.
     pub time_s: Vec<f64>,
     /// Measured values, in the channel's unit.
     pub measured: Vec<f64>,

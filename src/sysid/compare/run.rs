@@ -1,4 +1,4 @@
-//! The comparison: evaluates every model over every flight and collects the findings.
+//! Comparison of every model with every flight: free runs, channel residuals and findings.
 
 use rayon::prelude::*;
 
@@ -30,9 +30,9 @@ use crate::weak_form::prepared::{ClockError, Prepared};
 use crate::weak_form::windows::{self, Series};
 use greylag_model::GreyBox;
 
-/// Reason for abstaining from a channel.
+/// Reasons why a channel is not assessed.
 const UNMOVED: &str = "these flights do not move it above the sensors' noise";
-const DOUBTFUL: &str = "the remaining errors of the sensors may account for all that is left";
+const DOUBTFUL: &str = "the uncertainty of the sensor errors may explain the whole residual";
 
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl Default for Options {
     }
 }
 
-/// Compares `models` with reconstructed `flights`; reports to `progress`, which may cancel.
+/// Compares `models` with reconstructed `flights`. `progress` receives the stages and may cancel.
 ///
 /// # Errors
 /// No model or flight is given, no log holds a usable flight, the sampling interval of a flight or a horizon is not
@@ -107,7 +107,7 @@ pub fn compare(
 /// Free-run errors of `model` over `flights`, one for each of `horizons_s` (s).
 ///
 /// # Errors
-/// The sampling interval of a flight is not usable.
+/// The sampling interval of a flight is not usable: see `ClockError`.
 pub fn scores(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -122,7 +122,8 @@ pub fn scores(
 
 type Usable<'a> = (Vec<&'a Reconstruction>, Vec<Prepared>, Vec<String>);
 
-/// The flights that can be compared, with notes on those left out.
+/// The flights that can be compared, with notes on the flights that are left out. `slowest` is the airspeed at which flight
+/// begins, m/s.
 fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, CompareError> {
     if flights.is_empty() {
         return Err(CompareError::NoLog);
@@ -142,7 +143,7 @@ fn usable(flights: &[Reconstruction], slowest: f64) -> Result<Usable<'_>, Compar
         }
         if flight.noise.iter().chain(&flight.force_noise).all(|sd| !sd.is_finite()) {
             notes.push(format!(
-                "{}: the sensors' noise is not known, so all that is left over counts as unexplained",
+                "{}: the sensors' noise is not known, so the whole residual counts as unexplained",
                 flight.name
             ));
         }
@@ -170,7 +171,7 @@ fn why_unusable(flight: &Reconstruction, slowest: f64) -> String {
     }
 }
 
-/// A note for each horizon that exceeds every stretch of flight.
+/// A note for each horizon (s) that is longer than the longest segment.
 fn short_of(flights: &[Prepared], horizons: &[f64]) -> Vec<String> {
     let longest = flights
         .iter()
@@ -215,11 +216,10 @@ fn one_model(
     }
 }
 
-/// Reasons why `flights` cannot judge `model`, channel by channel; `None` where they can, or where a channel was not
-/// measured.
+/// For each measured channel, the reason why `flights` do not suffice to assess `model`, if there is one.
 ///
 /// # Errors
-/// No flight can be compared.
+/// There is no flight, no flight is usable, or the sampling interval of a flight is not usable.
 pub fn abstentions(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -250,14 +250,14 @@ fn seen(model: &GreyBox, flights: &[Prepared], from: &[&Reconstruction]) -> Meas
     (series, shifts.collect())
 }
 
-/// Windows of the flights under one model, one list for each flight.
+/// Flights with the channels and residual shifts of one model, one entry for each flight.
 struct Seen<'a> {
     flights: &'a [Prepared],
     series: &'a [Vec<Series>],
     shifts: &'a [Vec<[Shift; ChannelId::ALL.len()]>],
 }
 
-/// The results of all channels that the flights hold.
+/// The results of all channels that the flights measure.
 fn all_channels(model: &GreyBox, seen: &Seen, seed: u64) -> Vec<ChannelResult> {
     let Seen { flights, series, shifts } = *seen;
     let cut = |(k, id): (usize, &ChannelId)| {
@@ -322,13 +322,13 @@ fn channel(
     }
 }
 
-/// Rate of the scaled state error for one unit of a channel, 1/s.
+/// Rate of the scaled state error (error / x_c) for one unit of a channel, 1/s per unit.
 fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     let [_, _, v, p, q, r, alpha, beta] = model.scale();
     let body = &model.body;
     match id {
         ChannelId::Drag => 1.0 / (body.mass * v),
-        // a force across the path turns it by force / (m V)
+        // a force F normal to the path turns the path at the rate F / (m V)
         ChannelId::Lift => 1.0 / (body.mass * v * alpha),
         ChannelId::Side => 1.0 / (body.mass * v * beta),
         ChannelId::Roll => 1.0 / (body.jx * p),
@@ -340,7 +340,7 @@ fn leverage(model: &GreyBox, id: ChannelId) -> f64 {
     }
 }
 
-/// Mean noise variance over the windows of all flights.
+/// Mean noise variance over the windows of all flights, in the channel's unit squared.
 fn noise(id: ChannelId, series: &[Vec<Series>]) -> f64 {
     let own = || series.iter().flatten().filter(|s| s.channel == id);
     let windows = |s: &Series| s.measured.iter().filter(|x| x.is_finite()).count() as f64;
@@ -357,7 +357,7 @@ fn channel_trace(flight: &Prepared, series: &Series) -> ChannelTrace {
     let mut segment = None;
     for (k, window) in flight.windows.iter().enumerate() {
         if segment.is_some_and(|s| s != window.segment) {
-            // a NaN row breaks the curve between segments
+            // a NaN row interrupts the curve between segments
             trace.time_s.push(window.time_s - flight.dt);
             trace.measured.push(f64::NAN);
             trace.predicted.push(f64::NAN);

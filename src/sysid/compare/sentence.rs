@@ -1,23 +1,23 @@
-//! A channel's finding as one sentence of plain language.
+//! Wording of a channel's finding as one sentence.
 
 use super::finding::{Finding, Trend};
 use super::result::Regime;
 use crate::weak_form::channels::{ChannelId, RegimeVariable};
 
-/// A channel counts as explained if its unexplained share is below this.
+/// A channel counts as explained if its unexplained share of the variance is below this.
 const EXPLAINED: f64 = 0.01;
-/// Unexplained share below which no regime is named.
+/// Unexplained share of the variance below which the sentence names no regime.
 pub const NOTHING_LEFT: f64 = 0.001;
 
-/// Figures from which the sentence of a channel is written.
+/// Quantities from which the sentence of a channel is written.
 pub struct Subject<'a> {
     /// Identifier of the channel.
     pub channel: ChannelId,
     /// Unexplained share of the channel's variance; NaN if the flights do not excite the channel above the noise.
     pub unexplained: f64,
-    /// Worst regime of the channel, if there is one.
+    /// Worst regime of the channel; `None` if there is none.
     pub finding: Option<&'a Finding>,
-    /// The variable that the residual mainly follows.
+    /// The variable that the residual mainly follows; `None` if there is none.
     pub follows: Option<RegimeVariable>,
     /// Whether the uncertainty of the sensor errors may account for the whole residual (95 %).
     pub within_doubt: bool,
@@ -27,10 +27,10 @@ pub struct Subject<'a> {
     pub flights: usize,
 }
 
-/// Unexplained share beyond which the channel is hardly excited, so that a percentage means nothing.
+/// Unexplained share of the variance above which the sentence states no percentage: the channel is hardly excited.
 const QUIET: f64 = 9.995;
 
-/// The sentence, without a full stop, beginning in lower case.
+/// The sentence without a full stop; the first letter is lower case.
 pub fn sentence(subject: &Subject) -> String {
     let noun = noun(subject.channel);
     if subject.unexplained.is_nan() {
@@ -45,7 +45,7 @@ pub fn sentence(subject: &Subject) -> String {
     let Some(finding) = subject.finding else {
         let why = match subject.follows {
             _ if subject.within_doubt => {
-                "which the remaining errors of the sensors may account for: these flights cannot judge \
+                "which the uncertainty of the sensor errors may explain: these flights cannot judge \
                  the model more closely"
                     .into()
             }
@@ -57,8 +57,8 @@ pub fn sentence(subject: &Subject) -> String {
         };
         if subject.unexplained > QUIET {
             return format!(
-                "{noun} hardly varies in these flights (a quiet axis): the model leaves over more than ten times \
-                 what there is, {why}"
+                "{noun} hardly varies in these flights (a quiet axis): the residual is more than ten times \
+                 the channel's variation, {why}"
             );
         }
         return format!("{noun}: {share} of its variation is unexplained, {why}");
@@ -90,10 +90,10 @@ fn noun(channel: ChannelId) -> &'static str {
     }
 }
 
-/// Descriptions of the model's error by its sign: `(model too low, model too high)`.
+/// Descriptions of the model's error for a positive and a negative residual (measured − model).
 fn directions(channel: ChannelId) -> (&'static str, &'static str) {
     match channel {
-        // the channel is drag less thrust, the sentence speaks of the forward force
+        // the channel is drag less thrust, the sentence describes the forward force
         ChannelId::Drag => ("too high", "too low"),
         ChannelId::Lift | ChannelId::Airspeed | ChannelId::Alpha => ("too low", "too high"),
         ChannelId::Side | ChannelId::Beta | ChannelId::Yaw => {
@@ -107,7 +107,7 @@ fn directions(channel: ChannelId) -> (&'static str, &'static str) {
 /// The error in words: "8.2 ± 0.3 N too low" or "28 ± 4 % too high".
 fn error(subject: &Subject, regime: &Regime) -> String {
     let [least, most] = regime.interval;
-    // the half width towards zero: an interval that excludes zero must not appear to include it
+    // half width on the side of zero: an interval that excludes zero must not appear to include zero
     let half = if regime.mean > 0.0 { regime.mean - least } else { most - regime.mean };
     let (low, high) = directions(subject.channel);
     if subject.channel == ChannelId::Lift && regime.relative_percent.is_finite() {
@@ -130,7 +130,7 @@ fn error(subject: &Subject, regime: &Regime) -> String {
     }
 }
 
-/// For moments, the error relative to the measured moment, if that has the same sign throughout the regime.
+/// For moments, the error relative to the measured moment. Empty if the measured moment changes its sign in the regime.
 fn strength(channel: ChannelId, regime: &Regime) -> String {
     let moment = matches!(channel, ChannelId::Roll | ChannelId::Pitch | ChannelId::Yaw);
     match regime.relative_percent {
@@ -219,12 +219,12 @@ fn who(regime: &Regime, flights: usize) -> String {
     format!("{} samples, {who}", regime.independent)
 }
 
-/// Value and uncertainty, rounded to the uncertainty's figures: "8.2 ± 0.3".
+/// Value and uncertainty, rounded to the significant figures of the uncertainty: "8.2 ± 0.3".
 fn plus_minus(value: f64, half: f64) -> String {
     if !(half.is_finite() && half > 0.0) {
         return significant(value, 3);
     }
-    // one figure of the uncertainty, two if it begins with 1; never finer than a thousandth of the value
+    // one significant figure of the uncertainty, two if the first figure is 1; at least a thousandth of the value
     let half = half.max(1e-3 * value.abs());
     let power = half.log10().floor();
     let power = if half / 10_f64.powf(power) < 2.0 { power - 1.0 } else { power };
@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn forces_and_moments_say_their_direction_in_words() {
-        // measured drag less thrust is 8.2 N lower than the model's: the model pushes too little
+        // measured drag less thrust is 8.2 N lower than the model's: the forward force of the model is too low
         let at = regime(RegimeVariable::Throttle, 0.4, f64::NAN, -8.2, 0.31);
         assert_eq!(
             say(ChannelId::Drag, at, Trend::Grows),

@@ -1,11 +1,13 @@
-//! A model's findings in the order in which they are reported.
+//! Order of a model's findings in the report, and warnings on its free runs.
 
 use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
 use crate::weak_form::channels::ChannelId;
 
-/// Sentences on a model: the worst force (forces drive V, α, β) and the worst moment (moments drive p, q, r) lead,
-/// the others follow. The rates of V, α, β repeat the forces and are left out where the logs have those.
+/// Sentences on a model. The worst force and the worst moment come first, then the other channels.
+///
+/// Forces drive V, α, β; moments drive p, q, r. The rates of V, α and β contain the same information as the forces. They are
+/// left out if the logs contain the forces.
 pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<String> {
     use ChannelId::{Drag, Lift, Pitch, Roll, Side, Yaw};
     let is_force = |c: &&ChannelResult| matches!(c.channel, Drag | Lift | Side);
@@ -27,8 +29,7 @@ pub fn sentences(free_run: &[HorizonScore], channels: &[ChannelResult]) -> Vec<S
     diverges(free_run).into_iter().chain(stated).collect()
 }
 
-/// The part of a channel's effect that its sentence accounts for: the shares of its offset and of the variable that
-/// explains most.
+/// The part of a channel's effect that is due to its offset and to the variable that explains most, 1/s.
 fn weight(channel: &ChannelResult) -> f64 {
     let share = channel.bins.iter().map(|b| b.explained).fold(0.0, f64::max);
     let weight = channel.offset_share + (1.0 - channel.offset_share) * share;
@@ -40,18 +41,18 @@ fn capital(text: &str) -> String {
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
 }
 
-/// A warning if most free runs have diverged by the shortest horizon.
+/// A warning if more than half of the free runs have diverged at the shortest horizon.
 fn diverges(scores: &[HorizonScore]) -> Option<String> {
     let first = scores.iter().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
     (first.divergence_rate > 0.5).then(|| {
         format!(
-            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are those of the bound.",
+            "The model diverges at once: {} of {} free runs are lost within {} s, so its free-run errors are dominated by the divergence bound.",
             first.diverged, first.runs, first.horizon_s
         )
     })
 }
 
-/// A warning if a forecast without aerodynamics is better than the model at the longest horizon.
+/// A warning if a forecast without aerodynamics is better than the model at the longest horizon that a run reaches.
 pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
     let score = free_run.iter().rev().find(|s| s.runs > 0 && s.rmse_scaled.is_finite())?;
     let horizon = score.horizon_s;

@@ -9,10 +9,10 @@ pub enum DiagnoseError {
     /// No flight is given.
     #[error("cannot diagnose without a flight: give at least one log")]
     NoFlight,
-    /// A flight cannot be resampled to the model's clock.
+    /// The sampling interval of a flight is not usable.
     #[error(transparent)]
     Flight(#[from] ClockError),
-    /// There is too little flight.
+    /// The usable parts of the flights are too short.
     #[error(
         "cannot diagnose from {seconds:.0} s of flight: {least:.0} s in the air without gaps is the least; \
          fly longer, two or three flights of 50 s with the manoeuvres of `greylag design`"
@@ -29,12 +29,12 @@ pub enum DiagnoseError {
          elevator and throttle at two airspeeds"
     )]
     NoExcitation {
-        /// The unexcited variables, with their figures.
+        /// The unexcited variables with their values, in words.
         what: String,
     },
     /// No channel's residual can be computed.
     #[error(
-        "cannot diagnose {model}: its residuals cannot be worked out over these flights; check its figures \
+        "cannot diagnose {model}: its residuals cannot be computed over these flights; check its figures \
          with `greylag compare` first"
     )]
     Unusable {
@@ -46,11 +46,11 @@ pub enum DiagnoseError {
         "cannot leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
     )]
     UnknownEffect {
-        /// The unknown id.
+        /// The unknown identifier.
         id: String,
     },
-    /// The progress listener cancelled.
-    // not transparent: this error itself must stand in the chain of causes
+    /// The progress listener cancelled the diagnosis.
+    // not transparent: `Cancelled` must appear in the chain of error sources
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
 }

@@ -7,7 +7,7 @@ use crate::per_flight::PerFlight;
 pub enum Detail {
     /// The result with curves and decoys.
     Full,
-    /// The same numbers without curves and decoys, which only illustrate and check.
+    /// The result without curves and decoys; all other numbers are the same.
     Lean,
 }
 
@@ -16,19 +16,19 @@ pub enum Detail {
 pub struct Options {
     /// Seed of null flights, bootstraps, decoys and the flexible model.
     pub seed: u64,
-    /// Number of null flights.
+    /// Number of null flights: simulated residuals without a missing effect.
     pub nulls: usize,
-    /// Number of block bootstraps.
+    /// Number of block bootstraps of the flights.
     pub bootstraps: usize,
-    /// Significance level: probability of any assertion on flights that lack nothing.
+    /// Significance level: probability of any assertion on flights in which the model lacks no effect.
     pub level: f64,
-    /// Ids of effects from files, tried in addition to the catalogue.
+    /// Identifiers of effects from files that are tried in addition to the catalogue.
     pub with: Vec<String>,
-    /// Ids excluded from the catalogue.
+    /// Identifiers of effects of the catalogue that are not tried.
     pub without: Vec<String>,
     /// Extent of the result.
     pub detail: Detail,
-    /// Whether the search for a formula tries free forms if the shapes of its library do not suffice.
+    /// Whether the search for a formula tries free forms if no shape of the library suffices.
     pub free_forms: bool,
     /// Constants estimated for each flight in addition to its sensor errors.
     pub per_flight: PerFlight,

@@ -1,11 +1,11 @@
-//! Delay of the recorded actuators behind the gyros, estimated from the moments they cause.
+//! Delay of the recorded actuator positions relative to the gyros, estimated from the moments that the deflections cause.
 //!
 //! The kinematics do not depend on the actuators, but the angular accelerations do. Roll and pitch accelerations are
 //! regressed on rates, flow angles, inertial coupling, deflection and rate of deflection, all averaged over a short
-//! kernel, which limits the noise of the derivatives. The delay is the coefficient of the rate of deflection divided by
-//! that of the deflection. A lag of the surfaces that the record does not show is confounded with it. Both sides are
-//! high-pass filtered at half a second, because slower variations contain the errors of unmeasured flow angles, up to
-//! 0.2° with PX4, and no information on a delay.
+//! kernel. The averaging limits the noise of the derivatives. The delay is the coefficient of the rate of deflection divided
+//! by the coefficient of the deflection. This delay also contains any lag of the surfaces that the record does not show.
+//! Both sides are high-pass filtered at half a second: slower variations contain no information on a delay, but the errors of
+//! unmeasured flow angles, up to 0.2° with PX4.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,41 +15,43 @@ use greylag_logs::Sampling;
 
 /// Length of the averaging kernel, s.
 const KERNEL: f64 = 0.15;
-/// Number of windows over which residuals are taken as correlated: about 1 s.
+/// Number of windows over which residuals are treated as correlated: about 1 s.
 const BLOCK: usize = 14;
 /// Number of windows of the moving mean that is subtracted: about 0.5 s.
 const SLOW: usize = 7;
-/// Systematic error of the regression's delay, s: the largest one on 16 axes of noise-free flights of the X8 in calm
+/// Systematic error of the regression's delay, s: the largest error on 16 axes of noise-free flights of the X8 in calm
 /// air.
 const SYSTEMATIC: f64 = 2e-5;
-/// Additional standard deviation due to gusts, s for each m/s of their level: they rotate the aircraft and the
-/// autopilot responds, so deflections follow moments that no term explains. Measured: 2.2 ms rms against a stated 1.1
-/// ms on 20 flights of the X8 in light turbulence, level 2.4 m/s.
+/// Additional standard deviation of the delay due to gusts, s for each m/s of the gusts' standard deviation.
+///
+/// Gusts rotate the aircraft and the autopilot responds. The deflections are then correlated with moments that no regressor
+/// explains. On 20 flights of the X8 in light turbulence (2.4 m/s), the error was 2.2 ms RMS. The standard deviation without
+/// this addition was 1.1 ms.
 const BY_GUSTS: f64 = 8e-4;
-/// Share of the extrapolated bias correction that may be wrong because the extrapolation is linear.
+/// Standard deviation of the linearly extrapolated bias correction, as a share of the correction.
 const CURVED: f64 = 0.5;
-/// Least number of windows for each unknown.
+/// Smallest number of windows for each regressor.
 const SUPPORT: usize = 10;
 
 /// A delay with its standard deviation, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Skew {
-    /// Delay of the record, s.
+    /// Delay of the recorded deflections, s; positive if they are late.
     pub late: f64,
-    /// Standard deviation of the delay, s, the prior included.
+    /// Standard deviation of the delay, s, with the prior's information.
     pub deviation: f64,
 }
 
 /// Reads a body rate, rad/s.
 type Rate = fn(&Instant) -> f64;
-/// Regressors of the rate's derivative.
+/// Regressors of the body rate's derivative; the deflection is the last regressor.
 type Terms = fn(&Instant) -> Vec<f64>;
 
-/// Delay of the recorded deflections from roll and pitch together with the prior of ±1.5 samples, in gusts of level
-/// `gusts` (m/s).
+/// Delay of the recorded deflections from roll, pitch and the prior, in gusts of the standard deviation `gusts` (m/s).
 ///
-/// Errors in the regressors bias the coefficients. `erring` holds copies of the flight with an additional error like
-/// its own: the additional bias in them is subtracted (simulation extrapolation, Cook and Stefanski 1994, linear).
+/// Errors in the regressors bias the coefficients. `erring` holds copies of the flight with simulated additional errors of
+/// the same distribution. The additional bias of the copies is subtracted (simulation extrapolation, Cook and Stefanski
+/// 1994, linear).
 pub fn estimate(
     segments: &[Segment],
     erring: &[Vec<Segment>],
@@ -69,14 +71,15 @@ pub fn estimate(
         information += i;
         weighted += i * skew.late;
     }
-    // the same gusts disturb roll and pitch, so two axes do not average this error
+    // the same gusts disturb roll and pitch: the mean over both axes does not reduce this error
     let by_gusts = BY_GUSTS * gusts;
     let width = SKEW_SAMPLES * step;
     let deviation = information.recip().sqrt().hypot(by_gusts).min(width);
     Skew { late: weighted / information, deviation }
 }
 
-/// The delay corrected for the bias from the states' errors, given the additional bias in the copies, `again`.
+/// The delay corrected for the bias due to the states' errors. `again` holds the delays, s, estimated from the copies with
+/// additional errors.
 fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     if again.len() < 2 {
         return skew;
@@ -85,19 +88,19 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     let mean = again.iter().sum::<f64>() / count;
     let scatter = again.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let pulled = mean - skew.late;
-    // scatter of the draws, and the part of the bias that is not linear in the errors' variance
+    // variance of the draws' mean, and the part of the bias that is not linear in the errors' variance
     let deviation = (skew.deviation.powi(2) + scatter / count + (CURVED * pulled).powi(2)).sqrt();
     Skew { late: skew.late - pulled, deviation }
 }
 
-/// Regressors of the roll acceleration, the deflection last.
+/// Regressors of the roll acceleration; the deflection is last.
 fn roll_terms(i: &Instant) -> Vec<f64> {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
     vec![v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
 }
 
-/// Regressors of the pitch acceleration, the deflection last.
+/// Regressors of the pitch acceleration; the deflection is last.
 fn pitch_terms(i: &Instant) -> Vec<f64> {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
@@ -137,7 +140,8 @@ fn from_axis(
     regress(&rows, &values)
 }
 
-/// Regressors over the interval that starts at each sample.
+/// Regressors averaged over the interval that starts at each sample: the sample itself if it is held, else the mean with the
+/// next sample.
 fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
     match sampling {
         Sampling::Held => terms,
@@ -150,7 +154,7 @@ fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
     }
 }
 
-/// Each row less the moving mean around it.
+/// Each row less the moving mean of `SLOW` rows.
 fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let about = |i: usize| &rows[i.saturating_sub(SLOW / 2)..(i + SLOW / 2 + 1).min(rows.len())];
     let less_mean = |(i, row): (usize, &Vec<f64>)| {
@@ -161,7 +165,7 @@ fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     rows.iter().enumerate().map(less_mean).collect()
 }
 
-/// Kernel averages from sample `start`: the regressors with the rate of the last one, and the acceleration.
+/// Kernel averages from sample `start`: the regressors, the rate of the last regressor, and the angular acceleration.
 fn window(
     kernel: &[f64],
     terms: &[Vec<f64>],
@@ -183,7 +187,8 @@ fn window(
     (row, value)
 }
 
-/// Least squares with a covariance that is robust to correlation within blocks of residuals.
+/// Delay by least squares, with a covariance that is robust to correlation within blocks of residuals. `None` if there are too
+/// few windows or the regression is singular.
 fn regress(rows: &[Vec<f64>], values: &[f64]) -> Option<Skew> {
     let columns = rows.first()?.len();
     if rows.len() < SUPPORT * columns {

@@ -1,17 +1,17 @@
 //! Normal equations that are block-tridiagonal in time, bordered by constants.
 //!
-//! The right-hand side is carried as an additional constant, the last column: elimination turns it into the solution,
-//! and its last entry in the corner is the least sum of squares. Both ends of a stretch are eliminated towards its
-//! middle at once, at the same cost as in sequence.
+//! The right-hand side is the last column of the constants. Elimination turns this column into the solution. The last
+//! entry of the corner becomes the minimum of the sum of squares. A stretch is eliminated from both ends towards its middle
+//! in parallel, with the same number of operations as in sequence.
 
 /// Square block of one instant's unknowns.
 pub type Block<const N: usize> = [[f64; N]; N];
-/// One instant's unknowns by the constants, the right-hand side last.
+/// Matrix of one instant's unknowns (rows) by the constants (columns), with the right-hand side in the last column.
 pub type Wide<const N: usize, const W: usize> = [[f64; W]; N];
-/// Constants by constants, the right-hand side last.
+/// Matrix of the constants by the constants, with the right-hand side in the last row and column.
 pub type Corner<const W: usize> = [[f64; W]; W];
 
-/// Number of instants below which a second thread does not pay off.
+/// Number of instants below which one thread eliminates both halves.
 const WORTH_A_THREAD: usize = 2000;
 
 /// Normal equations of one instant.
@@ -23,7 +23,7 @@ pub struct Node<const N: usize, const W: usize> {
     pub rest: Wide<N, W>,
 }
 
-/// Normal equations between an instant and the next one.
+/// Normal equations that couple an instant with the next one.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<const N: usize, const W: usize> {
     /// Contribution to the first instant.
@@ -47,7 +47,7 @@ impl<const N: usize, const W: usize> Node<N, W> {
 /// Equations of the constants after elimination.
 #[derive(Clone, Copy, Debug)]
 pub struct Left<const W: usize> {
-    /// Normal equations of the constants; the sum of squares is the last entry.
+    /// Normal equations of the constants; the last entry is the sum of squares.
     pub corner: Corner<W>,
     /// Logarithm of the determinant of the eliminated block.
     pub log_det: f64,
@@ -57,15 +57,15 @@ impl<const W: usize> Left<W> {
     /// The neutral element of `add`.
     pub const ZERO: Self = Left { corner: [[0.0; W]; W], log_det: 0.0 };
 
-    /// Adds the contribution of another part.
+    /// Adds the contribution of another stretch or half of a stretch.
     pub fn add(&mut self, other: &Self) {
         add(&mut self.corner, &other.corner);
         self.log_det += other.log_det;
     }
 }
 
-/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`, where x' is that of its neighbour nearer
-/// the middle and p the constants.
+/// An instant after elimination: `factorᵀ x = rest · (−p, 1) − next · x'`. Here x' are the unknowns of the neighbour nearer
+/// to the middle, and p are the constants.
 #[derive(Clone, Copy, Debug)]
 struct Eliminated<const N: usize, const W: usize> {
     factor: Block<N>,
@@ -76,10 +76,10 @@ struct Eliminated<const N: usize, const W: usize> {
 /// A stretch after elimination.
 #[derive(Clone, Debug)]
 pub struct Stretch<const N: usize, const W: usize> {
-    /// Instants from the start to the one before the middle.
+    /// Instants before the middle, in order of time.
     head: Vec<Eliminated<N, W>>,
     middle: Eliminated<N, W>,
-    /// Instants from the end to the one after the middle.
+    /// Instants after the middle, in reverse order of time.
     tail: Vec<Eliminated<N, W>>,
 }
 
@@ -147,7 +147,7 @@ fn forward<const N: usize, const W: usize>(l: &Block<N>, y: &mut Wide<N, W>) {
     }
 }
 
-/// Eliminates one instant, coupled with one neighbour.
+/// Eliminates one instant that is coupled with one neighbour; `None` if its block is not positive definite.
 fn one<const N: usize, const W: usize>(
     node: &Node<N, W>,
     coupling: &Block<N>,
@@ -171,8 +171,8 @@ fn transposed<const N: usize>(a: &Block<N>) -> Block<N> {
 
 /// Eliminates the instants `0..count` of a stretch; `None` if a block is not positive definite.
 ///
-/// `instant(k, node, corner)` adds the equations of instant `k`, `link(k, corner)` makes those that couple it to the
-/// next one.
+/// `instant(k, node, corner)` adds the equations of instant `k`. `link(k, corner)` returns the equations that couple instants
+/// `k` and `k + 1`.
 pub fn eliminate<const N: usize, const W: usize>(
     count: usize,
     instant: impl Fn(usize, &mut Node<N, W>, &mut Corner<W>) + Sync,
@@ -232,7 +232,7 @@ impl<const N: usize, const W: usize> Eliminated<N, W> {
 }
 
 impl<const N: usize, const W: usize> Stretch<N, W> {
-    /// The unknowns in order of time; `by` holds the negated constants, followed by one.
+    /// The unknowns in order of time. `by` holds the negated constants, followed by the number 1.
     pub fn substitute(&self, by: &[f64; W]) -> Vec<[f64; N]> {
         let middle = self.middle.solve(by, &[0.0; N]);
         let walk = |side: &[Eliminated<N, W>]| {
@@ -260,7 +260,7 @@ mod tests {
         const C: usize = 5;
         const COUNT: usize = 7;
         let size = COUNT * N + C;
-        // residuals with pseudo-random coefficients, each touching two neighbours and the constants
+        // residuals with pseudo-random coefficients; each residual depends on two adjacent instants and the constants
         let mut seed = 1_u64;
         let mut random = || {
             seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -320,7 +320,7 @@ mod tests {
             }
         }
         assert!((p.clone() - reference.rows(COUNT * N, C)).norm() < 1e-11);
-        // the least sum of squares: Σ r² less its reduction by the dense solution
+        // minimum of the sum of squares: Σ r² less its reduction by the dense solution
         let least = left.corner[C][C] - b.dot(&p);
         assert!((least - (corner[C][C] - right.dot(&reference))).abs() < 1e-11);
         let log_det = left.log_det + factor.determinant().ln();

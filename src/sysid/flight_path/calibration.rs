@@ -1,31 +1,33 @@
-//! Rare instrument errors. Each is estimated only if a flight shows it significantly.
+//! Rare instrument errors: each error is estimated only if a flight shows it significantly.
 //!
-//! These are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay far beyond a
-//! sample. If they were free in every flight, the biases would be less certain in every flight. Each is therefore held
-//! until its estimate without its own prior differs from the prior mean significantly and by enough to matter (a score
-//! test with the path and all other constants fitted along; Klein and Morelli, Aircraft System Identification, section
-//! 5.3.3).
+//! Rare errors are gains of gyros, accelerometers and vanes, an offset of airspeed or heading, and a delay of many samples.
+//! If all were free in every flight, the biases would be less certain in every flight. Each error is therefore held at its
+//! prior mean at first. It is freed if its estimate without its prior differs from the prior mean significantly and by a
+//! relevant size (a score test with the path and all other constants fitted; Klein and Morelli, Aircraft System
+//! Identification, section 5.3.3).
 
 use crate::flight_path::equations::{Found, Problem};
 use crate::flight_path::nuisance::{
     self, AIRSPEED_OFFSET, COUNT, HEADING, SKEW_ATTITUDE, SKEW_FORCE, SKEW_VELOCITY,
 };
 
-/// Standard deviations for significance; high because fifteen errors are tested in every flight, whose noise is not
-/// quite white.
+/// Number of standard deviations for significance. It is high because fifteen errors are tested in every flight, and
+/// because the noise is not quite white.
 const BEYOND_DOUBT: f64 = 6.0;
-/// Least relevant size: of a gain, an airspeed (m/s), a heading (rad).
+/// Smallest relevant errors of a gain (1), an airspeed (m/s) and a heading (rad).
 const GAIN: f64 = 0.01;
 const AIRSPEED: f64 = 0.3;
 const ASKEW: f64 = 1.5 * std::f64::consts::PI / 180.0;
-/// Prior standard deviations beyond which a delay is unusual.
+/// Number of prior standard deviations beyond which a delay is relevant.
 const UNUSUAL: f64 = 4.0;
-/// Least relevant size of a delay, s.
+/// Smallest relevant delay, s.
 const DELAY: f64 = 0.02;
-/// A constant is freed only if its standard deviation is below this share of its new prior width.
+/// A constant is freed only if its standard deviation is below this share of its new prior standard deviation.
 const KNOWN: f64 = 0.25;
 
-/// The next constant to free with its new prior width; `None` if no other one is significant.
+/// Index of the next constant to free, and its new prior standard deviation. `None` if no other constant is significant.
+///
+/// `bound` is the residual, in standard deviations, beyond which a measurement is down-weighted.
 pub fn next(problem: &Problem, found: &Found, bound: f64) -> Option<(usize, f64)> {
     let open = |place: &usize| {
         let freed = nuisance::wide(*place).is_some_and(|wide| problem.widths[*place] >= wide);
@@ -49,7 +51,7 @@ pub fn next(problem: &Problem, found: &Found, bound: f64) -> Option<(usize, f64)
     Some((place, wide))
 }
 
-/// Size below which an error is irrelevant.
+/// Smallest relevant error of the constant `place`, in its unit.
 fn least(problem: &Problem, place: usize) -> f64 {
     match place {
         AIRSPEED_OFFSET => AIRSPEED,

@@ -1,12 +1,12 @@
-//! A channel of a log: its finite samples in time order.
+//! A channel of a log: finite samples in time order, with interpolation.
 
 use std::ops::{Add, Mul, Sub};
 
 use greylag_num::statistics::quantile;
 
-/// Share of repeated values above which a channel's sensor is taken to be slower than the log's rows.
+/// Share of repeated values above which a channel's sensor is assumed to be slower than the log's rows.
 const HELD_SHARE: f64 = 0.3;
-/// Number of the slower sensor's periods after which a repeated value counts as a measurement again.
+/// Number of periods of the slower sensor after which a repeated value counts as a new measurement.
 const LONGEST_PERIODS: f64 = 2.5;
 
 /// Kind of a channel's values, which determines interpolation.
@@ -25,14 +25,16 @@ pub enum Interpolation {
 pub struct Channel {
     time: Vec<f64>,
     value: Vec<f64>,
-    /// Whether more than 20 values are all equal; always false for `Interpolation::Kept`.
+    /// Whether all values are equal, if there are more than 20; always false for `Interpolation::Kept`.
     pub stuck: bool,
 }
 
 impl Channel {
-    /// The finite ones of `samples` (time in s, value). If many values repeat the previous one, the sensor is slower
-    /// than the log's rows, and repeats are dropped. A value that persists for several of that sensor's periods, such
-    /// as a coarsely quantised one, keeps some of its repeats. The last sample is always kept. Angles are unwrapped.
+    /// The finite samples among `samples` (time in s, value). Angles are unwrapped.
+    ///
+    /// If many values repeat the previous value, the sensor is slower than the log's rows. Repeated values are then dropped. If
+    /// a value, for example a coarsely quantised one, persists for several periods of the sensor, some of its repeats are kept.
+    /// The last sample is always kept.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>, kind: Interpolation) -> Channel {
         let (mut time, mut value): (Vec<f64>, Vec<f64>) =
             samples.filter(|(_, x)| x.is_finite()).unzip();
@@ -56,12 +58,12 @@ impl Channel {
         Channel { time, value, stuck }
     }
 
-    /// Whether it has no samples.
+    /// Whether the channel has no samples.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
 
-    /// Median time between samples, s; zero without two of them.
+    /// Median time between samples, s; 0 for fewer than two samples.
     pub fn period(&self) -> f64 {
         let periods: Vec<f64> = self.time.windows(2).map(|w| w[1] - w[0]).collect();
         if periods.is_empty() { 0.0 } else { quantile(&periods, 0.5) }
@@ -74,7 +76,7 @@ impl Channel {
         b.saturating_sub(a)
     }
 
-    /// Linear interpolation at `t` (s) between samples at most `reach` (s) apart; else NaN.
+    /// Linear interpolation at `t` (s) between samples at most `reach` (s) apart; NaN if there are none.
     pub fn between(&self, t: f64, reach: f64) -> f64 {
         match self.around(t) {
             [_, Some((time, x))] if time == t => x,
@@ -85,8 +87,9 @@ impl Channel {
         }
     }
 
-    /// The measurement for `t` (s): NaN without a sample within `near` (s), else the interpolation of
-    /// [`between`](Self::between), or the nearest sample where that is NaN.
+    /// The measurement at `t` (s); NaN without a sample within `near` (s).
+    ///
+    /// The value is the interpolation of [`between`](Self::between). If the interpolation is NaN, it is the nearest sample.
     pub fn measured(&self, t: f64, reach: f64, near: f64) -> f64 {
         let [left, right] = self.around(t);
         let distance = |s: &(f64, f64)| (s.0 - t).abs();
@@ -100,7 +103,7 @@ impl Channel {
         if between.is_nan() { nearest } else { between }
     }
 
-    /// The samples before `t`, and at or after it.
+    /// The last sample before `t`, and the first one at or after `t`.
     fn around(&self, t: f64) -> [Option<(f64, f64)>; 2] {
         let after = self.time.partition_point(|x| *x < t);
         let side = |i: usize| Some((*self.time.get(i)?, *self.value.get(i)?));
@@ -114,7 +117,7 @@ impl Channel {
     }
 }
 
-/// Marks the samples that are kept where repeats are dropped.
+/// Marks the samples to keep if repeated values are dropped; `fresh` marks values that differ from the previous one.
 fn kept(time: &[f64], fresh: &[bool]) -> Vec<bool> {
     let new: Vec<f64> = time.iter().zip(fresh).filter(|(_, f)| **f).map(|(t, _)| *t).collect();
     let periods: Vec<f64> = new.windows(2).map(|w| w[1] - w[0]).collect();
@@ -143,11 +146,13 @@ pub fn wrap(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// Value and slope (per sample) at `part`, 0 to 1, of the way from the second of four samples to the third: the cubic
-/// whose slopes at these two are those of the parabolas around them.
+/// Value and slope (per sample) of the cubic interpolation between the second and third of four samples.
 ///
-/// Value and slope are continuous from one interval to the next. A parabola around the nearest sample would jump half-way
-/// between two samples. With rough samples, a search for a delay cannot pass such a jump.
+/// `part`, 0 to 1, is the fraction of the interval. At the second and third sample, the cubic has the slope of the parabola
+/// through that sample and its two neighbours.
+///
+/// Value and slope are continuous from one interval to the next. A parabola through the nearest sample would jump half-way
+/// between two samples. The search for a delay could not pass this jump if the samples are noisy.
 pub fn cubic<T>([a, b, c, d]: [T; 4], part: f64) -> (T, T)
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
@@ -165,7 +170,7 @@ where
 mod tests {
     use super::*;
 
-    /// 100 Hz samples of a slow sine as `value` makes them.
+    /// Channel with 100 Hz samples of `value`.
     fn channel(value: impl Fn(f64) -> f64) -> Channel {
         let times = (0..1000).map(|k| k as f64 * 0.01);
         Channel::new(times.map(|t| (t, value(t))), Interpolation::Linear)
@@ -180,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_quantised_sensor_is_known_while_it_stays() {
-        // about 0.6 s pass at the sine's top without a step of 0.05
+        // at the maximum of the sine, about 0.6 s pass without a step of 0.05
         let coarse = channel(|t| (t.sin() / 0.05).round() * 0.05);
         assert!((0..1000).all(|k| coarse.between(k as f64 * 0.01, 0.2).is_finite()));
     }

@@ -1,4 +1,5 @@
-//! Normal equations of a fit: all stretches linearised at the present estimate, eliminated, solved.
+//! Normal equations of a fit: linearises all stretches at the present estimate, eliminates the paths, solves for the
+//! constants.
 
 mod erring;
 
@@ -16,7 +17,7 @@ use crate::flight_path::{Options, ReconstructError, noise};
 use greylag_logs::Sampling;
 use greylag_num::statistics;
 
-/// Number of columns if the constants are free: all constants, then the right-hand side.
+/// Number of columns if the constants are free: all constants and the right-hand side.
 const WIDTH: usize = COUNT + 1;
 const BETWEEN: usize = COUNT - INERTIAL + 1;
 
@@ -53,7 +54,7 @@ pub struct Problem<'a> {
 
 /// Solution of one linearisation with `N` unknowns for each instant.
 pub struct Solved<const N: usize> {
-    /// Change of the path at every instant of every stretch.
+    /// Changes of the path at every instant of every stretch.
     moves: Vec<Vec<[f64; N]>>,
     /// Changes of the constants; zero where they are held.
     constants: Values,
@@ -63,8 +64,8 @@ pub struct Solved<const N: usize> {
     pub readings: Vec<Vec<Reading>>,
 }
 
-/// Ratio of the bound beyond which a kinematic step is down-weighted to that of the measurements. With a launcher, an impact
-/// or an estimator that aligns itself, the logged path moves by more than gyros and accelerometers measure.
+/// Ratio between the bounds beyond which residuals of kinematic steps and of measurements are down-weighted. At a launch, an
+/// impact or an alignment of the estimator, the logged path changes by more than gyros and accelerometers measure.
 const PROCESS: f64 = 1.5;
 
 impl Problem<'_> {
@@ -107,8 +108,10 @@ impl Problem<'_> {
         measured + between.sum::<f64>()
     }
 
-    /// Residuals of the kinematic steps relative to the assumed standard deviations of gyros and accelerometers: a robust scale
-    /// for each axis of rotation and velocity. At most one if the assumed noise is large enough.
+    /// Robust scale of the residuals of the kinematic steps, for each axis of rotation and velocity.
+    ///
+    /// The scales are relative to the assumed standard deviations of gyros and accelerometers. They are at most 1 if the assumed
+    /// noise is large enough.
     pub fn step_residuals(&self, found: &Found) -> [f64; MOTION] {
         let (step, gravity) = (self.log.step, self.options.gravity);
         let sd = step_deviations::<MOTION>(&found.levels, step);
@@ -123,8 +126,8 @@ impl Problem<'_> {
         left.map(|mut left| noise::level(&mut left))
     }
 
-    /// Root mean square difference between measured and estimated roll, pitch and yaw averaged over blocks of `block`
-    /// (s), rad; zero where they were not measured.
+    /// Root mean square difference between measured and estimated roll, pitch and yaw, averaged over blocks of `block` (s), rad.
+    /// 0 for an angle that is not measured.
     pub fn slow_disagreement(&self, found: &Found, block: f64) -> [f64; 3] {
         let vanes_at = self.log.sensors.vanes_at();
         let mut sums = [(0.0, 0.0); 3];
@@ -145,7 +148,7 @@ impl Problem<'_> {
         sums.map(|(sum, count): (f64, f64)| (sum / count.max(1.0)).sqrt())
     }
 
-    /// −2 ln L of the noise levels with the constants held, up to terms independent of the gusts' level.
+    /// −2 ln L of the noise levels with the constants held, up to terms that do not depend on the gusts' level.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
         let (_, _, left) = self.eliminate::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
         let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
@@ -153,8 +156,8 @@ impl Problem<'_> {
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
     }
 
-    /// Information matrix of the constants, from prior and data. Constants that the log's columns do not observe have the
-    /// prior's information only.
+    /// Information matrix of the constants, from prior and data. A constant that the log's columns do not observe has only the
+    /// information of its prior.
     fn information<const W: usize>(&self, left: &Left<W>) -> Option<SMatrix<f64, COUNT, COUNT>> {
         let first = W.checked_sub(WIDTH)?;
         Some(SMatrix::from_fn(|i, j| {
@@ -164,8 +167,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// Estimate of each of the constants `places` without its own prior, with the standard deviation; NaN if the data have no
-    /// information on it.
+    /// Estimate and standard deviation of each of the constants `places` without the prior of that constant. NaN if the data have
+    /// no information on the constant.
     pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
         let (_, _, left) = self.eliminate::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
         let bound = self.information(&left)?;
@@ -280,7 +283,7 @@ fn huber(size: f64, bound: f64) -> f64 {
     if size <= bound { size * size } else { bound * (2.0 * size - bound) }
 }
 
-/// Standard deviations of the differences between samples `step` (s) apart.
+/// Standard deviations of the changes between samples `step` (s) apart: attitude (rad), velocity (m/s), gust (m/s).
 fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
     std::array::from_fn(|i| match i {
@@ -290,8 +293,7 @@ fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
     })
 }
 
-/// Prior of an initial instant: standard deviations of 10 rad and 100 m/s, which hardly constrain the motion, and the level
-/// of the gusts.
+/// Adds the prior of a stretch's first instant: standard deviations of 10 rad, 100 m/s and the gusts' `level` (m/s).
 fn start<const N: usize, const W: usize>(
     gust: &Vector3<f64>,
     level: f64,
@@ -309,7 +311,7 @@ fn start<const N: usize, const W: usize>(
     }
 }
 
-/// Equations of a step whose rows have the standard deviations `sd`; a residual beyond `bound` of them is
+/// Normal equations of a step whose rows have the standard deviations `sd`. Residuals beyond `bound` standard deviations are
 /// down-weighted.
 fn weigh<const N: usize, const W: usize, const D: usize>(
     mut step: Step<N, D>,
@@ -344,11 +346,11 @@ fn weigh<const N: usize, const W: usize, const D: usize>(
 }
 
 impl<const N: usize> Solved<N> {
-    /// Changes the path and the constants by a `part` of the step. Returns the largest change of a constant, in units of
-    /// its standard deviation.
+    /// Changes the paths and the constants in `found` by the fraction `part` of the step. Returns the largest change of a
+    /// constant, in standard deviations.
     ///
     /// # Errors
-    /// The path is not finite.
+    /// The change of a constant is not finite; the error names `flight`.
     pub fn apply(
         &self,
         found: &mut Found,
@@ -380,7 +382,7 @@ impl<const N: usize> Solved<N> {
     }
 }
 
-/// The error of a search without a finite result.
+/// The error of a reconstruction without a finite path; `why` is the reason in words.
 pub fn no_path(flight: &str, why: &'static str) -> ReconstructError {
     ReconstructError::NoPath { flight: flight.into(), why }
 }

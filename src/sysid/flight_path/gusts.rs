@@ -1,8 +1,8 @@
 //! Uncertainty of the constants due to gusts of the estimated level, by simulation.
 //!
-//! The constants are fitted as if the air-data sensors had white noise, wide enough to cover the gusts. Gusts persist
-//! for many seconds, so white noise neither covers the error of a mean wind nor shows that a delay is better known than
-//! a bias. Draws of gusts passed through the equations of the fit account for both.
+//! The fit of the constants assumes white noise of the air-data sensors with a variance that includes the gusts. But gusts
+//! are correlated over many seconds. White noise therefore understates the error of the mean wind and overstates that of a
+//! delay. Here, random gusts pass through the equations of the fit.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,13 +14,13 @@ use crate::flight_path::nuisance::{COUNT, Values};
 use crate::flight_path::path::Path;
 use greylag_num::stream::{Stream, stream};
 
-/// Number of pairs of draws in one set of equations: without gusts, with gusts.
+/// Number of pairs of random draws in one set of equations. A pair is a draw without gusts and a draw with gusts.
 const PAIRS: usize = OTHERS / 2;
-/// Number of sets of equations: 32 pairs determine a standard deviation to an eighth of itself.
+/// Number of sets of equations: their 32 pairs determine a standard deviation to one eighth of its value.
 const SETS: u64 = 4;
 
-/// Standard deviations of the constants of the calm fit `found` if its noise were that of `rough`: gusts of that
-/// level in addition to white noise of the air-data sensors.
+/// Standard deviations of the constants of the fit `found`, which assumes no gusts, if the noise is that of `rough`. The
+/// noise of `rough` consists of gusts and of white noise of the air-data sensors.
 pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -> Option<Values> {
     let (mut assumed, mut drawn) = ([0.0; COUNT], [0.0; COUNT]);
     for set in 0..SETS {
@@ -45,8 +45,8 @@ pub fn deviations(problem: &Problem, found: &Found, rough: &Found, bound: f64) -
     }))
 }
 
-/// Residuals of airspeed, α, β along a path: with the noise that the fit assumes, and, from the same random numbers,
-/// with white noise and gusts.
+/// Random residuals of airspeed, α and β along a path. The first half has the noise that the fit assumes. The second half
+/// has white noise and gusts, from the same random numbers.
 fn draws(
     problem: &Problem,
     path: &Path,

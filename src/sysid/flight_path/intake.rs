@@ -1,4 +1,4 @@
-//! Intake: resamples a log's rows to one uniform clock for each segment.
+//! Intake: resamples a log to uniform time steps, one track for each stretch without gaps.
 
 mod channels;
 mod stretches;
@@ -13,7 +13,7 @@ use greylag_physics::{Command, Controls, Sensors};
 use stretches::{gap, step, stretches};
 use track::track;
 
-/// Least number of samples for a sensor to be used in a segment.
+/// Smallest number of samples with which a sensor is used in a stretch.
 const FEWEST: usize = 10;
 
 /// Note on a log without vanes.
@@ -33,7 +33,7 @@ pub struct Log {
     pub periods: Periods,
     /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
-    /// Stated errors and noise of its sensors and of the wind.
+    /// Errors and noise of the sensors, and the wind, as stated in the options or the log.
     pub sensors: Sensors,
     /// Notes for the reader.
     pub notes: Vec<String>,
@@ -56,7 +56,7 @@ pub struct Present {
     pub altitude: bool,
 }
 
-/// Mean time between the measurements of a sensor, s; zero where it is unknown.
+/// Typical time between the measurements of a sensor, s; 0 if it is not known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Periods {
     /// Period of the attitude, s.
@@ -69,10 +69,10 @@ pub struct Periods {
     pub velocity: f64,
 }
 
-/// Extent in time of a flight with all its stretches.
+/// Extent in time of a flight, over all stretches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Span {
-    /// Its middle on the log's clock, s.
+    /// Middle of the flight on the log's clock, s.
     pub middle: f64,
     /// Length of the flight, s.
     pub length: f64,
@@ -87,7 +87,7 @@ pub struct Track {
     pub span: Span,
     /// Body rates p, q, r; never missing.
     pub rates: Vec<[f64; 3]>,
-    /// Specific force, body axes; never missing if the log has it.
+    /// Specific force, body axes; never missing if the log has accelerometers.
     pub force: Vec<[f64; 3]>,
     /// Roll, pitch, yaw, wrapped to ±π.
     pub attitude: Vec<[f64; 3]>,
@@ -97,11 +97,11 @@ pub struct Track {
     pub vanes: Vec<[f64; 2]>,
     /// Measured velocity over ground: north, east, down.
     pub velocity: Vec<[f64; 3]>,
-    /// Altitude, interpolated; never missing if the segment has it at all.
+    /// Altitude, interpolated; never missing if the stretch has any sample of the altitude.
     pub altitude: Vec<f64>,
     /// Air density; never missing.
     pub density: Vec<f64>,
-    /// Command in force at each sample, if it is logged.
+    /// Last command at or before each sample; `None` if commands are not logged.
     pub commands: Vec<Option<Command>>,
     /// Deflections and throttle position; never missing.
     pub controls: Vec<Controls>,
@@ -113,13 +113,13 @@ impl Track {
         self.rates.len()
     }
 
-    /// Time of sample `k`, s, for a sampling interval of `step` (s).
+    /// Time of sample `k` on the log's clock, s, for the sampling interval `step` (s).
     pub fn time(&self, k: usize, step: f64) -> f64 {
         self.start + k as f64 * step
     }
 }
 
-/// Reads a log: resamples to one clock, splits at gaps, holds commands.
+/// Converts a log to tracks: splits the log at gaps, resamples the channels and holds the commands.
 ///
 /// # Errors
 /// A required channel is missing, the log contains no flight, or no stretch is long enough.

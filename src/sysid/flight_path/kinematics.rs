@@ -12,23 +12,23 @@ use crate::flight_path::path::Path;
 use crate::flight_path::rotation::{self, cross, exp, log};
 use greylag_logs::Sampling;
 
-/// Correlation time of gusts, s: the length scale of turbulence at an altitude of some hundred metres, divided by the
-/// airspeed of a small aircraft.
+/// Correlation time of gusts, s: length scale of turbulence at an altitude of some hundred metres divided by the airspeed
+/// of a small aircraft.
 const GUST_TIME: f64 = 20.0;
 
-/// Share of a gust that remains after the time `step` (s).
+/// Autocorrelation of a gust after the time `step` (s).
 pub fn gust_kept(step: f64) -> f64 {
     (-step / GUST_TIME).exp()
 }
 
-/// Mean rates and forces over each interval, from gyros and accelerometers.
+/// Mean rates and specific forces over each interval between samples, from gyros and accelerometers.
 #[derive(Clone, Debug)]
 pub struct Drive {
     /// Mean rate from each sample to the next, body axes, rad/s.
     rate: Vec<Vector3<f64>>,
-    /// Mean specific force from each sample to the next, body axes at the first one, m/s².
+    /// Mean specific force from each sample to the next, body axes at the first sample, m/s².
     force: Vec<Vector3<f64>>,
-    /// Derivative of `force` with respect to the accelerometers' delay, m/s³.
+    /// Derivative of `force` with respect to the accelerometers' delay, body axes, m/s³.
     force_by_skew: Vec<Vector3<f64>>,
     /// Time of the first sample, s.
     start: f64,
@@ -38,18 +38,19 @@ pub struct Drive {
 
 /// Number of unknowns of an instant: attitude and velocity.
 pub const MOTION: usize = 6;
-/// Number of unknowns of an instant with the gust's three components.
+/// Number of unknowns of an instant: attitude, velocity and the three components of the gust.
 pub const MOTION_AND_GUST: usize = 9;
 
-/// Difference between the propagated state of one sample and that of the next one, with its derivatives: rows of
-/// attitude (rad), velocity (m/s, body axes), gust (m/s, earth axes).
+/// Difference between the state at the next sample and the state propagated from one sample, with its derivatives.
+///
+/// The rows are attitude (rad), velocity (m/s, body axes) and gust (m/s, earth axes).
 pub struct Step<const N: usize, const D: usize> {
     /// Derivatives with respect to the first sample.
     pub first: Block<N>,
     /// Derivatives with respect to the second sample.
     pub second: Block<N>,
-    /// Derivatives with respect to the constants that act between samples, then the negated difference: the last `D`
-    /// columns of the equations.
+    /// Derivatives with respect to the constants that act between samples, and the negated difference in the last column. These
+    /// are the last `D` columns of the equations.
     pub rest: Wide<N, D>,
 }
 
@@ -67,9 +68,10 @@ fn put<const N: usize, const W: usize>(
 }
 
 impl Drive {
-    /// Propagation input of `track` at the constants `values`, for a sampling interval of `step` (s).
+    /// Rates and forces of `track`, corrected with the constants `values`, for the sampling interval `step` (s) and `gravity`
+    /// (m/s²).
     ///
-    /// Without accelerometers the velocity is propagated unchanged.
+    /// Without accelerometers, the force is the one that keeps the velocity constant.
     pub fn new(
         track: &Track,
         values: &Values,
@@ -111,9 +113,9 @@ impl Drive {
         drive
     }
 
-    /// The step from sample `k` to the next one along `path`.
+    /// Equations of the step from sample `k` to the next sample along `path`.
     ///
-    /// The gust decays over [`GUST_TIME`]. With `D` = 1 the constants are held.
+    /// The gust decays with the time constant [`GUST_TIME`]. With `D` = 1 the constants are held.
     pub fn step<const N: usize, const D: usize>(
         &self,
         path: &Path,
@@ -172,15 +174,15 @@ impl Drive {
     }
 }
 
-/// Specific force that keeps the velocity constant.
+/// Specific force that keeps the velocity constant at sample `k`, body axes, m/s².
 fn weight(track: &Track, k: usize, gravity: f64) -> Vector3<f64> {
     let [roll, pitch, _] = track.attitude[k].map(|x| if x.is_finite() { x } else { 0.0 });
     let r = rotation::from_euler([roll, pitch, 0.0]);
     r.transpose() * Vector3::new(0.0, 0.0, -gravity)
 }
 
-/// `samples` with a delay of `late` samples removed by cubic interpolation through four of them, and the derivative
-/// of each with respect to the delay.
+/// `samples` with a delay of `late` sampling intervals removed, and the derivative of each with respect to the delay, per
+/// sampling interval. The interpolation is cubic through four samples.
 pub fn shifted(samples: &[[f64; 3]], late: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let last = samples.len() as isize - 1;
     let at = |i: isize| Vector3::from(samples[i.clamp(0, last) as usize]);

@@ -1,4 +1,4 @@
-//! Noise levels, estimated first from the data alone, then from the residuals of the fit.
+//! Noise levels of the sensors: estimated first from the measurements alone, then from the residuals of the fit.
 
 use crate::flight_path::intake::{Log, Track};
 use crate::flight_path::measurement::{self, Reading};
@@ -6,36 +6,39 @@ use crate::flight_path::noise;
 use crate::flight_path::path::CHANNELS;
 use greylag_physics::sensors::Noisy;
 
-/// Smallest noise levels, of the size of the errors of discrete kinematics: gyro rad/s, force m/s².
+/// Smallest noise levels of gyros (rad/s) and accelerometers (m/s²), of the size of the errors of the discrete kinematics.
 const GYRO_FLOOR: f64 = 2e-4;
 const FORCE_FLOOR: f64 = 5e-3;
-/// Smallest noise levels of the measured channels.
+/// Smallest noise levels of the measured channels: attitude (rad), airspeed (m/s), vanes (rad), velocity (m/s).
 const FLOORS: [f64; CHANNELS] = [2e-5, 2e-5, 2e-5, 1e-3, 5e-5, 5e-5, 1e-3, 1e-3, 1e-3];
-/// Least level of a channel, relative to the path's change between two samples due to noise of gyros or
-/// accelerometers. With a smaller level the path would follow every single measurement, and the most likely delay
-/// would be half a sample, whatever the true one, because interpolation there averages neighbours.
+/// Smallest noise level of a channel, relative to the change of the path between two samples due to noise of gyros or
+/// accelerometers.
+///
+/// With a smaller level the path would follow every single measurement. The most likely delay would then be half a sample
+/// for any true delay, because interpolation at half a sample averages two measurements.
 const CARRIED: f64 = 30.0;
-/// Levels used where too few samples allow an estimate: rad, m/s, rad, m/s.
+/// Noise levels used if there are too few samples for an estimate: attitude (rad), airspeed (m/s), vanes (rad), velocity
+/// (m/s).
 const DEFAULTS: [f64; CHANNELS] = [0.02, 0.02, 0.05, 0.5, 0.02, 0.02, 0.5, 0.5, 0.5];
-/// Largest levels, colour included: the largest plausible errors of attitude, airspeed, vanes and velocity. Without a
-/// limit, a path that departs from a sensor would lower that sensor's weight and depart further.
+/// Largest noise levels times colour: the largest plausible errors of attitude (rad), airspeed (m/s), vanes (rad) and
+/// velocity (m/s). Without this limit, a path that departs from a sensor would reduce the sensor's weight and depart further.
 const WIDEST: [f64; CHANNELS] = [0.05, 0.05, 0.1, 2.0, 0.1, 0.1, 1.0, 1.0, 1.0];
-/// Scaled residual of the kinematic steps above which gyros or accelerometers have larger errors than their noise;
-/// that of a launch is 8.
+/// Scaled residual of the kinematic steps above which the noise levels of gyros or accelerometers are raised. The scaled
+/// residual of a launch is 8.
 const EXCESSIVE: f64 = 2.0;
-/// Standard deviation of the acceleration where no accelerometer measures it, m/s².
+/// Standard deviation of the specific force if the log has no accelerometers, m/s².
 const UNKNOWN_FORCE: f64 = 3.0;
-/// Gust level of calm air, m/s.
+/// Standard deviation of the gusts in calm air, m/s.
 pub const CALM: f64 = 0.002;
 /// Index of the airspeed among the measured channels.
 const AIRSPEED: usize = 3;
 /// Lengths of the blocks over which residuals are averaged to detect coloured noise, s.
 const COLOUR_BLOCKS: [f64; 2] = [1.0, 4.0];
-/// Slow error of a dynamic pressure sensor, Pa, and its correlation time, s: the sensor's zero drifts, and the static
-/// port errs with attitude. An assumption, 0.3 % of the airspeed at 17 m/s; no sensor was measured.
+/// Slow error of a dynamic pressure sensor, Pa, and its correlation time, s. The sensor's zero drifts, and the error of the
+/// static port changes with attitude. The figures are assumed, not measured: the error is 0.3 % of the airspeed at 17 m/s.
 const PITOT: (f64, f64) = (1.0, 30.0);
-/// Air density for converting that pressure to a speed, kg/m³. A typical value suffices, because only the order of magnitude
-/// of the error is known.
+/// Air density for converting the pressure error to a speed, kg/m³. A typical value suffices, because only the order of
+/// magnitude of the pressure error is known.
 const NEAR_THE_GROUND: f64 = 1.2;
 
 /// Noise levels, as standard deviations.
@@ -49,17 +52,18 @@ pub struct Levels {
     pub gusts: f64,
     /// Noise of the measured channels, in their units.
     pub measured: [f64; CHANNELS],
-    /// Least levels of the channels: the white part of the measurements, where the sampling rate is high enough to
-    /// estimate it. A path that can follow the measurements closely has residuals that are too small.
+    /// Smallest levels of the channels: the white part of the measurements, if the sampling rate is high enough to estimate it.
+    /// Without this limit, a path that follows the measurements closely would have residuals below the noise.
     pub white: [f64; CHANNELS],
-    /// Ratio of the scatter of the channels' block means to that of white noise.
+    /// Ratio of the standard deviation of the channels' block means to that of white noise, at least 1.
     pub colour: [f64; CHANNELS],
     /// Whether a level is stated and therefore not estimated.
     pub stated: [bool; CHANNELS],
-    /// White noise of the airspeed whose means scatter like its slow error, m/s. Zero where a vane measures α or no
-    /// velocity over ground was logged. In all other logs, the mean vertical wind, and with it α, follows from the change
-    /// of airspeed with climb: in 13 minutes of a PX4 flight without wind, 0.01 m/s of such an error was estimated as
-    /// 0.18 ± 0.04 m/s of wind.
+    /// White noise of the airspeed whose means have the same standard deviation as the slow error of the sensor, m/s. Zero if a
+    /// vane measures α or the log has no velocity over ground.
+    ///
+    /// In all other logs, the mean vertical wind and α follow from the change of airspeed with climb. In 13 minutes of a PX4
+    /// flight without wind, a slow error of 0.01 m/s was estimated as 0.18 ± 0.04 m/s of vertical wind.
     slow_airspeed: f64,
 }
 
@@ -71,7 +75,7 @@ impl Levels {
         };
         let or = |level: f64, default: f64| if level.is_finite() { level } else { default };
         let attitude = |i: usize| {
-            // angles near ±π jump; their sine and cosine do not
+            // angles jump at ±π, their sine and cosine do not
             let (a, b) =
                 (over(&|t, k| t.attitude[k][i].sin()), over(&|t, k| t.attitude[k][i].cos()));
             a.hypot(b)
@@ -95,7 +99,7 @@ impl Levels {
         let speeds = log.tracks.iter().flat_map(|t| &t.airspeed).filter(|v| v.is_finite());
         let (sum, count) = speeds.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         let between = |sd: [f64; 3]| CARRIED * log.step * sd.into_iter().fold(0.0, f64::max);
-        // an unknown force is not noise: it does not average out
+        // the unknown force of a log without accelerometers is not noise: its mean is not zero
         let gain = if log.has.force { between(force) } else { 0.0 };
         let turn = between(gyro);
         let floor: [f64; CHANNELS] = std::array::from_fn(|i| {
@@ -133,8 +137,8 @@ impl Levels {
         self
     }
 
-    /// Raises the levels of gyros and accelerometers whose kinematic residuals exceed chance, one level for the three
-    /// axes of each. Returns the largest relative change.
+    /// Raises the noise levels of gyros or accelerometers if their scaled kinematic residuals exceed `EXCESSIVE`. The three
+    /// axes have a common factor. Returns the natural logarithm of the largest factor.
     pub fn loosen(&mut self, step_residuals: &[f64; 6]) -> f64 {
         let worst = |of: &[f64]| {
             let worst = of.iter().copied().fold(1.0, f64::max);
@@ -146,13 +150,14 @@ impl Levels {
         turn.max(pull).ln()
     }
 
-    /// Least colour of a channel due to slow errors, if a sample has the noise `level`.
+    /// Smallest colour of a channel due to slow errors, if a sample has the noise `level`.
     fn least_colour(&self, channel: usize, level: f64) -> f64 {
         let least = if channel == AIRSPEED { self.slow_airspeed } else { 0.0 };
         1.0_f64.hypot(least / level)
     }
 
-    /// Estimates the levels again from the residuals of every stretch; returns the largest relative change.
+    /// Estimates the levels again from the residuals of every stretch with the sampling interval `step` (s). Returns the largest
+    /// change of the natural logarithm of a level.
     pub fn renew(&mut self, readings: &[Vec<Reading>], step: f64) -> f64 {
         let mut change = 0.0_f64;
         for (channel, widest) in WIDEST.into_iter().enumerate() {
@@ -165,7 +170,7 @@ impl Levels {
                 continue;
             }
             if self.stated[channel] {
-                // the stated noise is that of a sample and says nothing about the errors' correlation in time
+                // the stated noise is that of one sample and does not include the errors' correlation in time
                 self.colour[channel] = self.least_colour(channel, self.measured[channel]);
                 continue;
             }
@@ -178,7 +183,7 @@ impl Levels {
     }
 }
 
-/// The white noise that represents [`PITOT`] at `airspeed`, m/s: see [`Levels::slow_airspeed`].
+/// White noise, m/s, that represents [`PITOT`] at `airspeed` (m/s): see [`Levels::slow_airspeed`].
 fn slow_airspeed(log: &Log, airspeed: f64) -> f64 {
     if log.has.alpha || !log.has.velocity {
         return 0.0;

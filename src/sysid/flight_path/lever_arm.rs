@@ -1,4 +1,4 @@
-//! Lever arms: effect of rotation on sensors away from the centre of gravity.
+//! Lever arms: corrections for the rotation of sensors about the centre of gravity.
 
 use nalgebra::Vector3;
 
@@ -7,8 +7,8 @@ use crate::flight_path::intake::Track;
 /// Half of the interval over which gyro rates are differenced to angular acceleration, s.
 const HALF_S: f64 = 0.02;
 
-/// Transfers the specific force of an accelerometer at `at` (m from the centre of gravity, body axes) to the centre
-/// of gravity: f − ω̇ × r − ω × (ω × r), for a sampling interval of `step` (s).
+/// Transfers the specific force of `track` from the accelerometer's position `at` (m from the centre of gravity, body axes)
+/// to the centre of gravity: f − ω̇ × r − ω × (ω × r). The sampling interval is `step` (s).
 pub fn to_the_centre(track: &mut Track, at: [f64; 3], step: f64) {
     let at = Vector3::from(at);
     let (half, last) = ((HALF_S / step).round().max(1.0) as usize, track.len().saturating_sub(1));
@@ -22,8 +22,9 @@ pub fn to_the_centre(track: &mut Track, at: [f64; 3], step: f64) {
     }
 }
 
-/// Velocity through the air (m/s, body axes) at the position `at` (m), from that at the centre of gravity, `air`, and
-/// the body rates `rate` (rad/s).
+/// Velocity relative to the air (m/s, body axes) at the position `at` (m from the centre of gravity, body axes).
+///
+/// `air` is the velocity relative to the air at the centre of gravity, `rate` are the body rates (rad/s).
 pub fn air_at(air: &Vector3<f64>, rate: &Vector3<f64>, at: [f64; 3]) -> Vector3<f64> {
     air + rate.cross(&Vector3::from(at))
 }

@@ -1,23 +1,24 @@
 //! Classification of a flight into manoeuvres by rates, surfaces, bank and throttle.
 //!
-//! A moment belongs to a roll or pitch manoeuvre if the root mean square of the roll rate (of the
-//! rate of pitch angle), or of the surface about its mean, over the second around it exceeds a bound;
-//! else to a change of thrust if the throttle moves; else to a turn if the bank is large; else the flight
-//! is steady. Stretches under half a second join the one before them.
+//! Root mean squares over the second around a sample are compared with bounds. A sample belongs to a roll manoeuvre if the
+//! roll rate, or the aileron about its mean, exceeds its bound. A sample belongs to a pitch manoeuvre if the rate of the
+//! pitch angle, or the elevator about its mean, exceeds its bound. The other samples belong to a change of thrust if the
+//! throttle moves, to a turn if the bank angle is large, and to steady flight if neither holds. Manoeuvres shorter than
+//! half a second join the preceding one.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction, Segment};
 
-/// Roll rate from which a moment belongs to a manoeuvre, rad/s.
+/// RMS roll rate above which a sample belongs to a roll manoeuvre, rad/s.
 const ROLL_RATE: f64 = 0.15;
-/// Rate of pitch angle from which a moment belongs to a manoeuvre, rad/s.
+/// RMS rate of the pitch angle above which a sample belongs to a pitch manoeuvre, rad/s.
 const PITCH_RATE: f64 = 0.08;
-/// Deflection about its mean from which a moment belongs to a manoeuvre, rad.
+/// RMS deflection about its mean above which a sample belongs to a roll or pitch manoeuvre, rad.
 const DEFLECTION: f64 = 0.03;
-/// Throttle about its mean from which a moment belongs to a change of thrust.
+/// RMS throttle about its mean (0..1) above which a sample belongs to a change of thrust.
 const THROTTLE: f64 = 0.05;
-/// Bank angle from which a moment belongs to a turn, rad.
+/// Bank angle above which a sample belongs to a turn, rad.
 const BANK: f64 = 0.26;
-/// Length of the window in which activity is measured, s.
+/// Length of the window of the root mean squares, s.
 const WINDOW: f64 = 1.0;
 /// Shortest stretch of one manoeuvre, s.
 const SHORTEST: f64 = 0.5;
@@ -25,15 +26,15 @@ const SHORTEST: f64 = 0.5;
 /// Kind of a manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ManoeuvreKind {
-    /// Neither surfaces nor throttle move.
+    /// Small bank angle; neither surfaces nor throttle move.
     Steady,
-    /// Steady bank, no other motion.
+    /// Large bank angle; neither surfaces nor throttle move.
     Turn,
     /// The throttle moves, the surfaces do not.
     Thrust,
-    /// The ailerons or the roll rate move.
+    /// The ailerons move, or the roll rate is large.
     Roll,
-    /// The elevator or the pitch angle moves.
+    /// The elevator moves, or the pitch angle changes.
     Pitch,
     /// Roll and pitch move together.
     RollAndPitch,
@@ -106,7 +107,7 @@ fn kinds(instants: &[Instant], step: f64) -> Vec<ManoeuvreKind> {
         .collect()
 }
 
-/// Root of the mean square less `share` of the squared mean, over `half` samples to either side.
+/// Square root of the mean square less `share` times the squared mean, over `half` samples on each side of a sample.
 fn root_mean_square(
     instants: &[Instant],
     half: usize,

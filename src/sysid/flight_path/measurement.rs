@@ -15,24 +15,24 @@ use crate::flight_path::nuisance::{
 use crate::flight_path::path::{CHANNELS, Path, SLOW, flow_angles};
 use crate::flight_path::rotation::{cross, euler_by_turn, to_euler};
 
-/// Number of columns of the constants that act at instants, the right-hand side last.
+/// Number of columns of the constants that act at instants and of the right-hand side.
 pub const AT: usize = INERTIAL + 1;
-/// Number of additional residuals that the equations can be solved for at once.
+/// Number of additional right-hand sides for which the equations are solved at once.
 pub const OTHERS: usize = 16;
-/// Additional residuals of a channel.
+/// Residuals of a channel for the additional right-hand sides.
 pub type Others = [f64; OTHERS];
 
-/// Measurements of an instant less their predictions; NaN where there is none.
+/// Measurements of an instant less their predictions.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    /// Measured less predicted, by channel.
+    /// Measured less predicted, by channel, rad or m/s; NaN without a measurement.
     pub residual: [f64; CHANNELS],
-    /// Derivative of the predictions with respect to the delay, per s.
+    /// Derivatives of the predictions with respect to the delay of the channel, rad/s or m/s².
     by_late: [f64; CHANNELS],
 }
 
 impl Reading {
-    /// This reading with other residuals, where there are measurements.
+    /// This reading with `residuals` in the channels that have measurements.
     pub fn with(mut self, residuals: [f64; CHANNELS]) -> Reading {
         for (residual, other) in self.residual.iter_mut().zip(residuals) {
             *residual = if residual.is_nan() { f64::NAN } else { other };
@@ -41,7 +41,7 @@ impl Reading {
     }
 }
 
-/// Index of the delay that applies to a channel.
+/// Index of the constant that is the delay of a channel.
 pub fn skew_of(channel: usize) -> usize {
     match channel {
         0..3 => SKEW_ATTITUDE,
@@ -61,7 +61,8 @@ pub fn measured(track: &Track, channel: usize, k: usize) -> f64 {
     }
 }
 
-/// Derivatives of airspeed, α and β with respect to the velocity through the air; `None` at low speed.
+/// Derivatives of airspeed, α and β with respect to the velocity `u` relative to the air (body axes, m/s). `None` at low
+/// airspeed.
 fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let (v, plane) = (u.norm(), u.x.hypot(u.z));
     (plane >= SLOW).then(|| {
@@ -72,7 +73,8 @@ fn air_slopes(u: &Vector3<f64>) -> Option<Matrix3<f64>> {
     })
 }
 
-/// Values of sensors without errors at sample `k`, vanes at the position `vanes_at`.
+/// Values of error-free sensors at sample `k`, by channel. The vanes are at the position `vanes_at` (m from the centre of
+/// gravity, body axes).
 fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) -> [f64; CHANNELS] {
     let [roll, pitch, yaw] = to_euler(&path.attitude[k]);
     let u = path.air_velocity(k);
@@ -82,7 +84,7 @@ fn shown(path: &Path, k: usize, rates: &[f64; 3], vanes_at: Option<[f64; 3]>) ->
     [roll, pitch, yaw, u.norm(), alpha, beta, ground.x, ground.y, ground.z]
 }
 
-/// Converts derivatives of true air data to those of measured air data.
+/// Converts derivatives of true air data to derivatives of measured air data.
 fn scale(slopes: &mut Matrix3<f64>, values: &Values) {
     for (row, place) in [SCALE, VANE_GAIN, VANE_GAIN + 1].into_iter().enumerate() {
         slopes.row_mut(row).scale_mut(1.0 + values[place]);
@@ -137,7 +139,7 @@ pub fn readings(
     (0..n).into_par_iter().with_min_len(1000).map(read).collect()
 }
 
-/// Value of a sensor without errors a fraction `part` of a sample after sample `j`, and its slope (per sample).
+/// Value of an error-free sensor at the time `part` sampling intervals after sample `j`, and its slope per sampling interval.
 fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f64, f64) {
     let (here, last) = (shown[j][channel], shown.len() as isize - 1);
     let beside = |i: isize| turn(channel, shown[i.clamp(0, last) as usize][channel] - here);
@@ -147,12 +149,12 @@ fn seen_at(shown: &[[f64; CHANNELS]], channel: usize, j: usize, part: f64) -> (f
     (here + beside, slope)
 }
 
-/// A difference of a channel, wrapped to ±π for angles.
+/// A difference of a channel's values, wrapped to ±π for attitude angles.
 fn turn(channel: usize, x: f64) -> f64 {
     if channel < 3 { wrap(x) } else { x }
 }
 
-/// Value of a sensor with its errors where the error-free value is `h`, and its derivative with respect to `h`.
+/// Value of a sensor with its errors for the error-free value `h`, and the derivative with respect to `h`.
 fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     match channel {
         2 => (h + values[HEADING], 1.0),
@@ -163,9 +165,11 @@ fn with_errors(channel: usize, h: f64, values: &Values) -> (f64, f64) {
     }
 }
 
-/// Adds the reading of sample `k` to the equations. `spread` holds the standard deviations of the channels; a
-/// residual beyond `bound` of them is down-weighted. The first columns are `others`, additional residuals of the
-/// air-data sensors; then come the constants that act at instants, none if `M` is 1.
+/// Adds the reading of sample `k` to the equations.
+///
+/// `spread` holds the standard deviations of the channels. A residual beyond `bound` standard deviations is down-weighted.
+/// The first columns are `others`, additional residuals of the air-data sensors. The constants that act at instants follow.
+/// There are none if `M` is 1.
 #[expect(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
 pub fn add<const N: usize, const W: usize, const M: usize>(
     path: &Path,
@@ -209,14 +213,14 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
     }
 }
 
-/// Adds the first columns and the last one of `part` to those of `row`.
+/// Adds `part` to `row`: the leading columns to the leading columns, the last column to the last column.
 fn spill<const M: usize, const W: usize>(row: &mut [f64; W], part: &[f64; M]) {
     row.iter_mut().zip(&part[..M - 1]).for_each(|(x, y)| *x += y);
     row[W - 1] += part[M - 1];
 }
 
-/// Derivatives of every channel with respect to the path at sample `k`, `None` where a channel carries no
-/// information, and to the constants.
+/// Derivatives of every channel with respect to the path at sample `k` and to the constants. `None` for a channel without
+/// information.
 fn slopes<const N: usize, const M: usize>(
     path: &Path,
     k: usize,

@@ -1,7 +1,7 @@
-//! Measurement errors that look like missing physics, as entries of the catalogue of effects.
+//! Catalogue entries of measurement errors that resemble missing physical effects.
 //!
-//! The reconstruction of the flight path estimates them without any aerodynamics: their parameters are its
-//! [nuisances](crate::flight_path), under the same names.
+//! The reconstruction of the flight path estimates these errors without aerodynamics. Their coefficients are the
+//! [nuisances](crate::flight_path) of the reconstruction, with the same names.
 
 use greylag_physics::effects::{Coefficient, Description, Entry, coefficient};
 
@@ -31,7 +31,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "alpha_bias",
-        description: "The angle-of-attack vane stands askew.",
+        description: "The angle-of-attack vane is misaligned.",
         formula: "α_measured = α + b",
         source: PATH,
         coefficients: &[coefficient("alpha_bias", "measured less true", "rad", (-0.3, 0.3))],
@@ -45,7 +45,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "beta_bias",
-        description: "The sideslip vane stands askew.",
+        description: "The sideslip vane is misaligned.",
         formula: "β_measured = β + b",
         source: PATH,
         coefficients: &[coefficient("beta_bias", "measured less true", "rad", (-0.3, 0.3))],
@@ -73,14 +73,14 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "imu_bias",
-        description: "Gyros or accelerometers show a constant beside what they measure; that of a gyro drifts.",
+        description: "Gyros or accelerometers have a constant bias; that of a gyro drifts.",
         formula: "ω_measured = ω + b_ω + d_ω (t − t_middle), f_measured = f + b_f",
         source: PATH,
         coefficients: &IMU,
         ..measured(&Entry {
             channels: &[],
             look_alikes: &["propeller_gyro", "asymmetry", "external_load", "thrust_scale"],
-            separated_by: "steady flight on several headings and banks, and a stand still before take-off",
+            separated_by: "steady flight on several headings and banks, and a standstill before take-off",
             example: &[],
             starts: &[],
         })
@@ -132,7 +132,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
     },
     Description {
         id: "heading_offset",
-        description: "The measured heading stands askew against the velocity over ground.",
+        description: "The measured heading is misaligned with the velocity over ground.",
         formula: "ψ_measured = ψ + b",
         source: PATH,
         coefficients: &[coefficient("heading_offset", "measured less true", "rad", (-0.5, 0.5))],
@@ -153,7 +153,7 @@ pub const MEASUREMENT_EFFECTS: [Description; 10] = [
         ..measured(&Entry {
             channels: &[],
             look_alikes: &["time_delay", "actuator_lag", "unsteady_lift"],
-            separated_by: "fast rolls and pull-ups: kinematics tell the skew without the surfaces",
+            separated_by: "fast rolls and pull-ups: kinematics determine the skew without the surfaces",
             example: &[],
             starts: &[],
         })
@@ -199,7 +199,7 @@ const SKEW: [Coefficient; 5] = [
     coefficient("skew_velocity", "delay of the velocity over ground", "s", (-2.0, 2.0)),
 ];
 
-/// Common properties of all of them: no shape constants, no table.
+/// Common properties of all measurement effects: no shape constants, no table.
 const fn measured(entry: &Entry) -> Description {
     Description {
         id: "",
@@ -220,8 +220,8 @@ mod tests {
     use super::*;
     use crate::flight_path::nuisance;
 
-    /// The reconstruction estimates exactly these constants, under these names and in these units;
-    /// the Earth's rate, known from the latitude, is no error of a sensor.
+    /// The reconstruction estimates exactly these constants, with these names and units. The Earth's rate is not among them,
+    /// because it is not a sensor error.
     #[test]
     fn parameters_are_the_nuisances_of_the_reconstruction() {
         let mut ours: Vec<_> = MEASUREMENT_EFFECTS

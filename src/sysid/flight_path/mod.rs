@@ -1,7 +1,7 @@
 //! Flight-path reconstruction (data compatibility check): estimates states without sensor errors from a log.
 //!
-//! Kinematics need no aerodynamics, so sensor errors and wind are estimated here, before any model of the aircraft is
-//! used.
+//! The kinematic equations contain no aerodynamics. Sensor errors and wind are therefore estimated before any model of the
+//! aircraft is used.
 
 pub mod measurement_effects;
 pub mod reconstruction;
@@ -41,11 +41,11 @@ use greylag_physics::airframe::ActuatorFigures;
 /// Clock of the reconstructed deflections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActuatorClock {
-    /// The gyros' clock: recorded deflections are shifted if their delay is significant. A time delay or a lag of the
-    /// surfaces that the record does not show is confounded with it, so it is removed too.
+    /// The gyros' clock: recorded deflections are shifted if their delay is significant. The estimated delay contains any time
+    /// delay or lag of the surfaces that the record does not show. The shift removes this delay as well.
     Estimated,
-    /// The log's clock: deflections stay as recorded, so that a later search for missing effects can separate clock
-    /// errors from physics. `skew_actuators` is estimated nevertheless, for information.
+    /// The log's clock: deflections stay as recorded. A later search for missing effects can then separate clock errors from
+    /// physics. `skew_actuators` is estimated for information only.
     AsRecorded,
 }
 
@@ -54,16 +54,16 @@ pub enum ActuatorClock {
 pub struct Options {
     /// Name of the flight in reports, from its file.
     pub name: String,
-    /// Actuator model of the airframe, which converts commands to deflections where the log has none.
+    /// Actuator model of the airframe. It converts commands to deflections if the log has no deflections.
     pub actuators: ActuatorFigures,
     /// Effective gravity at the site, m/s².
     pub gravity: f64,
-    /// Meaning of a rate sample; `None` to read it from the log's column `rate_hold_s`, or to infer it from the log's
-    /// clocks. Clock skews are relative to the gyros' samples thus defined.
+    /// Meaning of a rate sample: an instant's value, or a value held until the next sample. `None` to read the meaning from the
+    /// log's column `rate_hold_s`, or to infer it from the data. Clock skews are relative to the gyro samples of this meaning.
     pub sampling: Option<Sampling>,
     /// Clock of the reconstructed deflections.
     pub actuators_clock: ActuatorClock,
-    /// Shortest time between reconstructed samples, s; a slower log keeps its own median period.
+    /// Shortest time between reconstructed samples, s. A log with a longer median period keeps that period.
     pub step_s: f64,
     /// Longest time between rows that does not count as a gap, s.
     pub gap_s: f64,
@@ -71,7 +71,7 @@ pub struct Options {
     pub shortest_s: f64,
     /// Airspeed below which the aircraft counts as not flying, m/s.
     pub airspeed_min_mps: f64,
-    /// Stated properties of the aircraft's sensors; those stated in the log itself take precedence.
+    /// Stated properties of the aircraft's sensors. Properties that the log states take precedence.
     pub sensors: Sensors,
 }
 
@@ -92,9 +92,9 @@ impl Options {
         }
     }
 
-    /// Options for the aircraft and the gravity of `model`, deflections on `clock`.
+    /// Options for the aircraft and the gravity of `model`, with deflections on `clock`.
     ///
-    /// An aircraft slower than usual is reconstructed down to a lower airspeed and in shorter stretches.
+    /// For a slow aircraft, the airspeed limit and the shortest segment are smaller than the defaults.
     pub fn of(name: &str, model: &GreyBox, clock: ActuatorClock) -> Options {
         let usual = Options::new(name, model.airframe.actuators);
         let flies = Flying::from(model.airframe.envelope.flying_from_mps());
@@ -127,7 +127,7 @@ pub enum ReconstructError {
         flight: String,
         /// The missing channel, in words.
         channel: &'static str,
-        /// Column of the log format that would provide it.
+        /// Column of the log format for the channel.
         column: &'static str,
     },
     /// The log contains no flight.
@@ -154,7 +154,7 @@ pub enum ReconstructError {
         /// Shortest stretch that can be reconstructed, s.
         shortest_s: f64,
     },
-    /// The sensors contradict one another, so that no path fits them.
+    /// No path fits the sensors: the search has no finite result.
     #[error(
         "cannot reconstruct {flight}: no flight path fits its sensors ({why}); check the units and \
          signs of attitude, rates and accelerations"
@@ -167,11 +167,11 @@ pub enum ReconstructError {
     },
 }
 
-/// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors and wind.
+/// Reconstructs `flight`: resamples each segment to uniform time steps, then estimates and removes sensor errors and wind.
 ///
 /// # Errors
-/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors
-/// contradict one another.
+/// A required channel is missing, the log contains no flight, no stretch of the flight is long enough, or no path fits the
+/// sensors.
 pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
     let log = intake::take_in(flight, options)?;
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));

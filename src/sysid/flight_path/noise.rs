@@ -1,12 +1,13 @@
-//! Estimation of noise levels from data.
+//! Estimators of noise: white part of a signal, robust level of residuals, correlation of residuals in time.
 
 use greylag_num::statistics::quantile;
 
-/// Least number of values for an estimate.
+/// Smallest number of values for an estimate.
 const FEWEST: usize = 8;
 
-/// Standard deviation of the white part of `samples`, from their fourth differences, in which a smooth signal
-/// vanishes; NaN for too few samples. Missing ones are skipped.
+/// Standard deviation of the white part of `samples`, in their unit. NaN for too few samples; missing samples are skipped.
+///
+/// The estimate uses fourth differences, in which a smooth signal vanishes.
 pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     let x: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
     let differences: Vec<f64> =
@@ -22,8 +23,8 @@ pub fn white(samples: impl Iterator<Item = f64>) -> f64 {
     if median > 0.0 { median } else { mean_square.sqrt() / gain }
 }
 
-/// Root mean square of `residuals` with outliers limited to four times the median level; NaN for too few. Reorders
-/// the slice.
+/// Root mean square of `residuals`, with outliers limited to four standard deviations estimated from the median. NaN for too
+/// few residuals. Reorders the slice.
 pub fn level(residuals: &mut [f64]) -> f64 {
     if residuals.len() < FEWEST {
         return f64::NAN;
@@ -36,8 +37,8 @@ pub fn level(residuals: &mut [f64]) -> f64 {
     (sum / residuals.len() as f64).sqrt()
 }
 
-/// Ratio of the scatter of block means of `residuals` to that for white noise: ratio of standard deviations, at least
-/// 1, for blocks of `block` values.
+/// Ratio of the standard deviation of the block means of `residuals` to that of white noise, for blocks of `block` values.
+/// 1 if the ratio is not significantly above 1.
 pub fn colour(residuals: &[f64], block: usize) -> f64 {
     let count = residuals.len() / block.max(1);
     if block < 2 || count < FEWEST {
@@ -50,7 +51,7 @@ pub fn colour(residuals: &[f64], block: usize) -> f64 {
         .sum::<f64>()
         / count as f64;
     let ratio = of_means * block as f64 / variance;
-    // the ratio of white noise scatters by √(2 / count) around one
+    // for white noise, the ratio of variances has the mean 1 and the standard deviation √(2 / count)
     let chance = 1.0 + 3.0 * (2.0 / count as f64).sqrt();
     if ratio > chance { ratio.sqrt() } else { 1.0 }
 }
@@ -71,7 +72,7 @@ mod tests {
         let noise = noise(4000);
         let signal = |k: usize| 3.0 * (k as f64 * 0.05).sin();
         let x = noise.iter().enumerate().map(|(k, n)| signal(k) + 0.02 * n);
-        // a median of 4000 correlated values is good to about 3 %
+        // the median of 4000 correlated values has a standard deviation of about 3 %
         assert!((white(x) / 0.02 - 1.0).abs() < 0.06);
         let mut noise = noise;
         assert!((level(&mut noise) - 1.0).abs() < 0.04);
@@ -89,8 +90,8 @@ mod tests {
                 slow
             })
             .collect();
-        // for a first-order process the ratio of variances is (1 + 0.9) / (1 − 0.9) = 19, less the
-        // ends of the blocks
+        // for a first-order process, the ratio of variances is (1 + 0.9) / (1 − 0.9) = 19, reduced by the ends
+        // of the blocks
         let found = colour(&slow, 100);
         assert!((3.4..4.8).contains(&found), "{found}");
     }

@@ -1,4 +1,4 @@
-//! Constants estimated along with the path: names, units and prior widths.
+//! Constants estimated together with the path (sensor errors, wind, Earth's rate): indices, names, units and priors.
 
 use crate::flight_path::Options;
 use crate::flight_path::intake::{Log, Present, Span};
@@ -6,60 +6,64 @@ use greylag_physics::sensors::CONSTANTS;
 
 /// Number of estimated constants.
 pub const COUNT: usize = 41;
-/// Index of the angle-of-attack vane's bias.
+/// Index of the angle-of-attack vane's bias, rad.
 pub const ALPHA: usize = 0;
-/// Index of the sideslip vane's bias.
+/// Index of the sideslip vane's bias, rad.
 pub const BETA: usize = 1;
-/// Index of the airspeed scale less one: measured = (1 + scale) · true.
+/// Index of the airspeed scale: measured = (1 + scale) · true.
 pub const SCALE: usize = 2;
-/// Index of the wind north, east, down: its steady part, about which gusts vary.
+/// First index of the steady wind north, east, down, m/s.
 pub const WIND: usize = 3;
-/// Index of the attitude's delay behind the gyros.
+/// Index of the attitude's delay relative to the gyros, s.
 pub const SKEW_ATTITUDE: usize = 6;
-/// Index of the airspeed's delay.
+/// Index of the airspeed's delay relative to the gyros, s.
 pub const SKEW_AIRSPEED: usize = 7;
-/// Index of the vanes' delay.
+/// Index of the vanes' delay relative to the gyros, s.
 pub const SKEW_VANES: usize = 8;
-/// Index of the ground velocity's delay.
+/// Index of the ground velocity's delay relative to the gyros, s.
 pub const SKEW_VELOCITY: usize = 9;
-/// Index of the gains of the α and β vanes less one, caused by upwash of a wing or a body.
+/// First index of the gains of the α and β vanes less 1. Upwash of a wing or a body causes such gains.
 pub const VANE_GAIN: usize = 10;
 const BETA_GAIN: usize = VANE_GAIN + 1;
-/// Index of the airspeed's offset: measured = (1 + scale) · true + offset.
+/// Index of the airspeed's offset, m/s: measured = (1 + scale) · true + offset.
 pub const AIRSPEED_OFFSET: usize = 12;
-/// Index of the measured heading's offset against the velocity over ground.
+/// Index of the offset of the measured heading relative to the velocity over ground, rad.
 pub const HEADING: usize = 13;
-/// Index of the first constant that acts between instants; those before it act at instants.
+/// Index of the first constant that acts between instants. Constants with smaller indices act at instants.
 pub const INERTIAL: usize = 14;
-/// Index of the gyro biases p, q, r in the middle of the flight.
+/// First index of the gyro biases p, q, r in the middle of the flight, rad/s.
 pub const GYRO: usize = 14;
-/// Index of the accelerometer biases x, y, z.
+/// First index of the accelerometer biases x, y, z, m/s².
 pub const FORCE: usize = 17;
-/// Index of the accelerometers' delay.
+/// Index of the accelerometers' delay relative to the gyros, s.
 pub const SKEW_FORCE: usize = 20;
-/// Index of the drifts of the gyro biases p, q, r: their rate of change, rad/s². A gyro that warms up drifts by
-/// 0.05°/s a minute (so does ArduPilot's SITL): with a constant bias, the heading error was 1.5° in four minutes.
+/// First index of the drift rates of the gyro biases p, q, r, rad/s².
+///
+/// The gyros of ArduPilot's SITL drift by 0.05°/s a minute, like a gyro that warms up. With constant biases, the heading
+/// error was 1.5° in four minutes.
 pub const DRIFT: usize = 21;
-/// Index of the gains of the gyros p, q, r less one.
+/// First index of the gains of the gyros p, q, r less 1.
 pub const GYRO_GAIN: usize = 24;
-/// Index of the gains of the accelerometers x, y, z less one.
+/// First index of the gains of the accelerometers x, y, z less 1.
 pub const FORCE_GAIN: usize = 27;
-/// Index of the changes of the drifts, rad/s², at the inner knots of the flight, p, q, r of each. The drift of
-/// ArduPilot's SITL reverses after five minutes.
+/// First index of the changes of the drift rates at the inner knots of the flight, p, q, r for each knot, rad/s². The drift
+/// of ArduPilot's SITL reverses after five minutes.
 pub const BEND: usize = 30;
 /// Number of inner knots, equally spaced between the ends of the flight.
 const KNOTS: usize = 3;
-/// Index of the Earth's rate north and down, rad/s. A log without a latitude does not determine it, and the Coriolis
-/// acceleration, 0.003 m/s² at 20 m/s, is twice the uncertainty of an accelerometer bias after a minute.
+/// First index of the Earth's rate north and down, rad/s.
+///
+/// A log without a latitude does not determine this rate. The Coriolis acceleration, 0.003 m/s² at 20 m/s, is twice the
+/// standard deviation of an accelerometer bias after a minute.
 pub const EARTH: usize = 39;
 
-/// Order of the constants in the result.
+/// Indices of the constants in the order of the result.
 pub const ORDER: [usize; BEND] = [
     14, 15, 16, 21, 22, 23, 24, 25, 26, 17, 18, 19, 27, 28, 29, 0, 1, 10, 11, 2, 12, 13, 3, 4, 5,
     6, 20, 7, 8, 9,
 ];
 
-/// Prior width of a clock skew, samples: ±1.5 samples are its 95 % interval.
+/// Prior standard deviation of a clock skew, in sampling intervals: the 95 % interval is ±1.5 sampling intervals.
 pub const SKEW_SAMPLES: f64 = 0.77;
 
 /// Values of the constants.
@@ -79,14 +83,15 @@ pub const NAMES: [(&str, &str); COUNT] = {
     all
 };
 
-/// Prior width of the delay of a sensor slower than the log's rows, in its own sample periods: its filter is about as
-/// long as its period.
+/// Prior standard deviation of the delay of a sensor that is slower than the log's rows, in periods of the sensor. The
+/// sensor's filter is assumed to be about as long as its period.
 const SKEW_PERIODS: f64 = 0.5;
 
-/// Usual drift of a gyro's bias, rad/s²: somewhat more than ArduPilot's SITL has (0.05°/s a minute, 1.45e-5).
+/// Prior standard deviation of the drift rate of a gyro's bias, rad/s²: somewhat more than in ArduPilot's SITL (0.05°/s a
+/// minute, 1.45e-5 rad/s²).
 const DRIFTING: f64 = 2e-5;
-/// Time over which a drift changes by about its own size, s: of 300 and 3000, the better value on ArduPlane's logs,
-/// because a drift that changes faster follows their slow heading errors.
+/// Time over which a drift rate changes by about its magnitude, s. Of 300 s and 3000 s, 3000 s gave better results on
+/// ArduPlane's logs: a drift rate that changes faster follows their slow heading errors.
 const STEADY: f64 = 3000.0;
 
 impl Span {
@@ -96,11 +101,12 @@ impl Span {
     }
 }
 
-/// Share of its usual width used for a constant that is known exactly, which keeps the equations regular.
+/// Prior standard deviation of a constant that is known exactly, relative to its usual prior standard deviation. A value
+/// above zero keeps the equations regular.
 const HELD: f64 = 1e-4;
 
-/// Rare instrument errors, held at zero until a flight shows them significantly (see `calibration`), with their prior
-/// widths from then on.
+/// Rare instrument errors with their prior standard deviations. They are held at zero until a flight shows them
+/// significantly (see `calibration`).
 const SELDOM: [(usize, f64); 10] = [
     (VANE_GAIN, 0.2),
     (VANE_GAIN + 1, 0.2),
@@ -116,18 +122,18 @@ const SELDOM: [(usize, f64); 10] = [
 /// Prior standard deviation of a delay that exceeds its usual width, s.
 const LATE: f64 = 0.5;
 
-/// Prior width of a constant once a flight has shown it significantly; `None` if it is free anyway.
+/// Prior standard deviation of a constant that a flight has shown significantly. `None` for a constant that is always free.
 pub fn wide(place: usize) -> Option<f64> {
     let late = matches!(place, SKEW_ATTITUDE..=SKEW_VELOCITY | SKEW_FORCE);
     SELDOM.iter().find(|(of, _)| *of == place).map(|(_, width)| *width).or(late.then_some(LATE))
 }
 
-/// Whether a constant with the prior width `width` is held until a flight shows it.
+/// Whether a constant with the prior standard deviation `width` is still held at its prior mean.
 pub fn held(place: usize, width: f64) -> bool {
     SELDOM.iter().any(|(of, wide)| *of == place && width <= 2.0 * HELD * wide)
 }
 
-/// Prior standard deviations of the constants for `log`: those stated for its sensors, else the usual ones.
+/// Prior standard deviations of the constants for `log`: stated for the sensors, or else the default values.
 pub fn prior_widths(log: &Log) -> Values {
     let mut widths = usual_widths(log);
     for (place, (width, (name, _))) in widths.iter_mut().zip(NAMES).enumerate() {
@@ -152,7 +158,7 @@ fn usual_widths(log: &Log) -> Values {
     width[ALPHA..=BETA].fill(5.0_f64.to_radians());
     width[SCALE] = 0.2;
     width[WIND..WIND + 2].fill(15.0);
-    // vertical wind averages out over most of a flight
+    // the mean vertical wind over a flight is close to zero
     width[WIND + 2] = 1.0;
     width[DRIFT..DRIFT + 3].fill(DRIFTING);
     let apart = log.tracks.first().map_or(0.0, |track| track.span.apart());
@@ -168,9 +174,10 @@ fn usual_widths(log: &Log) -> Values {
     width
 }
 
-/// Prior means of the constants: those stated for the log's sensors, else zero except for the Earth's rate, 7.29e-5
-/// rad/s at any latitude from −65° to 65°, whose north component is never negative. Its standard deviations cover the
-/// same latitudes.
+/// Prior means of the constants: stated for the sensors of `log`, or else zero.
+///
+/// The Earth's rate to the north has the mean 5.8e-5 rad/s. Mean and standard deviations of the Earth's rate (7.29e-5 rad/s)
+/// cover latitudes from −65° to 65°.
 pub fn prior_means(log: &Log) -> Values {
     let mut mean = [0.0; COUNT];
     mean[EARTH] = 5.8e-5;
@@ -182,7 +189,7 @@ pub fn prior_means(log: &Log) -> Values {
     mean
 }
 
-/// The constants that add up to the gyro bias of an axis (0 to 2) at `time`, each with its factor.
+/// Indices and factors of the constants that add up to the gyro bias of an axis (0 to 2) at `time` (s).
 pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + KNOTS] {
     let since_middle = time - span.middle;
     std::array::from_fn(|i| match i {
@@ -190,7 +197,7 @@ pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + K
         1 => (DRIFT + axis, since_middle),
         _ => {
             let knot = (i - 2) as f64 - 0.5 * (KNOTS - 1) as f64;
-            // from the middle to both ends, so that the bias of the middle stays
+            // from the middle to both ends: the bias in the middle does not change
             let beyond = match knot {
                 ..0.0 => (since_middle - knot * span.apart()).min(0.0),
                 _ => (since_middle - knot * span.apart()).max(0.0),
@@ -200,25 +207,25 @@ pub fn gyro_bias_of(axis: usize, time: f64, span: &Span) -> [(usize, f64); 2 + K
     })
 }
 
-/// Gyro biases p, q, r at `time`, rad/s.
+/// Gyro biases p, q, r at `time` (s), rad/s.
 pub fn gyro_bias(values: &Values, time: f64, span: &Span) -> [f64; 3] {
     std::array::from_fn(|axis| {
         gyro_bias_of(axis, time, span).iter().map(|(place, by)| values[*place] * by).sum()
     })
 }
 
-/// `measured` on three axes corrected for their gains, whose indices start at `first`: measured = (1 + gain) · (true
-/// + bias).
+/// `measured` on three axes divided by 1 + gain: measured = (1 + gain) · (true + bias). `first` is the index of the first
+/// gain.
 pub fn without_gain(values: &Values, first: usize, measured: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| measured[axis] / (1.0 + values[first + axis]))
 }
 
-/// Offset added to a constant in the result, where the airspeed scale is a factor.
+/// Offset added to a constant in the result: 1 for the airspeed scale, which the result states as a factor, else 0.
 pub fn offset(place: usize) -> f64 {
     if place == SCALE { 1.0 } else { 0.0 }
 }
 
-/// Whether the log contains the sensor that a constant belongs to.
+/// Whether the log contains the sensor to which a constant belongs. False for constants that are not reported.
 pub fn concerned(place: usize, has: &Present) -> bool {
     match place {
         ALPHA | VANE_GAIN => has.alpha,
@@ -233,9 +240,11 @@ pub fn concerned(place: usize, has: &Present) -> bool {
     }
 }
 
-/// Whether a constant is unobservable in the log. Without accelerometers and velocity over ground, no air-data sensor
-/// is related to another one: only the smoothness of the path remains, which favours slower flight (an airspeed scale
-/// of four in a flight without any error).
+/// Whether a constant is unobservable in the log.
+///
+/// Without accelerometers and velocity over ground, the air-data sensors are not related to one another. Only the smoothness
+/// of the path then determines the constants, and this favours slow flight: in a flight without sensor errors, the estimate
+/// of the airspeed scale was four.
 pub fn unseeable(place: usize, has: &Present) -> bool {
     let of_the_air = place < SKEW_ATTITUDE
         || place == SKEW_AIRSPEED
@@ -255,7 +264,7 @@ pub fn remedy(place: usize, has: &Present) -> &'static str {
     }
 }
 
-/// Notes on the constants that keep their prior, one for each remedy.
+/// Notes on the constants `places`, which keep their priors; one note for each remedy.
 pub fn unseen(places: &[usize], has: &Present, options: &Options) -> Vec<String> {
     let mut by_remedy: Vec<(&str, Vec<&str>)> = Vec::new();
     for place in places {
@@ -271,7 +280,7 @@ pub fn unseen(places: &[usize], has: &Present, options: &Options) -> Vec<String>
             _ => ("they", "keep their priors", "them"),
         };
         format!(
-            "The data of {} cannot tell {}: {they} {keep}; {remedy} to see {them}.",
+            "The data of {} do not determine {}: {they} {keep}; {remedy} to see {them}.",
             options.name,
             names.join(", ")
         )

@@ -1,4 +1,4 @@
-//! Result of the smoother, as a reconstruction with its notes.
+//! Conversion of the smoother's result to a reconstruction: states, sensor errors, remaining errors, actuator delay, notes.
 
 use nalgebra::Vector3;
 
@@ -19,32 +19,35 @@ use greylag_num::stream::stream;
 use greylag_physics::sensors::Known;
 use greylag_physics::{Controls, State};
 
-/// A constant counts as unobservable if its posterior width exceeds this share of the prior's.
+/// A constant counts as unobservable if its posterior standard deviation exceeds this share of its prior standard deviation.
 const UNSEEN: f64 = 0.7;
-/// Distance from the prior mean, in prior standard deviations, that gets a note.
+/// Distance of an estimate from its prior mean, in prior standard deviations, above which a note is written.
 const FAR: f64 = 3.0;
-/// Gust level that gets a note, m/s.
+/// Standard deviation of the gusts above which a note is written, m/s.
 const ROUGH: f64 = 0.1;
-/// Smallest actuator delay that is corrected, samples: a smaller one is within the regression's own error.
+/// Smallest actuator delay that is corrected, in sampling intervals. A smaller delay is within the error of the regression.
 const CORRECTED: f64 = 0.25;
 
-/// Time scale above which a difference between path and measured attitude does not count as noise, s.
+/// Length of the blocks over which the difference between estimated and measured attitude is averaged, s. The means do not
+/// count as noise.
 const DISAGREEING: f64 = 4.0;
 
-/// Constant error of a flight controller's pitch and heading, rad (standard deviation). A log does not show it: an
-/// estimator that attributes an accelerometer bias to pitch corrects the accelerations consistently. PX4 in SITL has
-/// 0.14° to 0.22° in pitch, 0.11° to 0.30° in heading (results/notes/2026-11-27-flight-path-reconstruction.md). A board
-/// levelled and a compass calibrated by hand are assumed to be no better.
+/// Standard deviations of the constant errors of a flight controller's pitch and heading, rad.
+///
+/// A log does not show these errors: an estimator that attributes an accelerometer bias to pitch corrects the accelerations
+/// consistently. PX4 in SITL has 0.14° to 0.22° in pitch, 0.11° to 0.30° in heading
+/// (results/notes/2026-11-27-flight-path-reconstruction.md). For a board levelled and a compass calibrated by hand, at least
+/// the same errors are assumed.
 const ALIGNED: [f64; 2] = [0.25 * DEGREE, 0.5 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Number of draws of the path's errors: enough for their rms over a flight to a few percent.
+/// Number of random draws of the path's errors: they determine the RMS errors over a flight to a few percent.
 const DRAWS: usize = 3;
 
 /// Assembles the reconstruction.
 ///
 /// # Errors
-/// [`ReconstructError::NoPath`] if the path's errors cannot be drawn.
+/// [`ReconstructError::NoPath`] if the equations of the simulated path errors are singular.
 pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, ReconstructError> {
     let Problem { log, options, .. } = *problem;
     let mut segments = path_as_segments(problem, found, &found.paths, None);
@@ -77,7 +80,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     } else if late {
         correct(&mut segments, &skew, log.step);
         notes.push(format!(
-            "The recorded actuators came {:.1} ms late against the gyros and were put right; a lag of \
+            "The recorded actuators came {:.1} ms late against the gyros and were corrected; a lag of \
              the surfaces that the record does not show would look the same.",
             1e3 * skew.late
         ));
@@ -105,7 +108,7 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     })
 }
 
-/// Copies of the flight, each with an additional error like those of the path.
+/// Copies of the flight, each with a random additional error of the same distribution as the error of the path.
 fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, ReconstructError> {
     let mut random = stream(0, &[]);
     let draw = |_| {
@@ -116,7 +119,8 @@ fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, Reconstr
     all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
 }
 
-/// Root mean square of the drawn errors of each state; the noise `gyro` for the rates.
+/// Root mean square of the drawn errors of each state, in the unit of the state. For the body rates, the noise `gyro`
+/// (rad/s).
 fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64; 8] {
     let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
     for draw in erring {
@@ -135,7 +139,7 @@ fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64;
     left
 }
 
-/// The tracks with the states of `paths`, and the gyros' noise `gyro` added to the rates.
+/// Segments with the states of `paths`. The noise `gyro` (rad/s), if given, is added to the body rates.
 fn path_as_segments(
     problem: &Problem,
     found: &Found,
@@ -181,7 +185,7 @@ fn segment(
                 let gain = if log.has.force { 1.0 + values[FORCE_GAIN + i] } else { 1.0 };
                 force[k][i] / gain - values[FORCE + i]
             }),
-            // Without an altitude the air density is that at sea level, as the notes state.
+            // Without an altitude, the air density at sea level is used; the notes state this.
             altitude: Some(track.altitude[k]).filter(|h| h.is_finite()).unwrap_or(0.0),
             density: track.density[k],
         }
@@ -189,8 +193,8 @@ fn segment(
     Segment { instants: (0..track.len()).map(instant).collect() }
 }
 
-/// Specific force of a path without accelerometers: acceleration less gravity, body axes; NaN where no velocity was
-/// measured, and at the ends.
+/// Specific force of a path without accelerometers: acceleration less gravity, body axes, m/s². NaN at samples without a
+/// measured velocity, and at both ends.
 fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector3<f64>> {
     let nan = Vector3::repeat(f64::NAN);
     let down = Vector3::new(0.0, 0.0, gravity);
@@ -204,7 +208,7 @@ fn path_force(track: &Track, path: &Path, log: &Log, gravity: f64) -> Vec<Vector
     (0..path.len()).map(at).collect()
 }
 
-/// Whether the delay of the recorded deflections exceeds its possible error.
+/// Whether the delay of the recorded deflections is significant (2 standard deviations) and large enough to be corrected.
 fn late_beyond_doubt(skew: &Skew, step: f64) -> bool {
     skew.late.abs() >= CORRECTED * step && skew.late.abs() >= 2.0 * skew.deviation
 }
@@ -231,7 +235,7 @@ fn correct(segments: &mut [Segment], skew: &Skew, step: f64) {
     }
 }
 
-/// Constants of the log's sensors, the airspeed scale as a factor.
+/// Estimated constants of the log's sensors; the airspeed scale is stated as a factor.
 fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
     nuisance::ORDER
         .into_iter()
@@ -252,11 +256,13 @@ fn nuisances(problem: &Problem, smoothed: &Found) -> Vec<Nuisance> {
         .collect()
 }
 
-/// Uncertainty of α and β without vanes. It has four parts: the wind, the path, the slow difference between estimated and
-/// measured pitch and heading, and the alignment of the measured ones. The values themselves are zero.
+/// Standard deviations of α and β without vanes, rad, as nuisances with the value zero.
 ///
-/// If gyros and compass differ by a degree over half a minute, the heading has at least that error, even with little
-/// noise. The error of β includes it.
+/// The variance has four parts: the wind, the path, the slow difference between estimated and measured pitch and heading, and
+/// the constant error of the measured pitch and heading.
+///
+/// If gyros and compass differ by a degree over half a minute, the heading has an error of at least this size, even with
+/// little noise. The standard deviation of β includes this error.
 fn unmeasured_angles(
     problem: &Problem,
     smoothed: &Found,
@@ -309,7 +315,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     }
     let unseen = |place: &usize| {
         let stated = log.sensors.known(nuisance::NAMES[*place].0).is_some();
-        // a drift that is too slow to observe in a flight does not matter there
+        // an unobservable drift is too slow to be relevant in this flight
         !stated
             && !nuisance::held(*place, problem.widths[*place])
             && !(DRIFT..BEND).contains(place)
@@ -320,7 +326,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     notes.extend(nuisance::unseen(&places, has, options));
     for n in found.iter().filter(|n| n.moved().abs() > FAR) {
         notes.push(format!(
-            "{} is found at {:.4} {}, {:.1} standard deviations from what was known of it beforehand: check that \
+            "{} is found at {:.4} {}, {:.1} standard deviations from the prior mean: check that \
              sensor, or what [sensors] says of it.",
             n.name,
             n.value,
@@ -330,7 +336,7 @@ fn declare(problem: &Problem, smoothed: &Found, found: &[Nuisance], notes: &mut 
     }
     if smoothed.levels.gusts > ROUGH {
         notes.push(format!(
-            "The air was rough: gusts of about {:.1} m/s beside the mean wind.",
+            "The air was rough: gusts of about {:.1} m/s in addition to the mean wind.",
             smoothed.levels.gusts
         ));
     }

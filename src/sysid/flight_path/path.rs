@@ -25,7 +25,8 @@ pub struct Path {
 }
 
 impl Path {
-    /// Initial guess in air without wind: attitude, airspeed and flow angles as measured, each held where it is missing.
+    /// Initial guess without wind, from the measured attitude, airspeed and flow angles. A missing measurement is replaced by the
+    /// preceding one.
     pub fn guess(track: &Track) -> Path {
         let course = track.velocity.iter().find(|v| v[0].is_finite() && v[1].is_finite());
         let first = |mut values: Box<dyn Iterator<Item = f64> + '_>, default: f64| {
@@ -68,7 +69,8 @@ impl Path {
         path
     }
 
-    /// Wind implied by the measured ground velocities of `track` for this path: sum and number of the differences.
+    /// Differences between the measured velocities over ground of `track` and the path's velocities, m/s: sum and number. Their
+    /// mean is the wind if the path has none.
     pub fn wind_left(&self, track: &Track) -> (Vector3<f64>, f64) {
         let mut sum = (Vector3::zeros(), 0.0);
         for (measured, own) in track.velocity.iter().zip(&self.velocity) {
@@ -80,7 +82,7 @@ impl Path {
         sum
     }
 
-    /// Changes the wind to `wind`, with the same motion through the air.
+    /// Changes the wind of a path without wind to `wind` (m/s, earth axes). The motion relative to the air does not change.
     pub fn carry(&mut self, wind: Vector3<f64>) {
         self.wind = wind;
         self.velocity.iter_mut().for_each(|v| *v += wind);
@@ -108,7 +110,7 @@ impl Path {
     }
 }
 
-/// α and β of a velocity relative to the air in body axes, rad.
+/// α and β, rad, of the velocity `u` relative to the air (body axes).
 pub fn flow_angles(u: &Vector3<f64>) -> [f64; 2] {
     let v = u.norm().max(1e-9);
     [u.z.atan2(u.x), (u.y / v).clamp(-1.0, 1.0).asin()]

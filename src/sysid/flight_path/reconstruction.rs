@@ -1,4 +1,4 @@
-//! A reconstructed flight: one clock, sensor errors removed, no gaps within a segment.
+//! A reconstructed flight: segments with uniform time steps, sensor errors removed.
 
 use greylag_logs::rudder::RudderMotion;
 use greylag_logs::{Flight, Sample, Sampling};
@@ -10,17 +10,18 @@ use greylag_physics::{Command, Controls, State};
 pub struct Instant {
     /// Time on the log's clock, s.
     pub time_s: f64,
-    /// Flight state, sensor errors removed.
+    /// Flight state without the estimated sensor errors.
     pub state: State,
     /// Heading ψ, rad; NaN if the log has none.
     pub yaw: f64,
-    /// The recorded deflections and throttle position, resampled, before the model's own effects on inputs.
+    /// The resampled deflections (rad) and throttle position (0..1), before the input effects of a model.
     pub controls: Controls,
-    /// The command, where the log has one.
+    /// The command; `None` if the log has no commands.
     pub command: Option<Command>,
-    /// Specific force at the centre of gravity, biases removed, body axes, m/s²; NaN if not logged.
+    /// Specific force at the centre of gravity without biases, body axes, m/s². NaN if neither accelerometers nor the velocity
+    /// over ground are logged.
     pub specific_force: [f64; 3],
-    /// Altitude above mean sea level, m.
+    /// Altitude above mean sea level, m; 0 if it is not logged.
     pub altitude: f64,
     /// Density of the air, kg/m³.
     pub density: f64,
@@ -33,10 +34,10 @@ pub struct Segment {
     pub instants: Vec<Instant>,
 }
 
-/// A sensor error or a component of the wind, as estimated together with the path.
+/// A sensor error or a component of the wind that the reconstruction has estimated.
 ///
-/// The wind is the steady part, without gusts. Its standard deviation covers the difference to the mean wind of the flight.
-/// The velocity through the air at an instant includes the gust.
+/// The wind is the steady part without gusts. Its standard deviation covers the difference to the mean wind of the flight.
+/// The velocity relative to the air at an instant includes the gust.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nuisance {
     /// Name, for example `gyro_bias_p`, `alpha_bias`, `airspeed_scale`, `wind_north`.
@@ -47,12 +48,12 @@ pub struct Nuisance {
     pub sd: f64,
     /// Unit of the values, for example `rad/s`.
     pub unit: &'static str,
-    /// Prior mean and standard deviation; `None` if it was not estimated along with the path.
+    /// Prior mean and standard deviation, in `unit`; `None` if the quantity was not estimated together with the path.
     pub prior: Option<Known>,
 }
 
 impl Nuisance {
-    /// Change from the prior mean in prior standard deviations; zero without a prior.
+    /// Difference between estimate and prior mean in prior standard deviations; 0 without a prior.
     pub fn moved(&self) -> f64 {
         self.prior.filter(|p| p.sd > 0.0).map_or(0.0, |p| (self.value - p.value) / p.sd)
     }
@@ -65,30 +66,33 @@ pub struct Reconstruction {
     pub name: String,
     /// Time between samples, s.
     pub step_s: f64,
-    /// Whether body rates and deflections are constant from one sample to the next, or samples of continuous signals.
+    /// Whether body rates and deflections are held from one sample to the next, or are samples of continuous signals.
     pub sampling: Sampling,
     /// Stretches of the flight without gaps.
     pub segments: Vec<Segment>,
-    /// Sensor errors and wind estimated along with the path.
+    /// Estimated sensor errors, wind, actuator delay and, without vanes, uncertainties of α and β.
     pub nuisances: Vec<Nuisance>,
     /// Standard deviations of the measurement noise as logged, before smoothing, in the order roll, pitch, airspeed,
     /// p, q, r, alpha, beta (units of [`State`]).
     pub noise: [f64; 8],
-    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the same order. Body rates are
-    /// measured rates less their biases, not smoothed; the errors of the other states vary over tenths of seconds. Constant
-    /// errors are not included: [`Self::nuisances`] has them.
+    /// Standard deviations of the remaining errors in the states of [`Self::segments`], in the order and units of
+    /// `Self::noise`.
+    ///
+    /// Body rates are measured rates less biases and are not smoothed. The errors of the other states vary over tenths of
+    /// seconds. Constant errors are not included; [`Self::nuisances`] contains their standard deviations.
     pub left: [f64; 8],
-    /// Standard deviation of the accelerometers' noise, m/s².
+    /// Standard deviations of the specific force's noise in body axes x, y, z, m/s².
     pub force_noise: [f64; 3],
     /// Motion of the rudder, if it moves.
     pub rudder: Option<RudderMotion>,
-    /// Notes for the reader: assumptions made, and lost accuracy, for example without a vane.
+    /// Notes on assumptions and on lost accuracy, for example without a vane.
     pub notes: Vec<String>,
 }
 
 impl Reconstruction {
-    /// Standard deviation of the constant `name`, in its unit; without a vane that of `alpha_bias` is the uncertainty
-    /// of α, and likewise for β. `None` if it was not estimated.
+    /// Standard deviation of the constant `name`, in its unit; `None` if the constant was not estimated.
+    ///
+    /// Without a vane, the value for `alpha_bias` or `beta_bias` is the standard deviation of α or β, rad.
     pub fn deviation(&self, name: &str) -> Option<f64> {
         let angle = match name {
             "alpha_bias" => "alpha_path",
@@ -99,8 +103,8 @@ impl Reconstruction {
         Some(found.sd).filter(|sd| sd.is_finite())
     }
 
-    /// The flight as a log: reconstructed states and specific force, altitude, air density, deflections and commands; those of the
-    /// rudder if it moves.
+    /// The flight as a log: reconstructed states and specific force, altitude, air density, deflections and commands. Rudder
+    /// deflection and command are NaN if the rudder does not move.
     pub fn to_flight(&self) -> Flight {
         let rate_hold_s = if self.sampling == Sampling::Held { self.step_s } else { 0.0 };
         let of_rudder = |x: f64| if self.rudder.is_some() { x } else { f64::NAN };

@@ -2,12 +2,12 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Matrix of the cross product with `v` from the left.
+/// Matrix C of the cross product with `v`: C x = v × x.
 pub fn cross(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// Rotation by the vector `turn`, rad.
+/// Rotation matrix of the rotation vector `turn`, rad.
 pub fn exp(turn: &Vector3<f64>) -> Matrix3<f64> {
     let angle2 = turn.norm_squared();
     let angle = angle2.sqrt();
@@ -20,7 +20,7 @@ pub fn exp(turn: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * a + k * k * b
 }
 
-/// Rotation vector of a small rotation, rad.
+/// Rotation vector of a rotation by less than π, rad.
 pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     let half = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12) * 0.5;
     let sine = half.norm();
@@ -49,7 +49,8 @@ pub fn to_euler(r: &Matrix3<f64>) -> [f64; 3] {
     [r.m32.atan2(r.m33), (-r.m31).clamp(-1.0, 1.0).asin(), r.m21.atan2(r.m11)]
 }
 
-/// Derivatives of roll, pitch and yaw with respect to a small rotation in body axes; `None` close to the vertical.
+/// Derivatives of roll, pitch and yaw (rows) with respect to a small rotation about body x, y, z (columns). `None` for cos θ
+/// below 0.05.
 pub fn euler_by_turn(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (sp, cp) = (-r.m31, r.m32.hypot(r.m33));
     (cp > 0.05).then(|| {
@@ -79,7 +80,7 @@ mod tests {
         }
         let turn = Vector3::new(0.3, -0.2, 0.1);
         assert!((log(&exp(&turn)) - turn).norm() < 1e-14);
-        // the derivative by differences of 1e-6, good to 1e-6
+        // finite differences with a step of 1e-6, accurate to 1e-6
         let jacobian = euler_by_turn(&r).unwrap();
         for axis in 0..3 {
             let mut turn = Vector3::zeros();

@@ -1,11 +1,10 @@
-//! Sampling of a log's rates, as stated in the log or as inferred from its clocks.
+//! Sampling of a log's body rates: stated in the log, or inferred from the estimated clock skews.
 //!
-//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. Interpreted as a sample
-//! at an instant, that rate is half a sample period early, and every other sensor seems delayed by as much. A log
-//! that does not state its sampling is therefore first interpreted as samples at instants. If the known time offset
-//! of every sensor is half a period under samples at instants, and zero under held rates, the rates are held. Means over
-//! a sample period need no case of their own: their gyros are delayed by half a period, which the estimated clock skews
-//! absorb.
+//! A simulator with explicit Euler steps logs the rate that it holds until the next sample. If this rate is interpreted as
+//! a sample at an instant, it is half a sample period early. Every other sensor then seems delayed by half a period. A log
+//! that does not state its sampling is first interpreted as samples at instants. The rates count as held if every
+//! well-determined clock skew is half a period under samples at instants, and zero under held rates. Means over a sample
+//! period need no separate case: they delay the gyros by half a period, and the estimated clock skews include this delay.
 
 use crate::flight_path::ReconstructError;
 use crate::flight_path::equations::{Found, Problem};
@@ -16,17 +15,17 @@ use crate::flight_path::nuisance::{
 use crate::flight_path::smoother::smooth;
 use greylag_logs::Sampling;
 
-/// Least number of clocks that must agree.
+/// Smallest number of clock skews that must agree.
 const FEWEST: usize = 2;
-/// A clock counts as known if its standard deviation is below this share of the sample period.
+/// A clock skew counts as well determined if its standard deviation is below this share of the sample period.
 const KNOWN: f64 = 0.1;
-/// Largest difference between the clocks of one simulator, as a share of the sample period, due to interpolation
-/// errors.
+/// Tolerance for the clock skews of a simulator, as a share of the sample period: their largest differences due to
+/// interpolation errors.
 const AGREE: f64 = 0.03;
-/// Further tolerance in standard deviations of each clock; it is added to `AGREE`.
+/// Additional tolerance, in standard deviations of the clock skew.
 const DEVIATIONS: f64 = 3.0;
 
-/// The sampling of a log with the path estimated under it, and a note on the choice.
+/// The sampling of a log, the path estimated with this sampling, and a note on the choice.
 pub struct Chosen {
     /// Meaning of a rate sample.
     pub sampling: Sampling,
@@ -36,7 +35,7 @@ pub struct Chosen {
     pub note: Option<String>,
 }
 
-/// Smooths the log of `problem` under the sampling `declared`, or under the one that its clocks support.
+/// Smooths the log of `problem` under the sampling `declared`, or else under the sampling that the clock skews support.
 ///
 /// # Errors
 /// [`ReconstructError::NoPath`] if the search has no finite result.
@@ -61,7 +60,7 @@ pub fn choose(problem: &Problem, declared: Option<Sampling>) -> Result<Chosen, R
     Ok(Chosen { sampling: Sampling::Instants, found: instants, note: None })
 }
 
-/// Whether all known clocks of the log are `late` (s) behind the gyros, and there are enough of them.
+/// Whether all well-determined clock skews of the log equal `late` (s) within tolerance, and there are enough of them.
 fn agree(log: &Log, found: &Found, late: f64) -> bool {
     let clocks = [SKEW_ATTITUDE, SKEW_AIRSPEED, SKEW_VANES, SKEW_VELOCITY, SKEW_FORCE];
     let known: Vec<usize> = clocks

@@ -1,9 +1,9 @@
-//! The smoother: fits path and constants to all sensors by Gauss–Newton.
+//! The smoother: fits path and constants to all sensors by Gauss–Newton iterations.
 //!
-//! At first, gusts count as noise of the air-data sensors, and motion and constants are fitted. If gusts are more likely
-//! than noise, gusts along the path are then estimated with the constants held, and the effect of gusts of that level
-//! on the constants is added to their standard deviations. Estimating path, gusts and constants together would give an
-//! airspeed scale far above one, because that makes every gust smaller.
+//! First, motion and constants are fitted; gusts count as noise of the air-data sensors. If gusts are more likely than
+//! noise, gusts along the path are then estimated with the constants held. The standard deviations of the constants are
+//! raised by the effect of these gusts. A joint estimate of path, gusts and constants would give an airspeed scale far above
+//! 1, because a large scale makes every gust smaller.
 
 use nalgebra::Vector3;
 
@@ -16,20 +16,21 @@ use crate::flight_path::levels::{CALM, Levels};
 use crate::flight_path::nuisance::WIND;
 use crate::flight_path::path::Path;
 
-/// Gust levels tried, m/s, before refinement by factors around the best of them.
+/// Standard deviations of the gusts that are tried first, m/s, and factors of the refinement around the best of them.
 const COARSE: [f64; 4] = [0.02, 0.1, 0.5, 2.0];
 const FINE: [f64; 3] = [2.0, 1.4, 1.2];
-/// Residuals beyond this many standard deviations are down-weighted.
+/// Residuals beyond this number of standard deviations are down-weighted.
 const BOUND: f64 = 4.0;
-/// Largest number of iterations with gusts.
+/// Number of iterations with gusts.
 const GUSTY: usize = 4;
-/// Number of iterations before levels are estimated from residuals, and in total.
+/// Number of iterations before noise levels are estimated from residuals, and largest total number of iterations.
 const FIRST: usize = 2;
 const LAST: usize = 25;
-/// Convergence tolerance: largest change of a constant in units of its standard deviation, and relative change of a level.
+/// Convergence tolerances: largest change of a constant in its standard deviations, and largest relative change of a noise
+/// level.
 const STEP_TOLERANCE: f64 = 0.05;
 const LEVEL_TOLERANCE: f64 = 0.02;
-/// Smallest share of a step that is tried.
+/// Smallest fraction of a step that the line search tries.
 const LEAST_PART: f64 = 1.0 / 64.0;
 
 /// Smooths all stretches of the log together.
@@ -58,7 +59,7 @@ pub fn smooth(problem: &Problem) -> Result<Found, ReconstructError> {
     Ok(found)
 }
 
-/// Fits motion and constants for calm air, from iteration `from` on.
+/// Fits motion and constants without gusts, starting with the iteration number `from`.
 fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), ReconstructError> {
     let Problem { log, options, .. } = *problem;
     let singular = || no_path(&options.name, "the equations became singular");
@@ -78,11 +79,11 @@ fn calm(problem: &Problem, found: &mut Found, from: usize) -> Result<(), Reconst
     Ok(())
 }
 
-/// Takes the step, or its largest fraction (by halving) that lowers the merit function; no step if there is none.
-/// Returns the largest change of a constant in units of its standard deviation.
+/// Takes the step, or its largest fraction (by halving) that does not raise the merit function. Without such a fraction, no
+/// step is taken. Returns the largest change of a constant in its standard deviations.
 ///
-/// Without this line search a nearly straight flight, in which wind, airspeed scale and path are confounded, ends in
-/// a wrong wind of 5 m/s, as the first minute of a real ArduPlane flight did.
+/// In a nearly straight flight, wind, airspeed scale and path are confounded. Without this line search, the first minute of
+/// a real ArduPlane flight gave a wrong wind of 5 m/s.
 fn search(
     problem: &Problem,
     found: &mut Found,
@@ -104,13 +105,13 @@ fn search(
     Ok(0.0)
 }
 
-/// Estimates gusts along the path if the data make them more likely.
+/// Estimates gusts along the path if the data make gusts more likely than white noise of the air-data sensors.
 fn gusty(
     problem: &Problem,
     found: &mut Found,
     singular: &dyn Fn() -> ReconstructError,
 ) -> Result<(), ReconstructError> {
-    // without both vanes, the filter and the delay of the airspeed would be fitted as vertical gusts
+    // if a vane is missing, the filter and the delay of the airspeed would be estimated as vertical gusts
     if !(problem.log.has.alpha && problem.log.has.beta) {
         return Ok(());
     }
@@ -133,7 +134,7 @@ fn gusty(
     Ok(())
 }
 
-/// The most likely gust level, m/s.
+/// The most likely standard deviation of the gusts, m/s. `None` if the equations are singular.
 fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
     let mut trial = found.clone();
     let mut misfit = |gusts: f64| {
@@ -163,7 +164,7 @@ fn likeliest_gusts(problem: &Problem, found: &Found) -> Option<f64> {
     Some(best)
 }
 
-/// Initialises the wind with the stated one, else with the mean implied by the measurements.
+/// Initialises the wind with the stated wind, or else with the mean difference between measured and guessed velocities.
 fn start(found: &mut Found, problem: &Problem) {
     let mut sum = (Vector3::zeros(), 0.0);
     for (path, track) in found.paths.iter().zip(&problem.log.tracks) {

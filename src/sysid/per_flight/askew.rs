@@ -1,50 +1,48 @@
-//! Misaligned measured axes: rotated against the body by a small constant angle.
+//! Misalignment of the measured axes: a small constant rotation relative to the body axes.
 //!
-//! ε (rad, body axes) is the rotation from the body's axes to those of the board or the markers. The coordinates of a
+//! ε (rad, body axes) is the rotation from the body axes to the axes of the board or the markers. The coordinates of a
 //! vector x in the rotated axes are x − ε × x = x + x × ε to first order (Stevens, Lewis and Johnson, Aircraft
-//! Control and Simulation, section 1.3): this applies to body rates, specific force and the velocity through the air.
-//! The path is smoothed in the axes of gyros and attitude, so α and β are of these axes too. Vanes measure in the
-//! body's axes: the reconstruction attributes the mean effect of the misalignment on α and β to their bias, and the
-//! path follows the vanes otherwise.
+//! Control and Simulation, section 1.3). This formula applies to body rates, specific force and the velocity relative to the
+//! air. The path is smoothed in the axes of gyros and attitude. Without vanes, α and β also refer to these axes. Vanes
+//! measure in the body axes: the reconstruction then attributes the mean effect of the misalignment on α and β to the vane
+//! biases, and otherwise the path follows the vanes.
 
 use crate::flight_path::reconstruction::{Instant, Reconstruction};
 
-/// Id of the misalignment angles among the measurement errors.
+/// Identifier of the misalignment among the measurement errors.
 pub const ID: &str = "axes_askew";
 /// Names of the angles, about body x, y and z.
 pub const NAMES: [&str; 3] = ["askew_roll", "askew_pitch", "askew_yaw"];
 
-/// Change of the coordinates `x` of a vector for a unit of each angle: x × e.
+/// Change of the coordinates `x` of a vector per rad of each angle: x × e, with the unit vector e of the body axis.
 pub fn vector(x: [f64; 3]) -> [[f64; 3]; 3] {
     let [x, y, z] = x;
     [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
 }
 
-/// Change of α and β (rad) for a unit of each angle: those of the velocity V (cos α cos β, sin β, sin α cos β),
-/// rotated like any vector.
+/// Changes of α and β per rad of each angle, from the rotation of the velocity V (cos α cos β, sin β, sin α cos β).
 pub fn flow(alpha: f64, beta: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_beta) = (alpha.sin_cos(), beta.tan());
     [[-cos * tan_beta, sin], [1.0, 0.0], [-sin * tan_beta, -cos]]
 }
 
-/// Change of roll and pitch (rad) for a unit of each angle, away from vertical flight: a rotation about body axes, as
-/// by body rates.
+/// Changes of roll and pitch per rad of each angle, from a rotation about the body axes. Not valid near vertical flight.
 pub fn attitude(roll: f64, pitch: f64) -> [[f64; 2]; 3] {
     let ((sin, cos), tan_pitch) = (roll.sin_cos(), pitch.tan());
     [[1.0, 0.0], [tan_pitch * sin, cos], [tan_pitch * cos, -sin]]
 }
 
-/// Change of α and β of a flight's path for a unit of each angle.
+/// Changes of α and β of a flight's path per rad of each angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Turning {
-    /// Mean change of α over the flight, where a vane measures it.
+    /// Mean change of α over the flight; `None` without an angle-of-attack vane.
     alpha: Option<[f64; 3]>,
-    /// Mean change of β over the flight, where a vane measures it.
+    /// Mean change of β over the flight; `None` without a sideslip vane.
     beta: Option<[f64; 3]>,
 }
 
 impl Turning {
-    /// The changes for `flight`, of which `segments` are used.
+    /// The changes for `flight`; means are taken over `segments`.
     pub fn of(flight: &Reconstruction, segments: &[Vec<Instant>]) -> Turning {
         let vane = |name: &str| flight.nuisances.iter().any(|n| n.name == name);
         let mut sums = [[0.0; 3]; 2];
@@ -61,7 +59,8 @@ impl Turning {
         }
     }
 
-    /// The changes at `alpha` and `beta` (rad): those of [`flow`] for an angle that no vane measures.
+    /// The changes at `alpha` and `beta` (rad). An angle with a vane has the mean change, an angle without a vane that of
+    /// [`flow`].
     pub fn at(&self, alpha: f64, beta: f64) -> [[f64; 2]; 3] {
         let turned = flow(alpha, beta);
         std::array::from_fn(|axis| {
@@ -71,8 +70,8 @@ impl Turning {
     }
 }
 
-/// Change of a measured state for a unit of each angle, in the order and the units of the state. `turning` gives the changes
-/// of α and β.
+/// Changes of a measured state per rad of each angle, in the order and units of the state. `turning` states the changes of α
+/// and β.
 pub fn state(turning: &Turning, state: &[f64; 8]) -> [[f64; 8]; NAMES.len()] {
     let [roll, pitch, _, p, q, r, alpha, beta] = *state;
     let attitude = attitude(roll, pitch);

@@ -1,5 +1,5 @@
-//! Flights corrected by the constants in a model's file: measured axes rotated back to the body axes, sensor errors removed,
-//! and the model with the trims of the flight.
+//! Correction of flights with the constants in a model's file: rotates the measured axes to the body axes, removes sensor
+//! errors, and sets the trims of the flight in the model.
 
 use greylag_model::known::{FlightConstants, SENSORS};
 use greylag_model::{GreyBox, Known};
@@ -10,14 +10,14 @@ use crate::per_flight::askew::{self, Turning};
 use crate::per_flight::trims;
 use crate::weak_form::prepared::Prepared;
 
-/// Index of the state to which each sensor error is added; that of the airspeed is relative.
+/// Index of the state to which each sensor error is added. The error of the airspeed is relative to the airspeed.
 const ADDED_TO: [usize; SENSORS.len()] = [AIRSPEED, 3, 4, 5, 6, 7];
 const AIRSPEED: usize = 2;
 
-/// A flight with the model that flies it.
+/// A corrected flight, and the model with the trims of this flight.
 #[derive(Clone, Debug)]
 pub struct KnownFlight {
-    /// The model with the trims of the flight and without other constants of flights.
+    /// The model with the trims of the flight and without any other constants of flights.
     pub model: GreyBox,
     /// The flight in body axes, with the sensor errors removed.
     pub flight: Prepared,
@@ -25,7 +25,7 @@ pub struct KnownFlight {
 }
 
 impl KnownFlight {
-    /// `flight` corrected by its constants in the file of `model`; `None` if the file has none.
+    /// `flight` corrected with its constants in the file of `model`; `None` if the file has no constants for this flight.
     pub fn of(model: &GreyBox, flight: &Prepared) -> Option<KnownFlight> {
         let own = model.known.of(&flight.name)?;
         let added = Added { own: own.clone(), turning: flight.turning };
@@ -34,7 +34,7 @@ impl KnownFlight {
         Some(KnownFlight { model: with_trims(model, &own), flight, added })
     }
 
-    /// Converts a predicted state to the one that the sensors of the flight would measure, with their errors.
+    /// Converts a predicted state to the state that the sensors of the flight would measure with their errors.
     pub fn as_measured(&self, state: [f64; 8]) -> [f64; 8] {
         let by = self.added.to(&state);
         std::array::from_fn(|k| state[k] + by[k])
@@ -76,7 +76,7 @@ fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     let mut bare = model.clone();
     bare.known = Default::default();
     let Some(values) = own.trims else { return bare };
-    // a model that has trims already belongs to a fit, which estimates them
+    // a model that already has trims belongs to a fit, and the fit estimates the trims
     match trims::joined(&bare) {
         Ok(mut with) => {
             trims::set(&mut with, &values);
@@ -86,7 +86,7 @@ fn with_trims(model: &GreyBox, own: &FlightConstants) -> GreyBox {
     }
 }
 
-/// `flights` corrected for the axes' misalignment and the sensor errors in `known`, and the names of the corrected ones.
+/// `flights` corrected for the axes' misalignment and the sensor errors in `known`, and the names of the corrected flights.
 pub fn put_right(known: &Known, flights: &[Reconstruction]) -> (Vec<Reconstruction>, Vec<String>) {
     let mut named = Vec::new();
     let one = |flight: &Reconstruction| {

@@ -1,8 +1,8 @@
-//! Constants that differ from flight to flight of one aircraft: its trims, and the misalignment of its measured axes.
+//! Constants that differ between the flights of one aircraft: trims, and the misalignment of the measured axes.
 //!
-//! Loading, the setting of a surface, a battery or a propeller change between flights; an autopilot's board and the
-//! markers of motion capture are mounted again. Neither is an effect that the model lacks. Both are estimated only on
-//! request, for each flight beside the coefficients common to all flights.
+//! Loading, the setting of a surface, a battery or a propeller may change between two flights. An autopilot's board or the
+//! markers of motion capture may be mounted again. These changes are not effects that the model lacks. Their constants are
+//! estimated only on request, for each flight, in addition to the coefficients common to all flights.
 
 pub mod askew;
 pub mod known;
@@ -13,11 +13,10 @@ use serde::Serialize;
 /// Selection of the constants estimated for each flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PerFlight {
-    /// Trims, with this multiple of the widths of [`trims::TRIMS`]; `None` for one set of trims for all flights.
+    /// Factor on the prior standard deviations of [`trims::TRIMS`]; `None` for the same trims in all flights.
     #[serde(rename = "flight_trims", skip_serializing_if = "Option::is_none")]
     pub trims: Option<f64>,
-    /// Misalignment of the measured axes: prior standard deviation of each of three angles, °; `None` for aligned
-    /// axes.
+    /// Prior standard deviation of each of the three misalignment angles, °; `None` for aligned axes.
     #[serde(rename = "axes_askew_deg", skip_serializing_if = "Option::is_none")]
     pub askew_deg: Option<f64>,
 }
@@ -27,12 +26,12 @@ pub struct PerFlight {
 pub struct Constant {
     /// Name of the constant.
     pub name: &'static str,
-    /// Prior standard deviation; the prior mean is zero.
+    /// Prior standard deviation, rad for an angle, dimensionless for a trim. The prior mean is zero.
     pub width: f64,
 }
 
 impl PerFlight {
-    /// Constants of a flight: misalignment angles (rad), then trims; empty if nothing is selected.
+    /// Constants of a flight: first the misalignment angles (rad), then the trims. Empty if neither is selected.
     pub fn constants(&self) -> Vec<Constant> {
         let askew = self
             .askew_deg
@@ -43,7 +42,7 @@ impl PerFlight {
         askew.into_iter().flatten().chain(trims.into_iter().flatten()).collect()
     }
 
-    /// Number of misalignment angles; the trims follow.
+    /// Number of misalignment angles among the constants: 3 or 0.
     pub fn angles(&self) -> usize {
         if self.askew_deg.is_some() { askew::NAMES.len() } else { 0 }
     }

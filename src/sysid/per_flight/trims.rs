@@ -1,16 +1,16 @@
-//! Trims of each flight: constants added to the model's coefficients, and a relative change of its thrust.
+//! Trims of each flight: constants added to the model's coefficients, and a relative change of the thrust.
 //!
-//! They join a model as an effect outside the catalogue, so a model needs no coefficients of these names.
+//! The trims are added to a model as an effect outside the catalogue. The model needs no coefficients of the same names.
 
 use greylag_model::{GreyBox, JoinError};
 use greylag_physics::formula::register;
 
-/// A trim with its prior width.
+/// A trim with its prior standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trim {
-    /// Name; those of coefficients are as in the catalogue.
+    /// Name of the trim; a coefficient has its name in the catalogue.
     pub name: &'static str,
-    /// Standard deviation from flight to flight, dimensionless.
+    /// Standard deviation between flights, dimensionless.
     pub width: f64,
 }
 
@@ -18,13 +18,13 @@ const fn trim(name: &'static str, width: f64) -> Trim {
     Trim { name, width }
 }
 
-/// The trims in the order of the effect's coefficients, with their usual standard deviations between flights of one
+/// The trims in the order of the effect's coefficients, with their assumed standard deviations between flights of one
 /// aircraft.
 ///
-/// Lift: half a degree of a wing that is put on anew, at a slope of 4 to 5 per rad. Pitch: a centre of gravity that is
-/// off by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator. Roll and yaw: a degree of
-/// one surface. Side force: two degrees of a fin. Drag: a hatch, tape, a dirty wing. Thrust: the voltage of a battery
-/// between full and half empty squared, or another propeller.
+/// Assumed causes. Lift: half a degree of incidence of a wing that was mounted again, at a slope of 4 to 5 per rad. Pitch: a
+/// shift of the centre of gravity by 1 to 2 % of the chord at a lift coefficient of 0.5, or half a degree of elevator. Roll
+/// and yaw: a degree of one surface. Side force: two degrees of a fin. Drag: a hatch, tape or a dirty wing. Thrust: the
+/// squared voltage of a battery between full and half empty, or another propeller.
 pub const TRIMS: [Trim; 7] = [
     trim("CD0", 0.005),
     trim("CL0", 0.03),
@@ -37,19 +37,19 @@ pub const TRIMS: [Trim; 7] = [
 
 const ID: &str = "flight_trims";
 
-/// `model` with the trims, all zero, as its last coefficients.
+/// `model` with the trims as its last coefficients, all zero.
 ///
 /// # Errors
-/// The model has an effect of that id.
+/// The model already has the effect `flight_trims`.
 pub fn joined(model: &GreyBox) -> Result<GreyBox, JoinError> {
-    // an error in this built-in text is not lost: `join` then fails, because it does not know the id
+    // the result is not needed: after an error in this built-in text, `join` fails because the effect is not registered
     let _ = register::read(include_str!("flight_trims.toml"));
     let mut with = model.clone();
     with.join(ID, &[0.0; TRIMS.len()])?;
     Ok(with)
 }
 
-/// Sets the trims of a model from [`joined`] to `values`.
+/// Sets the trims of a model from [`joined`] to `values`, in the order of `TRIMS`.
 pub fn set(model: &mut GreyBox, values: &[f64]) {
     let mut all: Vec<f64> = model.coefficients().iter().map(|c| c.value).collect();
     let first = all.len().saturating_sub(values.len());

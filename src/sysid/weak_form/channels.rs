@@ -1,15 +1,15 @@
-//! Channels and regime variables, with their names and units.
+//! Channels in which models are compared, and regime variables that locate a residual in the flight envelope.
 
 use serde::Serialize;
 
 /// A channel in which a model is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum ChannelId {
-    /// Drag less thrust along the airflow, N, positive backwards. An effect's `physics::Channel::Drag` is drag alone:
-    /// accelerometers do not distinguish it from thrust.
+    /// Drag less thrust along the airflow, N, positive backwards. Accelerometers do not distinguish drag from thrust.
+    /// `physics::Channel::Drag` of an effect is drag without thrust.
     #[serde(rename = "D")]
     Drag,
-    /// Lift, thrust's part included, N, positive upwards.
+    /// Lift including the component of thrust, N, positive upwards.
     #[serde(rename = "L")]
     Lift,
     /// Side force, N, positive to the right.
@@ -36,7 +36,7 @@ pub enum ChannelId {
 }
 
 impl ChannelId {
-    /// All channels, forces before moments before kinematics.
+    /// All channels in the order forces, moments, rates of V, α and β.
     pub const ALL: [ChannelId; 9] = [
         ChannelId::Drag,
         ChannelId::Lift,
@@ -79,7 +79,7 @@ impl ChannelId {
         }
     }
 
-    /// Unit of its residuals.
+    /// Unit of the channel's values and residuals.
     pub const fn unit(self) -> &'static str {
         match self {
             ChannelId::Drag | ChannelId::Lift | ChannelId::Side => "N",
@@ -94,38 +94,38 @@ impl ChannelId {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RegimeVariable {
-    /// Angle of attack α.
+    /// Angle of attack α, °.
     Alpha,
-    /// Sideslip angle β.
+    /// Sideslip angle β, °.
     Beta,
-    /// True airspeed V.
+    /// True airspeed V, m/s.
     Airspeed,
     /// Throttle position, 0..1.
     Throttle,
-    /// Roll rate p.
+    /// Roll rate p, °/s.
     P,
-    /// Pitch rate q.
+    /// Pitch rate q, °/s.
     Q,
-    /// Yaw rate r.
+    /// Yaw rate r, °/s.
     R,
-    /// Deflection of the ailerons.
+    /// Deflection of the ailerons, °.
     Aileron,
-    /// Deflection of the elevator.
+    /// Deflection of the elevator, °.
     Elevator,
-    /// Rate of the aileron deflection, with which dynamic errors vary.
+    /// Rate of the aileron deflection, °/s.
     AileronRate,
-    /// Rate of the elevator deflection.
+    /// Rate of the elevator deflection, °/s.
     ElevatorRate,
-    /// Altitude above mean sea level.
+    /// Altitude above mean sea level, m.
     Altitude,
-    /// Time since the log's first sample.
+    /// Time since the first sample of the reconstructed flight, s.
     Time,
     /// Index of the flight.
     Flight,
 }
 
 impl RegimeVariable {
-    /// The numeric variables: all but the flight.
+    /// The continuous variables: all variables except the flight.
     pub const CONTINUOUS: [RegimeVariable; 13] = [
         RegimeVariable::Alpha,
         RegimeVariable::Beta,
@@ -162,7 +162,7 @@ impl RegimeVariable {
         }
     }
 
-    /// Unit of its bins.
+    /// Unit of the variable's values and bins.
     pub const fn unit(self) -> &'static str {
         use RegimeVariable as V;
         match self {

@@ -1,15 +1,15 @@
-//! Smooth test function of the weak form.
+//! Kernel of the weak form: a Hann window as the test function.
 
 use std::f64::consts::TAU;
 
-/// Length of the kernel, s (`docs/explanation/comparison.md`).
+/// Length of the kernel, s (see `docs/explanation/comparison.md`).
 pub const KERNEL_S: f64 = 0.37;
 
-/// A Hann window over `steps` time steps, that is `steps + 1` samples.
+/// A Hann window over a number of time steps; it has one more sample than steps.
 ///
-/// Multiplying ẋ = f by the kernel K and summing by parts moves the difference from the data onto K: Σ K (x₊ − x)/Δt
-/// = −Σ K′ x. The sums are exact for the discrete steps, so the residual of a model with the flight's own integrator
-/// is zero.
+/// The equation ẋ = f is multiplied by the kernel K. Summation by parts then moves the difference from the data to K:
+/// Σ K (x₊ − x)/Δt = −Σ K′ x. The sums are exact for discrete steps. The residual of an exact model is therefore zero if the
+/// model has the same integrator as the simulated flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
     /// Weights K of the steps, which sum to 1.
@@ -37,12 +37,12 @@ impl Kernel {
         Kernel { step, sample, slope }
     }
 
-    /// Length in steps.
+    /// Length of the kernel in time steps.
     pub fn steps(&self) -> usize {
         self.step.len()
     }
 
-    /// Steps between windows: half a kernel.
+    /// Number of time steps between two windows: half a kernel, rounded up.
     pub fn stride(&self) -> usize {
         self.steps().div_ceil(2)
     }
@@ -62,7 +62,7 @@ mod tests {
         let kernel = Kernel::hann(0.01);
         let x = |i: usize| 3.0 + 2.0 * (i as f64 * 0.01) + 5.0 * (i as f64 * 0.01).powi(2);
         let rate = weigh(&kernel.slope, (0..=kernel.steps()).map(x));
-        // the rate in the middle, since the kernel is symmetric: 2 + 10 t, t = 37 · 0.005
+        // the kernel is symmetric, so this is the rate in the middle: 2 + 10 t, t = 37 · 0.005
         assert!((rate - (2.0 + 10.0 * 0.185)).abs() < 1e-9, "{rate}");
         assert!((kernel.sample.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         assert_eq!(kernel.steps(), 37);

@@ -1,4 +1,4 @@
-//! The weak form: the equations of motion integrated against smooth windows, so that no signal is differentiated.
+//! The weak form: the equations of motion integrated with smooth kernels. No signal is differentiated.
 
 pub(super) mod channels;
 pub mod kernel;

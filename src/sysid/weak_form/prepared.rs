@@ -1,4 +1,5 @@
-//! A reconstructed flight prepared for comparison: on the models' clock, in flight, divided into windows.
+//! Preparation of a reconstructed flight for a comparison: resamples to model steps, keeps the parts in flight, divides them
+//! into windows.
 
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
@@ -11,22 +12,20 @@ use greylag_logs::Sampling;
 use greylag_model::{GreyBox, Integrator, Memory, STEP};
 use greylag_physics::State;
 
-/// Airspeed below which an aircraft of any size counts as not flying, m/s.
+/// Airspeed below which an aircraft of any size counts as not in flight, m/s.
 const FLYING_FLOOR: f64 = 3.0;
 
-/// Error of a flight whose sampling interval is not usable.
+/// Error of a flight whose sampling interval is outside 1e-6 to 1 s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "flight {flight} is said to have a sample every {step_s} s, which is no clock to compare on: it must lie in 1e-6 to 1 s"
-)]
+#[error("flight {flight} has a sampling interval of {step_s} s; it must be 1e-6 to 1 s")]
 pub struct ClockError {
     /// Name of the flight.
     pub flight: String,
-    /// Its sampling interval, s.
+    /// Sampling interval of the flight, s.
     pub step_s: f64,
 }
 
-/// A flight on the models' clock.
+/// A flight whose sampling interval is a multiple of the model step [`STEP`].
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// Name of the flight.
@@ -39,14 +38,14 @@ pub struct Prepared {
     pub sampling: Sampling,
     /// Stretches in flight without gaps.
     pub segments: Vec<Vec<Instant>>,
-    /// Remaining noise of roll, pitch, airspeed, p, q, r, α, β after reconstruction, in the units of the state; zero
-    /// where unknown.
+    /// Standard deviations of the white noise of roll, pitch, airspeed, p, q, r, α, β after reconstruction, in the units of the
+    /// state; 0 if not known.
     pub noise: [f64; 8],
-    /// Noise of the accelerometers, m/s²; zero where unknown.
+    /// Standard deviations of the specific force's white noise, body axes, m/s²; 0 if not known.
     pub force_noise: [f64; 3],
-    /// Change of its α and β with the misalignment of the axes.
+    /// Changes of α and β with the misalignment of the measured axes.
     pub turning: Turning,
-    /// Kernel at its sampling interval.
+    /// Kernel for the sampling interval `dt`.
     pub kernel: Kernel,
     /// Windows in time order.
     pub windows: Vec<Window>,
@@ -57,16 +56,16 @@ pub struct Prepared {
 pub struct Window {
     /// Index of the segment.
     pub segment: usize,
-    /// Index of its first sample in the segment.
+    /// Index of the window's first sample in the segment.
     pub start: usize,
-    /// Time of its middle on the log's clock, s.
+    /// Time of the window's middle on the log's clock, s.
     pub time_s: f64,
     /// Regime variables in the order and units of [`RegimeVariable::CONTINUOUS`].
     pub regime: [f64; RegimeVariable::CONTINUOUS.len()],
 }
 
 impl Prepared {
-    /// Resamples `flight` to the models' clock and keeps the parts flown faster than `slowest` (m/s).
+    /// Resamples `flight` to a multiple of the model step and keeps the parts with an airspeed of at least `slowest` and 3 m/s.
     ///
     /// # Errors
     /// The sampling interval of `flight` lies outside 1e-6 to 1 s.
@@ -124,8 +123,7 @@ impl Prepared {
         }
     }
 
-    /// The flight with the deflections that act under `model`'s input effects in place of the measured
-    /// ones.
+    /// The flight with deflections that are passed through the input effects of `model`, for example an actuator lag.
     pub fn acting(&self, model: &GreyBox) -> Cow<'_, Prepared> {
         if model.acts_at_once() {
             return Cow::Borrowed(self);
@@ -152,8 +150,10 @@ impl Prepared {
         Cow::Owned(acting)
     }
 
-    /// `model` with the integrator that matches this flight's sampling: its own if the log holds a simulator's held
-    /// rates, RK4 for samples at instants.
+    /// `model` with the integrator that matches this flight's sampling.
+    ///
+    /// For held rates of a simulator, the integrator of the model is kept. For samples at instants, JSBSim's integrator is
+    /// replaced by RK4.
     pub fn stepping<'a>(&self, model: &'a GreyBox) -> Cow<'a, GreyBox> {
         match (self.sampling, model.integrator) {
             (Sampling::Instants, Integrator::Jsbsim) => {
@@ -165,8 +165,9 @@ impl Prepared {
         }
     }
 
-    /// State of `model`, which must be [`Self::stepping`], one sample after `state`; the deflections are those of
-    /// sample `at` until the next one, `next`.
+    /// State of `model` one sample after `state`. `model` must come from [`Self::stepping`].
+    ///
+    /// Deflections are held from sample `at`, or interpolated from `at` to the next sample `next` for samples at instants.
     pub fn advance(
         &self,
         model: &GreyBox,
@@ -207,7 +208,7 @@ impl Prepared {
     }
 }
 
-/// Model steps of [`STEP`] between samples of the models' clock: the nearest whole number.
+/// Number of model steps of [`STEP`] between samples, rounded to the nearest whole number, at least 1.
 fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
     let step_s = flight.step_s;
     if !(1e-6..=1.0).contains(&step_s) {
@@ -216,8 +217,10 @@ fn substeps(flight: &Reconstruction) -> Result<usize, ClockError> {
     Ok(((step_s / STEP).round() as usize).max(1))
 }
 
-/// Samples of a stretch at intervals of `dt` (s): unchanged if they have that interval, every n-th one if `dt` is n of
-/// theirs, else linearly interpolated with the deflections held.
+/// Resamples a stretch from the interval `step_s` to the interval `dt` (s).
+///
+/// Equal intervals leave the samples unchanged. If `dt` is n times `step_s`, every n-th sample is kept. In all other cases,
+/// states are interpolated linearly and deflections are held.
 fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     if (step_s / dt - 1.0).abs() < 1e-6 {
         return instants.to_vec();
@@ -235,8 +238,9 @@ fn on_clock(instants: &[Instant], step_s: f64, dt: f64) -> Vec<Instant> {
     (0..=count).map(at).collect()
 }
 
-/// Standard deviation of white noise in a series, by third differences, which a smooth signal does
-/// not have: their variance is 1 + 9 + 9 + 1 = 20 times that of the noise.
+/// Standard deviation of the white noise in a series, from third differences; infinite if there are none.
+///
+/// Third differences of a smooth signal vanish. Those of white noise have 1 + 9 + 9 + 1 = 20 times its variance.
 fn white_noise(segments: &[Vec<Instant>], of: &dyn Fn(&Instant) -> f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for four in segments.iter().flat_map(|s| s.windows(4)) {
@@ -252,7 +256,7 @@ fn white_noise(segments: &[Vec<Instant>], of: &dyn Fn(&Instant) -> f64) -> f64 {
 fn between(a: &Instant, b: &Instant, part: f64) -> Instant {
     let mix = |x: f64, y: f64| x + (y - x) * part;
     let (x, mut y) = (a.state.to_array(), b.state.to_array());
-    // roll the short way round
+    // interpolate roll along the smaller angle
     y[0] = x[0] + (y[0] - x[0] + PI).rem_euclid(TAU) - PI;
     Instant {
         time_s: mix(a.time_s, b.time_s),
@@ -264,7 +268,7 @@ fn between(a: &Instant, b: &Instant, part: f64) -> Instant {
     }
 }
 
-/// The parts in flight whose values are all finite.
+/// The parts with an airspeed of at least `slowest` (m/s) whose values are all finite.
 fn in_the_air(instants: &[Instant], slowest: f64) -> impl Iterator<Item = &[Instant]> {
     let flown = move |i: &Instant| {
         let z = i.controls;
@@ -290,7 +294,7 @@ fn windows(segments: &[Vec<Instant>], kernel: &Kernel, origin: f64) -> Vec<Windo
     windows
 }
 
-/// Regime of a window, each variable averaged with the kernel.
+/// Regime variables of a window, averaged with the kernel.
 fn regime(
     samples: &[Instant],
     kernel: &Kernel,

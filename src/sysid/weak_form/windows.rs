@@ -1,7 +1,6 @@
-//! Channels in weak form: measured and predicted forces, moments and rates, window by window.
+//! Channels in weak form: measured and predicted forces, moments and rates for each window.
 //!
-//! Measured data is never differentiated: see [`Kernel`]. Products are
-//! formed before smoothing.
+//! Measured data are never differentiated: see [`Kernel`]. Products of signals are formed before smoothing.
 
 use rayon::prelude::*;
 
@@ -15,7 +14,7 @@ use greylag_num::Real;
 use greylag_physics::rigid_body::{self, ForceAxes, RigidBody, Vector};
 use greylag_physics::{AirData, Channel, State, Wrench};
 
-/// Number of windows of a flight in which the sensitivity to sensor noise is evaluated.
+/// Approximate number of windows of a flight in which the sensitivity to sensor noise is evaluated.
 const NOISE_WINDOWS: usize = 40;
 /// Number of windows whose columns one thread computes at a time.
 const CHUNK: usize = 64;
@@ -25,15 +24,15 @@ const CHUNK: usize = 64;
 pub struct Series {
     /// Identifier of the channel.
     pub channel: ChannelId,
-    /// Measured values, one for each window, in the channel's unit; NaN where the log has no specific force.
+    /// Measured values, one for each window, in the channel's unit. Forces are NaN in windows without specific force.
     pub measured: Vec<f64>,
-    /// Predicted values at the same windows.
+    /// Predicted values in the same windows, in the channel's unit.
     pub predicted: Vec<f64>,
-    /// Variance of measured − predicted due to sensor noise.
+    /// Variance of measured − predicted due to sensor noise, in the channel's unit squared.
     pub noise_variance: f64,
 }
 
-/// All channels of a flight under `model`, in the model's own force axes.
+/// All channels of a flight under `model`, with forces in the model's force axes (stability or wind axes).
 ///
 /// Forces need the accelerometers and are left out if the flight has none.
 pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
@@ -59,9 +58,10 @@ pub fn channels(model: &GreyBox, flight: &Prepared) -> Vec<Series> {
     ChannelId::ALL.iter().enumerate().skip(forces).map(series).collect()
 }
 
-/// Measured − predicted of forces (N) and moments (N m) alone, a row for each window, channels D, L, Y, l, m, n: the
-/// residual of an equation-error fit, at a fraction of the cost of [`channels`]. Forces are NaN where they are not
-/// measured.
+/// Residuals (measured − predicted) of forces (N) and moments (N m) for an equation-error fit, a row for each window.
+///
+/// The columns are D, L, Y, l, m, n. Forces are NaN in windows without specific force. The computation is much shorter than
+/// that of [`channels`].
 pub fn force_and_moment_residuals(model: &GreyBox, flight: &Prepared) -> Vec<[f64; 6]> {
     let flight = &*flight.acting(model);
     let residual = |w: &Window| {
@@ -71,7 +71,7 @@ pub fn force_and_moment_residuals(model: &GreyBox, flight: &Prepared) -> Vec<[f6
     flight.windows.par_iter().map(residual).collect()
 }
 
-/// Measured and predicted in one window, in the order of [`ChannelId::ALL`].
+/// Pairs of measured and predicted value in one window, in the order of [`ChannelId::ALL`].
 fn window(
     model: &GreyBox,
     flight: &Prepared,
@@ -124,7 +124,7 @@ fn smooth(weights: &[f64], values: impl Iterator<Item = Vector<f64>>) -> Vector<
 /// A step between two samples.
 struct Step<'a> {
     from: &'a Instant,
-    /// End of the step, for schemes that evaluate the model there too, with the controls of the start.
+    /// End of the step for an integrator that also evaluates the model there, with the controls of the start; else `None`.
     to: Option<&'a Instant>,
 }
 
@@ -136,8 +136,8 @@ fn steps(samples: &[Instant], integrator: Integrator) -> impl Iterator<Item = St
 }
 
 impl Step<'_> {
-    /// The mean of `f(state instant, controls instant)` over the step: its start for explicit
-    /// Euler, both ends under the start's controls for RK4.
+    /// Mean of `f(instant of the state, instant of the controls)` over the step. Explicit Euler uses the start of the step. RK4
+    /// uses both ends with the controls of the start.
     fn average(&self, f: impl Fn(&Instant, &Instant) -> Vector<f64>) -> Vector<f64> {
         let start = f(self.from, self.from);
         match self.to {
@@ -150,7 +150,7 @@ impl Step<'_> {
     }
 }
 
-/// Measured D less thrust, L, Y from the accelerometers, N, in the order of [`ChannelId::ALL`].
+/// Measured D less thrust, L and Y from the accelerometers, N.
 fn measured_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     let air = model.air(&at.state, at.altitude);
     let force = at.specific_force.map(|f| f * model.body.mass);
@@ -163,8 +163,8 @@ fn predicted_force(model: &GreyBox, at: &Instant) -> Vector<f64> {
     to_force_axes(rigid_body::body_force(&wrench, &air, model.axes), &air, model.axes)
 }
 
-/// D less thrust, L and Y, N, of a force in body axes: in the order of [`ChannelId::ALL`], not of
-/// [`rigid_body::aerodynamic_force`], which is D, Y, L.
+/// Converts a force in body axes, N, to D less thrust, L and Y, N. The order is that of [`ChannelId::ALL`];
+/// [`rigid_body::aerodynamic_force`] has the order D, Y, L.
 pub(crate) fn to_force_axes<R: Real>(
     force: Vector<R>,
     air: &AirData<R>,
@@ -174,7 +174,7 @@ pub(crate) fn to_force_axes<R: Real>(
     [drag, lift, side]
 }
 
-/// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia; `turning` is the second term.
+/// Σ K (J Δω/Δt + ω × Jω), N m, with the model's inertia. `turning` is the smoothed term ω × Jω.
 fn measured_moment(
     model: &GreyBox,
     samples: &[Instant],
@@ -209,7 +209,7 @@ fn moment(model: &GreyBox, at: &Instant, controls: &Instant) -> Vector<f64> {
     [Channel::Roll, Channel::Pitch, Channel::Yaw].map(|c| wrench.get(c))
 }
 
-/// Rates of V (m/s²), α and β (rad/s) by the model's integrator over each step.
+/// Rates of V (m/s²), α and β (rad/s) that the model's integrator gives for one step from each sample.
 fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Vec<Vector<f64>> {
     let mut memory = Memory::default();
     let mut rate = |k: usize| {
@@ -220,7 +220,7 @@ fn one_step_rates(model: &GreyBox, segment: &[Instant], flight: &Prepared) -> Ve
     (0..segment.len()).map(&mut rate).collect()
 }
 
-/// Variances of each channel's residual due to sensor noise, taken as white, in the order of [`ChannelId::ALL`].
+/// Variances of the channels' residuals due to white sensor noise, in the order of [`ChannelId::ALL`].
 fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     let kernel = &flight.kernel;
     let squares = |w: &[f64]| w.iter().map(|x| x * x).sum::<f64>();
@@ -240,8 +240,8 @@ fn noise_variance(model: &GreyBox, flight: &Prepared) -> [f64; 9] {
     variance
 }
 
-/// Part of the noise variance from measurements weighted by the kernel or its slope: accelerations, rates, airspeed, α,
-/// β.
+/// Part of the noise variance due to the measured side: accelerations weighted by the kernel; body rates, airspeed, α and β
+/// weighted by its slope.
 fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) -> [f64; 9] {
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|sd| sd * sd);
     let [fx, fy, fz] = flight.force_noise.map(|sd| (model.body.mass * sd).powi(2));
@@ -253,7 +253,7 @@ fn measured_noise(model: &GreyBox, flight: &Prepared, average: f64, slope: f64) 
     std::array::from_fn(|k| [force, moment, path][k / 3][k % 3])
 }
 
-/// Variance of one sample of the residual due to the state's noise, by central differences.
+/// Variance of the residual in one sample due to the noise of the state, by central differences.
 fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     let mut variance = [0.0; 9];
     for (k, sd) in noise.iter().enumerate().filter(|(_, sd)| **sd > 0.0) {
@@ -268,8 +268,8 @@ fn state_noise(model: &GreyBox, at: &Instant, noise: &[f64; 8]) -> [f64; 9] {
     variance
 }
 
-/// Predicted value less those parts of the measured one that depend on the state: specific force rotated by α and β, and
-/// gyroscopic moment.
+/// Predicted value less the parts of the measured value that depend on the state. These parts are the specific force rotated
+/// by α and β, and the gyroscopic moment.
 pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     let (force, measured) = (predicted_force(model, at), measured_force(model, at));
     let known = at.specific_force.iter().all(|f| f.is_finite());
@@ -281,7 +281,7 @@ pub(crate) fn residual(model: &GreyBox, at: &Instant) -> [f64; 9] {
     std::array::from_fn(|k| [force, moment, [rate.airspeed, rate.alpha, rate.beta]][k / 3][k % 3])
 }
 
-/// Linear part of a model in weak form: contribution of one unit of each coefficient.
+/// Linear part of a model in weak form: contribution of each coefficient per unit of the coefficient.
 #[derive(Clone, Debug)]
 pub struct Columns {
     /// Names of the coefficients, as in the model.
@@ -293,8 +293,8 @@ pub struct Columns {
 
 /// Columns of `model` over the windows of `flight`, as regressors for the measured channels.
 ///
-/// Shape constants and those of effects on inputs or inertia have columns of zeros: the model is not linear in them,
-/// or they act on the measured side.
+/// Shape constants and coefficients of effects on inputs or inertia have columns of zeros. The model is not linear in them, or
+/// they act on the measured side.
 pub fn columns(model: &GreyBox, flight: &Prepared) -> Columns {
     let flight = &*flight.acting(model);
     let names: Vec<String> = model.coefficients().iter().map(|c| c.name.clone()).collect();

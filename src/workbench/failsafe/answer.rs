@@ -1,4 +1,4 @@
-//! Result of a flight as HTML: verdict, time lines, texts, rules, the scenario with its command.
+//! Result of a failsafe flight as HTML: verdict, time lines, texts, rules, and the command for the scenario.
 
 use super::Flown;
 use super::verdict::Happened;
@@ -6,13 +6,13 @@ use greylag_control::ControllerKind;
 use greylag_report::{TimeLine, escape};
 use greylag_sim::faults::policies::Policy;
 
-/// File of the command that flies the scenario again.
+/// Name of the scenario file in the command.
 const FILE: &str = "scenario.json";
 
-/// Distance from which a rule counts as far from broken.
+/// Distance from which a rule counts as far from being broken; the largest distance is 1.
 const FAR: f64 = 0.9995;
 
-/// HTML of the result of a flight.
+/// The result of a flight as HTML.
 pub(super) fn html(flown: &Flown) -> String {
     let close_up = flown.close_up().as_ref().map_or_else(String::new, TimeLine::html);
     format!(
@@ -28,7 +28,7 @@ pub(super) fn html(flown: &Flown) -> String {
 
 /// Legend of the bands' colours, as HTML.
 const KEY: &str = "<ul class=\"tones\"><li><i class=\"tone-asked\"></i>flies what is asked</li>\
-                   <li><i class=\"tone-safe\"></i>flies level by itself</li><li><i class=\"tone-begins\"></i>on the way, or a failsafe's mode</li>\
+                   <li><i class=\"tone-safe\"></i>flies level without a command</li><li><i class=\"tone-begins\"></i>on the way, or a failsafe's mode</li>\
                    <li><i class=\"tone-wrong\"></i>fault, failsafe</li><li><i class=\"tone-idle\"></i>does nothing</li></ul>\n";
 
 fn events(flown: &Flown) -> String {
@@ -48,7 +48,7 @@ fn events(flown: &Flown) -> String {
     )
 }
 
-/// The rules that apply with their least distance, the worst first.
+/// The applicable rules with their smallest distances, in order of increasing distance.
 fn rules(flown: &Flown) -> String {
     let judged = flown.rules.iter().zip(&flown.judged);
     let mut judged: Vec<(&Policy, f64, f64)> =
@@ -81,14 +81,14 @@ fn rules(flown: &Flown) -> String {
     )
 }
 
-/// The command that flies the same scenario again.
+/// The command that repeats the flight.
 pub(super) fn command(controller: ControllerKind) -> String {
     format!("greylag faults --controller {} --scenario {FILE}", controller.name())
 }
 
-/// The scenario as a file, and the command that flies it.
+/// The content of the scenario file, and the command that repeats the flight.
 fn again(flown: &Flown) -> String {
-    // numbers and names cannot fail to be written
+    // serialisation of numbers and names does not fail
     let json = serde_json::to_string_pretty(&flown.scenario).unwrap_or_default();
     let command = command(flown.controller);
     format!(

@@ -1,4 +1,4 @@
-//! A flight as bands of states and lines over time.
+//! Time lines of a failsafe flight: bands of states, and curves.
 
 use super::Flown;
 use super::choices::{fault, request};
@@ -13,7 +13,7 @@ const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 5.0;
 /// Age above which a decision is stale, s.
 const STALE_S: f64 = 0.2;
-/// Drawn length of an instantaneous event, such as a request, s.
+/// Displayed length of an instantaneous event, such as a request, s.
 const MOMENT_S: f64 = 0.1;
 
 /// Name and kind of a state at a step; `None` without a state.
@@ -33,7 +33,7 @@ impl Flown {
         }
     }
 
-    /// Close-up around the first event; `None` without one.
+    /// Time line around the first event; `None` without events.
     pub(super) fn close_up(&self) -> Option<TimeLine> {
         let first_s = self.first_s()?;
         let from = (first_s - BEFORE_S).max(0.0);
@@ -42,7 +42,7 @@ impl Flown {
         Some(TimeLine { title, span_s, states: self.states(), ..TimeLine::default() })
     }
 
-    /// Time of the first fault, or else of the first request, s.
+    /// Time of the first fault, or without faults of the first request, s; `None` without either.
     pub(super) fn first_s(&self) -> Option<f64> {
         let faults = self.scenario.faults.iter().map(|f| f.from_s).reduce(f64::min);
         faults.or(self.scenario.asked.iter().map(|a| a.at_s).reduce(f64::min))
@@ -71,7 +71,7 @@ impl Flown {
         rows
     }
 
-    /// Band of the faults and requests.
+    /// Row of the faults and requests.
     fn befalls(&self) -> States {
         let of_fault = |f: &Fault| Span {
             time_s: [f.from_s, f.to_s.max(f.from_s + MOMENT_S)],
@@ -122,7 +122,7 @@ impl Flown {
     }
 }
 
-/// Joins equal states of consecutive steps to spans. A step without a state leaves a gap.
+/// Joins equal states of consecutive samples to spans. A sample without a state leaves a gap.
 pub(super) fn spans(samples: &[Sample], of: impl Fn(&Sample) -> Seen) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
     for (k, sample) in samples.iter().enumerate() {
@@ -138,7 +138,7 @@ pub(super) fn spans(samples: &[Sample], of: impl Fn(&Sample) -> Seen) -> Vec<Spa
     spans
 }
 
-/// The mode that the companion shows to its clients.
+/// Mode that the companion reports to its clients.
 pub(super) fn companion(s: &Sample) -> Seen {
     let Some(shown) = s.shown else { return Some(("killed".into(), Tone::Wrong)) };
     let mode = mode_name(shown.mode);
@@ -150,7 +150,7 @@ pub(super) fn companion(s: &Sample) -> Seen {
     })
 }
 
-/// Source of the actuator command in a sample.
+/// Source of the actuator command in a sample; `None` if the command is stale or the companion is disarmed.
 fn command(s: &Sample, controller: &str) -> Seen {
     let decision = s.decision.filter(|_| s.age_s <= STALE_S)?;
     let (word, tone) = match decision.source {
@@ -165,13 +165,13 @@ fn command(s: &Sample, controller: &str) -> Seen {
     Some((word.into(), tone))
 }
 
-/// Party in control of the aircraft in a sample.
+/// The system that controls the aircraft in a sample.
 fn owner(s: &Sample, stack: &str) -> Seen {
     Some(match (s.engaged, s.steered) {
         (true, true) if s.confirmed => ("the companion's".into(), Tone::Asked),
         (true, false) if s.confirmed => (format!("taken by {stack}"), Tone::Begins),
         (true, _) => ("asked for".into(), Tone::Begins),
-        // the companion is dead, or was restarted and has not been requested to fly
+        // the companion has been killed, or was restarted and has no request to fly
         (false, true) if s.shown.is_none() || !s.asked => ("nobody's".into(), Tone::Wrong),
         (false, true) => ("let go".into(), Tone::Begins),
         (false, false) => (format!("{stack}'s"), Tone::Safe),

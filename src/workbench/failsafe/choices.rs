@@ -1,13 +1,13 @@
-//! Choices of the form with their texts: counterparts, controllers, faults, requests.
+//! Options of the failsafe form with their texts: counterparts, controllers, faults, requests.
 
 use greylag_control::{ControllerKind, Pace};
 use greylag_sim::faults::{Asking, Counterpart, FaultKind};
 
-/// Choice of no fault, or of no request.
+/// Value for no fault or no request.
 pub(super) const NOTHING: &str = "none";
-/// The client arms and requests OFFBOARD again.
+/// Value for the request in which the client arms and requests OFFBOARD again.
 pub(super) const AGAIN: &str = "again";
-/// Requests of the client: form value, displayed text.
+/// Requests of the client: form value and displayed text.
 pub(super) const REQUESTS: [(&str, &str); 7] = [
     (NOTHING, "Nothing"),
     (AGAIN, "Client arms, then OFFBOARD, again"),
@@ -17,16 +17,17 @@ pub(super) const REQUESTS: [(&str, &str); 7] = [
     ("disarm", "Client asks to disarm"),
     ("take-over", "Ground station takes the aircraft"),
 ];
-/// Turbulence: severity curve of MIL-F-8785C, displayed text.
+/// Turbulence: severity curve of MIL-F-8785C and displayed text.
 pub(super) const TURBULENCE: [(&str, &str); 4] =
     [("0", "none"), ("3", "light"), ("4", "moderate"), ("6", "severe")];
 
-/// Controllers that answer within a tick. A flight with a planner takes seconds: `greylag faults` flies those.
+/// Controllers that compute a command within one control step. A flight with a planner takes seconds of computation and is
+/// available in `greylag faults`.
 pub(super) fn controllers() -> impl Iterator<Item = ControllerKind> {
     ControllerKind::ALL.iter().copied().filter(|kind| kind.pace() == Pace::Immediate)
 }
 
-/// Name of a counterpart.
+/// Displayed name of a counterpart.
 pub(super) fn counterpart(counterpart: Counterpart) -> &'static str {
     match counterpart {
         Counterpart::Sitl => "Simulator",
@@ -37,7 +38,7 @@ pub(super) fn counterpart(counterpart: Counterpart) -> &'static str {
     }
 }
 
-/// Faults that can be chosen, the most common ones first.
+/// Faults in the form, in order of decreasing frequency.
 pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Unplug,
     FaultKind::Corruption,
@@ -59,7 +60,7 @@ pub(super) const FAULTS: [FaultKind; 18] = [
     FaultKind::Disk,
 ];
 
-/// Name of a fault, and its effect as the strength goes from 0 to 100 %.
+/// Name of a fault, and the range of its effect from a strength of 0 to 100 %.
 pub(super) fn fault(kind: FaultKind) -> (&'static str, &'static str) {
     match kind {
         FaultKind::Unplug => ("Link cut", "Nothing passes between companion and vehicle."),
@@ -98,7 +99,7 @@ pub(super) fn fault(kind: FaultKind) -> (&'static str, &'static str) {
     }
 }
 
-/// Text of a request in the list of events.
+/// Text of a request for the list of events.
 pub(super) fn request(asking: Asking) -> &'static str {
     match asking {
         Asking::Offboard => "client asks for OFFBOARD",
@@ -109,7 +110,7 @@ pub(super) fn request(asking: Asking) -> &'static str {
     }
 }
 
-/// The name of a kind of fault in a scenario's file.
+/// Name of a fault in a scenario file.
 pub(super) fn file_name(kind: FaultKind) -> String {
     let value = serde_json::to_value(kind).unwrap_or_default();
     value.as_str().unwrap_or_default().to_owned()

@@ -1,4 +1,4 @@
-//! The choices of the page, and the scenario that they describe.
+//! The form of the failsafe page, and the scenario that it describes.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -9,20 +9,20 @@ use greylag_sim::faults::{
     Asked, Asking, ControllerSetting, Counterpart, Fault, FaultKind, Leg, Scenario,
 };
 
-/// Length of a flight, s.
+/// Duration of a flight, s.
 pub(super) const FLIGHT_S: f64 = 60.0;
-/// Start and end of the commanded attitude, s; level flight is commanded before and after.
+/// Start and end of the commanded attitude, s; before and after, the command is level flight.
 const ATTITUDE_S: [f64; 2] = [8.0, 45.0];
-/// Pitch that a client commands in level flight, degrees.
+/// Pitch command in level flight, °.
 const LEVEL_DEG: f64 = 3.0;
-/// Time at which the client requests HOLD in the mode of that name, s.
+/// Time at which the client requests HOLD if the form selects that mode, s.
 const HOLD_S: f64 = 8.0;
-/// Time from arming to asking for OFFBOARD, s.
+/// Time between arming and the request for OFFBOARD, s.
 const AFTER_ARMING_S: f64 = 0.1;
 /// Largest seed that the form accepts.
 const SEED: u64 = 999_999;
 
-/// Names of the fields with their defaults: a link that is cut in a turn, and a client that asks again later.
+/// Fields and their default values: a link interruption in a turn, and a client that repeats its request later.
 pub(super) const FIELDS: [(&str, &str); 16] = [
     ("counterpart", "px4"),
     ("radio", "no"),
@@ -42,7 +42,7 @@ pub(super) const FIELDS: [(&str, &str); 16] = [
     ("seed", "1"),
 ];
 
-/// A number of the form: field, meaning, limits and unit.
+/// A numeric field: name, meaning, limits and unit.
 pub(super) struct Number {
     pub field: &'static str,
     pub what: &'static str,
@@ -59,7 +59,7 @@ const fn number(
     Number { field, what, limits, unit }
 }
 
-/// The numbers, in the order of the page.
+/// The numeric fields.
 pub(super) const NUMBERS: [Number; 9] = [
     number("from_s", "the fault's beginning", [1.0, 55.0], "s"),
     number("for_s", "the fault's length", [0.02, 40.0], "s"),
@@ -72,23 +72,23 @@ pub(super) const NUMBERS: [Number; 9] = [
     number("seed", "the seed", [0.0, SEED as f64], ""),
 ];
 
-/// The choices as they were made.
+/// The values of the form's fields.
 #[derive(Clone, Debug)]
 pub(super) struct Form {
     values: Vec<(&'static str, String)>,
 }
 
-/// An invalid choice.
+/// An invalid value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{why}")]
 pub(super) struct Wrong {
-    /// The field; empty if the form has no such field.
+    /// The invalid field; empty for an unknown field name.
     pub field: &'static str,
-    /// Error in words, with a remedy.
+    /// Text of the error, with a remedy.
     pub why: String,
 }
 
-/// A scenario and the controller that flies it.
+/// A scenario and the controller for it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chosen {
     pub scenario: Scenario,
@@ -96,7 +96,7 @@ pub(super) struct Chosen {
 }
 
 impl Form {
-    /// The form with the values of a query and defaults for the rest, and the error of a name that is no field.
+    /// The form with the values of a query and defaults for other fields, and the error of the first unknown field name.
     pub fn of(query: &[(String, String)]) -> (Form, Option<Wrong>) {
         let value = |(field, default): (&'static str, &str)| {
             let given = query.iter().rev().find(|(name, _)| name == field);
@@ -116,10 +116,10 @@ impl Form {
         self.values.iter().find(|(name, _)| *name == field).map_or("", |(_, value)| value)
     }
 
-    /// The scenario and the controller.
+    /// The scenario and the controller that the form describes.
     ///
     /// # Errors
-    /// The first invalid choice.
+    /// `Wrong` for the first invalid value.
     pub fn chosen(&self) -> Result<Chosen, Wrong> {
         let counterpart: Counterpart = self.named("counterpart", "flight controller")?;
         let controller = self.controller()?;
@@ -155,13 +155,13 @@ impl Form {
         })
     }
 
-    /// The flight controller's parameter that binds a radio, if one is wanted.
+    /// Parameter of the flight controller that binds a radio; empty without a radio.
     fn radio(&self, counterpart: Counterpart) -> Result<Vec<ControllerSetting>, Wrong> {
         match (self.value("radio"), counterpart.stack()) {
             ("no", _) => Ok(Vec::new()),
             ("yes", Some("ArduPilot")) => Ok(vec![bound_radio()]),
             ("yes", _) => {
-                Err(self.wrong("radio", "is for ArduPilot: only that is played with a radio"))
+                Err(self.wrong("radio", "is for ArduPilot: only that is simulated with a radio"))
             }
             _ => Err(self.wrong("radio", "is no choice; choose yes or no")),
         }
@@ -183,7 +183,7 @@ impl Form {
         let from_s = self.number("from_s")?;
         let length = if kind.has_length() { self.number("for_s")? } else { FLIGHT_S - from_s };
         let strength = if kind.has_strength() { self.number("strength")? / 100.0 } else { 0.5 };
-        // a jump happens once, at its beginning
+        // a clock jump happens once, at its beginning
         let length = if kind == FaultKind::Clock { 0.01 } else { length };
         let to_s = (from_s + length).min(FLIGHT_S);
         Ok(Some(Fault { kind, from_s, to_s, strength }))
@@ -217,7 +217,7 @@ impl Form {
         Ok(asked)
     }
 
-    /// Level flight, the commanded attitude, level flight.
+    /// Legs of the flight: level, the commanded attitude, level.
     fn legs(&self) -> Result<Vec<Leg>, Wrong> {
         let [roll_deg, pitch_deg] = [self.number("roll_deg")?, self.number("pitch_deg")?];
         let leg = |from_s, roll_deg, pitch_deg| Leg { from_s, roll_deg, pitch_deg };
@@ -225,7 +225,7 @@ impl Form {
         Ok(vec![leg(0.0, 0.0, LEVEL_DEG), leg(from, roll_deg, pitch_deg), leg(to, 0.0, LEVEL_DEG)])
     }
 
-    /// The value of a field, which must be one of the names of the type `T`.
+    /// The value of a field, which must be a name of the type `T`.
     fn named<T: DeserializeOwned>(&self, field: &'static str, what: &str) -> Result<T, Wrong> {
         let value = Value::String(self.value(field).to_owned());
         serde_json::from_value(value).map_err(|e| {
@@ -257,15 +257,15 @@ impl Form {
     }
 }
 
-/// A radio with its sticks released at ArduPilot.
+/// ArduPilot parameter for a bound radio with released sticks.
 fn bound_radio() -> ControllerSetting {
     ControllerSetting { name: "SIM_RC_FAIL".into(), value: 0.0 }
 }
 
-/// The velocity of the air over the ground, north-east-down, m/s, of a wind that comes from a direction.
+/// Wind vector, north-east-down, m/s, from the speed, m/s, and the direction from which the wind blows, ° from north.
 fn wind(speed_mps: f64, from_deg: f64) -> [f64; 3] {
     let (sin, cos) = from_deg.to_radians().sin_cos();
-    // to a millimetre a second, without −0, which would appear in the file
+    // rounded to 1 mm/s, without −0, which would appear in the file
     [-speed_mps * cos, -speed_mps * sin, 0.0].map(|v| (v * 1e3).round() / 1e3 + 0.0)
 }
 
@@ -330,7 +330,7 @@ mod tests {
         );
         assert_eq!((scenario.turbulence, scenario.seed), (4, 77));
         assert_eq!(scenario.controller_parameters, [bound_radio()]);
-        // a wind from the west goes east
+        // a wind from 270° blows towards the east
         assert_eq!(scenario.wind_ned_mps, [0.0, 5.0, 0.0]);
         assert_eq!((scenario.legs[1].roll_deg, scenario.legs[1].pitch_deg), (-10.0, -2.0));
         let Fault { kind, from_s, to_s, strength } = scenario.faults[0];
@@ -373,21 +373,21 @@ mod tests {
             ("controller", "hybrid", "choose one of pid,"),
             ("mode", "return", "choose offboard or hold"),
             ("request", "land", "is no request"),
-            ("radio", "yes", "only that is played with a radio"),
+            ("radio", "yes", "only that is simulated with a radio"),
             ("turbulence", "9", "choose 0, 3, 4 or 6"),
         ] {
             let wrong = chosen(&[(field, value)]).unwrap_err();
             assert!(wrong.field == field && wrong.why.contains(why), "{field}: {wrong}");
         }
-        // a cut has no strength
+        // a link interruption has no strength, but frame loss has
         let wrong = chosen(&[("fault", "loss"), ("strength", "101")]).unwrap_err();
         assert!(wrong.why.contains("from 0 to 100 %"), "{wrong}");
         let wrong = chosen(&[("colour", "red")]).unwrap_err();
         assert!(wrong.why.contains("no choice \"colour\"") && wrong.why.contains("counterpart"));
-        // there is no autopilot that a station could ask
+        // the simulator has no flight controller from which a ground station can take over
         let station = [("counterpart", "sitl"), ("request", "take-over")];
         assert!(chosen(&station).unwrap_err().why.contains("choose PX4 or ArduPilot"));
-        // what is not used is not looked at
+        // unused fields are not checked
         assert!(chosen(&[("fault", "none"), ("from_s", "soon")]).is_ok());
     }
 }

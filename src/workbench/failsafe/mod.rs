@@ -1,6 +1,5 @@
-//! Interactive failsafe scenarios. A page selects a fault, the companion's own pilot flies it in
-//! lockstep, and the page shows who was in control when, which texts were sent and which rules of
-//! flight held.
+//! Interactive failsafe scenarios. The user selects a fault, and the companion's pilot flies the scenario in lockstep. The page
+//! shows who was in control at each time, which texts were sent, and which rules of flight held.
 
 mod answer;
 mod bands;
@@ -18,26 +17,25 @@ use greylag_sim::faults::policies::{Policy, policies};
 use greylag_sim::faults::search::judged;
 use greylag_sim::faults::{CompanionFactory, FaultsError, Scenario, Witnessed};
 
-/// Makes the companions with a controller; the error is a message for the page.
+/// Makes companions with a controller; the error is a message for the page.
 type Make = Box<dyn Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync>;
-/// Stack size of the thread that designs a controller, bytes: dual numbers need much of it in an unoptimised build.
+/// Stack size of the thread that designs a controller, bytes. Dual numbers need a large stack in an unoptimised build.
 const STACK: usize = 16 << 20;
 
-/// Simulates the scenario that the page requests.
+/// Simulates the scenarios that the page requests.
 pub struct Failsafes {
     make: Make,
-    /// Companions made so far, by controller: the design of one takes a moment.
+    /// Companions by controller; they are kept because the design of a controller takes time.
     made: Mutex<HashMap<&'static str, Arc<CompanionFactory>>>,
 }
 
-/// A flight with its rules.
+/// The result of a flight, with the rules of flight.
 struct Flown {
     scenario: Scenario,
     controller: ControllerKind,
     witnessed: Witnessed,
     rules: Vec<Policy>,
-    /// For each rule its least distance (at most 1, negative if broken) and the time of it, s; `None` if the rule
-    /// does not apply.
+    /// Smallest distance of each rule (at most 1, negative if broken) and its time, s; `None` if the rule does not apply.
     judged: Vec<Option<(f64, f64)>>,
 }
 
@@ -46,20 +44,20 @@ struct Flown {
 pub struct Answer {
     /// The page, as HTML.
     pub html: String,
-    /// Whether a choice was invalid, so that nothing was flown.
+    /// Whether a value of the form was invalid; then there was no flight.
     pub refused: bool,
 }
 
 impl Failsafes {
-    /// Flies with the companions of `make`.
+    /// Makes the failsafe simulation with the companions that `make` returns.
     pub fn new(
         make: impl Fn(ControllerKind) -> Result<CompanionFactory, String> + Send + Sync + 'static,
     ) -> Failsafes {
         Failsafes { make: Box::new(make), made: Mutex::default() }
     }
 
-    /// The page for the choices in `query` (names and values of the form's fields); a missing field has its default. The
-    /// page shows the error of an invalid choice, or of a flight that cannot be flown.
+    /// The page for the form fields in `query`, pairs of name and value; a missing field has its default. If a value is invalid
+    /// or the flight fails, the page shows the error.
     pub fn page(&self, query: &[(String, String)]) -> Answer {
         let (form, unknown) = Form::of(query);
         let chosen = match unknown {

@@ -1,4 +1,4 @@
-//! The page: the choices and their result, side by side.
+//! HTML page of the failsafe scenarios: the form and the result.
 
 use super::choices::{
     FAULTS, NOTHING, REQUESTS, TURBULENCE, controllers, counterpart, fault, file_name,
@@ -7,7 +7,7 @@ use super::form::{Form, NUMBERS, Wrong};
 use greylag_report::escape;
 use greylag_sim::faults::{Counterpart, FaultKind};
 
-/// Example flights: the name, and the fields that differ from the defaults.
+/// Example scenarios: the name, and the fields that differ from the defaults.
 const EXAMPLES: [(&str, &str); 8] = [
     ("Link cut in a turn", ""),
     ("Client dies", "fault=client&for_s=8&request=none"),
@@ -25,7 +25,7 @@ const EXAMPLES: [(&str, &str); 8] = [
     ("Disarm in the air", "counterpart=sitl&fault=none&request=disarm"),
 ];
 
-/// The page with the choices of `form` and their result; an invalid choice is marked.
+/// The page with the values of `form` and the result `shown`; an invalid field is marked.
 pub(super) fn render(form: &Form, wrong: Option<&Wrong>, shown: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -46,7 +46,7 @@ pub(super) fn render(form: &Form, wrong: Option<&Wrong>, shown: &str) -> String 
     )
 }
 
-/// HTML in place of the result for an invalid choice.
+/// HTML in place of the result if a value is invalid.
 pub(super) fn refused(wrong: &Wrong) -> String {
     let (field, why) = (wrong.field, escape(&wrong.why));
     format!(
@@ -54,7 +54,7 @@ pub(super) fn refused(wrong: &Wrong) -> String {
     )
 }
 
-/// HTML in place of the result for a flight that cannot be flown.
+/// HTML in place of the result if the flight fails.
 pub(super) fn failed(why: &str) -> String {
     format!("<p class=\"bad\" role=\"alert\" id=\"wrong\">Cannot fly: {}</p>\n", escape(why))
 }
@@ -106,9 +106,9 @@ fn choices(form: &Form, wrong: Option<&Wrong>) -> String {
     )
 }
 
-/// Conditions that all flights of the page share.
+/// Conditions of every flight of the page.
 const NOTE: &str = "60 s of the X8 as shipped. The attitude is asked for from 8 to 45 s; level before and after. The flight \
-                    controllers are played: their modes, time-outs and rules, not their firmware.";
+                    controllers are simulated: their modes, time-outs and rules, not their firmware.";
 
 fn examples() -> String {
     let one = |(name, query): &(&str, &str)| {
@@ -120,7 +120,7 @@ fn examples() -> String {
 
 const MODES: [(&str, &str); 2] = [("offboard", "OFFBOARD"), ("hold", "HOLD")];
 
-/// A field that selects one of `options`, each of which is a value and its displayed text.
+/// A selection field with `options`, which are pairs of value and displayed text.
 fn select(
     name: &str,
     label: &str,
@@ -139,7 +139,7 @@ fn select(
     )
 }
 
-/// Options of the field `fault`, each with its length and strength fields and its description.
+/// The field `fault` with its options. Each option states whether the fault has a length and a strength, and describes it.
 fn faults(form: &Form, wrong: Option<&Wrong>) -> String {
     let chosen = form.value("fault");
     let nothing = if chosen == NOTHING { " selected" } else { "" };
@@ -177,7 +177,7 @@ fn number(form: &Form, name: &str, label: &str, wrong: Option<&Wrong>) -> String
     )
 }
 
-/// A group of buttons of which one is selected.
+/// A group of radio buttons.
 fn group(name: &str, legend: &str, options: &[(&str, &str)], form: &Form) -> String {
     let option = |(value, words): &(&str, &str)| {
         let checked = if form.value(name) == *value { " checked" } else { "" };

@@ -1,4 +1,4 @@
-//! Events of a flight in order of time, and the verdict in one sentence.
+//! Events of a failsafe flight in time order, and the verdict in words.
 
 use super::Flown;
 use super::bands::{companion, spans};
@@ -10,25 +10,25 @@ use greylag_report::{Span, Tone};
 use greylag_sim::faults::policies::Sample;
 use greylag_sim::faults::{Asking, Fault, Finding, Found};
 
-/// Largest number of changes that a sentence names.
+/// Largest number of changes in a sentence.
 const NAMED: usize = 4;
-/// Arming and asking for OFFBOARD within this time are one request, s.
+/// Longest time between arming and the request for OFFBOARD at which both count as one request, s.
 const TOGETHER_S: f64 = 0.2;
 /// Time after a cause at which its effect is evaluated, s.
 const LATER_S: f64 = 2.0;
 
-/// A loss of altitude that the sentence mentions, m.
+/// Smallest loss of altitude that the verdict mentions, m.
 const MUCH_M: f64 = 30.0;
 
-/// A cause of later changes.
+/// A fault or request that can cause later changes.
 struct Cause {
     at_s: f64,
     words: String,
-    /// Time and kind of the client's request, if there was one.
+    /// Time, s, and kind of the request; `None` for a fault.
     asked: Option<(f64, Asking)>,
 }
 
-/// One event of the flight, at its time.
+/// One event of the flight.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Happened {
     pub at_s: f64,
@@ -36,21 +36,21 @@ pub(super) struct Happened {
     pub what: String,
 }
 
-/// Party that caused an event.
+/// Origin of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Who {
-    /// The injected fault of the scenario.
+    /// A fault of the scenario.
     Fault,
-    /// The client, or a ground station.
+    /// The client or a ground station.
     Client,
-    /// The companion computer's program.
+    /// The companion.
     Companion,
-    /// The flight controller's firmware.
+    /// The flight controller.
     Controller,
 }
 
 impl Who {
-    /// Name of the party on the page.
+    /// Displayed name of the origin.
     pub fn name(self, stack: Option<&'static str>) -> &'static str {
         match self {
             Who::Fault => "fault",
@@ -62,7 +62,7 @@ impl Who {
 }
 
 impl Flown {
-    /// All events and texts of the flight, in order of time.
+    /// All events and texts of the flight, in time order.
     pub(super) fn events(&self) -> Vec<Happened> {
         let mut all = self.befallen();
         let said = |(at_s, words): &(f64, String)| Happened {
@@ -102,7 +102,7 @@ impl Flown {
         all
     }
 
-    /// The modes of the flight controller, one after the other.
+    /// The consecutive modes of the flight controller.
     fn modes(&self) -> Vec<Span> {
         let counterpart = self.scenario.counterpart;
         spans(&self.witnessed.samples, |s| {
@@ -111,7 +111,7 @@ impl Flown {
         })
     }
 
-    /// Actions in order of time, as clauses.
+    /// Changes in time order: time, s, and text.
     fn deeds(&self) -> Vec<(f64, String)> {
         let mut all: Vec<(f64, String)> = Vec::new();
         for (k, pair) in self.witnessed.samples.windows(2).enumerate() {
@@ -122,7 +122,7 @@ impl Flown {
         all
     }
 
-    /// Changes from one step to the next: first of the companion, then of its flight controller.
+    /// Changes between two consecutive samples: of the companion, and of its flight controller.
     fn change(&self, before: &Sample, now: &Sample) -> [Option<String>; 2] {
         let counterpart = self.scenario.counterpart;
         let companion = match (before.shown, now.shown) {
@@ -144,8 +144,7 @@ impl Flown {
         [companion, controller]
     }
 
-    /// One sentence for each cause with its consequence, one on the end of the flight, one on the
-    /// rules.
+    /// The verdict: one sentence for each cause with its consequences, then sentences on the end of the flight and on the rules.
     pub(super) fn sentence(&self) -> String {
         let causes = self.causes();
         let deeds = self.deeds();
@@ -170,7 +169,7 @@ impl Flown {
         format!("{text}{}{} {}", self.end(), self.lost(), self.rules_in_words())
     }
 
-    /// Faults and requests in order of time.
+    /// Faults and requests in time order.
     fn causes(&self) -> Vec<Cause> {
         let of_fault = |f: &Fault| {
             let (name, from, to) = (fault(f.kind).0, f.from_s, f.to_s);
@@ -200,7 +199,7 @@ impl Flown {
         all
     }
 
-    /// Clause for a cause after which control did not change hands.
+    /// Text for a cause without a change of control.
     fn nothing_changed(&self, cause: &Cause) -> String {
         match cause.asked.map(|(at_s, what)| self.answer(at_s, what)) {
             Some(Some(Verdict::Rejected(why) | Verdict::Denied(why))) => return why.clone(),
@@ -215,13 +214,13 @@ impl Flown {
         }
     }
 
-    /// The sample at which the effect of a cause is visible.
+    /// The sample at which the effect of a cause is evaluated.
     fn later(&self, cause: &Cause) -> Option<&Sample> {
         let samples = &self.witnessed.samples;
         samples.get(((cause.at_s + LATER_S) / TICK_S) as usize).or(samples.last())
     }
 
-    /// Clause on an aircraft that nobody controls after a cause; `None` if somebody does.
+    /// Text for an aircraft that nobody controls after a cause; `None` if somebody controls it.
     fn left_alone(&self, cause: &Cause) -> Option<String> {
         let later = self.later(cause).filter(|s| s.shown.is_none() && s.steered)?;
         let counterpart = self.scenario.counterpart;
@@ -233,14 +232,14 @@ impl Flown {
         })
     }
 
-    /// The answer to a request of the client.
+    /// The companion's answer to a request; `None` without an answer.
     fn answer(&self, asked_s: f64, asked: Asking) -> Option<&Verdict> {
         let mut answers = self.witnessed.answers.iter();
         let near = |at_s: f64| (at_s - asked_s).abs() < 2.0 * TICK_S;
         answers.find(|(at_s, what, _)| *what == asked && near(*at_s)).map(|(.., verdict)| verdict)
     }
 
-    /// How the flight ended, in one sentence.
+    /// Sentence on the end of the flight.
     fn end(&self) -> String {
         let Some(last) = self.witnessed.samples.last() else { return String::new() };
         let found = |finding| self.witnessed.findings.iter().find(|f| f.finding == finding);
@@ -266,13 +265,13 @@ impl Flown {
         }
     }
 
-    /// Clause on the altitude lost, if that is much.
+    /// Sentence on the loss of altitude; empty if the loss is below `MUCH_M`.
     fn lost(&self) -> String {
         let lost = self.witnessed.samples.iter().map(|s| s.lost_m).fold(0.0, f64::max);
         if lost < MUCH_M { String::new() } else { format!(" The aircraft lost {lost:.0} m.") }
     }
 
-    /// Sentence on the rules of flight: all hold, or which are broken.
+    /// Sentence on the rules of flight: either all hold, or which are broken.
     fn rules_in_words(&self) -> String {
         let judged = self.judged.iter().zip(&self.rules);
         let judged: Vec<_> =
@@ -285,7 +284,8 @@ impl Flown {
         }
     }
 
-    /// Class of the style sheet for the state of the flight: rule broken or aircraft lost, uncontrolled, or well.
+    /// CSS class of the verdict: "unexplained" if a rule is broken or the aircraft is lost, "open" if nobody controlled the
+    /// aircraft, otherwise "effect".
     pub(super) fn standing(&self) -> &'static str {
         let bad = |f: &Found| matches!(f.finding, Finding::Crash | Finding::Panic);
         let broken = self.judged.iter().flatten().any(|(distance, _)| *distance < 0.0);

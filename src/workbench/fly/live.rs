@@ -1,4 +1,4 @@
-//! A flight while it is flown: measured against predicted, with the bands of the models' monitors.
+//! A flight in progress: measured and predicted values, with the bands of the models' monitors.
 
 use std::collections::BTreeMap;
 
@@ -11,22 +11,22 @@ use greylag_logs::Sample;
 use greylag_model::GreyBox;
 use greylag_physics::{ActuatorState, State, Time};
 
-/// Time between two points, s; rows in between are averaged.
+/// Time between two points, s; the rows in between are averaged.
 const STEP_S: f64 = 0.1;
-/// Points that are kept: ten minutes.
+/// Largest number of points: ten minutes of flight.
 const MOST: usize = 6000;
 
-/// Values at the points; `None` where there is no measurement.
+/// Values at the points; `None` if there is no measurement.
 type Column = Vec<Option<f32>>;
 
-/// A flight, or a part of it, as a page draws it.
+/// A flight or a part of it, as data for the plots of a page.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Live {
     /// Time on the vehicle's clock, s.
     pub time_s: Vec<f64>,
-    /// States and targets by name, in °, m/s and m.
+    /// States and targets by name, in °, m/s and m; throttle 0..1.
     pub states: BTreeMap<&'static str, Column>,
-    /// Specific force (m/s², body x, y, z), then angular acceleration (rad/s²), as measured.
+    /// Measured channels: specific force (body x, y, z, m/s²), then angular acceleration (rad/s²).
     pub measured: [Column; 6],
     /// Predictions of the models for this part.
     pub models: Vec<Watched>,
@@ -41,34 +41,34 @@ pub struct Watched {
     pub model: String,
     /// Predicted channels, in the units of [`Live::measured`].
     pub predicted: [Column; 6],
-    /// Half width of the monitor's band, two standard deviations.
+    /// Half width of the monitor's band (two standard deviations), in the units of [`Live::measured`].
     pub band: [Column; 6],
-    /// The monitor's residual divided by the half width of its band; dimensionless, outside the band beyond ±1.
+    /// The monitor's residual divided by the half width of its band, dimensionless. Values beyond ±1 are outside the band.
     pub share: [Column; 6],
 }
 
 /// A warning of a model's monitor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Warning {
-    /// When, s on the vehicle's clock.
+    /// Time of the warning, s, on the vehicle's clock.
     pub time_s: f64,
-    /// Index of the model.
+    /// Index of the model in `Live::models`.
     pub model: usize,
-    /// Index of the channel.
+    /// Index of the channel in [`Live::measured`].
     pub channel: usize,
-    /// The warning in words.
+    /// Text of the warning.
     pub text: String,
 }
 
-/// Names of the channels, as MAVLink has them and in words.
+/// Names of the channels: in MAVLink, and for display.
 pub fn channels() -> [[String; 2]; 6] {
     std::array::from_fn(|k| [RESIDUALS[k].to_owned(), Channel::ALL[k].to_string()])
 }
 
-/// A value of a row.
+/// Reads one value from a row.
 type Get = fn(&Sample) -> f64;
 
-/// States and targets of a row, °, m/s, m.
+/// States and targets of a row, in °, m/s and m; throttle 0..1.
 const STATES: [(&str, Get); 9] = [
     ("V", |s| s.airspeed_mps),
     ("alpha", |s| s.alpha_rad.to_degrees()),
@@ -81,13 +81,13 @@ const STATES: [(&str, Get); 9] = [
     ("throttle", |s| s.throttle),
 ];
 
-/// Watches a flight with some models.
+/// Compares a flight with the predictions of models, row by row.
 pub struct Watcher {
     models: Vec<(String, Monitor)>,
     point: Option<Point>,
 }
 
-/// Mean of the finite values.
+/// Mean of finite values.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
     sum: f64,
@@ -107,12 +107,12 @@ impl Mean {
     }
 }
 
-/// A point whose samples are not complete yet.
+/// A point that still receives samples.
 struct Point {
     place: i64,
     states: [Mean; STATES.len()],
     measured: [Mean; 6],
-    /// By model and channel: predicted, band, share.
+    /// By model and channel: predicted value, half width of the band, share.
     models: Vec<[[Mean; 3]; 6]>,
 }
 
@@ -123,7 +123,7 @@ impl Watcher {
         Watcher { models: models.iter().map(of).collect(), point: None }
     }
 
-    /// Adds rows and returns the points that are complete now.
+    /// Adds rows and returns the points that are now complete.
     pub fn take(&mut self, rows: &[Sample]) -> Live {
         let mut live = self.empty();
         for row in rows {
@@ -156,7 +156,7 @@ impl Watcher {
         live
     }
 
-    /// The incomplete last point, at the end of the flight.
+    /// Completes and returns the last point, at the end of the flight.
     pub fn rest(&mut self) -> Live {
         let mut live = self.empty();
         self.finish(&mut live);
@@ -200,7 +200,7 @@ impl Point {
 }
 
 impl Live {
-    /// Appends a later part; returns the number of oldest points that were dropped.
+    /// Appends a later part; returns the number of oldest points that were removed.
     pub fn append(&mut self, later: Live) -> usize {
         self.time_s.extend(later.time_s);
         for (name, column) in later.states {
@@ -238,8 +238,8 @@ impl Watched {
     }
 }
 
-/// A row converted for the monitor. A missing value is a fault of the frame, which the monitor does
-/// not compare.
+/// Converts a row for the monitor. A missing value becomes a fault of the frame, and the monitor does not compare the affected
+/// channels.
 fn frame(row: &Sample) -> Telemetry {
     let [roll, pitch, yaw] = row.attitude_rad;
     let [p, q, r] = row.rates_radps;
@@ -253,7 +253,7 @@ fn frame(row: &Sample) -> Telemetry {
         alpha: row.alpha_rad,
         beta: row.beta_rad,
     };
-    // the log of an aircraft without a rudder has no deflection of one
+    // the log of an aircraft without a rudder has no rudder deflection
     let rudder = if row.rudder_rad.is_nan() { 0.0 } else { row.rudder_rad };
     let actuators = ActuatorState {
         aileron: row.aileron_rad,

@@ -1,5 +1,5 @@
-//! Flights in the simulator with the session's model, and recordings that other programs write. The measured channels
-//! are shown against the models' predictions during the flight.
+//! Flights in the simulator with the session's model, and recordings that other programs write. During the flight, the page
+//! compares the measured channels with the models' predictions.
 
 mod live;
 mod order;
@@ -28,18 +28,18 @@ use greylag_model::GreyBox;
 use live::Watcher;
 use program::Program;
 
-/// The folder of recordings, below the session's.
+/// Subfolder of the session's folder for recordings.
 const FLIGHTS: &str = "flights";
 /// File name of a recording's log.
 const LOG: &str = "flight.csv";
-/// Interval at which the recording is polled.
+/// Interval between reads of the recording.
 const LOOK: Duration = Duration::from_millis(100);
-/// Characters that are kept of a program's last line.
+/// Largest number of characters kept of a program's last line.
 const LINE_LENGTH: usize = 400;
 
-/// The present flight, which is flown or watched, or else the last one.
+/// The present flight, simulated or recorded by another program, or else the last flight.
 pub struct Flying {
-    /// Number of the flight, which names its folder.
+    /// Number of the flight, which is also the name of its folder.
     pub number: u64,
     /// Index of the flight in the session's list of flights.
     pub place: usize,
@@ -47,19 +47,19 @@ pub struct Flying {
     pub on: bool,
     /// Samples, predictions and warnings so far.
     pub live: Live,
-    /// Points dropped from the start of `live`, so that it stays short.
+    /// Number of points removed from the start of `live`, whose length is limited.
     pub gone: usize,
     stop: Stop,
 }
 
-/// A part of a flight as a page is sent it.
+/// A part of a flight that is sent to a page.
 #[derive(Clone, Debug, Serialize)]
 pub struct Part {
     /// Number of the flight.
     pub number: u64,
     /// Whether the flight is in progress.
     pub on: bool,
-    /// Points of the flight before this part.
+    /// Number of points of the flight before this part.
     pub from: usize,
     /// Samples, predictions and warnings of the part.
     pub live: Live,
@@ -75,7 +75,7 @@ struct Task {
 }
 
 impl Bench {
-    /// Starts a flight in the simulator with the model of the accepted effects.
+    /// Starts a simulator flight with the amended model, or with the given model if no fit is complete.
     pub(super) fn fly(self: &Arc<Self>, seen: u64, order: &Order) -> Result<(), WorkbenchError> {
         if !cfg!(feature = "sitl") {
             return Err(WorkbenchError::NoSimulator);
@@ -100,7 +100,7 @@ impl Bench {
         self.begin(seen, begun, || Program::start(&words).map(Some).map_err(|e| io(&record, e)))
     }
 
-    /// Watches the recording in `folder`, which another program is writing.
+    /// Displays the recording in `folder` while another program writes it.
     pub(super) fn watch(self: &Arc<Self>, seen: u64, folder: &Path) -> Result<(), WorkbenchError> {
         let folder = match folder.file_name() {
             Some(name) if name == LOG => folder.parent().unwrap_or(folder),
@@ -142,7 +142,7 @@ impl Bench {
             Ok(Task { number, log, models, program, stop })
         });
         let task = task.inspect_err(|_| {
-            // a flight whose order was not written has not started
+            // a flight whose record could not be written did not start
             let mut inner = self.lock();
             let flown = inner.session.flown.len();
             inner.flying = inner.flying.take().filter(|f| f.place < flown);
@@ -152,7 +152,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Stops the flight, or the watching of a recording.
+    /// Stops the flight, or the display of a recording.
     pub(super) fn stop_flight(&self) -> Result<(), WorkbenchError> {
         let inner = self.lock();
         let flying = inner.flying.as_ref().filter(|f| f.on);
@@ -160,7 +160,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Takes the recording of the session's flight `place` as a log.
+    /// Adds the recording of the flight with index `place` to the session as a log.
     pub(super) fn take_flight(&self, seen: u64, place: usize) -> Result<(), WorkbenchError> {
         let (file, name) = {
             let inner = self.lock();
@@ -173,11 +173,11 @@ impl Bench {
             (self.folder.join(&flown.folder).join(LOG), format!("flown-{name}.csv"))
         };
         let bytes = std::fs::read(&file).map_err(|e| io(&file, e))?;
-        // results depend only on flights with a role: they stay valid until this flight is given one
+        // results depend only on flights with a role, so they stay valid until this flight gets a role
         self.take_as(seen, &name, &bytes, Some(Role::Unused))
     }
 
-    /// The complete present flight, or the last one.
+    /// The present or last flight with all its points; `None` without a flight.
     pub fn flying(&self) -> Option<Part> {
         let inner = self.lock();
         let Flying { number, on, live, gone, .. } = inner.flying.as_ref()?;
@@ -191,7 +191,7 @@ impl Bench {
         let mut trouble = None;
         let outcome = loop {
             let stopped = task.stop.answer().is_break();
-            // checked before the last rows are read, so that no row is missed
+            // checked before the last rows are read, because rows written in between must be read
             let ended = match &mut task.program {
                 Some(program) => {
                     if stopped {
@@ -219,7 +219,7 @@ impl Bench {
         self.record_end(task.number, outcome, &last, tail.seconds());
     }
 
-    /// Notes a part of the flight, and sends it to the pages.
+    /// Stores a part of the flight and sends it to the pages.
     fn seen(&self, number: u64, later: Live) {
         if later.time_s.is_empty() && later.warnings.is_empty() {
             return;
@@ -253,7 +253,7 @@ impl Bench {
 }
 
 impl Flown {
-    /// A flight that begins now, recorded in `folder`.
+    /// A record of a flight that begins now, with the recording in `folder`.
     fn new(folder: PathBuf) -> Flown {
         Flown {
             unix_s: now_s(),
@@ -270,14 +270,14 @@ impl Flown {
     }
 }
 
-/// The number above the largest number of a recording in `folder`.
+/// The lowest number above all numbers of recordings in `folder`.
 fn free(folder: &Path) -> u64 {
     let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let numbers = names.filter_map(|e| e.file_name().to_str()?.parse::<u64>().ok());
     numbers.max().unwrap_or(0) + 1
 }
 
-/// State of reading a recording that grows.
+/// State of reading a growing recording.
 #[derive(Default)]
 struct Tail {
     growing: Growing,
@@ -286,7 +286,7 @@ struct Tail {
 }
 
 impl Tail {
-    /// Rows added to the file since the last call; empty if there is no file yet.
+    /// Rows added to the file since the last call; empty if the file does not exist yet.
     fn rows(&mut self, log: &Path) -> Result<Vec<greylag_logs::Sample>, WorkbenchError> {
         let mut file = match File::open(log) {
             Ok(file) => file,
@@ -305,7 +305,7 @@ impl Tail {
         Ok(rows)
     }
 
-    /// The time from its first row to its last, s.
+    /// Time from the first to the last row, s; 0 without rows.
     fn seconds(&self) -> f64 {
         self.span.map_or(0.0, |[first, last]| last - first)
     }

@@ -1,4 +1,4 @@
-//! Requested simulator flights, and the commands that fly them.
+//! Orders for simulator flights, and the commands that execute them.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -13,32 +13,32 @@ use greylag_manoeuvres::menu::{self, MENU};
 
 /// Name of the default schedule of `greylag demo`.
 pub const ATTITUDES: &str = "attitudes";
-/// The folder of schedules, below the session's.
+/// Subfolder of the session's folder for schedules.
 pub const SCHEDULES: &str = "schedules";
-/// Aircraft that the simulator holds.
+/// Aircraft that the simulator contains.
 pub const AIRCRAFT: [&str; 4] = ["x8", "aerosonde", "x8-elevons", "c172p"];
 
-/// Request for a simulator flight.
+/// Order for a simulator flight.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Order {
-    /// `attitudes`, a manoeuvre of the menu, or a schedule of the session.
+    /// Name of the schedule: `attitudes`, a manoeuvre of the list, or a schedule of the session.
     pub schedule: String,
-    /// The controller, designed from the session's model.
+    /// Name of the controller, which is designed from the session's model.
     pub controller: String,
-    /// The aircraft that the simulator flies.
+    /// Name of the simulated aircraft.
     pub aircraft: String,
-    /// Effects hidden in the aircraft, each ID=AMPLITUDE, with blanks between them.
+    /// Effects hidden in the aircraft, each ID=AMPLITUDE, separated by spaces.
     #[serde(default)]
     pub hide: String,
-    /// Turbulence, 1 to 7 (3 light, 4 moderate, 6 severe).
+    /// Turbulence severity, 1 to 7 (3 light, 4 moderate, 6 severe); `None` for calm air.
     #[serde(default)]
     pub turbulence: Option<u8>,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u32,
 }
 
-/// A schedule that can be chosen.
+/// A schedule for selection by the user.
 #[derive(Clone, Debug, Serialize)]
 pub struct Choice {
     /// Identifier of the schedule in an [`Order`].
@@ -48,7 +48,7 @@ pub struct Choice {
 }
 
 impl Inner {
-    /// The schedules that can be flown: the demonstration's, those made in this session, the menu's.
+    /// The available schedules: that of the demonstration, those of this session, and the manoeuvres of the list.
     pub fn schedules(&self) -> Vec<Choice> {
         let attitudes = Choice {
             id: ATTITUDES.into(),
@@ -60,7 +60,7 @@ impl Inner {
         let own = self.designed.iter().map(|d| Choice {
             id: d.name.clone(),
             description: format!(
-                "{} {} times: tells {} apart.",
+                "{} {} times: distinguishes {}.",
                 d.manoeuvre,
                 d.times,
                 d.between.join(" and ")
@@ -69,7 +69,7 @@ impl Inner {
         std::iter::once(attitudes).chain(own).chain(of_menu).collect()
     }
 
-    /// The model that flies: as amended if its fit is done, else as given.
+    /// Path of the model for a flight: the amended model if its fit is complete and an effect joined, otherwise the given model.
     pub fn flying_model(&self) -> PathBuf {
         let key = self.key("fit", &self.session.effects);
         let fitted = self.fits.get(&key).filter(|f| !f.all_refused());
@@ -82,18 +82,18 @@ impl Inner {
     }
 }
 
-/// Controllers that need a model alone.
+/// Names of the controllers that need no trained policy.
 pub fn controllers() -> impl Iterator<Item = &'static str> {
     let alone = ControllerKind::ALL.iter().filter(|k| !k.needs().policy());
     alone.map(|k| k.name())
 }
 
 impl Order {
-    /// The words of the command that flies the order with the model file `model` and records to `record`. A schedule
-    /// of the menu is first written below `folder`, the session's folder.
+    /// Arguments of the command that executes the order with the model file `model` and records to `record`. If the schedule is a
+    /// manoeuvre of the list, its file is first written below the session's folder `folder`.
     ///
     /// # Errors
-    /// If the simulator does not know an option, or the schedule cannot be written.
+    /// `WorkbenchError::Order` if an option is unknown, and an error if the schedule cannot be written.
     pub fn words(
         &self,
         folder: &Path,
@@ -129,7 +129,7 @@ impl Order {
         Ok(words)
     }
 
-    /// The file of the order's schedule; `None` for the attitudes of the demonstration.
+    /// Path of the schedule file; `None` for the default schedule of the demonstration.
     fn schedule(&self, folder: &Path) -> Result<Option<PathBuf>, WorkbenchError> {
         if self.schedule == ATTITUDES {
             return Ok(None);
@@ -149,7 +149,7 @@ impl Order {
     }
 }
 
-/// The words as a shell takes them.
+/// The command with its arguments, quoted for a shell.
 pub fn line(words: &[String]) -> String {
     words.iter().fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(word)))
 }

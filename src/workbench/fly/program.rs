@@ -1,19 +1,18 @@
-//! The process that flies: this program as `greylag demo`.
+//! The process of a simulator flight: this program with the command `greylag demo`.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Number of output lines that are kept.
+/// Largest number of output lines kept.
 const LINES: usize = 40;
-/// Time that the program gets to end by itself, with its report, after the request to stop.
+/// Time for the program to end normally after the stop request, including its report.
 const STOP_TIMEOUT: Duration = Duration::from_secs(120);
 /// Start of the line that `greylag demo` prints when a flight is complete.
 const COMPLETE: &str = "report: ";
 
-/// A flight in a separate process, which ends with this program because its standard input is
-/// closed then.
+/// A flight in a separate process. The process ends with this program, because its standard input is then closed.
 pub struct Program {
     child: Child,
     input: Option<ChildStdin>,
@@ -25,7 +24,7 @@ impl Program {
     /// Starts this program with the arguments `words`.
     ///
     /// # Errors
-    /// The system refuses.
+    /// If the operating system cannot start the process.
     pub fn start(words: &[String]) -> std::io::Result<Program> {
         let mut child = Command::new(std::env::current_exe()?)
             .args(words)
@@ -47,7 +46,7 @@ impl Program {
         self.stop_requested.get_or_insert_with(Instant::now);
     }
 
-    /// Exit status once the program has ended. It is killed [`STOP_TIMEOUT`] after the request to stop.
+    /// Exit status; `None` while the program runs. The program is killed [`STOP_TIMEOUT`] after the stop request.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         if self.stop_requested.is_some_and(|at| at.elapsed() > STOP_TIMEOUT) {
             let _ = self.child.kill();
@@ -55,12 +54,12 @@ impl Program {
         self.child.try_wait().ok().flatten()
     }
 
-    /// Whether the flight was flown to its planned end.
+    /// Whether the flight reached its planned end.
     pub fn is_whole(&self) -> bool {
         self.lines(0).iter().any(|line| line.starts_with(COMPLETE))
     }
 
-    /// Last useful line of output: how targets were tracked, or why the program failed.
+    /// Last non-empty line of output: the tracking result of a complete flight, otherwise the error.
     pub fn last_line(&self) -> String {
         let [out, errors] = [self.lines(0), self.lines(1)];
         let words = if self.is_whole() { &out } else { &errors };
@@ -83,7 +82,7 @@ impl Drop for Program {
     }
 }
 
-/// Collects the last [`LINES`] lines of `from` in `output`, on a separate thread.
+/// Keeps the last [`LINES`] lines of `from` in `output`, on a separate thread.
 fn listen(from: Option<impl Read + Send + 'static>, output: &Arc<Mutex<Vec<String>>>) {
     let (Some(from), output) = (from, output.clone()) else { return };
     std::thread::spawn(move || {

@@ -1,4 +1,4 @@
-//! The page's files, which the program carries.
+//! Files of the page, which are embedded in the program.
 
 use axum::extract::Path;
 use axum::http::header::CONTENT_TYPE;
@@ -7,7 +7,7 @@ use axum::response::{Html, IntoResponse, Response};
 use super::routes;
 
 const PAGE: &str = include_str!("../assets/page.html");
-/// Files by name, with their types.
+/// Name, media type and content of each file.
 const FILES: [(&str, &str, &str); 13] = [
     ("workbench.css", CSS, include_str!("../assets/workbench.css")),
     ("uplot.css", CSS, include_str!("../../report/kit/assets/uPlot.min.css")),
@@ -31,7 +31,7 @@ pub async fn page() -> Html<&'static str> {
     Html(PAGE)
 }
 
-/// The file `name` of the page; 404 if there is none.
+/// The file `name` of the page; status 404 if it does not exist.
 pub async fn asset(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|(own, ..)| *own == name) {
         Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
@@ -43,13 +43,13 @@ pub async fn asset(Path(name): Path<String>) -> Response {
 mod tests {
     use super::*;
 
-    /// 300 kB: what a page may weigh without data.
+    /// The limit for the page without data is 300 kB.
     #[test]
     fn the_page_is_light_and_names_only_its_own_files() {
         let weight: usize = PAGE.len() + FILES.iter().map(|(.., text)| text.len()).sum::<usize>();
         assert!(weight < 300_000, "{weight} bytes");
         for (name, _, text) in FILES.iter().filter(|(name, ..)| !name.starts_with("uplot")) {
-            // the name of SVG's namespace is no address that is fetched
+            // the name of the SVG namespace is not fetched
             let text = text.replace("http://www.w3.org/2000/svg", "");
             assert!(!text.contains("http://") && !text.contains("https://"), "{name}");
             assert!(!text.contains("innerHTML"), "{name} writes text of logs as HTML");

@@ -1,11 +1,11 @@
-//! The page of failsafes.
+//! Handler of the page on failsafes.
 
 use axum::extract::{Query, State};
 use axum::response::Response;
 
 use super::Shared;
 
-/// The page for the choices in the address. An invalid choice is answered with 422.
+/// The page for the form values in the address. An invalid value gives status 422.
 #[cfg(feature = "sitl")]
 pub async fn page(
     State(shared): State<Shared>,
@@ -28,7 +28,7 @@ pub async fn page(
     }
 }
 
-/// A build without the simulator flies no scenarios.
+/// Error of a build without the simulator.
 #[cfg(not(feature = "sitl"))]
 pub async fn page(_: State<Shared>, _: Query<Vec<(String, String)>>) -> Response {
     use axum::response::IntoResponse;

@@ -1,4 +1,4 @@
-//! Access control: only pages of this program on this machine, by a token.
+//! Access control: allows only pages of this program on this computer, identified by a token.
 
 use axum::extract::{Request, State};
 use axum::http::header::{
@@ -12,16 +12,16 @@ use axum::response::{IntoResponse, Response};
 use super::Shared;
 use super::routes::failure;
 
-/// Content security policy: a page may load only this program's own files, no inline scripts.
+/// Content security policy: a page may load only files of this program, and no inline scripts.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
                       img-src 'self' data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
-/// Lets a request pass that has the token and comes from this program's own page.
+/// Forwards a request that has the token and comes from a page of this program.
 pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let answer = match allowed(&shared, &request) {
         Ok(Entry::Known) => next.run(request).await,
         Ok(Entry::New(cookie)) => {
-            // the token leaves the address bar at once
+            // the redirect removes the token from the address bar
             let headers = [(SET_COOKIE, cookie), (LOCATION, "/".to_owned())];
             (StatusCode::SEE_OTHER, headers).into_response()
         }
@@ -30,11 +30,11 @@ pub async fn guard(State(shared): State<Shared>, request: Request, next: Next) -
     safe(answer)
 }
 
-/// Place of the token in a request.
+/// How the request contains the token.
 enum Entry {
-    /// By the cookie, or a header.
+    /// In the cookie or in a header.
     Known,
-    /// In the address, to be given this cookie.
+    /// In the address; the answer sets this cookie.
     New(String),
 }
 
@@ -43,7 +43,7 @@ fn allowed(shared: &Shared, request: &Request) -> Result<Entry, Box<Response>> {
     let port = shared.address.port();
     let hosts = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
     let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
-    // refuses a foreign host name that resolves to this machine, and requests of another site's page
+    // refuses a foreign host name that resolves to this computer, and requests from a page of another site
     let host = text(HOST).is_some_and(|h| hosts.iter().any(|own| own == h));
     let origin = text(ORIGIN).is_none_or(|o| hosts.iter().any(|own| o == format!("http://{own}")));
     if !host || !origin {
@@ -68,7 +68,7 @@ fn allowed(shared: &Shared, request: &Request) -> Result<Entry, Box<Response>> {
     Err(Box::new(failure(StatusCode::UNAUTHORIZED, why)))
 }
 
-/// Value of the cookie `name`.
+/// Value of the cookie `name`; `None` if it is not set.
 fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     let all = headers.get_all(COOKIE).into_iter().filter_map(|v| v.to_str().ok());
     all.flat_map(|line| line.split("; ")).find_map(|pair| {
@@ -77,12 +77,12 @@ fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     })
 }
 
-/// Whether two tokens are equal, compared in a time that does not depend on where they differ.
+/// Whether two tokens are equal. The time of the comparison does not depend on the position of a difference.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
 }
 
-/// An answer with the headers that all have.
+/// Adds the security headers of every answer.
 fn safe(mut answer: Response) -> Response {
     let headers = answer.headers_mut();
     for (name, value) in [

@@ -1,4 +1,4 @@
-//! The workbench served to a browser on this machine: on the loopback interface, with a token, without external files.
+//! HTTP server of the workbench: on the loopback interface, with a token, without external files.
 
 mod assets;
 mod failsafes;
@@ -18,11 +18,11 @@ use super::bench::{Bench, Given};
 use super::error::WorkbenchError;
 use super::jobs::Event;
 
-/// Largest log that a page may send, bytes.
+/// Largest log in an upload, bytes.
 pub const LARGEST_LOG: usize = 256 << 20;
-/// Largest other request, bytes.
+/// Largest body of any other request, bytes.
 const LARGEST_REQUEST: usize = 64 << 10;
-/// Events that a slow page may lag behind.
+/// Number of events by which a slow page may lag.
 const LAG: usize = 256;
 
 /// Why the workbench cannot be served.
@@ -43,7 +43,7 @@ pub enum ServeError {
     },
 }
 
-/// State shared by all requests.
+/// State that all requests share.
 #[derive(Clone)]
 struct Shared {
     bench: Arc<Bench>,
@@ -52,11 +52,11 @@ struct Shared {
     address: SocketAddr,
 }
 
-/// Serves the session of `given` on `port` of this machine (0 for any that is free) with `token`, until the
-/// program ends; calls `ready` with the page's address.
+/// Serves the session of `given` on `port` of this computer (0 for any free port) until the program ends. Requests need `token`.
+/// When the server listens, it calls `ready` with the address of the page.
 ///
 /// # Errors
-/// The session cannot be opened, or the port cannot be bound.
+/// `ServeError::Bench` if the session cannot be opened, and `ServeError::Socket` if the port cannot be used.
 pub fn serve(
     given: Given,
     port: u16,
@@ -73,7 +73,7 @@ pub fn serve(
         let shout = events.clone();
         let on_event = move |event: Event| {
             if let Ok(text) = serde_json::to_string(&event) {
-                // without an open page there is no receiver
+                // without an open page, the channel has no receiver
                 let _ = shout.send(text.into());
             }
         };
@@ -84,10 +84,10 @@ pub fn serve(
     })
 }
 
-/// A random token, hexadecimal.
+/// A random token of 32 hexadecimal digits.
 ///
 /// # Errors
-/// The system has no random numbers.
+/// If the operating system provides no random numbers.
 pub fn random_token() -> io::Result<String> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(io::Error::other)?;

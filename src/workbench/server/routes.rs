@@ -21,7 +21,7 @@ use crate::bench::Bench;
 use crate::error::{Kind, WorkbenchError};
 use crate::view::RunRequest;
 
-/// A failure in words.
+/// An answer with an error message as JSON.
 pub fn failure(status: StatusCode, why: &str) -> Response {
     (status, Json(json!({ "error": why }))).into_response()
 }
@@ -39,7 +39,7 @@ impl IntoResponse for WorkbenchError {
     }
 }
 
-/// Runs the work on a separate thread, so that other requests are answered meanwhile.
+/// Runs `work` on a separate thread, because other requests must be answered meanwhile.
 async fn aside<T: Serialize + Send + 'static>(
     shared: Shared,
     work: impl FnOnce(&Arc<Bench>) -> Result<T, WorkbenchError> + Send + 'static,
@@ -54,7 +54,7 @@ async fn aside<T: Serialize + Send + 'static>(
     }
 }
 
-/// The session as JSON, without its curves.
+/// The state of the session as JSON, without curves.
 pub async fn state(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| bench.state()).await
 }
@@ -69,7 +69,7 @@ pub async fn diagnosis(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.diagnosis())).await
 }
 
-/// Result of the search for a formula, as JSON.
+/// Result of the search for a formula, as JSON; `null` without a search.
 pub async fn proposal(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.proposal())).await
 }
@@ -79,43 +79,43 @@ pub async fn grammar() -> Response {
     Json(crate::grammar()).into_response()
 }
 
-/// A text that may be an effect file.
+/// Body of a request to check an effect file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Text {
     text: String,
 }
 
-/// Description of an effect file, or its error.
+/// Description of an effect file or its error, as JSON.
 pub async fn check(Json(Text { text }): Json<Text>) -> Response {
     match crate::check(&text) {
         Ok(checked) => Json(checked).into_response(),
-        // a text that is still being edited is not an error of the request
+        // a text that the user still edits is not an error of the request
         Err(error) => Json(json!({ "error": error.to_string() })).into_response(),
     }
 }
 
-/// The curve of an accepted effect.
+/// The curve of an accepted effect, as JSON.
 pub async fn curve(State(shared): State<Shared>, Path(effect): Path<String>) -> Response {
     aside(shared, move |bench| bench.curve(&effect)).await
 }
 
-/// The present flight, or else the last one.
+/// The present flight, or else the last flight, as JSON; `null` without a flight.
 pub async fn flying(State(shared): State<Shared>) -> Response {
     aside(shared, |bench| Ok(bench.flying())).await
 }
 
-/// A flight over time.
+/// One flight over time, as JSON.
 pub async fn flight(State(shared): State<Shared>, Path(place): Path<usize>) -> Response {
     aside(shared, move |bench| bench.flight(place)).await
 }
 
-/// Free runs from a moment.
+/// Free runs from a time of a flight, as JSON.
 pub async fn free_run(State(shared): State<Shared>, Json(request): Json<RunRequest>) -> Response {
     aside(shared, move |bench| bench.free_run(request)).await
 }
 
-/// Makes a change and answers with the session after it.
+/// Executes a request and answers with the new state of the session.
 pub async fn act(State(shared): State<Shared>, Json(request): Json<Request>) -> Response {
     aside(shared, move |bench| {
         bench.act(request)?;
@@ -124,14 +124,14 @@ pub async fn act(State(shared): State<Shared>, Json(request): Json<Request>) -> 
     .await
 }
 
-/// The log's name, and the revision that its sender saw.
+/// Query of an upload: name of the log, and revision on which the upload is based.
 #[derive(Deserialize)]
 pub struct Sent {
     name: String,
     revision: u64,
 }
 
-/// Takes a log and answers with the session after it.
+/// Adds an uploaded log and answers with the new state of the session.
 pub async fn take(
     State(shared): State<Shared>,
     Query(sent): Query<Sent>,
@@ -139,7 +139,7 @@ pub async fn take(
     body: Body,
 ) -> Response {
     let announced = headers.get(CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-    // a log of a declared length that is too large is refused before its body is read
+    // a log with a too large declared length is refused before its body is read
     if announced.is_some_and(|bytes: usize| bytes > LARGEST_LOG) {
         return too_large(&sent.name);
     }
@@ -159,17 +159,17 @@ fn too_large(name: &str) -> Response {
     failure(StatusCode::PAYLOAD_TOO_LARGE, &why)
 }
 
-/// An event that makes a page fetch the state again; without a revision in any case.
+/// An event after which a page reads the state again; without a revision, it does so in any case.
 fn changed(revision: Option<u64>) -> Arc<str> {
     json!({ "event": "changed", "revision": revision }).to_string().into()
 }
 
-/// Stream of events while the page is open.
+/// Stream of events for an open page.
 pub async fn events(
     State(shared): State<Shared>,
 ) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
     let later = BroadcastStream::new(shared.events.subscribe());
-    // a change may hold the session; other requests are served meanwhile
+    // another request may hold the lock of the session; this thread must not block meanwhile
     let revision = tokio::task::spawn_blocking(move || shared.bench.revision()).await;
     let first = tokio_stream::once(changed(revision.ok()));
     // a page that lags may have missed a change

@@ -1,15 +1,15 @@
-//! Names of properties in the files of an aircraft.
+//! Reads the property names in the files of an aircraft and sorts them by their use.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::aircraft;
 
-/// Names of properties, by how the aircraft's files use them.
+/// Names of properties in an aircraft's files.
 pub(super) struct Names {
-    /// Properties that the systems read but do not write: the commands and others.
+    /// Properties that the systems read but do not write and whose names suggest a command.
     pub commands: Vec<String>,
-    /// Properties that the aerodynamic functions read.
+    /// Properties that the aerodynamic functions read and whose names suggest a position.
     pub read: Vec<String>,
 }
 
@@ -17,7 +17,7 @@ pub(super) struct Names {
 const USUAL: [&str; 3] = ["fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm"];
 
 impl Names {
-    /// Reads the main document of `aircraft` and the files that it names, as far as they can be read.
+    /// Reads the main document of `aircraft` and those files that it names; a file that cannot be read is left out.
     pub fn read(dir: &Path, aircraft: &str) -> Names {
         let given = (!dir.as_os_str().is_empty()).then_some(dir);
         let main = aircraft::read(given, aircraft).unwrap_or_default();
@@ -56,12 +56,12 @@ impl Names {
     }
 }
 
-/// The text within `<aerodynamics>`, and the rest.
+/// Splits the text into the part within `<aerodynamics>` and the rest.
 fn parted(all: &str) -> (String, String) {
     let (mut inside, mut outside, mut rest) = (String::new(), String::new(), all);
     while let Some(from) = rest.find("<aerodynamics") {
         let to = rest[from..].find("</aerodynamics>").map_or(rest.len(), |k| from + k);
-        // a reference to a file closes itself and has no end tag
+        // an element that only refers to a file closes itself and has no end tag
         if rest[from..].find("/>").is_some_and(|k| !rest[from..from + k].contains('>')) {
             outside.push_str(&rest[..from + 1]);
             rest = &rest[from + 1..];
@@ -75,7 +75,7 @@ fn parted(all: &str) -> (String, String) {
     (inside, outside)
 }
 
-/// Properties that components write: their outputs, and the properties that bear their names.
+/// Properties that components write: their outputs, and the properties derived from the names of the components.
 fn written(systems: &str) -> BTreeSet<String> {
     let mut all: BTreeSet<String> = elements(systems, "output").into_iter().collect();
     for component in attributes(systems, "name") {
@@ -89,7 +89,7 @@ fn written(systems: &str) -> BTreeSet<String> {
 fn elements(text: &str, tag: &str) -> Vec<String> {
     let after = |part: &str| {
         let (attributes, rest) = part.split_once('>')?;
-        // <inputs> is no <input>
+        // the prefix <input also matches <inputs>, which is another element
         let own = attributes.is_empty() || attributes.starts_with(char::is_whitespace);
         let name = rest.split('<').next()?.trim().trim_start_matches('-');
         (own && !name.is_empty() && !name.contains(char::is_whitespace)).then(|| name.to_owned())
@@ -97,7 +97,7 @@ fn elements(text: &str, tag: &str) -> Vec<String> {
     text.split(&format!("<{tag}")).skip(1).filter_map(after).collect()
 }
 
-/// Values of an attribute.
+/// Values of the attribute `name` of all elements.
 fn attributes(text: &str, name: &str) -> Vec<String> {
     let open = format!(" {name}=\"");
     text.split(&open).skip(1).filter_map(|part| Some(part.split_once('"')?.0.to_owned())).collect()

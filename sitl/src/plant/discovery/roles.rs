@@ -8,10 +8,9 @@ use crate::plant::{PlantError, Properties};
 #[derive(Clone, Debug)]
 pub(super) struct Tried {
     pub command: String,
-    /// Rolling, pitching and yawing moment, each divided by its reference length, at the command 1
-    /// less those at 0, lbf.
+    /// Rolling, pitching and yawing moment at the command 1 minus those at 0, each divided by its reference length, lbf.
     pub moments: [f64; 3],
-    /// Positions that moved, with their changes at the commands −1 (0 without a negative side) and 1.
+    /// Positions that moved, with their changes at the commands −1 and 1; the first is 0 if −1 is not allowed.
     pub moved: Vec<(String, [f64; 2])>,
     /// The least command that gives the full deflection.
     pub full_at: f64,
@@ -19,11 +18,11 @@ pub(super) struct Tried {
     pub two_sided: bool,
 }
 
-/// Deflection assumed at full command where only a normalised position is known, rad: 20°.
+/// Deflection assumed at full command if the aircraft has only a normalised position, rad: 20°.
 const SHARE_RAD: f64 = 0.349;
-/// Least moment of a candidate, as a fraction of the largest about the same axis.
+/// Smallest moment of a candidate, as a fraction of the largest about the same axis.
 const LEAST: f64 = 0.05;
-/// Least moment about an axis, as a fraction of the largest about any axis: less is rounding.
+/// Smallest moment about an axis, as a fraction of the largest about any axis; a smaller one is attributed to rounding.
 const LEAST_OF_ALL: f64 = 1e-3;
 
 /// A control and its axis: 0 roll, 1 pitch, 2 yaw.
@@ -47,16 +46,16 @@ const ROLES: [Role; 3] = [
     },
     Role { name: "rudder", axis: 2, sense: -1.0, words: ["rud", "rud", "yaw"], does: "yaws" },
 ];
-/// Parts of the names of commands that are no primary controls.
+/// Parts of the names of commands that are not primary controls.
 const OTHERS: [&str; 7] = ["flap", "spoil", "brake", "trim", "slat", "gear", "gain"];
 
-/// One command, or two with a sign for the second.
+/// One command, or two commands with the sign of each.
 struct Choice<'a> {
     parts: Vec<(&'a Tried, f64)>,
     score: f64,
 }
 
-/// Assigns the roles; the error names the axis that nothing moves, and what was tried.
+/// Assigns the roles. The error names the axis that no command moves and the commands that were tried.
 pub(super) fn choose(tried: &[Tried], names: &Names, aircraft: &str) -> Result<Found, PlantError> {
     let mut properties = Properties::default();
     let mut notes = Vec::new();
@@ -99,7 +98,7 @@ fn listed(tried: &[Tried], names: &Names) -> String {
     tried.iter().take(8).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The command or pair that moves the axis most and the others least.
+/// The command or pair with the highest score: most moment about the axis of `role`, least about the others.
 fn best<'a>(tried: &'a [Tried], role: &Role) -> Option<Choice<'a>> {
     let largest = tried.iter().map(|t| t.moments[role.axis].abs()).fold(0.0, f64::max);
     let of_all = tried.iter().flat_map(|t| t.moments).fold(0.0, |most, m| m.abs().max(most));
@@ -147,7 +146,7 @@ fn are_sides(a: &str, b: &str) -> bool {
     swapped || (a.len() == b.len() && differ.len() == 1 && letters)
 }
 
-/// The position that a command moves: the one in rad with the largest change, else a normalised one.
+/// The position that a command moves most, in rad; if there is none in rad, a normalised position.
 fn position(tried: &Tried) -> Option<&(String, [f64; 2])> {
     let kind = |name: &str| match name {
         _ if name.contains("deg") => 0,
@@ -159,7 +158,7 @@ fn position(tried: &Tried) -> Option<&(String, [f64; 2])> {
     usable.max_by(|a, b| kind(&a.0).cmp(&kind(&b.0)).then(size(&a.1).total_cmp(&size(&b.1))))
 }
 
-/// Command and position as `--property` takes them.
+/// Command and position of the choice, written as `--property` takes them.
 fn named(
     choice: &Choice,
     role: &Role,
@@ -176,7 +175,7 @@ fn named(
             let is_share = name.contains("norm");
             if is_share {
                 notes.push(format!(
-                    "{name} is a share of a deflection that the file does not tell: {SHARE_RAD} rad are assumed, and only the \
+                    "{name} is a share of a deflection that the file does not state: {SHARE_RAD} rad are assumed, and only the \
                      {}'s effect at full command is known", role.name
                 ));
             }

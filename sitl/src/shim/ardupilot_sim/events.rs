@@ -1,4 +1,4 @@
-//! Events of a run against ArduPilot.
+//! Events of a run against ArduPilot and their texts.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -15,30 +15,30 @@ pub enum ArdupilotEvent {
     Connected {
         /// Address from which ArduPilot sends.
         peer: SocketAddr,
-        /// Channels that it sends.
+        /// Number of channels that ArduPilot sends.
         channels: usize,
-        /// Steps a second that it asks for, Hz.
+        /// Step rate that ArduPilot requests, Hz.
         asked_hz: u16,
-        /// Steps a second that are made, Hz.
+        /// Rate of the states that the shim sends, Hz.
         made_hz: u64,
     },
-    /// The frame count has gone back: the aircraft is at its start again.
+    /// The frame count went back, so the aircraft was put back to its start.
     Restarted,
     /// The catapult has been released.
     Catapult,
-    /// No servo packet for a second.
+    /// No servo packet arrived for 1 s.
     Stopped,
-    /// Servo packets come again after a silence.
+    /// Servo packets arrive again after an interruption.
     Resumed,
-    /// A datagram that is no servo packet: from where, of how many bytes.
+    /// A datagram that is not a servo packet: its sender and its length in bytes.
     Garbage(SocketAddr, usize),
-    /// Servo packets come from a second sender too.
+    /// A second sender also sends servo packets.
     Second(SocketAddr),
     /// ArduPilot sends fewer channels than the outputs need.
     Missing {
-        /// The highest channel that moves something.
+        /// Highest channel that is assigned to a control.
         wanted: usize,
-        /// Channels that it sends.
+        /// Number of channels that ArduPilot sends.
         channels: usize,
     },
 }

@@ -1,9 +1,8 @@
 //! ArduPilot's JSON interface: the shim as the simulator of stock ArduPlane SITL.
 //!
-//! ArduPilot sends a servo packet for every step, to UDP port 9002, and waits for the state, one
-//! line of JSON. ArduPilot therefore sets the pace: the simulation steps only on a new packet, and
-//! ArduPilot's option `--speedup` decides whether the run follows the wall clock. The protocol is
-//! that of ArduPilot's public documentation (SITL, JSON interface).
+//! ArduPilot sends a servo packet for every step to UDP port 9002 and waits for the state, one line of JSON. ArduPilot therefore
+//! sets the pace: the simulation steps only on a new packet. Its option `--speedup` decides whether the run follows the wall
+//! clock. The protocol is that of ArduPilot's public documentation (SITL, JSON interface).
 
 mod events;
 mod packet;
@@ -30,9 +29,8 @@ pub use state::Home;
 
 /// One step of JSBSim, µs.
 const STEP_US: u64 = 1_000;
-/// Most steps of JSBSim between two states that are sent. ArduPilot refuses to arm when its sensors
-/// update slower than 1.8 times its own loop (SCHED_LOOP_RATE, up to 250 Hz on a plane), whatever
-/// rate it asks for.
+/// Largest number of JSBSim steps between two states that are sent. ArduPilot refuses to arm if its sensors update slower than
+/// 1.8 times its own loop rate (SCHED_LOOP_RATE, up to 250 Hz on a plane), whatever step rate it requests.
 const MOST_STEPS: u64 = 2;
 /// Silence after which ArduPilot is reported as stopped and another ArduPilot may connect.
 const SILENCE: Duration = Duration::from_secs(1);
@@ -42,7 +40,7 @@ const SILENCE: Duration = Duration::from_secs(1);
 pub struct ArdupilotOptions {
     /// Assignment of the channels to the aircraft's controls.
     pub outputs: OutputMap,
-    /// Pulse widths of channels that are not 1000 to 2000 µs.
+    /// Pulse widths of the channels that do not use 1000 to 2000 µs.
     pub ranges: Vec<ChannelRange>,
 }
 
@@ -53,7 +51,7 @@ impl Default for ArdupilotOptions {
     }
 }
 
-/// The ArduPilot that is answered.
+/// The connected ArduPilot.
 struct Client {
     peer: SocketAddr,
     frame_count: u32,
@@ -83,7 +81,7 @@ struct Run<'a> {
     second_reported: bool,
 }
 
-/// Flies for whichever ArduPilot sends until asked to stop or until the flight is over.
+/// Simulates for the connected ArduPilot until a stop request or the end of the flight.
 pub(super) fn fly(
     link: Link,
     options: &ShimOptions,
@@ -168,7 +166,7 @@ impl Run<'_> {
         }
     }
 
-    /// Counts a datagram that is no servo packet, and reports the first.
+    /// Counts a datagram that is not a servo packet, and reports the first of them.
     fn refuse(&mut self, from: SocketAddr, length: usize) {
         self.counts.bad_frames += 1;
         if !std::mem::replace(&mut self.garbage_reported, true) {
@@ -177,7 +175,7 @@ impl Run<'_> {
         self.watch();
     }
 
-    /// Answers a servo packet with the state after the step that it asks for.
+    /// Answers a servo packet with the state after the requested step.
     fn take(&mut self, packet: &ServoPacket, from: SocketAddr) -> Result<Option<Over>, ShimError> {
         self.watch();
         match &self.client {
@@ -205,7 +203,7 @@ impl Run<'_> {
         }
     }
 
-    /// Sends the last state once more: ArduPilot asks again when it has had no answer for a second.
+    /// Sends the last state again: ArduPilot repeats its packet after a second without an answer.
     fn repeat(&mut self) {
         self.resume();
         self.counts.repeated_frames += 1;
@@ -225,7 +223,7 @@ impl Run<'_> {
         }
     }
 
-    /// Begins with an ArduPilot that was just started: aircraft at its start, its time at 0.
+    /// Begins a flight for an ArduPilot that has just started: the aircraft is at its start and the client's time is 0.
     fn meet(
         &mut self,
         packet: &ServoPacket,
@@ -259,7 +257,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Makes the step that `packet` asks for and shows the state after it.
+    /// Makes the step that `packet` requests and sends the state after it.
     fn step(&mut self, packet: &ServoPacket) -> Result<Option<Over>, ShimError> {
         let inputs = self.inputs(packet);
         if self.launcher.let_go(true, inputs.throttle) {
@@ -278,7 +276,7 @@ impl Run<'_> {
         Ok(last.map(|_| Over::Duration))
     }
 
-    /// The commands of a packet; channels that are not sent have no pulse.
+    /// The commands of a packet; a channel that ArduPilot does not send counts as without pulse.
     fn inputs(&mut self, packet: &ServoPacket) -> Inputs {
         let ranges = &self.ardupilot.ranges;
         let command =
@@ -309,7 +307,7 @@ impl Run<'_> {
         let Some(client) = &mut self.client else { return };
         client.frame_count = packet.frame_count;
         client.time_us += steps(packet.frame_rate_hz) * STEP_US;
-        // The plant's state is finite, so that it can always be written.
+        // The plant's state is finite, so it can always be serialised.
         client.line =
             state::line(client.time_us as f64 * 1e-6, truth, &self.home).unwrap_or_default();
         self.counts.frames += 1;
@@ -317,16 +315,16 @@ impl Run<'_> {
     }
 }
 
-/// How a packet of ArduPilot relates to the known client.
+/// How a packet of ArduPilot relates to the connected client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meeting {
-    /// The first client, or another client than before.
+    /// First packet of a client, or of another client than before.
     New,
     /// ArduPilot was started again on the same port.
     Again,
 }
 
-/// Steps of JSBSim between two states at the rate `asked_hz`: the nearest whole number from 1 to `MOST_STEPS`.
+/// JSBSim steps between two states at the requested rate `asked_hz`, Hz: the nearest whole number from 1 to `MOST_STEPS`.
 fn steps(asked_hz: u16) -> u64 {
     let nearest = (1e6 / (f64::from(asked_hz.max(1)) * STEP_US as f64)).round() as u64;
     nearest.clamp(1, MOST_STEPS)
@@ -338,7 +336,7 @@ mod tests {
 
     #[test]
     fn steps_follow_the_rate_asked_for_and_stay_finer_than_the_sensors_need() {
-        // 1200 Hz is ArduPilot's default; 501 is its request while it is shown 500.
+        // 1200 Hz is ArduPilot's default. It requests 501 Hz while it gets 500 Hz.
         for (asked_hz, made) in
             [(1200, 1), (1000, 1), (800, 1), (501, 2), (500, 2), (50, 2), (0, 2)]
         {

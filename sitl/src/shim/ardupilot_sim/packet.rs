@@ -1,6 +1,6 @@
-//! The servo packet that ArduPilot sends for every step.
+//! Parser for the servo packet that ArduPilot sends for every step.
 
-/// The first number of a packet with 16 channels, and of one with 32 (SERVO_32_ENABLE 1).
+/// Magic number of a packet with 16 channels, and of one with 32 channels (SERVO_32_ENABLE 1).
 const MAGIC_16: u16 = 18_458;
 const MAGIC_32: u16 = 29_569;
 /// Bytes before the channels: magic, frame rate, frame count.
@@ -9,9 +9,9 @@ const HEAD: usize = 8;
 /// Servo packet of ArduPilot's JSON interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoPacket {
-    /// Steps a second that ArduPilot asks for, Hz.
+    /// Step rate that ArduPilot requests, Hz.
     pub frame_rate_hz: u16,
-    /// Counts the packets since ArduPilot was started.
+    /// Number of packets since ArduPilot was started.
     pub frame_count: u32,
     /// Channels sent: 16 or 32.
     pub channels: usize,
@@ -19,7 +19,7 @@ pub struct ServoPacket {
 }
 
 impl ServoPacket {
-    /// Reads a datagram; `None` when it is no servo packet.
+    /// Reads a datagram; `None` if it is not a servo packet.
     pub fn read(datagram: &[u8]) -> Option<Self> {
         let (head, channels) = datagram.split_at_checked(HEAD)?;
         let word = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
@@ -39,7 +39,7 @@ impl ServoPacket {
         Some(ServoPacket { frame_rate_hz: word(2), frame_count, channels: count, pwm_us })
     }
 
-    /// Pulse width of the channel at `place`, counted from 0, µs; 0, no pulse, when it is not sent.
+    /// Pulse width of the channel at index `place`, from 0, µs; 0 means no pulse or a channel that is not sent.
     pub fn pwm_us(&self, place: usize) -> u16 {
         self.pwm_us.get(place).copied().unwrap_or(0)
     }

@@ -1,4 +1,4 @@
-//! Conversion of pulse widths to normalised commands.
+//! Converts pulse widths of servo channels to normalised commands.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,16 +15,16 @@ pub struct PwmRange {
     high_us: u16,
 }
 
-/// Range of one channel, or of all; written as `3=1100:1500:1900` or `1000:1500:2000`.
+/// Range of one channel or of all channels, written as `3=1100:1500:1900` or `1000:1500:2000`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelRange {
-    /// The channel, from 1; `None` for all that have no range of their own.
+    /// The channel, from 1; `None` for all channels without a specific range.
     pub channel: Option<usize>,
     /// Pulse widths of the channel.
     pub range: PwmRange,
 }
 
-/// A range that cannot be read.
+/// Error of parsing a pulse-width range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "cannot read the pulse widths '{given}': {fault}; write SERVOn_MIN:SERVOn_TRIM:SERVOn_MAX in µs, such as 1000:1500:2000, or 3=1000:1500:2000 for channel 3"
@@ -38,8 +38,8 @@ impl PwmRange {
     /// 1000, 1500 and 2000 µs, as for ArduPilot's own simulated aircraft.
     pub const STANDARD: PwmRange = PwmRange { low_us: 1000, neutral_us: 1500, high_us: 2000 };
 
-    /// Command of a pulse of `pwm_us`: −1..1 for a surface, 0..1 for a throttle. A pulse width
-    /// beyond the stops gives a command beyond these limits; no pulse (0) gives 0.
+    /// Command at a pulse of `pwm_us`, µs: −1..1 for a surface, 0..1 for a throttle. A pulse width beyond the stops gives a
+    /// command outside these limits. No pulse (0) gives 0.
     pub fn command(self, pwm_us: u16, range: Range) -> f64 {
         let [pwm, low, neutral, high] =
             [pwm_us, self.low_us, self.neutral_us, self.high_us].map(f64::from);
@@ -97,8 +97,8 @@ impl fmt::Display for ChannelRange {
     }
 }
 
-/// The range of the channel at `place`, counted from 0: the last that was given for it, then the
-/// last for all, then the standard.
+/// Range of the channel at index `place`, from 0. The last range for this channel takes precedence over the last range for all
+/// channels; without either, the standard range applies.
 pub fn range_at(given: &[ChannelRange], place: usize) -> PwmRange {
     let last = |channel: Option<usize>| given.iter().rfind(move |item| item.channel == channel);
     last(Some(place + 1)).or(last(None)).map_or(PwmRange::STANDARD, |item| item.range)
@@ -116,7 +116,7 @@ mod tests {
     fn a_pulse_width_commands_by_its_own_stops() {
         let given = ranges(&["1=1100:1400:2000", "3=1000:1500:1800"]);
         let command = |place, pwm, range| range_at(&given, place).command(pwm, range);
-        // The neutral position need not be in the middle: each side goes to its stop.
+        // The neutral position may be off-centre; each side is scaled to its stop.
         assert_eq!(command(0, 1250, Range::Surface), -0.5);
         assert_eq!(command(0, 1700, Range::Surface), 0.5);
         assert_eq!(command(2, 1400, Range::Throttle), 0.5);

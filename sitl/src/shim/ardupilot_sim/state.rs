@@ -1,4 +1,4 @@
-//! The state that ArduPilot is shown: one line of JSON.
+//! Writes the state for ArduPilot as one line of JSON.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use crate::shim::telemetry::quaternion;
 /// Sea-level density of the standard atmosphere, kg/m³.
 const SEA_LEVEL_DENSITY: f64 = 1.225;
 
-/// The place from which positions count: ArduPilot's home.
+/// Origin of the positions: ArduPilot's home.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Home {
     /// Geodetic latitude, deg, north positive.
@@ -22,14 +22,14 @@ pub struct Home {
     pub heading_deg: f64,
 }
 
-/// Content of one JSON line; names and units are ArduPilot's.
+/// Content of one JSON line, with the names and units of ArduPilot's interface.
 #[derive(Debug, Serialize)]
 struct State {
     timestamp: f64,
     imu: Imu,
     position: [f64; 3],
     quaternion: [f64; 4],
-    // Ahead of velocity_wind: ArduPilot takes the first key that begins like this one.
+    // Before velocity_wind: ArduPilot takes the first key that begins with "velocity".
     velocity: [f64; 3],
     velocity_wind: [f64; 3],
     airspeed: f64,
@@ -41,10 +41,11 @@ struct Imu {
     accel_body: [f64; 3],
 }
 
-/// The line at `timestamp_s`, with the line feeds before and after it that ArduPilot needs.
+/// The JSON line of `truth` at `timestamp_s`, s, between the line feeds that ArduPilot requires. Positions are relative to
+/// `home`.
 ///
 /// # Errors
-/// Never for a finite state.
+/// If serialisation fails, which does not occur with a finite state.
 pub fn line(timestamp_s: f64, truth: &Truth, home: &Home) -> serde_json::Result<String> {
     let state = State {
         timestamp: timestamp_s,
@@ -56,7 +57,7 @@ pub fn line(timestamp_s: f64, truth: &Truth, home: &Home) -> serde_json::Result<
         quaternion: quaternion(truth.roll_rad, truth.pitch_rad, truth.yaw_rad),
         velocity: truth.velocity_ned_mps,
         velocity_wind: truth.wind_ned_mps,
-        // ArduPilot's pitot tube shows equivalent airspeed.
+        // ArduPilot expects the equivalent airspeed.
         airspeed: truth.airspeed_mps * (truth.air_density_kgpm3 / SEA_LEVEL_DENSITY).sqrt(),
     };
     Ok(format!("\n{}\n", serde_json::to_string(&state)?))
@@ -101,7 +102,7 @@ mod tests {
         assert_eq!(read["imu"]["accel_body"][2], -9.81);
         assert_eq!(read["airspeed"], 10.0);
         assert_eq!(read["velocity"][2], 3.0, "down is positive");
-        // A thousandth of a degree at 46.8° is 111.2 m north and 76.3 m east (WGS 84).
+        // A change of 0.001° at 46.8° latitude is 111.2 m north or 76.3 m east (WGS 84).
         let position = |axis: usize| read["position"][axis].as_f64().unwrap();
         assert!((position(0) - 111.2).abs() < 0.05, "{}", position(0));
         assert!((position(1) - 76.3).abs() < 0.05, "{}", position(1));

@@ -1,4 +1,4 @@
-//! Numbers as MAVLink puts them on the wire: little-endian, packed.
+//! Writes and reads numbers in MAVLink payloads: little-endian, packed.
 
 /// A payload that is being written, never longer than 255 bytes.
 #[derive(Debug)]
@@ -21,7 +21,7 @@ impl Writer {
         self.length = end;
     }
 
-    /// The payload without its trailing zeros; at least one byte remains, as MAVLink 2 asks.
+    /// The payload without its trailing zeros; at least one byte remains, as MAVLink 2 requires.
     pub fn truncated(&self) -> &[u8] {
         let written = &self.bytes[..self.length];
         let kept = written.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1);
@@ -56,7 +56,7 @@ pub trait Field: Sized {
     const SIZE: usize;
     /// Appends the value in little-endian order.
     fn put(&self, writer: &mut Writer);
-    /// Takes the value off the front.
+    /// Reads a value from the front and advances the reader.
     fn take(reader: &mut Reader<'_>) -> Self;
 }
 

@@ -1,4 +1,4 @@
-//! The frame around a payload: header, checksum, sequence number.
+//! Encodes and represents MAVLink frames: header, payload, checksum and sequence number.
 
 use super::field::{Reader, Writer};
 use super::messages::Message;
@@ -29,7 +29,7 @@ pub enum Version {
     Two,
 }
 
-/// A received frame whose checksum was right.
+/// A received frame with a valid checksum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Version of MAVLink, by the frame's magic byte.
@@ -47,18 +47,18 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The payload as it came, perhaps truncated of its trailing zeros.
+    /// The payload as received; its trailing zeros may be missing.
     pub fn payload(&self) -> &[u8] {
         &self.payload[..usize::from(self.length)]
     }
 
-    /// The message, if the frame holds an `M`.
+    /// The decoded message; `None` if the frame contains another message than `M`.
     pub fn decode<M: Message>(&self) -> Option<M> {
         (self.id == M::ID).then(|| M::read(&mut Reader::new(self.payload())))
     }
 }
 
-/// Writes MAVLink 2 frames in the name of one system and component, numbering them.
+/// Encodes MAVLink 2 frames for one system and component, with consecutive sequence numbers.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     system: u8,

@@ -1,22 +1,22 @@
-//! The messages of this link, each with its fields in wire order.
+//! Definitions of the MAVLink messages that the shim uses, each with its fields in wire order.
 //!
-//! Wire order is by falling size of the field's type, declaration order within a size, extension
-//! fields last. Identifiers, CRC_EXTRA and orders were read off pymavlink 2.4.50
-//! (`ardupilotmega`, MAVLink 2) and are held by `tests/shim/codec.rs`.
+//! In wire order, larger field types come first, fields of equal size keep the order of their declaration, and extension fields
+//! come last. Identifiers, CRC_EXTRA and orders are those of pymavlink 2.4.50 (`ardupilotmega`, MAVLink 2); `tests/shim/codec.rs`
+//! checks them.
 
 use super::field::{Field, Reader, Writer};
 
-/// A MAVLink message that this link knows.
+/// A MAVLink message that the shim can encode and decode.
 pub trait Message: Sized {
     /// Message identifier, 24 bits.
     const ID: u32;
-    /// Seed that ties the checksum to the message's definition.
+    /// Seed of the checksum that depends on the message's definition (CRC_EXTRA).
     const CRC_EXTRA: u8;
-    /// Payload length in bytes with all extension fields.
+    /// Payload length in bytes including all extension fields.
     const LENGTH: usize;
     /// Appends every field in wire order.
     fn write(&self, writer: &mut Writer);
-    /// Takes every field in wire order; missing bytes read as zero.
+    /// Reads every field in wire order; missing bytes count as zero.
     fn read(reader: &mut Reader<'_>) -> Self;
 }
 
@@ -48,7 +48,7 @@ macro_rules! messages {
             }
         )*
 
-        /// The CRC_EXTRA of a message that this link knows; `None` for all others.
+        /// CRC_EXTRA of a message that the shim defines; `None` for any other message.
         pub fn crc_extra(id: u32) -> Option<u8> {
             match id {
                 $( $id => Some($crc), )*
@@ -208,13 +208,13 @@ messages! {
         throttle: u16,
     }
 
-    /// HIL_ACTUATOR_CONTROLS: actuator commands of the companion or of PX4, in answer to a frame.
+    /// HIL_ACTUATOR_CONTROLS: actuator commands of the companion or of PX4 in answer to a state frame.
     HilActuatorControls = 93, crc_extra 47 {
         /// Time stamp of the answered frame, µs.
         time_usec: u64,
         /// Bit 0: the sender is in lockstep; unused in the profile `sitl`.
         flags: u64,
-        /// Aileron, elevator, throttle, rudder, then unused; of PX4 the outputs 1 to 16.
+        /// Aileron, elevator, throttle, rudder, then unused elements; from PX4, the outputs 1 to 16.
         controls: [f32; 16],
         /// MAV_MODE_FLAG bits; 128 is armed.
         mode: u8,

@@ -1,9 +1,8 @@
-//! MAVLink 2 for the messages of this link, written apart from the companion's codec.
+//! MAVLink 2 codec of the shim, independent of the companion's codec.
 //!
-//! The companion speaks through rust-mavlink; this codec shares no code with it, so that a slip in
-//! either shows as a disagreement between the two. It follows the serialisation guide of
-//! <https://mavlink.io/en/guide/serialization.html> and is checked against byte vectors made by
-//! pymavlink (`tests/shim_vectors.py`).
+//! The companion uses rust-mavlink. This codec shares no code with it, which makes an error in either codec visible as a
+//! disagreement. The codec follows the serialisation guide <https://mavlink.io/en/guide/serialization.html> and is checked
+//! against byte vectors from pymavlink (`tests/shim_vectors.py`).
 
 mod field;
 mod frame;

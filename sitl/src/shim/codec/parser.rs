@@ -1,4 +1,4 @@
-//! Finds MAVLink frames among other received bytes.
+//! Finds MAVLink frames in received bytes.
 
 use super::frame::{Frame, MAGIC_1, MAGIC_2, Version, checksum};
 use super::messages::crc_extra;
@@ -16,11 +16,11 @@ pub struct Parser {
 enum Front {
     /// A valid frame of this many bytes.
     Frame(Box<Frame>, usize),
-    /// A frame of this many bytes whose message this link does not know.
+    /// A frame of this many bytes with a message that the shim does not define.
     Unknown(usize),
-    /// The beginning of what may become a frame.
+    /// Bytes that may become a frame when more bytes arrive.
     Unfinished,
-    /// Bytes that begin no frame.
+    /// Bytes that do not begin a frame.
     Garbage,
 }
 
@@ -32,23 +32,23 @@ enum After {
 }
 
 impl Parser {
-    /// Runs of bytes so far that were no frame: wrong checksum, cut off, noise. One run counts once.
+    /// Number of byte runs that were not part of a frame: wrong checksum, truncated frame or noise.
     pub fn bad(&self) -> u64 {
         self.bad
     }
 
-    /// Frames so far that hold a message this link does not know; their checksum cannot be checked.
+    /// Number of frames with messages that the shim does not define and whose checksum it therefore cannot check.
     pub fn unknown(&self) -> u64 {
         self.unknown
     }
 
-    /// Hands every good frame in one datagram to `sink`; an unfinished frame at its end is bad.
+    /// Passes every valid frame of one datagram to `sink`; an unfinished frame at the end counts as bad.
     pub fn datagram(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Frame)) {
         self.scan(bytes, After::Nothing, sink);
         self.in_garbage = false;
     }
 
-    /// Hands every good frame that `bytes` complete to `sink`, keeping an unfinished one for later.
+    /// Passes every valid frame that `bytes` completes to `sink`, and keeps an unfinished frame for the next call.
     pub fn stream(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Frame)) {
         let mut held = std::mem::take(&mut self.held);
         held.extend_from_slice(bytes);
@@ -57,7 +57,7 @@ impl Parser {
         self.held = held;
     }
 
-    /// Forgets an unfinished frame: the stream it came from has ended.
+    /// Discards an unfinished frame after the end of a stream.
     pub fn restart(&mut self) {
         self.bad += u64::from(!self.held.is_empty() && !self.in_garbage);
         self.held.clear();
@@ -90,7 +90,7 @@ impl Parser {
     }
 }
 
-/// Where the parts of a frame lie.
+/// Offsets of the parts of a frame, in bytes.
 struct Layout {
     version: Version,
     header: usize,
@@ -112,7 +112,7 @@ fn front(bytes: &[u8]) -> Front {
         return Front::Unfinished;
     }
     let Some(extra) = crc_extra(layout.id) else {
-        // The checksum cannot be checked: the frame counts only if another frame or the end of the data follows.
+        // The checksum cannot be checked: the frame is accepted only if another frame or the end of the data follows.
         let plausible = matches!(bytes.get(total), None | Some(&(MAGIC_1 | MAGIC_2)));
         return if plausible { Front::Unknown(total) } else { Front::Garbage };
     };
@@ -140,7 +140,7 @@ fn frame(bytes: &[u8], layout: &Layout, length: usize) -> Frame {
 fn layout(bytes: &[u8]) -> Result<Layout, Front> {
     match bytes[0] {
         MAGIC_2 if bytes.len() < 10 => Err(Front::Unfinished),
-        // Of the incompatibility flags only 0x01, a signature behind the frame, is understood.
+        // Of the incompatibility flags, only 0x01 (a signature behind the frame) is supported.
         MAGIC_2 if bytes[2] & !1 != 0 => Err(Front::Garbage),
         MAGIC_2 => Ok(Layout {
             version: Version::Two,

@@ -1,15 +1,16 @@
-//! ArduPlane's failsafes, as its sources have them (`events.cpp`, `radio.cpp`, `system.cpp` of 4.6 to 4.8-dev).
+//! ArduPlane's failsafes, after its sources (`events.cpp`, `radio.cpp`, `system.cpp` of 4.6 to 4.8-dev).
 //!
-//! One state holds the active failure. Each failure acts once, when it is detected, and masks lesser ones while it is active.
+//! One state holds the active failure. A failure triggers one action when it is detected. While it is active, it masks failures
+//! of lower priority.
 
 use super::modes::Mode;
 use super::parameters::Table;
 
-/// Time of ten more readings of the channels at 50 Hz, which ArduPilot counts after RC_FS_TIMEOUT, s.
+/// Time of ten readings of the channels at 50 Hz, s; ArduPilot adds these readings to RC_FS_TIMEOUT.
 const COUNTED_S: f64 = 0.2;
 /// Steps between two checks for long failures: 3 Hz.
 const LOOK_EVERY: u64 = 33;
-/// FS_SHORT_TIMEOUT: a ground station whose heartbeat is younger than this is connected, s.
+/// Largest age of the ground station's heartbeat that ends the ground-station failure, s (FS_SHORT_TIMEOUT).
 const BACK_S: f64 = 1.5;
 
 /// Active failures.
@@ -17,7 +18,7 @@ const BACK_S: f64 = 1.5;
 enum Failed {
     #[default]
     Nothing,
-    /// RC receiver lost since this time, µs, and the mode before.
+    /// RC receiver lost since this time, µs; the mode is the mode before the loss.
     Short(u64, Mode),
     /// RC receiver lost for longer than FS_LONG_TIMEOUT, or from the start.
     Long,
@@ -28,13 +29,13 @@ enum Failed {
 /// Inputs of the failsafes at a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// Steps so far, and the time, µs.
+    /// Number of steps since the start, and simulated time, µs.
     pub(super) steps: u64,
     pub(super) now_us: u64,
     pub(super) mode: Mode,
     /// Whether a radio is bound.
     pub(super) radio: bool,
-    /// Age of the last overrides and of the last heartbeat of the ground station, s.
+    /// Age of the last overrides and of the ground station's last heartbeat, s; `None` before the first.
     pub(super) sticks_s: Option<f64>,
     pub(super) station_s: Option<f64>,
 }
@@ -42,7 +43,7 @@ pub(super) struct Seen {
 /// Action of a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Act {
-    /// The mode to go to; `None` where the mode stays.
+    /// The mode to enter; `None` if the mode does not change.
     pub(super) mode: Option<Mode>,
     /// Whether the companion's channel overrides are dropped.
     pub(super) drops_overrides: bool,
@@ -50,7 +51,7 @@ pub(super) struct Act {
     pub(super) words: &'static [u8],
 }
 
-/// Goes to a mode, and keeps the overrides.
+/// An action that enters `mode` and keeps the overrides.
 fn go(mode: Mode, words: &'static [u8]) -> Option<Act> {
     Some(Act { mode: Some(mode), drops_overrides: false, words })
 }
@@ -69,7 +70,7 @@ impl Failsafes {
         let silent = !seen.radio && seen.sticks_s.is_none_or(|age| age > patience);
         let receiver = parameters.get("THR_FAILSAFE") == 1.0 && silent;
         if !std::mem::replace(&mut self.begun, true) && receiver {
-            // The failure is older than the flight: its failsafe has acted on the ground already.
+            // The failure began before the flight, so its failsafe has already acted on the ground.
             self.failed = Failed::Long;
         }
         let short = parameters.get("FS_SHORT_ACTN") as i32;
@@ -97,7 +98,7 @@ impl Failsafes {
         }
     }
 
-    /// Checks that run at a lower rate.
+    /// Checks for long failures, which run at 3 Hz.
     fn look(&mut self, seen: &Seen, receiver: bool, parameters: &Table) -> Option<Act> {
         let timeout = parameters.get("FS_LONG_TIMEOUT");
         let since = match self.failed {
@@ -133,5 +134,5 @@ impl Failsafes {
     }
 }
 
-/// FS_SHORT_ACTN that disables the short failsafe.
+/// Value of FS_SHORT_ACTN that disables the short failsafe.
 const SHORT_DISABLED: i32 = 3;

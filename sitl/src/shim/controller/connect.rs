@@ -1,4 +1,4 @@
-//! Requests of a ground station when it connects to a flight controller, and their answers.
+//! Answers the requests that a ground station sends when it connects to a flight controller.
 
 use super::modes::Mode;
 use super::{FlightController, Personality, SYSTEM};
@@ -8,22 +8,22 @@ use crate::shim::codec::{
     MissionRequestList, ProtocolVersion,
 };
 
-/// MAV_RESULT: accepted, denied, unsupported.
+/// Values of MAV_RESULT: accepted, denied, unsupported.
 const ACCEPTED: u8 = 0;
 const DENIED: u8 = 2;
 const UNSUPPORTED: u8 = 3;
-/// MAV_MISSION_RESULT: accepted, unsupported, invalid sequence.
+/// Values of MAV_MISSION_RESULT: accepted, unsupported, invalid sequence.
 const MISSION_ACCEPTED: u8 = 0;
 const MISSION_UNSUPPORTED: u8 = 3;
 const MISSION_INVALID_SEQUENCE: u8 = 13;
 
-/// MAV_PROTOCOL_CAPABILITY bits of both simulated stacks: MISSION_INT, SET_ATTITUDE_TARGET,
-/// MAVLINK2, MISSION_FENCE, MISSION_RALLY (lists that are always empty) ...
+/// MAV_PROTOCOL_CAPABILITY bits of both simulated stacks: MISSION_INT, SET_ATTITUDE_TARGET, MAVLINK2, MISSION_FENCE,
+/// MISSION_RALLY. Their lists of missions, fences and rally points are always empty.
 const CAPABILITIES: u64 = 1 << 2 | 1 << 6 | 1 << 13 | 1 << 14 | 1 << 15;
-/// ... and how integers are sent as parameters: PARAM_ENCODE_BYTEWISE, PARAM_ENCODE_C_CAST.
+/// MAV_PROTOCOL_CAPABILITY bits of the encoding of integer parameters: PARAM_ENCODE_BYTEWISE, PARAM_ENCODE_C_CAST.
 const BYTEWISE: u64 = 1 << 4;
 const CAST: u64 = 1 << 17;
-/// Simulated versions in the encoding of FLIGHT_SW_VERSION: 1.15.0 and 4.6.0, released.
+/// Versions of the simulated stacks, encoded as FLIGHT_SW_VERSION: releases 1.15.0 and 4.6.0.
 const PX4_VERSION: u32 = 0x010F_00FF;
 const ARDUPILOT_VERSION: u32 = 0x0406_00FF;
 
@@ -34,12 +34,12 @@ pub(super) struct Requested {
     index: f32,
 }
 
-/// The message that a command asks for, if it asks for one.
+/// The message that a command requests; `None` if the command requests no message.
 pub(super) fn requested(command: u16, param: &[f32; 7]) -> Option<Requested> {
     let index = param[0];
     match command {
-        // REQUEST_MESSAGE, and what it has replaced: GET_HOME_POSITION, GET_MESSAGE_INTERVAL,
-        // REQUEST_PROTOCOL_VERSION, REQUEST_AUTOPILOT_CAPABILITIES.
+        // REQUEST_MESSAGE and the commands that it replaced: GET_HOME_POSITION, GET_MESSAGE_INTERVAL, REQUEST_PROTOCOL_VERSION,
+        // REQUEST_AUTOPILOT_CAPABILITIES.
         512 => Some(Requested { id: param[0] as u32, index: param[1] }),
         410 => Some(Requested { id: HomePosition::ID, index }),
         510 => Some(Requested { id: MessageInterval::ID, index }),
@@ -65,7 +65,7 @@ impl FlightController {
         }
     }
 
-    /// Sends a message that was granted.
+    /// Sends a message that `grants` has accepted.
     pub(super) fn send_requested(&mut self, Requested { id, index }: Requested) {
         let out = &mut self.waiting;
         match id {
@@ -124,13 +124,13 @@ impl FlightController {
         }
     }
 
-    /// FTP of a controller without files: NAK, "unknown command".
+    /// Answers an FTP request with NAK, "unknown command": the simulated controller has no files.
     pub(super) fn refuse_file(&mut self, frame: &Frame, m: &FileTransferProtocol) {
         const ACK: u8 = 128;
         const NAK: u8 = 129;
         const UNKNOWN_COMMAND: u8 = 7;
         let [low, high, session, opcode, ..] = m.payload[0];
-        // An answer gets no answer.
+        // ACK and NAK are answers, which get no answer.
         if matches!(opcode, ACK | NAK) {
             return;
         }
@@ -147,8 +147,8 @@ impl FlightController {
         self.encoder.encode(&answer, &mut self.waiting);
     }
 
-    /// Answers the mission protocol as a controller that holds no mission, fence or rally points
-    /// and accepts none. Returns whether the frame belongs to that protocol.
+    /// Answers the mission protocol as a controller without mission, fence or rally points that accepts none. Returns whether the
+    /// frame belongs to the mission protocol.
     pub(super) fn mission(&mut self, frame: &Frame) -> bool {
         let ours = |system: u8, component: u8| system == SYSTEM && matches!(component, 0 | 1);
         let (target, mission_type, result) = if let Some(m) = frame.decode::<MissionRequestList>() {

@@ -1,10 +1,10 @@
-//! Delays of a real controller between aircraft and companion: filtered gyros, late surfaces.
+//! Delays of a real flight controller: low-pass filters of the gyros and delay of the surfaces.
 
 use std::collections::VecDeque;
 
 use crate::plant::{DT_S, Inputs, Truth};
 
-/// Filters and delays with their memory.
+/// States of the gyro filter and of the command delay.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lag {
     rates: Option<[f64; 3]>,
@@ -12,7 +12,7 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// `measured` with its rates low-pass filtered at `cutoff_hz`; 0 is no filter.
+    /// `measured` with its body rates low-pass filtered at `cutoff_hz`, Hz; 0 disables the filter.
     pub(super) fn filtered(&mut self, mut measured: Truth, cutoff_hz: f64) -> Truth {
         let now = [measured.p_radps, measured.q_radps, measured.r_radps];
         let share = if cutoff_hz > 0.0 { share(cutoff_hz) } else { 1.0 };
@@ -24,7 +24,7 @@ impl Lag {
         measured
     }
 
-    /// The inputs of `delay_ms` ago, in whole steps.
+    /// The inputs of `delay_ms`, ms, ago; the delay is rounded to whole steps. Before that, the first inputs.
     pub(super) fn delayed(&mut self, inputs: Inputs, delay_ms: f64) -> Inputs {
         let steps = (delay_ms * 1e-3 / DT_S).round().max(0.0) as usize;
         self.late.push_back(inputs);
@@ -35,8 +35,8 @@ impl Lag {
     }
 }
 
-/// Weight of a new sample in a first-order low-pass at the step rate. Its delay at low frequency is that
-/// of the second-order Butterworth low-pass of both stacks: √2 / (2π f), 11 ms at 20 Hz.
+/// Weight of a new sample in a first-order low-pass at the step rate. Both stacks use a second-order Butterworth low-pass. The
+/// first-order filter has the same delay at low frequency, √2 / (2π f): 11 ms at 20 Hz.
 fn share(cutoff_hz: f64) -> f64 {
     let late_s = std::f64::consts::SQRT_2 / (std::f64::consts::TAU * cutoff_hz);
     DT_S / (DT_S + late_s)
@@ -54,7 +54,7 @@ mod tests {
             let measured = Truth { q_radps: 0.01 * f64::from(i), ..Truth::default() };
             shown = lag.filtered(measured, 20.0).q_radps;
         }
-        // 1 rad/s²: √2 / (2π 20 Hz) = 11.25 ms behind; the start has died out to 1e-28.
+        // The ramp is 1 rad/s², so the lag is √2 / (2π 20 Hz) = 11.25 ms; the transient has decayed to 1e-28.
         let behind = std::f64::consts::SQRT_2 / (std::f64::consts::TAU * 20.0);
         assert!((0.99 - shown - behind).abs() < 1e-9, "{shown}");
     }

@@ -1,33 +1,35 @@
 //! The attitude loops of a flight stack, and its airspeed and altitude loops for the autonomous modes.
 //!
 //! Both stacks have the same structure. The attitude error gives a commanded rate, to which the rate of a coordinated turn is
-//! added. The rate error, its integral and the commanded rate (feed-forward) give the deflection, which is scaled down with
-//! airspeed. PX4: `FixedwingAttitudeControl`, `FixedwingRateControl`, August 2025. ArduPlane: `AP_RollController`,
-//! `AP_PitchController`, 4.8.
+//! added. The rate error, its integral and the commanded rate (feed-forward) give the deflection. The deflection is scaled down
+//! with increasing airspeed. Sources: `FixedwingAttitudeControl` and `FixedwingRateControl` of PX4, August 2025;
+//! `AP_RollController` and `AP_PitchController` of ArduPlane 4.8.
 
 use super::Personality;
 use crate::plant::{DT_S, Inputs, Travel, Truth};
 
 const GRAVITY: f64 = 9.81;
-/// Airspeed error (m/s) and its integral to throttle.
+/// Gains from the airspeed error (m/s) and from its integral (m) to the throttle (0..1).
 const AIRSPEED: [f64; 2] = [0.2, 0.1];
-/// Airspeed that is held in the autonomous modes, m/s.
+/// Airspeed setpoint of the autonomous modes, m/s.
 const CRUISE_MPS: f64 = 20.0;
-/// Throttle in level flight.
+/// Throttle in level flight, 0..1.
 const THROTTLE: f64 = 0.2;
 /// Gains from altitude error (m) and climb rate (m/s) to pitch (rad), and the limit of that pitch, rad.
 const ALTITUDE: [f64; 3] = [0.01, 0.02, 0.15];
-/// The X8's elevator in level flight at that speed, rad: the pitch integrator begins there, as after minutes of flight.
+/// The X8's elevator in level flight at `CRUISE_MPS`, rad. The pitch integrator starts at this value, as after minutes of level
+/// flight.
 const LEVEL_RAD: f64 = 0.0685;
 /// Travel of the X8's surfaces, rad.
 const X8_TRAVEL: f64 = 30.0 * std::f64::consts::PI / 180.0;
-/// Bank up to which a turn is coordinated, rad.
+/// Largest bank angle for which the turn is coordinated, rad.
 const COORDINATED: f64 = 80.0 * std::f64::consts::PI / 180.0;
-/// Rate error at which the integrators stop, rad/s, as in PX4; smaller errors are weighted down towards it.
+/// Rate error above which the integrators stop, rad/s, as in PX4. The weight of the error in the integral falls to zero at this
+/// value.
 const NOT_INTEGRATED: f64 = 400.0 * std::f64::consts::PI / 180.0;
 
-/// Gains of an axis: time constant of the attitude, s; rate limit, rad/s; torque per rate error, per integral of
-/// the rate error with the limit of that torque, and per commanded rate.
+/// Gains of an axis: attitude time constant, s; rate limit, rad/s; torque per rate error; torque per integral of the rate error,
+/// and its limit; torque per commanded rate.
 #[derive(Clone, Copy, Debug)]
 struct Gains {
     time_constant_s: f64,
@@ -38,22 +40,23 @@ struct Gains {
     forward: f64,
 }
 
-/// Gains of the control law by a stack's parameters, for an aircraft like the X8.
+/// Gains of the control law that correspond to a stack's parameters for an aircraft like the X8.
 #[derive(Clone, Copy, Debug)]
 struct Stack {
     roll: Gains,
     pitch: Gains,
     /// Deflection of a torque of 1, rad.
     full_rad: f64,
-    /// Cutoff of the low-pass on the commanded rates, Hz; infinite for none.
+    /// Cutoff of the low-pass on the commanded rates, Hz; infinite for no low-pass.
     cutoff_hz: f64,
     /// Airspeed for which the gains are tuned, and the lowest airspeed of the gain scaling, m/s.
     scaled_at_mps: f64,
     least_mps: f64,
 }
 
-/// PX4's airframe 1036 with the airspeeds of the X8, as in the ULog of the flight that the test below replays: FW_R_TC,
-/// FW_R_RMAX, FW_RR_P, _I, _IMAX, _FF, those of pitch, the X8's travel, FW_AIRSPD_TRIM, FW_AIRSPD_STALL.
+/// PX4's airframe 1036 with the airspeeds of the X8, as in the ULog of the flight that the test below replays.
+/// The roll gains are FW_R_TC, FW_R_RMAX, FW_RR_P, _I, _IMAX and _FF; the pitch gains are the corresponding parameters. The
+/// others are the X8's travel, FW_AIRSPD_TRIM and FW_AIRSPD_STALL.
 const PX4: Stack = Stack {
     roll: Gains { time_constant_s: 0.45, most: 1.22, p: 0.085, i: 0.132, bound: 0.2, forward: 0.4 },
     pitch: Gains { time_constant_s: 0.4, most: 1.05, p: 0.05, i: 0.05, bound: 0.4, forward: 0.4 },
@@ -63,9 +66,10 @@ const PX4: Stack = Stack {
     least_mps: 11.0,
 };
 
-/// ArduPlane's gains for the X8, as in the log of the flight that the test below replays: RLL2SRV_TCONST, _RMAX, RLL_RATE_P, _I,
-/// _IMAX, _FF, those of pitch, RLL_RATE_FLTT. A torque of 1 is 57.3 degrees, of which 45 are full travel. SCALING_SPEED; half of
-/// it is the least.
+/// ArduPlane's gains for the X8, as in the log of the flight that the test below replays.
+/// The roll gains are RLL2SRV_TCONST, _RMAX, RLL_RATE_P, _I, _IMAX and _FF; the pitch gains are the corresponding parameters. The
+/// cutoff is RLL_RATE_FLTT. A torque of 1 is 57.3°, and 45° is full travel. The airspeeds are SCALING_SPEED and half of
+/// SCALING_SPEED.
 const ARDUPILOT: Stack = Stack {
     roll: Gains {
         time_constant_s: 0.45,
@@ -89,23 +93,23 @@ const ARDUPILOT: Stack = Stack {
     least_mps: 7.5,
 };
 
-/// The loops with their memory.
+/// The control loops with their states.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Law {
     stack: Stack,
     travel: Travel,
     /// Commanded rates after the low-pass, rad/s.
     wanted: [f64; 2],
-    /// Torques of the integrals.
+    /// Torques of the integrators, roll and pitch.
     integral: [f64; 2],
     /// Integral of the airspeed error, m.
     slow: f64,
-    /// The altitude that is held, m.
+    /// Altitude setpoint of the mode, m; `None` until `level` sets it.
     altitude: Option<f64>,
 }
 
 impl Law {
-    /// Loops that have flown level for minutes, for surfaces of this travel.
+    /// Loops with the integrators of steady level flight, for surfaces of this travel.
     pub(super) fn new(personality: Personality, travel: Travel) -> Self {
         let stack = match personality {
             Personality::Px4 => PX4,
@@ -116,7 +120,8 @@ impl Law {
         Law { stack, travel, wanted: [0.0; 2], integral: [0.0, level], slow: 0.0, altitude: None }
     }
 
-    /// Begins a new mode. ArduPlane then resets its integrators, PX4 only after a mode without rate control.
+    /// Resets the airspeed and altitude loops for a new mode, and with `forgets` also the integrators of the rate loops.
+    /// ArduPlane resets these integrators at every mode change, PX4 only after a mode without rate control.
     pub(super) fn begin(&mut self, forgets: bool) {
         (self.slow, self.altitude) = (0.0, None);
         if forgets {
@@ -124,7 +129,7 @@ impl Law {
         }
     }
 
-    /// Flies an attitude (rad), with a thrust or at cruise.
+    /// Commands for an attitude (rad) at a thrust, 0..1; without a thrust, the throttle holds the cruise airspeed.
     pub(super) fn attitude(
         &mut self,
         seen: &Truth,
@@ -147,7 +152,7 @@ impl Law {
                 let error = wanted - rate;
                 let torque = (gains.p * error + self.integral[axis]) * scale * scale
                     + gains.forward * wanted * scale;
-                // anti-windup: the integrator pushes no further into a stop
+                // anti-windup: no integration further into a stop
                 if torque.abs() < travels[axis] || torque.signum() != error.signum() {
                     let share = (1.0 - (error / NOT_INTEGRATED).powi(2)).max(0.0);
                     let sum = self.integral[axis] + share * gains.i * error * DT_S;
@@ -157,7 +162,7 @@ impl Law {
             });
         Inputs {
             aileron,
-            // a nose-up torque is the trailing edge up
+            // a nose-up torque needs the trailing edge up, which is negative
             elevator: -elevator,
             throttle: thrust.unwrap_or_else(|| self.throttle(seen)),
             rudder: 0.0,
@@ -165,7 +170,7 @@ impl Law {
         .clamped()
     }
 
-    /// Body rates about x and y that lead to an attitude, rad/s.
+    /// Commanded body rates about x and y that lead to an attitude (rad), rad/s.
     fn rates(&self, seen: &Truth, roll: f64, pitch: f64) -> [f64; 2] {
         let Stack { roll: of_roll, pitch: of_pitch, .. } = self.stack;
         let (now, up) = (seen.roll_rad, seen.pitch_rad);
@@ -187,18 +192,18 @@ impl Law {
         throttle
     }
 
-    /// Flies level at the altitude at which the mode began.
+    /// Commands that hold wings level at the altitude at which the mode began.
     pub(super) fn level(&mut self, seen: &Truth) -> Inputs {
         let altitude = *self.altitude.get_or_insert(seen.altitude_m);
         let climb = -seen.velocity_ned_mps[2];
         let [by_error, by_climb, most] = ALTITUDE;
         let pitch = by_error * (altitude - seen.altitude_m) - by_climb * climb;
-        // About the pitch of level flight at cruise.
+        // Added to 0.015 rad, the pitch of level flight at cruise airspeed.
         self.attitude(seen, 0.0, 0.015 + pitch.clamp(-most, most), None)
     }
 }
 
-/// Roll and pitch, rad, of a quaternion NED→FRD; `None` if it is not a rotation.
+/// Roll and pitch, rad, of a quaternion NED→FRD; `None` if its norm is not finite or not in 0.5..2.
 pub(super) fn roll_and_pitch(q: [f32; 4]) -> Option<[f64; 2]> {
     let q = q.map(f64::from);
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -215,15 +220,15 @@ mod tests {
     use super::*;
     use crate::plant::{Plant, PlantOptions, Start};
 
-    /// Seven attitudes and thrusts that were commanded to real PX4 in OFFBOARD, and its response: from its own ULog and the
-    /// simulator's truth.
+    /// Seven attitude and thrust setpoints of a real PX4 in OFFBOARD, from its ULog, and the response, from the simulator's
+    /// truth.
     const PX4_FLOWN: &str = include_str!("../../../../tests/data/px4_attitude_steps.csv");
-    /// The attitudes and thrusts of ArduPlane's own LOITER, likewise from its log.
+    /// Attitude and thrust setpoints of ArduPlane in LOITER, from its log, and the response.
     const ARDUPILOT_FLOWN: &str = include_str!("../../../../tests/data/ardupilot_loiter.csv");
-    /// Rows of 50 ms in which the aircraft comes to the attitude in which the recording begins.
+    /// Number of rows of 50 ms that are excluded: the aircraft first has to reach the attitude at which the recording begins.
     const BEGINNING: usize = 200;
 
-    /// Root mean square of the differences to the roll and pitch that were flown, and the largest, °.
+    /// Root mean square and largest magnitude of the differences from the recorded roll and pitch, °.
     fn beside(flown: &str, law: &mut Law, plant: &mut Plant) -> [[f64; 2]; 2] {
         let (mut squares, mut most, mut count) = ([0.0; 2], [0.0_f64; 2], 0.0);
         let mut seen = plant.reset(&Start::NEUTRAL).unwrap();
@@ -246,8 +251,8 @@ mod tests {
 
     #[test]
     fn the_loops_fly_the_attitudes_that_real_controllers_flew() {
-        // an earlier version of the loops was off by 5.7° and 3.4° rms, 38° at most, for PX4; 3.2° and 2.1°, 9° at
-        // most, for ArduPlane
+        // errors of an earlier version of the loops, roll and pitch: 5.7° and 3.4° rms, 38° at most, for PX4; 3.2° and 2.1° rms,
+        // 9° at most, for ArduPlane
         for (personality, flown, bounds) in [
             (Personality::Px4, PX4_FLOWN, [0.6, 0.6, 4.0]),
             (Personality::Ardupilot, ARDUPILOT_FLOWN, [0.8, 0.6, 2.5]),

@@ -1,10 +1,9 @@
 //! A simulated flight controller: the response of PX4 or ArduPilot to a companion's messages.
 //!
-//! Bytes in, bytes out, ten milliseconds a step; no socket and no clock, so that a flight can be
-//! run in lockstep with a companion in the same process. The simulation covers what a companion
-//! depends on: identities, modes with their rules, streams on request, the parameter server, the
-//! sampling of sticks, timeouts, the stack's own attitude loops. Estimation is perfect but for the
-//! sensor errors of the options.
+//! The controller takes and returns bytes and steps by 10 ms. It has no socket and no clock, so a companion in the same process
+//! can fly with it in lockstep. The simulation covers what a companion depends on: identities, modes and their rules, streams on
+//! request, the parameter server, the sampling of sticks, timeouts, and the stack's attitude loops. State estimation is perfect
+//! except for the sensor errors of the options.
 
 mod ardupilot_failsafe;
 mod connect;
@@ -43,16 +42,16 @@ pub const SYSTEM: u8 = 1;
 const COMPONENT: u8 = 1;
 /// ArduPilot reads its channels every second step: 50 Hz.
 const SAMPLE_EVERY: u64 = 2;
-/// PX4's commander checks the requirements of its modes every tenth step: 10 Hz ...
+/// PX4's commander checks the requirements of its modes every tenth step: 10 Hz.
 const LOOK_EVERY: u64 = 10;
-/// ... and sticks reach it through another module: real PX4 refused MANUAL 150 ms after the first
-/// stick in two of three requests, and never 300 ms after it.
+/// Least time from the first stick message until PX4's commander allows MANUAL, s, because another module forwards the sticks.
+/// Real PX4 refused MANUAL 150 ms after the first stick message in two of three requests, and never after 300 ms.
 const STICKS_SEEN_S: f64 = 0.15;
-/// Pulses of a radio with released sticks and idle throttle, µs.
+/// Pulse widths of roll, pitch and throttle from a radio with released sticks and idle throttle, µs.
 const RADIO_US: [u16; 3] = [1500, 1500, 1000];
 /// Sensor bit MAV_SYS_STATUS_SENSOR_RC_RECEIVER.
 const RECEIVER: u32 = 1 << 16;
-/// Bank of ArduPilot's turn back to where GUIDED was entered, rad; 45° to 55° were observed.
+/// Bank angle at which ArduPilot turns back to the place where GUIDED was entered, rad; 45° to 55° were observed.
 const TURN_BACK: f64 = 50.0 * std::f64::consts::PI / 180.0;
 
 /// Flight stack whose behaviour is simulated.
@@ -76,19 +75,19 @@ impl fmt::Display for Personality {
 /// Counts of the simulated controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Stick positions or overrides that were taken.
+    /// Accepted stick messages or channel overrides.
     pub sticks: u64,
-    /// Attitude targets that were taken.
+    /// Accepted attitude targets.
     pub targets: u64,
-    /// Steering messages that were ignored: wrong sender, wrong mode of input.
+    /// Ignored control messages: wrong sender, wrong addressee, or not accepted in this mode.
     pub ignored: u64,
-    /// Modes entered because the companion had fallen silent.
+    /// Mode changes by a failsafe.
     pub failsafes: u64,
-    /// Streams that were denied.
+    /// Stream requests that were denied because of their rate.
     pub denied: u64,
 }
 
-/// An attitude to be flown, with its thrust.
+/// An attitude setpoint (rad) with its thrust (0..1) and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Setpoint {
     at_us: u64,
@@ -111,10 +110,10 @@ pub struct FlightController {
     lag: Lag,
     distorter: Distorter,
     sticks: Sticks,
-    /// Time of the last heartbeat of the system that ArduPilot takes for its ground station, µs.
+    /// Time of the last heartbeat of the system that ArduPilot regards as its ground station, µs.
     station_us: Option<u64>,
     failsafes: Failsafes,
-    /// Commands at which aileron and elevator are jammed; `None` where they are free.
+    /// Commands at which aileron and elevator are jammed; `None` for a surface that is not jammed.
     jammed: [Option<f64>; 2],
     setpoint: Option<Setpoint>,
     mode: Mode,
@@ -122,7 +121,7 @@ pub struct FlightController {
     /// Latitude and longitude of the start, degrees.
     home: Option<(f64, f64)>,
     entered_us: u64,
-    /// Whether PX4 found the requirements of MANUAL met when it last looked.
+    /// Whether PX4's last check found the requirements of MANUAL met.
     manual_allowed: bool,
     steps: u64,
     now_us: u64,
@@ -130,22 +129,23 @@ pub struct FlightController {
     inputs: Inputs,
     /// Last command, before the delay of the servos.
     commanded: Inputs,
-    /// Bytes that are sent with the next step.
+    /// Bytes that wait to be sent with the next step.
     waiting: Vec<u8>,
     /// Counts of accepted and ignored messages.
     pub counts: Counts,
 }
 
 impl FlightController {
-    /// A controller that flies by itself, armed and in the air, with the options' aircraft.
+    /// A controller in an autonomous mode, armed and in the air, with the aircraft of the options.
     ///
     /// # Errors
-    /// If the aircraft cannot be loaded, or an option names a parameter that the stack has not.
+    /// If the aircraft cannot be loaded, the truth file cannot be created, or an option names a parameter that the stack does not
+    /// have.
     pub fn new(personality: Personality, options: &ShimOptions) -> Result<Self, ShimError> {
         FlightController::with(personality, Flight::new(options)?, &options.parameters)
     }
 
-    /// Whether the simulated `personality` has a parameter of this name.
+    /// Whether the simulated stack `personality` has the parameter `name`.
     pub fn plays(personality: Personality, name: &str) -> bool {
         Table::has(personality, name)
     }
@@ -189,7 +189,7 @@ impl FlightController {
         })
     }
 
-    /// Samples the sensors and appends the frames due now to `out`.
+    /// Samples the sensors and appends the frames that are due to `out`.
     pub fn show(&mut self, out: &mut Vec<u8>) {
         let (frame, measured) = self.flight.measure();
         (self.now_us, self.measured) = (frame.time_us, measured);
@@ -199,7 +199,7 @@ impl FlightController {
             let heartbeat = self.heartbeat();
             self.encoder.encode(&heartbeat, out);
         }
-        // The controller's own loops use the undistorted measurement; only messages are distorted.
+        // The controller's attitude loops use the undistorted measurement; only messages are distorted.
         let cutoff = match self.personality {
             Personality::Px4 => self.parameters.get("IMU_GYRO_CUTOFF"),
             Personality::Ardupilot => self.parameters.get("INS_GYRO_FILTER"),
@@ -211,12 +211,12 @@ impl FlightController {
         self.steps += 1;
     }
 
-    /// Distorts what the companion receives from now on.
+    /// Sets the distortion of the measurements that the companion receives from now on.
     pub fn distort(&mut self, distortion: Distortion) {
         self.distorter.now = distortion;
     }
 
-    /// Takes bytes that have arrived.
+    /// Parses and executes received messages.
     pub fn receive(&mut self, bytes: &[u8]) {
         let mut frames = Vec::new();
         self.parser.stream(bytes, &mut |frame| frames.push(frame));
@@ -228,14 +228,14 @@ impl FlightController {
         self.parser.restart();
     }
 
-    /// Flies one step with the commands received so far.
+    /// Makes one step with the messages received so far.
     ///
     /// # Errors
-    /// If the plant cannot be stepped.
+    /// If the plant cannot be stepped, or the truth file cannot be written.
     pub fn fly(&mut self) -> Result<Option<Over>, ShimError> {
         self.watch();
         self.commanded = self.command();
-        // PX4 lacks this parameter: its value is NaN, which gives no delay.
+        // PX4 does not have this parameter: its value is NaN, which gives no delay.
         let inputs = self.lag.delayed(self.commanded, self.parameters.get("SIM_SERVO_DELAY"));
         let inputs = Inputs {
             aileron: self.jammed[0].unwrap_or(inputs.aileron),
@@ -246,12 +246,12 @@ impl FlightController {
         self.flight.advance(self.inputs)
     }
 
-    /// The mode in force.
+    /// The present mode.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// The command that the actuators got last.
+    /// The last command of the actuators, after delay and jams.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }
@@ -266,7 +266,7 @@ impl FlightController {
         self.now_us
     }
 
-    /// Changes a parameter, as a pilot at the ground station would.
+    /// Changes a parameter as a ground station would; an unknown name has no effect.
     pub fn set_parameter(&mut self, name: &str, value: f64) {
         self.parameters.put(name, value);
     }
@@ -281,12 +281,12 @@ impl FlightController {
         self.jammed[1] = Some(self.inputs.elevator);
     }
 
-    /// Disarms or arms, as a pilot at the controller would.
+    /// Arms or disarms the controller as a pilot would.
     pub fn arm(&mut self, armed: bool) {
         self.armed = armed;
     }
 
-    /// Changes the mode by the pilot's hand.
+    /// Changes the mode as a pilot would.
     pub fn set_mode(&mut self, mode: Mode) {
         if self.mode != mode {
             let manual = self.mode == Mode::Manual;
@@ -371,7 +371,7 @@ impl FlightController {
             _ if requested.is_some() => requested.map_or(3, |r| self.grants(r)),
             176 => {
                 if self.personality == Personality::Px4 {
-                    // PX4's MAVLink receiver answers by itself before its commander does.
+                    // PX4's MAVLink receiver acknowledges the command before its commander does.
                     self.acknowledge(frame, m.command, 0);
                 }
                 self.asked_for_mode(m.param[1], m.param[2])
@@ -383,7 +383,7 @@ impl FlightController {
             511 => {
                 let denied = match self.personality {
                     Personality::Px4 => f64::INFINITY,
-                    // A stream is sent at 0.8 of the scheduler's rate at most.
+                    // ArduPilot sends a stream at no more than 0.8 of the scheduler's rate.
                     Personality::Ardupilot => 0.8 * self.parameters.get("SCHED_LOOP_RATE"),
                 };
                 let result = self.streams.set(m.param[0] as u32, m.param[1], denied);
@@ -413,11 +413,11 @@ impl FlightController {
         self.encoder.encode(&ack, &mut self.waiting);
     }
 
-    /// MAV_RESULT of a request for a mode.
+    /// Handles a mode request and returns its MAV_RESULT.
     fn asked_for_mode(&mut self, main: f32, sub: f32) -> u8 {
         let Some(mode) = Mode::of(self.personality, main, sub) else { return 2 };
         let refused = match mode {
-            // PX4 accepts MANUAL and OFFBOARD only while their sticks or setpoints arrive.
+            // PX4 accepts MANUAL only while sticks arrive, and OFFBOARD only while setpoints arrive.
             Mode::Manual => self.personality == Personality::Px4 && !self.manual_allowed,
             Mode::Guided => self.personality == Personality::Px4 && !self.setpoint_alive(),
             Mode::Hold | Mode::Return | Mode::Circle => false,
@@ -486,7 +486,7 @@ impl FlightController {
             .is_some_and(|setpoint| (self.now_us - setpoint.at_us) as f64 * 1e-6 <= timeout)
     }
 
-    /// Sends STATUSTEXT with a text of at most 25 bytes.
+    /// Sends a STATUSTEXT; `words` has at most 25 bytes.
     fn send_text(&mut self, severity: u8, words: &[u8]) {
         let mut text = [0; 25];
         text[..words.len()].copy_from_slice(words);
@@ -511,13 +511,13 @@ impl FlightController {
         }
     }
 
-    /// Whether the mode has lasted 0.5 s, in which its first stick or target may arrive.
+    /// Whether the mode has lasted longer than 0.5 s, the time allowed for its first setpoint.
     fn settled(&self) -> bool {
         (self.now_us - self.entered_us) as f64 * 1e-6 > 0.5
     }
 
-    /// PX4's failsafe. In OFFBOARD only lost setpoints count, in every other mode lost sticks do. A
-    /// return flight goes on without sticks.
+    /// PX4's failsafe. In OFFBOARD, only lost setpoints trigger it; in every other mode, lost sticks do. Lost sticks do not
+    /// interrupt a return flight.
     fn px4_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
         if self.mode == Mode::Guided {
             let lost = self.settled() && !self.setpoint_alive();
@@ -538,7 +538,7 @@ impl FlightController {
         Some((mode, b"Manual control lost"))
     }
 
-    /// ArduPilot's failsafe; where the mode stays, its text is sent here.
+    /// ArduPilot's failsafe. If the mode does not change, this function itself sends the text.
     fn ardupilot_failsafe(&mut self) -> Option<(Mode, &'static [u8])> {
         let act = self.failsafes.watch(&self.seen(), &self.parameters)?;
         if act.drops_overrides {
@@ -563,19 +563,19 @@ impl FlightController {
         }
     }
 
-    /// Whether ArduPilot takes its sticks as released, after RC_FS_TIMEOUT without an override.
+    /// Whether ArduPilot treats the sticks as released: RC_FS_TIMEOUT has passed without an override and no radio is bound.
     fn sticks_end(&self) -> bool {
         let patience = self.parameters.get("RC_FS_TIMEOUT");
         let ended = self.sticks.age_s(self.now_us).is_some_and(|age| age > patience);
         self.personality == Personality::Ardupilot && !self.has_radio() && ended
     }
 
-    /// Whether a radio is bound, its sticks released and its throttle closed.
+    /// Whether a radio is bound; its sticks are released and its throttle is closed.
     fn has_radio(&self) -> bool {
         self.parameters.get("SIM_RC_FAIL") == 0.0
     }
 
-    /// Whether GUIDED has no target any more, so that ArduPilot turns back to where it was entered.
+    /// Whether GUIDED no longer has a valid target; ArduPilot then turns back to the place where GUIDED was entered.
     pub fn turns_back(&self) -> bool {
         let ardupilot = self.personality == Personality::Ardupilot;
         ardupilot && self.mode == Mode::Guided && !self.setpoint_alive()
@@ -583,7 +583,7 @@ impl FlightController {
 
     fn command(&mut self) -> Inputs {
         if self.mode == Mode::Manual {
-            // Between two samples the last command is kept.
+            // between two samples the last command holds
             let samples = match self.personality {
                 Personality::Px4 => true,
                 Personality::Ardupilot => self.steps.is_multiple_of(SAMPLE_EVERY),

@@ -1,28 +1,28 @@
-//! The modes of the simulated stacks, with their own numbers.
+//! Flight modes of the simulated stacks and their mode numbers.
 
 use super::Personality;
 use crate::shim::codec::AvailableModes;
 
-/// A mode, named by its behaviour.
+/// A flight mode, named by its behaviour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// The sticks move the surfaces: MANUAL.
     Manual,
-    /// Attitudes are flown: OFFBOARD, GUIDED.
+    /// The controller follows attitude targets: OFFBOARD, GUIDED.
     Guided,
-    /// The controller flies by itself: HOLD, LOITER.
+    /// The controller flies autonomously: HOLD, LOITER.
     Hold,
-    /// Return mode after a failsafe: RTL. (It flies level here; the way home is not simulated.)
+    /// Return mode after a failsafe: RTL. The simulation flies level instead of returning.
     Return,
-    /// ArduPilot's short failsafe: CIRCLE. (It flies level here; PX4 has none and is never in it.)
+    /// ArduPilot's short failsafe: CIRCLE. The simulation flies level instead. PX4 never enters this mode.
     Circle,
 }
 
 impl Mode {
-    /// The modes that can be requested.
+    /// The modes that a companion can request.
     pub(super) const ALL: [Mode; 4] = [Mode::Manual, Mode::Guided, Mode::Hold, Mode::Return];
 
-    /// Main and sub mode.
+    /// Main mode and sub-mode, as numbered by the stack.
     fn numbers(self, personality: Personality) -> (u32, u32) {
         match (personality, self) {
             (Personality::Px4, Mode::Manual) => (1, 0),
@@ -37,7 +37,7 @@ impl Mode {
         }
     }
 
-    /// `custom_mode` of the heartbeat.
+    /// Value of `custom_mode` in HEARTBEAT.
     pub(super) fn number(self, personality: Personality) -> u32 {
         let (main, sub) = self.numbers(personality);
         match personality {
@@ -46,7 +46,7 @@ impl Mode {
         }
     }
 
-    /// AVAILABLE_MODES of this mode, number `at` from 0.
+    /// AVAILABLE_MODES for this mode, which has the index `at`, from 0.
     pub(super) fn available(self, personality: Personality, at: usize) -> AvailableModes {
         let (name, standard_mode) = match (personality, self) {
             (_, Mode::Manual) => ("Manual", 0),
@@ -71,7 +71,7 @@ impl Mode {
         }
     }
 
-    /// The mode that DO_SET_MODE asks for.
+    /// The mode that DO_SET_MODE requests; `None` if the stack has no such mode.
     pub(super) fn of(personality: Personality, main: f32, sub: f32) -> Option<Mode> {
         Mode::ALL.into_iter().find(|mode| {
             let (own_main, own_sub) = mode.numbers(personality);

@@ -1,14 +1,14 @@
-//! The parameter server of the simulated stacks: a small table of the parameters that concern a companion.
+//! Parameter server of the simulated stacks, with the parameters that concern a companion.
 
 use super::Personality;
 use crate::shim::codec::{Encoder, ParamRequestRead, ParamSet, ParamValue};
 use crate::shim::error::ShimError;
 
-/// MAV_PARAM_TYPE_INT32, and MAV_PARAM_TYPE_REAL32 below.
+/// MAV_PARAM_TYPE_INT32 and MAV_PARAM_TYPE_REAL32.
 const INT: u8 = 6;
 const REAL: u8 = 9;
 
-/// Name, value, type: PX4's defaults, except where a companion needs another value.
+/// Name, value and type of PX4's parameters. The values are PX4's defaults, except where a companion needs another value.
 const PX4: [(&str, f64, u8); 14] = [
     ("PWM_MAIN_REV", 0.0, INT),
     ("MAV_SYS_ID", 1.0, INT),
@@ -26,7 +26,7 @@ const PX4: [(&str, f64, u8); 14] = [
     ("IMU_GYRO_CUTOFF", 40.0, REAL),
 ];
 
-/// ArduPilot's parameters, with the calibration of a radio whose pitch channel is reversed.
+/// Name, value and type of ArduPilot's parameters, with the calibration of a radio whose pitch channel is reversed.
 const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("SERVO1_REVERSED", 0.0, INT),
     ("SERVO2_REVERSED", 0.0, INT),
@@ -43,9 +43,9 @@ const ARDUPILOT: [(&str, f64, u8); 41] = [
     ("FS_LONG_TIMEOUT", 2.0, REAL),
     ("MAV_GCS_SYSID_HI", 0.0, INT),
     ("RC_OPTIONS", 32.0, INT),
-    // Of ArduPilot's own simulator: 1 is no radio, 0 one with its sticks released.
+    // Parameter of ArduPilot's simulator: 1 for no radio, 0 for a radio with released sticks.
     ("SIM_RC_FAIL", 1.0, INT),
-    // Cutoff of the gyros' low-pass, Hz; 0 is none. Delay from command to surface, ms.
+    // Cutoff of the gyro low-pass, Hz (0 for no filter). SIM_SERVO_DELAY is the delay from command to surface, ms.
     ("INS_GYRO_FILTER", 20.0, INT),
     ("SIM_SERVO_DELAY", 0.0, INT),
     ("RCMAP_ROLL", 1.0, INT),
@@ -81,7 +81,7 @@ fn rows(personality: Personality) -> &'static [(&'static str, f64, u8)] {
     }
 }
 
-/// The table in force.
+/// The present parameter values of a stack.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     personality: Personality,
@@ -114,12 +114,12 @@ impl Table {
         Ok(table)
     }
 
-    /// The value of a parameter; NaN for one that the stack does not have.
+    /// The value of a parameter; NaN if the stack does not have it.
     pub(super) fn get(&self, name: &str) -> f64 {
         self.rows.iter().find(|(known, ..)| *known == name).map_or(f64::NAN, |(_, value, _)| *value)
     }
 
-    /// Sets a parameter that the stack has.
+    /// Sets a parameter; a name that the stack does not have has no effect.
     pub(super) fn put(&mut self, name: &str, value: f64) {
         self.rows.iter_mut().filter(|(known, ..)| *known == name).for_each(|row| row.1 = value);
     }
@@ -160,7 +160,7 @@ impl Table {
         let mut param_id = [0; 16];
         param_id[..name.len()].copy_from_slice(name.as_bytes());
         let param_value = match (self.personality, kind) {
-            // PX4 sends an integer's bytes in the float field, ArduPilot its value.
+            // PX4 sends the bytes of an integer in the float field; ArduPilot sends its value as a float.
             (Personality::Px4, INT) => f32::from_bits(value as i32 as u32),
             _ => value as f32,
         };

@@ -1,4 +1,4 @@
-//! The simulated controller in real time over a link.
+//! Runs the simulated controller in real time over a link.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -13,16 +13,16 @@ use crate::shim::summary::{Event, Notice, Summary};
 use crate::shim::telemetry::FRAME_US;
 
 const PERIOD: Duration = Duration::from_micros(FRAME_US);
-/// A cycle that begins later than this is late.
+/// Delay of a cycle beyond which it counts as late.
 const LATE: Duration = Duration::from_millis(2);
-/// A clock that lags by more than this is reset.
+/// Delay of a cycle beyond which the schedule restarts at the present time.
 const HOPELESS: Duration = Duration::from_millis(100);
-/// How often the link is looked at.
+/// Time between two polls of the link.
 const LOOK: Duration = Duration::from_micros(500);
-/// Arrivals taken at one look.
+/// Largest number of arrivals that one poll handles.
 const ARRIVALS: usize = 200;
 
-/// Flies until asked to stop or until the flight is over.
+/// Runs until a stop request or the end of the flight.
 pub(in crate::shim) fn fly(
     mut link: Link,
     options: &ShimOptions,
@@ -79,7 +79,7 @@ fn finish(
     Ok(summary)
 }
 
-/// Records the lateness of this cycle; returns the deadline from which the next one counts.
+/// Records the lateness of this cycle and returns the deadline from which the next cycle counts.
 fn begin(deadline: Instant, summary: &mut Summary) -> Instant {
     let now = Instant::now();
     let late = now.saturating_duration_since(deadline);
@@ -88,7 +88,7 @@ fn begin(deadline: Instant, summary: &mut Summary) -> Instant {
     if late > HOPELESS { now } else { deadline }
 }
 
-/// Takes what arrives until `deadline`.
+/// Receives and handles messages until `deadline`.
 fn converse_until(link: &mut Link, controller: &mut FlightController, deadline: Instant) {
     loop {
         for _ in 0..ARRIVALS {

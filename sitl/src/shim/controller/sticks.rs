@@ -1,4 +1,4 @@
-//! From sticks to actuators in MANUAL, as each stack does it.
+//! Converts sticks to actuator commands in MANUAL, as each stack does.
 
 use super::Personality;
 use super::parameters::Table;
@@ -10,13 +10,13 @@ use crate::shim::codec::{ManualControl, RcChannelsOverride};
 pub(super) struct Sticks {
     manual: Option<(u64, [i16; 3])>,
     channels: Option<(u64, [u16; 3])>,
-    /// Time of the last override, µs; kept after the channels were released.
+    /// Time of the last override, µs; it is kept after the channels are released.
     overridden: Option<u64>,
-    /// Start of the present uninterrupted stream of MANUAL_CONTROL, µs.
+    /// Start of the present uninterrupted stream of MANUAL_CONTROL, µs; `None` before the first message.
     since: Option<u64>,
 }
 
-/// A longer gap than this ends a stream of sticks, µs: PX4's default COM_RC_LOSS_T.
+/// Gap that ends a stream of MANUAL_CONTROL, µs: PX4's default of COM_RC_LOSS_T.
 const GAP_US: u64 = 500_000;
 
 impl Sticks {
@@ -26,12 +26,12 @@ impl Sticks {
         self.manual = Some((now_us, [m.x, m.y, m.z]));
     }
 
-    /// Seconds since the stream of MANUAL_CONTROL began.
+    /// Time since the stream of MANUAL_CONTROL began, s; `None` before the first message.
     pub(super) fn steady_s(&self, now_us: u64) -> Option<f64> {
         self.since.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Takes an override; a 0 in one of the first three channels releases all three to the radio.
+    /// Stores an override. The value 0 in one of the first three channels releases all three to the radio.
     pub(super) fn override_channels(&mut self, now_us: u64, m: &RcChannelsOverride) {
         let [one, two, three, ..] = m.channel;
         let given_back = [one, two, three].contains(&0);
@@ -39,19 +39,19 @@ impl Sticks {
         self.overridden = self.channels.map(|(at, _)| at).or(self.overridden);
     }
 
-    /// Seconds since channels were last overridden.
+    /// Time since the last override, s; `None` before the first.
     pub(super) fn overridden_s(&self, now_us: u64) -> Option<f64> {
         self.overridden.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Seconds since the last stick message; `None` before the first.
+    /// Time since the last stick message, s; `None` before the first or after the channels were released.
     pub(super) fn age_s(&self, now_us: u64) -> Option<f64> {
         let manual = self.manual.map(|(at, _)| at);
         let channels = self.channels.map(|(at, _)| at);
         manual.or(channels).map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Actuator command from the sticks; `standing` before the first stick message.
+    /// Actuator command from the sticks; `standing` if no stick message is in force.
     pub(super) fn inputs(
         &self,
         personality: Personality,
@@ -67,25 +67,25 @@ impl Sticks {
     }
 }
 
-/// Manual torque setpoints: stick times scale plus trim; a nose-up torque is elevator up.
+/// PX4's torque setpoints in MANUAL: stick times scale plus trim. A nose-up torque moves the elevator up (negative).
 fn px4([x, y, z]: [i16; 3], parameters: &Table) -> Inputs {
     let stick = |thousandths: i16| f64::from(thousandths) / 1000.0;
     let roll = stick(y) * parameters.get("FW_MAN_R_SC") + parameters.get("TRIM_ROLL");
     let pitch = -stick(x) * parameters.get("FW_MAN_P_SC") + parameters.get("TRIM_PITCH");
-    // One bit for each output. It reverses the sticks and not the attitude loops, to simulate a
-    // wrong sign between stick and surface.
+    // PWM_MAIN_REV has one bit per output. It reverses the sticks but not the attitude loops, which simulates a wrong sign
+    // between stick and surface.
     let reversed = parameters.get("PWM_MAIN_REV") as u32;
     let sign = |output: u32| if reversed >> output & 1 == 1 { -1.0 } else { 1.0 };
     Inputs { aileron: sign(0) * roll, elevator: -sign(1) * pitch, throttle: stick(z), rudder: 0.0 }
         .clamped()
 }
 
-/// All at neutral, the throttle closed.
+/// Surfaces at neutral and throttle closed.
 pub(super) fn released() -> Inputs {
     Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 }
 }
 
-/// Channels by their calibration: angles to 1/4500 of full travel, throttle to whole percents.
+/// ArduPilot's commands from channels by their calibration: angles in steps of 1/4500 of full travel, throttle in whole percent.
 pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
     let read = |channel: usize, name: &str| parameters.get(&format!("RC{channel}_{name}"));
     let angle = |channel: usize| {
@@ -99,7 +99,7 @@ pub(super) fn ardupilot(pulses: [u16; 3], parameters: &Table) -> Inputs {
     let (low, high) = (read(3, "MIN"), read(3, "MAX"));
     let throttle = ((f64::from(pulses[2]) - low) / (high - low)).clamp(0.0, 1.0);
     let throttle = (100.0 * throttle).trunc() / 100.0;
-    // The pitch stick is positive nose up.
+    // ArduPilot's pitch input is positive nose up.
     let sign = |name: &str| if parameters.get(name) == 1.0 { -1.0 } else { 1.0 };
     Inputs {
         aileron: sign("SERVO1_REVERSED") * angle(1),

@@ -1,4 +1,4 @@
-//! Streams of the simulated controller: few until they are requested.
+//! Message streams of the simulated controller; most are off until a companion requests them.
 
 use crate::plant::{Travel, Truth};
 use crate::shim::codec::{AoaSsa, Encoder, ServoOutputRaw, VfrHud};
@@ -10,7 +10,7 @@ const SEA_LEVEL: f64 = 1.225;
 /// Command result MAV_RESULT_DENIED.
 pub(super) const DENIED: u8 = 2;
 
-/// A stream with its period and the time of its next message, µs.
+/// A stream with its period and the time of its next message, µs; `None` for a stream that is off.
 #[derive(Clone, Copy, Debug)]
 struct Row {
     id: u32,
@@ -18,12 +18,12 @@ struct Row {
     due_us: u64,
 }
 
-/// Equipment of the aircraft that the streams report.
+/// Equipment of the aircraft that the messages report.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equipment {
     /// Travel of the surfaces.
     pub travel: Travel,
-    /// MAV_SYS_STATUS_SENSOR bits of a radio's receiver; zero where none is bound.
+    /// MAV_SYS_STATUS_SENSOR bits of the RC receiver; 0 if no radio is bound.
     pub receiver: u32,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct Streams {
 }
 
 impl Streams {
-    /// The streams of an aircraft with this equipment.
+    /// The streams of an aircraft with `equipment`, at the default rates.
     pub(super) fn new(equipment: Equipment) -> Self {
         let row = |id, interval_us| Row { id, interval_us, due_us: 0 };
         // Default rates of a telemetry port.
@@ -53,14 +53,14 @@ impl Streams {
         Streams { rows, equipment, last_us: 0 }
     }
 
-    /// MAV_RESULT of SET_MESSAGE_INTERVAL. A rate above that of the steps is limited to it, as PX4
-    /// does; a rate above `denied_hz` is denied and changes nothing, as ArduPilot does.
+    /// Sets a stream and returns the MAV_RESULT of SET_MESSAGE_INTERVAL. A rate above the step rate is limited to the step rate,
+    /// as in PX4. A rate above `denied_hz`, Hz, is denied and changes nothing, as in ArduPilot.
     pub(super) fn set(&mut self, id: u32, interval_us: f32, denied_hz: f64) -> u8 {
         let Some(row) = self.rows.iter_mut().find(|row| row.id == id) else {
             // MAV_RESULT_UNSUPPORTED.
             return 3;
         };
-        // 1 µs of tolerance for rounding.
+        // The tolerance of 1 µs covers rounding.
         if interval_us > 0.0 && f64::from(interval_us) + 1.0 < 1e6 / denied_hz {
             return DENIED;
         }
@@ -71,18 +71,18 @@ impl Streams {
         0
     }
 
-    /// Whether the message can be sent.
+    /// Whether the message can be sent as a stream.
     pub(super) fn knows(&self, id: u32) -> bool {
         self.rows.iter().any(|row| row.id == id)
     }
 
-    /// µs between messages; −1 when off, 0 when the message is not sent here.
+    /// Period of a stream, µs; −1 if it is off, 0 if the controller does not have it.
     pub(super) fn interval_us(&self, id: u32) -> i32 {
         let row = self.rows.iter().find(|row| row.id == id);
         row.map_or(0, |row| row.interval_us.map_or(-1, |us| us as i32))
     }
 
-    /// Appends a message once.
+    /// Appends one message, independent of its stream.
     pub(super) fn send_once(
         &self,
         id: u32,
@@ -97,7 +97,7 @@ impl Streams {
         }
     }
 
-    /// Appends what is due.
+    /// Appends the messages that are due.
     pub(super) fn send(
         &mut self,
         frame: &StateFrame,

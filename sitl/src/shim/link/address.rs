@@ -1,12 +1,12 @@
-//! Link addresses as people write them: `udpout:127.0.0.1:14600`.
+//! Parses link addresses such as `udpout:127.0.0.1:14600`.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Transport protocol, with the side that opens it.
+/// Transport protocol and the side that opens the connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// UDP: listens, and answers the sender of the first frame of the companion.
+    /// UDP: listens on a port and answers the sender of the first frame from the companion.
     UdpIn,
     /// UDP: sends to a fixed address.
     UdpOut,
@@ -16,7 +16,7 @@ pub enum Transport {
     TcpOut,
     /// Stream over a serial port, `DEVICE:BAUD`.
     Serial,
-    /// Stream over a pseudo-terminal made here, which the companion opens under a given name.
+    /// Stream over a pseudo-terminal that the shim creates and that the companion opens under a given name.
     Pty,
 }
 
@@ -31,18 +31,17 @@ impl Transport {
     ];
 }
 
-/// A link address: transport, host, port.
+/// A link address: a transport and its endpoint.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
     /// Transport protocol and the side that opens it.
     pub transport: Transport,
-    /// `host:port`, the host a name or a number; `device:baud` of a serial port; the name of a
-    /// pseudo-terminal.
+    /// `host:port`, with a host name or a numeric address; `device:baud` for a serial port; the name for a pseudo-terminal.
     pub endpoint: String,
 }
 
 impl Address {
-    /// Device and baud rate of a serial port.
+    /// Device and baud rate of a serial port; the baud rate is 0 if the endpoint has none.
     pub(super) fn device(&self) -> (String, u32) {
         let (device, baud) = self.endpoint.rsplit_once(':').unwrap_or((&self.endpoint, ""));
         (device.to_owned(), baud.parse().unwrap_or(0))
@@ -56,7 +55,7 @@ impl fmt::Display for Address {
     }
 }
 
-/// An address that cannot be read.
+/// Error of parsing a link address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "cannot read the link address '{given}': {fault}; write it like udpout:127.0.0.1:14600 (udpin, udpout, tcpin or tcpout, then host:port), serial:/dev/ttyUSB0:921600, or pty:NAME"

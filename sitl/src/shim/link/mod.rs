@@ -1,4 +1,4 @@
-//! The link to the companion: bytes out, bytes in, also while the peer is gone.
+//! The link to the companion, which sends and receives bytes and tolerates a missing peer.
 
 mod address;
 mod serial;
@@ -15,22 +15,22 @@ use serial::SerialLink;
 use tcp::TcpLink;
 use udp::UdpLink;
 
-/// How long a patient receive waits. The kernel rounds it up to its tick, some milliseconds.
+/// Longest wait of a patient receive. The kernel rounds it up to its tick, some milliseconds.
 const PATIENCE: Duration = Duration::from_millis(10);
 
-/// Whether `receive` waits for bytes.
+/// Whether `receive` waits for data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
-    /// Waits up to some ten milliseconds: in lockstep there is nothing else to do.
+    /// Waits for about 10 ms, for lockstep, in which nothing else is due meanwhile.
     Patient,
-    /// Not at all: real time, where the clock must not slip.
+    /// Does not wait, for real time, in which a wait would delay the next frame.
     Never,
 }
 
 /// Why an address could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The name does not lead to an address.
+    /// The host name cannot be resolved to an address.
     #[error("cannot resolve {address}: {source}; give a numeric address such as 127.0.0.1:14600")]
     Resolve {
         /// The address as written.
@@ -38,7 +38,7 @@ pub enum LinkError {
         /// Error of the operating system.
         source: io::Error,
     },
-    /// The port is taken.
+    /// Another program uses the port.
     #[error(
         "cannot listen on {address}: the port is in use by another program; stop it or choose another port with --link"
     )]
@@ -82,7 +82,9 @@ impl LinkError {
                 "add your user to the group that owns the device (dialout), then log in again"
             }
             io::ErrorKind::NotFound => "plug the device in, or give the name that it has here",
-            io::ErrorKind::InvalidInput => "give a baud rate that the port knows, such as 921600",
+            io::ErrorKind::InvalidInput => {
+                "give a baud rate that the port supports, such as 921600"
+            }
             _ => "stop other programs that use it, and check the name given with --link",
         };
         LinkError::Serial { address: address.clone(), source, remedy }
@@ -92,7 +94,7 @@ impl LinkError {
 /// Received data, or a change of the link itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival<'a> {
-    /// Nothing arrived within the wait.
+    /// Nothing arrived, within the wait if there is one.
     Nothing,
     /// One datagram from this sender.
     Datagram(&'a [u8], SocketAddr),
@@ -116,7 +118,7 @@ pub enum Link {
 }
 
 impl Link {
-    /// Opens `address`. A missing peer is not an error; a port that cannot be opened is.
+    /// Opens `address`. A missing peer is not an error; a port that cannot be opened is an error.
     pub fn open(address: &Address, wait: Wait) -> Result<Self, LinkError> {
         Ok(match address.transport {
             Transport::UdpIn | Transport::UdpOut => Link::Udp(UdpLink::open(address, wait)?),
@@ -125,7 +127,7 @@ impl Link {
         })
     }
 
-    /// Where this side listens or sends from; `None` for a stream that is not set up.
+    /// Local address of the link; `None` for a serial link or a stream without connection.
     pub fn local(&self) -> Option<SocketAddr> {
         match self {
             Link::Udp(link) => link.local(),
@@ -134,7 +136,7 @@ impl Link {
         }
     }
 
-    /// The sender whose datagrams are accepted, once it is known.
+    /// The peer of a UDP link; `None` if it is not yet known, and for a stream.
     pub fn peer(&self) -> Option<SocketAddr> {
         match self {
             Link::Udp(link) => link.peer(),
@@ -142,7 +144,7 @@ impl Link {
         }
     }
 
-    /// Sends one batch of whole frames; `false` without a peer or without room for it.
+    /// Sends a batch of whole frames. Returns `false` if there is no peer, or no room in the send buffer.
     pub fn send(&mut self, bytes: &[u8]) -> bool {
         match self {
             Link::Udp(link) => link.send(bytes),
@@ -151,7 +153,7 @@ impl Link {
         }
     }
 
-    /// Takes what has arrived.
+    /// Receives one arrival.
     pub fn receive(&mut self) -> Arrival<'_> {
         match self {
             Link::Udp(link) => link.receive(),
@@ -160,19 +162,19 @@ impl Link {
         }
     }
 
-    /// Fixes `sender` as the companion's address: a listening UDP link answers there from now on.
+    /// Sets `sender` as the companion's address: a listening UDP link sends to this address from now on.
     pub fn adopt(&mut self, sender: SocketAddr) {
         if let Link::Udp(link) = self {
             link.adopt(sender);
         }
     }
 
-    /// The companion has fallen silent: a listening link takes another.
+    /// Releases the silent companion: a listening link then accepts another peer.
     pub fn abandon(&mut self) {
         match self {
             Link::Udp(link) => link.abandon(),
             Link::Tcp(link) => link.abandon(),
-            // a serial wire has only one other end
+            // a serial line has only one other end
             Link::Serial(_) => {}
         }
     }

@@ -1,4 +1,4 @@
-//! A byte stream over a wire: a serial port, or a pseudo-terminal made here.
+//! Byte stream over a serial port or over a pseudo-terminal that the shim creates.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -10,27 +10,27 @@ use serialport::{SerialPort, TTYPort};
 use super::tcp::{flush, is_lull};
 use super::{Address, Arrival, LinkError, PATIENCE, Transport, Wait};
 
-/// How often a port that has gone is opened again.
+/// Time between attempts to reopen a lost port.
 const RETRY: Duration = Duration::from_millis(100);
 
 /// Device behind the link.
 #[derive(Debug)]
 enum End {
-    /// A port of this machine.
+    /// A serial port of this computer.
     Device { path: String, baud: u32 },
-    /// The far end of a pseudo-terminal, whose near end the companion opens under this name.
+    /// A pseudo-terminal of the shim; the companion opens its other end under this name.
     Pseudo { name: PathBuf },
 }
 
-/// A wire with at most one companion at its other end.
+/// A serial line with at most one companion at the other end.
 #[derive(Debug)]
 pub struct SerialLink {
     end: End,
     wait: Wait,
     port: Option<TTYPort>,
-    /// The unsent end of a batch; it is sent before anything else, or frames would be torn.
+    /// The unsent rest of a batch. It is sent before other bytes, because a frame must not be split.
     unsent: Vec<u8>,
-    /// No process has the other end open.
+    /// Whether no process has the other end open.
     hung_up: bool,
     next_look: Instant,
     buffer: Box<[u8; 4096]>,
@@ -110,7 +110,7 @@ impl SerialLink {
         }
     }
 
-    /// The other end is gone: a pseudo-terminal waits for it, a port is opened again.
+    /// Handles the loss of the other end: a pseudo-terminal waits for it, and a serial port is reopened.
     fn ended(&mut self) -> Arrival<'static> {
         if self.wait == Wait::Patient {
             thread::sleep(PATIENCE);
@@ -124,7 +124,7 @@ impl SerialLink {
         if was { Arrival::Nothing } else { Arrival::Closed }
     }
 
-    /// Tries to open the port again, at most once every `RETRY`.
+    /// Tries to reopen the port, at most once every `RETRY`; returns whether the port is open.
     fn look(&mut self) -> bool {
         let now = Instant::now();
         let End::Device { path, baud } = &self.end else { return false };
@@ -141,7 +141,7 @@ impl SerialLink {
 impl Drop for SerialLink {
     fn drop(&mut self) {
         if let End::Pseudo { name } = &self.end {
-            // The name leads to no terminal from now on.
+            // The name would otherwise point to a terminal that no longer exists.
             let _ = std::fs::remove_file(name);
         }
     }
@@ -151,11 +151,11 @@ fn device(path: &str, baud: u32) -> io::Result<TTYPort> {
     serialport::new(path, baud).open_native().map_err(Into::into)
 }
 
-/// A new pseudo-terminal whose near end is found under `name`.
+/// A new pseudo-terminal; `name` becomes a link to the companion's end.
 fn pseudo(name: &Path) -> io::Result<TTYPort> {
     let (far, near) = TTYPort::pair()?;
     let path = near.name().ok_or_else(|| io::Error::other("the pseudo-terminal has no name"))?;
-    // Only a name whose terminal is gone may be replaced.
+    // A name may be replaced only if its terminal no longer exists.
     if name.is_symlink() && !name.exists() {
         std::fs::remove_file(name)?;
     }

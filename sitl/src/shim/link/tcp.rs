@@ -1,4 +1,4 @@
-//! A byte stream to and from the companion, set up again whenever it breaks.
+//! TCP byte stream to and from the companion; a lost connection is set up again.
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -9,31 +9,31 @@ use std::time::{Duration, Instant};
 use super::udp::resolve;
 use super::{Address, Arrival, LinkError, PATIENCE, Transport, Wait};
 
-/// How often a broken stream is set up again, and how often a listener looks for newcomers.
+/// Time between attempts to connect, and between checks of a listener for new connections.
 const RETRY: Duration = Duration::from_millis(100);
-/// How long one attempt to connect may take.
+/// Longest time of one attempt to connect.
 const CONNECT: Duration = Duration::from_secs(2);
 
-/// Where streams come from.
+/// Origin of the connections.
 #[derive(Debug)]
 enum Source {
     Listener(TcpListener),
-    /// Connects in a separate thread, so that a slow network costs no cycle.
+    /// Connects in a separate thread, because a slow network must not delay a cycle.
     Connector {
         to: SocketAddr,
         attempt: Option<Receiver<io::Result<TcpStream>>>,
     },
 }
 
-/// At most one stream at a time.
+/// A TCP link with at most one connection at a time.
 #[derive(Debug)]
 pub struct TcpLink {
     source: Source,
     wait: Wait,
     stream: Option<TcpStream>,
-    /// The unsent end of a batch; it is sent before anything else, or frames would be torn.
+    /// The unsent rest of a batch. It is sent before other bytes, because a frame must not be split.
     unsent: Vec<u8>,
-    /// The companion on the present stream has fallen silent.
+    /// Whether the companion on the present connection is silent.
     silent: bool,
     closed: bool,
     next_look: Instant,
@@ -127,7 +127,7 @@ impl TcpLink {
         Arrival::Closed
     }
 
-    /// Looks for a new stream, at most once every `RETRY`.
+    /// Looks for a new connection, at most once every `RETRY`.
     fn look(&mut self) -> Option<SocketAddr> {
         let now = Instant::now();
         if now < self.next_look {
@@ -136,7 +136,7 @@ impl TcpLink {
         self.next_look = now + RETRY;
         let wanted = self.stream.is_none() || self.silent;
         let fresh = match &mut self.source {
-            // A newcomer while the companion is alive is turned away by closing its stream.
+            // While the companion is alive, a further connection is closed at once.
             Source::Listener(listener) => listener.accept().ok()?.0,
             Source::Connector { .. } if self.stream.is_some() => return None,
             Source::Connector { to, attempt } => arrived(*to, attempt)?,
@@ -171,7 +171,7 @@ fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     Ok(listener)
 }
 
-/// The stream that a running attempt has brought; begins an attempt when none runs.
+/// The connection of a finished attempt, if it succeeded; begins an attempt if none runs.
 fn arrived(
     to: SocketAddr,
     attempt: &mut Option<Receiver<io::Result<TcpStream>>>,
@@ -196,7 +196,7 @@ fn arrived(
     }
 }
 
-/// Writes what it can of `unsent` and keeps the rest.
+/// Writes as much of `unsent` as possible and keeps the rest.
 pub(super) fn flush(stream: &mut impl Write, unsent: &mut Vec<u8>) -> io::Result<()> {
     while !unsent.is_empty() {
         match stream.write(unsent) {

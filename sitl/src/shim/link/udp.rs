@@ -1,4 +1,4 @@
-//! Datagrams to and from the companion.
+//! UDP datagrams to and from the companion.
 
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
@@ -52,7 +52,7 @@ impl UdpLink {
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) -> bool {
-        // The kernel reports the refusal of an earlier datagram on this one, so it is tried again.
+        // The kernel reports the refusal of an earlier datagram at this call, so the datagram is sent again.
         let mut sent = self.try_send(bytes);
         if sent.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused) {
             sent = self.try_send(bytes);
@@ -71,13 +71,13 @@ impl UdpLink {
     pub(super) fn receive(&mut self) -> Arrival<'_> {
         match self.socket.recv_from(&mut self.buffer[..]) {
             Ok((length, sender)) => Arrival::Datagram(&self.buffer[..length], sender),
-            // Timed out, or the refusal of an earlier datagram: a companion that is not there yet.
+            // Either the wait timed out, or an earlier datagram was refused because the companion does not run yet.
             Err(_) => Arrival::Nothing,
         }
     }
 }
 
-/// A socket on any port that talks to `peer` alone.
+/// A socket on any free port that exchanges datagrams only with `peer`.
 fn connected(peer: SocketAddr) -> io::Result<UdpSocket> {
     let any: SocketAddr = if peer.is_ipv6() {
         (std::net::Ipv6Addr::UNSPECIFIED, 0).into()
@@ -89,7 +89,7 @@ fn connected(peer: SocketAddr) -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// The first socket address that `address` leads to.
+/// The first socket address to which `address` resolves.
 pub(super) fn resolve(address: &Address) -> Result<SocketAddr, LinkError> {
     let fail = |source| LinkError::Resolve { address: address.clone(), source };
     let mut found = address.endpoint.to_socket_addrs().map_err(fail)?;

@@ -1,4 +1,4 @@
-//! Decoded actuator message of PX4.
+//! Decodes the actuator message of PX4.
 
 use crate::plant::Inputs;
 use crate::shim::codec::HilActuatorControls;
@@ -7,23 +7,23 @@ use crate::shim::outputs::OutputMap;
 /// Bit MAV_MODE_FLAG_SAFETY_ARMED of `mode`.
 const ARMED: u8 = 128;
 
-/// Decoded actuator message.
+/// The content of PX4's actuator message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuation {
     /// The controller's time, µs.
     pub time_us: u64,
-    /// Whether the controller is in lockstep: bit 0 of the flags.
+    /// Whether the controller runs in lockstep: bit 0 of the flags.
     pub lockstep: bool,
-    /// Whether it is armed.
+    /// Whether the controller is armed.
     pub armed: bool,
-    /// Commands of the plant, zero when disarmed.
+    /// Commands for the plant; zero if disarmed.
     pub inputs: Inputs,
-    /// Whether a control lay outside its range and was limited.
+    /// Whether a control was outside its range and was limited.
     pub limited: bool,
 }
 
 impl Actuation {
-    /// Reads a message; `None` when an output that is used is not a finite number or not there.
+    /// Decodes a message; `None` if an assigned output is missing or not finite.
     pub fn read(outputs: &OutputMap, message: &HilActuatorControls) -> Option<Self> {
         let control =
             |place: usize| message.controls.get(place).copied().map_or(f64::NAN, f64::from);
@@ -53,7 +53,7 @@ mod tests {
     #[test]
     fn only_an_armed_controller_moves_anything() {
         let armed = Inputs { aileron: 1.0, throttle: 1.0, ..Inputs::default() };
-        // A negative zero is a zero.
+        // A negative zero equals zero.
         assert_eq!(read(129, 4).unwrap().inputs, armed);
         assert_eq!(read(1, 4).unwrap().inputs, Inputs::default());
         assert_eq!(read(129, 17), None, "PX4 has 16 outputs here");

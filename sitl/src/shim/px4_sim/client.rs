@@ -1,4 +1,4 @@
-//! One connected client: messages received from it and messages due to it.
+//! One connected client: handles its messages and tracks the messages that it has requested.
 
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ use crate::shim::summary::Summary;
 const PX4: u8 = 12;
 /// Command number MAV_CMD_SET_MESSAGE_INTERVAL.
 const SET_MESSAGE_INTERVAL: u16 = 511;
-/// The version of MAVLink's dialects that HEARTBEAT carries.
+/// MAVLink version that a HEARTBEAT of PX4 contains.
 const DIALECT: u8 = 3;
 
 const OLD_PROTOCOL: &str = "the client speaks MAVLink 1, PX4 speaks MAVLink 2 to its simulator: \
@@ -27,22 +27,22 @@ const OTHER_DIALECT: &str = "the client's HEARTBEAT has a MAVLink version other 
 const OTHER_STACK: &str = "the client's HEARTBEAT is not of PX4 (MAV_AUTOPILOT 12): its outputs \
                            may mean something else; see --px4-outputs";
 
-/// A connected client, which should be PX4.
+/// A connected client; the shim warns if it is not PX4.
 pub(super) struct Client {
     pub(super) parser: Parser,
     pub(super) encoder: Encoder,
     clock: Clock,
-    /// Time of the first step that it was shown, µs.
+    /// Time of the first step whose sensors the client received, µs.
     pub(super) begun_us: u64,
-    /// The newest actuation that may be flown.
+    /// The newest valid actuator message.
     pub(super) actuation: Option<Actuation>,
-    /// Whether it has asked for lockstep.
+    /// Whether the client runs in lockstep.
     pub(super) lockstep: bool,
-    /// Whether the step that was shown last is answered.
+    /// Whether the client has answered the latest step.
     pub(super) answered: bool,
-    /// When an actuator message last came.
+    /// Arrival time of the last actuator message.
     pub(super) last_actuation: Option<Instant>,
-    /// Whether its silence has been reported.
+    /// Whether the silence of the client has been reported.
     pub(super) silent: bool,
     reported: Vec<&'static str>,
     state_interval_us: Option<u64>,
@@ -67,8 +67,8 @@ impl Client {
         }
     }
 
-    /// Takes a frame while the step of `shown_us` is the last that was shown; appends to `reply`
-    /// what is to be sent, to `events` what is to be reported.
+    /// Handles a frame; `shown_us` is the time of the latest step that was sent, µs. Appends replies to `reply` and events to
+    /// `events`.
     pub(super) fn take(
         &mut self,
         frame: &Frame,
@@ -146,7 +146,7 @@ impl Client {
         }
     }
 
-    /// The only command that PX4 sends here asks for HIL_STATE_QUATERNION.
+    /// Handles a command: PX4 sends here only the request for HIL_STATE_QUATERNION.
     fn obey(&mut self, frame: &Frame, command: &CommandLong) -> CommandAck {
         let interval_us = f64::from(command.param[1]);
         let known = command.command == SET_MESSAGE_INTERVAL
@@ -156,7 +156,7 @@ impl Client {
         }
         CommandAck {
             command: command.command,
-            // MAV_RESULT_ACCEPTED, _UNSUPPORTED.
+            // MAV_RESULT_ACCEPTED and MAV_RESULT_UNSUPPORTED.
             result: if known { 0 } else { 3 },
             target_system: frame.system,
             target_component: frame.component,
@@ -164,7 +164,7 @@ impl Client {
         }
     }
 
-    /// Whether HIL_STATE_QUATERNION is due; a period shorter than a step means every step.
+    /// Whether HIL_STATE_QUATERNION is due; a period shorter than a step makes it due at every step.
     pub(super) fn wants_state(&mut self, now_us: u64) -> bool {
         let Some(interval) = self.state_interval_us.filter(|_| now_us >= self.next_state_us) else {
             return false;

@@ -1,4 +1,4 @@
-//! Assignment of actuator messages to steps by the controller's own clock.
+//! Assigns actuator messages to steps by the time stamps of the flight controller.
 
 use super::{FIRST_US, STEP_US};
 
@@ -8,30 +8,30 @@ pub enum Clock {
     /// No message has arrived yet.
     #[default]
     Unknown,
-    /// The clock lags simulated time by this offset, µs: 0, or the time of the first HIL_SENSOR
-    /// that PX4 sees, from which it counts.
+    /// The clock is behind simulated time by this offset, µs. The offset is 0, or the time of the first HIL_SENSOR that PX4
+    /// received and from which it counts.
     Behind(u64),
-    /// Another clock: messages are counted instead, as Gazebo's plugin does.
+    /// An unrelated clock; each message then counts as an answer to the latest step, as in Gazebo's plugin.
     Foreign,
 }
 
-/// Step that a message answers.
+/// Step that an actuator message answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
-    /// The one that was shown last.
+    /// The latest step that was sent.
     Present,
-    /// An earlier step than the last.
+    /// A step before the latest step.
     Past,
     /// No step that was sent.
     Nothing,
 }
 
 impl Clock {
-    /// Finds the step that a message of the time `time_us` answers. Steps were shown from
-    /// `begun_us`, which is [`FIRST_US`] or later, to `shown_us`.
+    /// Finds the step that a message with the time stamp `time_us` answers. Steps were sent from `begun_us`, which is at least
+    /// [`FIRST_US`], to `shown_us`; all times are in µs.
     ///
-    /// Simulated time begins at [`FIRST_US`], so that an offset of 0 and one of `begun_us` cannot
-    /// be confused before as much time has passed again.
+    /// Simulated time begins at [`FIRST_US`]. An offset of 0 and an offset of `begun_us` are therefore distinguishable until the
+    /// same time has passed again.
     pub fn judge(&mut self, time_us: u64, begun_us: u64, shown_us: u64) -> Answers {
         if *self == Clock::Unknown {
             *self = Clock::of(time_us, begun_us, shown_us);

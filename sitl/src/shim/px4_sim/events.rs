@@ -1,4 +1,4 @@
-//! Events of a run against PX4.
+//! Events of a run against PX4 and their texts.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -8,27 +8,27 @@ use crate::shim::link::Address;
 /// A change of state of a run against PX4.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Px4Event {
-    /// The simulator listens and no client is connected.
+    /// The simulator listens, but no client is connected.
     Waiting(Address),
     /// A client has connected.
     Connected(SocketAddr),
-    /// The client has closed its connection: the aircraft is back at its start.
+    /// The client has closed its connection, so the aircraft was put back to its start.
     Gone,
-    /// The client is in lockstep: a step is made on its answer, or after 3 s without one.
+    /// The client runs in lockstep: each step waits for its answer, for at most 3 s.
     Lockstep,
-    /// The client's times are of another clock: its messages are counted instead.
+    /// The client's time stamps are from an unrelated clock, so each message counts as an answer to the latest step.
     ForeignClock,
     /// The catapult has been released.
     Catapult,
-    /// Lockstep: no answer for a second; until one comes a step is made every 3 s.
+    /// Lockstep: no answer arrived for 1 s. Until an answer arrives, a step is made every 3 s.
     Stopped,
-    /// Lockstep: the answer has come after all.
+    /// Lockstep: an answer has arrived after the interruption.
     Resumed,
-    /// Real time: no actuator message for a second; the outputs stay as they are.
+    /// Real time: no actuator message arrived for 1 s; the last outputs hold.
     Silent,
-    /// Real time: actuator messages come again.
+    /// Real time: actuator messages arrive again.
     SilenceEnded,
-    /// The client cannot be used as PX4; the text gives the reason and the remedy.
+    /// The client is not usable as PX4; the text gives the reason and the remedy.
     Refused(&'static str),
 }
 

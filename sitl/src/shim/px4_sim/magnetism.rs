@@ -1,4 +1,4 @@
-//! The earth's magnetic field where the aircraft flies.
+//! The earth's magnetic field at the start of the flight.
 
 use world_magnetic_model::GeomagneticField;
 use world_magnetic_model::time::Date;
@@ -9,15 +9,16 @@ use world_magnetic_model::uom::si::magnetic_flux_density::gauss;
 
 use super::super::error::ShimError;
 
-/// The date of the field: fixed, so that equal flights are equal. WMM2025 holds from 2025 to 2029.
+/// Year and day of the field. A fixed date makes flights repeatable; WMM2025 is valid from 2025 to 2029.
 const DATE: (i32, u16) = (2026, 1);
 
-/// The field by the World Magnetic Model 2025, north-east-down, gauss.
+/// Magnetic field by the World Magnetic Model 2025, north-east-down, gauss.
 ///
-/// It is taken once, at the start: 100 km away it is off by about 1 %.
+/// Latitude and longitude are in degrees, the altitude is above mean sea level, m. The field is computed once, at the start: 100
+/// km away, its error is about 1 %.
 ///
 /// # Errors
-/// [`ShimError::Magnetism`] for a place that the model does not have.
+/// [`ShimError::Magnetism`] for a place outside the range of the model.
 pub fn field_ned_gauss(
     latitude_deg: f64,
     longitude_deg: f64,
@@ -39,9 +40,8 @@ pub fn field_ned_gauss(
 mod tests {
     use super::*;
 
-    /// Test values published with WMM2025 (NOAA, WMM2025_TestValues): 2025.0 at 80° N, 0° E, sea
-    /// level X 6521.6, Y 145.9, Z 54791.5 nT. A year of secular variation moves a component by less
-    /// than 100 nT, which is 0.001 gauss.
+    /// Test values published with WMM2025 (NOAA, WMM2025_TestValues): at 2025.0, 80° N, 0° E, sea level, X is 6521.6, Y 145.9 and
+    /// Z 54791.5 nT. A year of secular variation changes a component by less than 100 nT, which is 0.001 gauss.
     #[test]
     fn the_field_is_that_of_the_published_test_values() {
         let field = field_ned_gauss(80.0, 0.0, 0.0).unwrap();

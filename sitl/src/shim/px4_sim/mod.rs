@@ -1,10 +1,11 @@
-//! The PX4 simulator API: the shim as the simulator that stock PX4 SITL connects to.
+//! The PX4 simulator API: the shim as the simulator to which stock PX4 SITL connects.
 //!
-//! PX4 is the TCP client, port 4560. It is shown HIL_SENSOR at 250 Hz and HIL_GPS at 10 Hz of
-//! simulated time, HIL_STATE_QUATERNION when it asks, and answers with HIL_ACTUATOR_CONTROLS. Until
-//! its first answer time runs freely, so that it can boot; once an answer has the lockstep flag, a
-//! step is made on its answer, or after 3 s without one. The protocol is that of PX4's public
-//! documentation (Simulator MAVLink API) as its module `simulator_mavlink` speaks it.
+//! PX4 is the TCP client, port 4560. The shim sends HIL_SENSOR at 250 Hz and HIL_GPS at 10 Hz of simulated time, and
+//! HIL_STATE_QUATERNION on request. PX4 answers with HIL_ACTUATOR_CONTROLS.
+//!
+//! Until the first answer, time advances freely, because PX4 has to boot. After an answer with the lockstep flag, each step waits
+//! for the answer, for at most 3 s. The protocol is that of PX4's public documentation (Simulator MAVLink API), as its module
+//! `simulator_mavlink` implements it.
 
 mod actuation;
 mod client;
@@ -34,23 +35,23 @@ use sensors::Sensors;
 
 /// One step, µs: 250 Hz.
 pub const STEP_US: u64 = 4_000;
-/// Simulated time of the first step, µs; not 0, see the clock's judgement of an answer.
+/// Simulated time of the first step, µs. It is not 0, because the clock's offset would then be ambiguous.
 pub const FIRST_US: u64 = 1_000_000_000;
-/// HIL_GPS is sent every this many steps: 10 Hz.
+/// Number of steps between two HIL_GPS messages: 10 Hz.
 const GPS_EVERY: u64 = 25;
 const STEP: Duration = Duration::from_micros(STEP_US);
-/// Silence of PX4 after which it is reported.
+/// Silence of PX4 after which an event reports it.
 const SILENCE: Duration = Duration::from_secs(1);
-/// Delay beyond which the clock is reset: no burst of steps makes up for it.
+/// Delay beyond which the schedule restarts at the present time, without a burst of steps.
 const HOPELESS: Duration = Duration::from_millis(100);
-/// Time without an answer after which lockstep makes a step all the same. A PX4 that changed its mode may wait for a
-/// sensor before it sends actuators, and both sides would wait for ever.
+/// Time without an answer after which lockstep makes a step. After a mode change, PX4 may wait for a sensor before it sends
+/// actuators; without the step, both sides would wait forever.
 const NUDGE: Duration = Duration::from_secs(3);
-/// Time for which an answer is awaited by yielding.
+/// Time for which the loop waits for an answer by yielding.
 const SPIN: Duration = Duration::from_micros(300);
-/// Interval at which the link is polled after that.
+/// Interval between polls of the link after `SPIN`.
 const LOOK: Duration = Duration::from_micros(100);
-/// Interval at which the link is polled without a client.
+/// Interval between polls of the link without a client.
 const IDLE: Duration = Duration::from_millis(5);
 
 /// Options of a run against PX4 only.
@@ -58,12 +59,12 @@ const IDLE: Duration = Duration::from_millis(5);
 pub struct Px4Options {
     /// Assignment of the outputs to the aircraft's controls.
     pub outputs: OutputMap,
-    /// Sensor noise; biases are those of [`ShimOptions::bias`].
+    /// Sensor noise; constant sensor errors are in [`ShimOptions::bias`].
     pub noise: Px4Noise,
 }
 
 impl Default for Px4Options {
-    /// The outputs of the stock fixed-wing airframes, the noise of PX4's own simulators.
+    /// The outputs of the stock fixed-wing airframes and the noise of PX4's simulators.
     fn default() -> Self {
         Px4Options { outputs: OutputMap::px4(), noise: Px4Noise::STANDARD }
     }
@@ -87,7 +88,7 @@ struct Run<'a> {
     sent: Instant,
 }
 
-/// Simulates for each client that connects until asked to stop or until the flight is over.
+/// Simulates for each client that connects, until a stop request or the end of the flight.
 pub(super) fn fly(
     link: Link,
     options: &ShimOptions,
@@ -165,13 +166,13 @@ impl Run<'_> {
         self.notify(Event::Px4(Px4Event::Waiting(self.options.link.clone())));
     }
 
-    /// Sends the sensors of this step; HIL_SENSOR, which moves PX4's clock, comes last.
+    /// Sends the sensors of this step. HIL_SENSOR comes last, because it advances PX4's clock.
     fn show(&mut self) {
         let truth = self.launcher.truth();
         let (time_us, step) = (self.time_us, (self.time_us - FIRST_US) / STEP_US);
         let Some(client) = &mut self.client else { return };
         let mut bytes = Vec::with_capacity(256);
-        // Before its first HIL_SENSOR PX4 has no time to stamp others with.
+        // PX4 has no time for its time stamps before the first HIL_SENSOR.
         if time_us > client.begun_us {
             if step.is_multiple_of(GPS_EVERY) {
                 let gps = self.sensors.gps(time_us, &truth);
@@ -189,7 +190,7 @@ impl Run<'_> {
         self.counts.unsent_frames += u64::from(!self.link.send(&bytes));
     }
 
-    /// The moment at which the next step is due.
+    /// Time at which the next step is due.
     fn next(&mut self, deadline: Instant) -> Instant {
         let now = Instant::now();
         let late = now.saturating_duration_since(deadline);
@@ -203,7 +204,7 @@ impl Run<'_> {
         deadline + STEP
     }
 
-    /// Exchanges messages until the next step is due; `false` if the client has gone or the run is stopped.
+    /// Exchanges messages until the next step is due; `false` if the client has disconnected or the run is stopped.
     fn converse(&mut self, deadline: Instant, stop: &AtomicBool) -> Result<bool, ShimError> {
         let connection = self.connection;
         while !stop.load(Ordering::Relaxed) {
@@ -233,7 +234,7 @@ impl Run<'_> {
         Ok(false)
     }
 
-    /// Reports a client that has fallen silent, and lets another take its place.
+    /// Reports a client that has become silent, and allows another client to replace it.
     fn watch(&mut self, now: Instant) {
         let Some(client) = &mut self.client else { return };
         let Some(last) = client.last_actuation.filter(|_| !client.silent) else { return };
@@ -247,7 +248,7 @@ impl Run<'_> {
         self.notify(Event::Px4(event));
     }
 
-    /// Takes everything that has arrived.
+    /// Receives and handles everything that has arrived.
     fn listen(&mut self) -> Result<(), ShimError> {
         let mut frames: Vec<Frame> = Vec::new();
         loop {
@@ -298,7 +299,7 @@ impl Run<'_> {
         events.into_iter().for_each(|event| self.notify(Event::Px4(event)));
     }
 
-    /// Makes a step with the last commands.
+    /// Makes one step with the last commands.
     fn advance(&mut self) -> Result<Option<Over>, ShimError> {
         let actuation = self.client.as_ref().and_then(|client| client.actuation);
         let (armed, inputs) = actuation.map_or((false, Inputs::default()), |a| (a.armed, a.inputs));

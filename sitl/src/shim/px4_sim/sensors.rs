@@ -1,6 +1,6 @@
-//! The sensors that PX4 is shown: HIL_SENSOR, HIL_GPS, HIL_STATE_QUATERNION.
+//! Sensor messages for PX4: HIL_SENSOR, HIL_GPS, HIL_STATE_QUATERNION.
 //!
-//! Here, in one place, SI units become those of the wire.
+//! This module converts SI units to the units of these messages.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -11,28 +11,28 @@ use crate::shim::codec::{HilGps, HilSensor, HilStateQuaternion};
 use crate::shim::options::Bias;
 use crate::shim::telemetry::quaternion;
 
-/// The random stream of these sensors.
+/// Number of the random stream for these sensors.
 const STREAM: u64 = 4;
 /// Gas constant of dry air in the standard atmosphere, J/(kg K).
 const AIR: f64 = 287.053;
 /// Sea-level density (kg/m³) and pressure (Pa) of the standard atmosphere.
 const SEA_LEVEL_DENSITY: f64 = 1.225;
 const SEA_LEVEL_PRESSURE: f64 = 101_325.0;
-/// Standard gravity, m/s²: the g of the wire's mG.
+/// Standard gravity, m/s², for the conversion to mG.
 const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Radius of the earth by which PX4 turns metres of noise into degrees, m.
+/// Earth radius by which PX4 converts position noise from metres to degrees, m.
 const EARTH_M: f64 = 6_371_000.0;
 
-/// Bits of `fields_updated` (HIL_SENSOR_UPDATED_FLAGS): what comes with every message, ...
+/// Bits of `fields_updated` (HIL_SENSOR_UPDATED_FLAGS) for accelerometers and gyros, which every message updates.
 const INERTIAL: u32 = 0x0007 | 0x0038;
-/// ... the magnetometer, the differential pressure, and static pressure, altitude, temperature.
+/// Bits for the magnetometer; for the differential pressure; for static pressure, altitude and temperature.
 const MAGNETIC: u32 = 0x01C0;
 const DIFFERENTIAL: u32 = 0x0400;
 const BAROMETRIC: u32 = 0x0200 | 0x0800 | 0x1000;
-/// Period of the slow sensors in steps: 50 Hz.
+/// Period of magnetometer and air-pressure sensors in steps: 50 Hz.
 pub const SLOW_EVERY: u64 = 5;
 
-/// Standard deviations of white noise, one draw a message.
+/// Standard deviations of white noise; each message draws new values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Px4Noise {
     /// Accelerometers, each axis, m/s².
@@ -54,7 +54,7 @@ pub struct Px4Noise {
 }
 
 impl Px4Noise {
-    /// Perfect sensors. (PX4 itself takes readings that never change for a broken sensor.)
+    /// Perfect sensors. PX4 regards a sensor with constant readings as broken.
     pub const NONE: Px4Noise = Px4Noise {
         accelerometer_mps2: 0.0,
         gyro_radps: 0.0,
@@ -66,10 +66,12 @@ impl Px4Noise {
         gps_velocity_mps: [0.0; 3],
     };
 
-    /// Noise of PX4's own simulators. Inertial: the noise densities of Gazebo's IMU plugin,
-    /// 0.00186 m/s²/√Hz and 0.00018665 rad/s/√Hz, times √250 Hz; its wandering bias is left out.
-    /// The others: PX4's modules sensor_mag_sim (0.02, 0.02, 0.03 gauss), sensor_baro_sim (1 Pa),
-    /// sensor_airspeed_sim (0.01 hPa), sensor_gps_sim (0.2 m, 0.5 m; 0.06, 0.077, 0.158 m/s).
+    /// Noise of PX4's simulators.
+    ///
+    /// The inertial noise follows from the noise densities of Gazebo's IMU plugin, 0.00186 m/s²/√Hz and 0.00018665 rad/s/√Hz,
+    /// times √250 Hz; the plugin's bias drift is left out. The other values are those of PX4's modules sensor_mag_sim (0.02,
+    /// 0.02, 0.03 gauss), sensor_baro_sim (1 Pa), sensor_airspeed_sim (0.01 hPa) and sensor_gps_sim (0.2 m, 0.5 m; 0.06, 0.077,
+    /// 0.158 m/s).
     pub const STANDARD: Px4Noise = Px4Noise {
         accelerometer_mps2: 0.0294,
         gyro_radps: 0.00295,
@@ -82,7 +84,7 @@ impl Px4Noise {
     };
 }
 
-/// Sensors with their noise.
+/// Sensors with noise and constant errors.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     noise: Px4Noise,
@@ -90,19 +92,19 @@ pub struct Sensors {
     /// Magnetic field, north-east-down, gauss.
     field: [f64; 3],
     random: ChaCha8Rng,
-    /// Last message, for fields that are not measured in this step.
+    /// Last message, whose values stay in the fields that a step does not update.
     last: HilSensor,
 }
 
 impl Sensors {
-    /// Sensors in a magnetic field (north-east-down, gauss), their noise fixed by `seed`.
+    /// Sensors in the magnetic field `field` (north-east-down, gauss), with noise that depends only on `seed`.
     pub fn new(noise: Px4Noise, bias: Bias, field: [f64; 3], seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(STREAM);
         Sensors { noise, bias, field, random, last: HilSensor::default() }
     }
 
-    /// HIL_SENSOR of step `step`; the same number of draws whatever is updated.
+    /// HIL_SENSOR of the step `step`. Every step makes the same number of random draws, whichever fields it updates.
     pub fn inertial(&mut self, time_us: u64, step: u64, truth: &Truth) -> HilSensor {
         let (noise, bias) = (self.noise, self.bias);
         let mut draw = |deviation: f64| deviation * normal(&mut self.random);
@@ -146,7 +148,7 @@ impl Sensors {
         message
     }
 
-    /// HIL_GPS: a 3D fix of ten satellites, without latency (set in PX4: EKF2_GPS_DELAY).
+    /// HIL_GPS: a 3D fix with ten satellites, without latency (PX4's EKF2_GPS_DELAY has to match).
     pub fn gps(&mut self, time_us: u64, truth: &Truth) -> HilGps {
         let noise = self.noise;
         let mut draw = |deviation: f64| deviation * normal(&mut self.random);
@@ -164,7 +166,7 @@ impl Sensors {
             lat: (latitude * 1e7).round() as i32,
             lon: (longitude * 1e7).round() as i32,
             alt: (altitude * 1e3).round() as i32,
-            // Accuracies in cm, as PX4 reads them: those of sensor_gps_sim.
+            // Accuracies in cm, the unit in which PX4 reads them; values of sensor_gps_sim.
             eph: 90,
             epv: 178,
             vel: (velocity[0].hypot(velocity[1]) * 1e2).round() as u16,
@@ -179,7 +181,7 @@ impl Sensors {
     }
 }
 
-/// HIL_STATE_QUATERNION: the truth, for PX4's log.
+/// HIL_STATE_QUATERNION: the true state, which PX4 logs.
 pub fn state(time_us: u64, truth: &Truth) -> HilStateQuaternion {
     let [vx, vy, vz] = truth.velocity_ned_mps.map(|v| (v * 1e2).round() as i16);
     let [xacc, yacc, zacc] =
@@ -210,13 +212,13 @@ fn attitude(truth: &Truth) -> [f64; 3] {
     [truth.roll_rad, truth.pitch_rad, truth.yaw_rad]
 }
 
-/// ½ρu², u the airspeed along the body's x axis, with its sign: as PX4's own simulators have it.
+/// Differential pressure, Pa: ½ρu·|u| with the airspeed component u along body x, as in PX4's simulators.
 fn differential_pa(truth: &Truth, scale: f64) -> f64 {
     let u = scale * truth.airspeed_mps * truth.alpha_rad.cos() * truth.beta_rad.cos();
     0.5 * truth.air_density_kgpm3 * u * u.abs()
 }
 
-/// Altitude of the standard atmosphere that has this pressure, m.
+/// Altitude at which the standard atmosphere has this pressure, m.
 fn pressure_altitude_m(pressure_pa: f64) -> f64 {
     44_330.77 * (1.0 - (pressure_pa / SEA_LEVEL_PRESSURE).powf(0.190_263))
 }

@@ -1,14 +1,14 @@
-//! Golden flights of the official JSBSim: how they are read, and how far another flight is off.
+//! Golden flights of the official JSBSim: reads them and compares other flights with them.
 
 use std::path::{Path, PathBuf};
 
 use greylag_sitl::plant::{Inputs, Truth};
 
-/// The command histories, by the names of their files.
+/// Names of the command histories and of their files.
 pub const HISTORIES: [&str; 6] =
     ["white", "held", "ornstein_uhlenbeck", "pid_30_5", "pid_50_20", "pid_m40_m20"];
 
-/// Columns of state and actuators.
+/// Names of the columns for state and actuators.
 pub const COLUMNS: [&str; 14] = [
     "roll_rad",
     "pitch_rad",
@@ -29,7 +29,7 @@ pub const COLUMNS: [&str; 14] = [
 /// State and actuators in the order of [`COLUMNS`].
 pub type Row = [f64; 14];
 
-/// Picks the columns out of `t`.
+/// The values of `t` in the order of [`COLUMNS`].
 pub fn row(t: &Truth) -> Row {
     [
         t.roll_rad,
@@ -49,9 +49,9 @@ pub fn row(t: &Truth) -> Row {
     ]
 }
 
-/// One golden flight: a command for every step, a state for some.
+/// One golden flight: a command for every step, and a state after some of them.
 pub struct Golden {
-    /// Commands, and the state after them where it was kept.
+    /// Commands, each with the state after it; `None` if the file has no state for the step.
     pub steps: Vec<(Inputs, Option<Row>)>,
 }
 
@@ -83,12 +83,12 @@ impl Golden {
         Golden { steps }
     }
 
-    /// The states that were kept.
+    /// The states in the file.
     pub fn states(&self) -> impl Iterator<Item = &Row> {
         self.steps.iter().filter_map(|(_, state)| state.as_ref())
     }
 
-    /// Largest difference in each column, by the column's largest magnitude in this flight.
+    /// Largest difference in each column, divided by the column's largest magnitude in this flight.
     pub fn worst<'a>(&self, other: impl Iterator<Item = &'a Row>) -> Row {
         let mut scale = [0.0_f64; 14];
         let mut worst = [0.0_f64; 14];
@@ -102,7 +102,7 @@ impl Golden {
     }
 }
 
-/// Angles are compared around the circle: yaw starts at the seam of 0 and 2π.
+/// Difference of two values. Yaw angles are compared modulo 2π, because yaw starts at the discontinuity.
 fn difference(column: usize, a: f64, b: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let plain = (a - b).abs();

@@ -1,4 +1,4 @@
-//! Flights that several tests fly.
+//! Flights and plants that several tests use.
 #![allow(dead_code)] // Each test that includes this module uses a part of it.
 
 pub mod golden;
@@ -6,7 +6,7 @@ pub mod golden;
 use greylag_sitl::air::Air;
 use greylag_sitl::plant::{DT_S, Inputs, Plant, PlantOptions, Truth};
 
-/// Surfaces centred, motor off.
+/// Surfaces centred and throttle closed.
 pub const IDLE: Inputs = Inputs { aileron: 0.0, elevator: 0.0, throttle: 0.0, rudder: 0.0 };
 
 /// The built-in X8 in calm air at the neutral start.
@@ -26,7 +26,7 @@ pub fn plant_with(effects: &[&str]) -> Plant {
         .expect("the X8 takes the effects")
 }
 
-/// Command `k` of a history that moves every actuator at every step.
+/// Command number `k` of a history that moves every actuator at every step.
 pub fn busy(k: u32) -> Inputs {
     let t = f64::from(k) * DT_S;
     Inputs {
@@ -37,12 +37,12 @@ pub fn busy(k: u32) -> Inputs {
     }
 }
 
-/// Flies the busy history from step `from` up to `to`.
+/// States of a flight with the commands of `busy` from step `from` up to but not including `to`.
 pub fn fly(plant: &mut Plant, from: u32, to: u32) -> Vec<Truth> {
     (from..to).map(|k| plant.step(busy(k)).expect("a gentle flight stays finite")).collect()
 }
 
-/// Flies `steps` with constant `inputs`.
+/// Makes `steps` steps with constant `inputs`; returns the last state.
 pub fn hold(plant: &mut Plant, inputs: Inputs, steps: u32) -> Truth {
     for _ in 0..steps {
         plant.step(inputs).expect("a gentle flight stays finite");
@@ -50,7 +50,7 @@ pub fn hold(plant: &mut Plant, inputs: Inputs, steps: u32) -> Truth {
     plant.truth()
 }
 
-/// Asserts that two flights are the same to the bit, and shows the first step where they are not.
+/// Asserts that two flights are bit-identical; otherwise prints the first step with a difference.
 pub fn assert_same(a: &[Truth], b: &[Truth]) {
     assert_eq!(a.len(), b.len());
     if let Some(k) = (0..a.len()).find(|k| a[*k] != b[*k]) {
@@ -58,7 +58,7 @@ pub fn assert_same(a: &[Truth], b: &[Truth]) {
     }
 }
 
-/// Whether two flights differ anywhere.
+/// Whether two flights differ at any step.
 pub fn differ(a: &[Truth], b: &[Truth]) -> bool {
     a != b
 }

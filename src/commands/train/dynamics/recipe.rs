@@ -4,8 +4,8 @@ use super::{Arguments, Joint};
 use crate::learn::{Criterion, Recipe, Start, trainable};
 use crate::model::{GreyBox, STEP};
 
-/// Steps of a rollout on logs that are sampled more slowly than the model steps. Such a log is interpolated between its
-/// samples, and short rollouts would learn the interpolation.
+/// Steps of a rollout on logs that are sampled more slowly than the model steps. These logs are interpolated between
+/// their samples. Short rollouts would learn the interpolation.
 const SLOW_STEPS: usize = 200;
 
 impl Arguments {

@@ -1,4 +1,4 @@
-//! Where a policy is trained and judged: the model or the simulator.
+//! Environment in which a policy is trained and evaluated: a model or JSBSim.
 
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// Scores `actor` in the environment of its training on a tenth of a target file. A policy that is trained in a
-    /// model is therefore chosen without a flight in any simulator.
+    /// Scores `actor` in the environment of its training on a tenth of a target file. The choice of a policy that is
+    /// trained in a model needs no flight in JSBSim.
     pub(super) fn evaluate(&self, actor: Arc<Actor>) -> Result<Evaluated> {
         let mut rows = TargetFile::generate(JUDGE_SEED).rows;
         rows.retain(|r| r.group != Group::HardOutside && r.number % 10 == r.number / 10 % 10);
@@ -41,10 +41,10 @@ impl Ground {
     }
 }
 
-/// Seed of the targets that judge a training; policies are scored on other targets.
+/// Seed of the targets by which the best policy of a training is chosen. Other targets score the policies.
 const JUDGE_SEED: u64 = 2;
 
-/// Results of flights in JSBSim, where the policy was trained there.
+/// Results of flights in JSBSim, for a policy that is trained in JSBSim.
 #[cfg(feature = "demo")]
 pub(super) fn flown(make: Make, rows: &[Row]) -> Result<Vec<Outcome>> {
     let plant = greylag_sitl::plant::PlantOptions::default();

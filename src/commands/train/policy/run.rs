@@ -24,10 +24,10 @@ use crate::sim::world::World;
 
 /// File from which a training is resumed.
 const CHECKPOINT: &str = "checkpoint.safetensors";
-/// Largest share of lost imagined episodes without a warning.
+/// Largest fraction of lost episodes without a warning.
 const MANY: f64 = 0.2;
 
-/// Record of a run beside its curve.
+/// Record of a training, written into the folder of its learning curve.
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -55,7 +55,7 @@ pub(super) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Trains an actor by the analytic policy gradient, then its critics; `false` if interrupted.
+    /// Trains an actor by the analytic policy gradient, then its critics. Returns `false` if interrupted.
     pub(super) fn climb(
         &self,
         recipe: &AnalyticRecipe,
@@ -81,7 +81,7 @@ impl Run<'_> {
     }
 
     pub(super) fn train<W: World>(&self, recipe: PolicyRecipe, world: W) -> Result<bool> {
-        // the number of steps does not identify a training, so that one can be continued with more steps
+        // The number of steps is not part of the identity. A training can then be continued with more steps.
         let of = PolicyRecipe { steps: 0, ..recipe.clone() };
         let of = (of, &self.ground.origin.model_sha256);
         let what = serde_json::to_string(&of)?;
@@ -168,7 +168,7 @@ impl Run<'_> {
     }
 }
 
-/// Warns if many episodes end outside the envelope.
+/// Warns if many episodes end outside the validity limits.
 fn warn(seed: u64, progress: &PolicyProgress) {
     let part = progress.lost as f64 / progress.episodes.max(1) as f64;
     if progress.updates > 0 && part > MANY {

@@ -1,11 +1,11 @@
-//! Every instruction set flies the same rollout.
+//! Tests of the rollouts: agreement of the instruction sets, and the slew limit.
 
 use super::*;
 use crate::disturbance;
 use greylag_physics::Time;
 use std::path::Path;
 
-/// Candidates have the same returns in every instruction set.
+/// The same candidates have the same returns with every instruction set.
 #[test]
 fn instruction_sets_agree() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
@@ -33,7 +33,7 @@ fn instruction_sets_agree() {
         sideslip: None,
     };
     let wave = |k: usize| std::array::from_fn(|i| ((k * 16 + i) as f32 * 0.37).sin());
-    // an odd number of blocks: the last one is evaluated alone, not in a pair
+    // with an odd number of blocks, the last one is evaluated alone instead of in a pair
     let mut blocks: [Block; 3] = std::array::from_fn(|b| {
         std::array::from_fn(|h| std::array::from_fn(|c| wave(40 * b + 3 * h + c)))
     });
@@ -45,7 +45,7 @@ fn instruction_sets_agree() {
     let baseline = run(Machine::baseline());
     let widest = run(Machine::detect());
     for (a, b) in widest.iter().zip(&baseline) {
-        // single precision through five steps, rewards summing up to 5
+        // single precision over five steps, rewards with a sum of up to 5
         assert!((a - b).abs() < 1e-5, "{a} {b}");
     }
     #[cfg(target_arch = "x86_64")]
@@ -55,7 +55,7 @@ fn instruction_sets_agree() {
     }
 }
 
-/// A surface moves by 0.2 in a step where the airframe allows 20 a second; the throttle is not a surface.
+/// A surface moves by 0.2 per step of 10 ms if the airframe allows 20 per second. The throttle is not limited.
 #[test]
 fn surfaces_of_a_plan_move_no_faster_than_the_airframe_allows() {
     for (aircraft, rudder) in [("x8/jsbsim.toml", 1.0), ("aerosonde/jsbsim.toml", 0.3)] {
@@ -65,7 +65,7 @@ fn surfaces_of_a_plan_move_no_faster_than_the_airframe_allows() {
         let last = Command { aileron: 0.1, elevator: 0.1, throttle: 0.0, rudder: 0.1 };
         let far = Command { aileron: 1.0, elevator: -1.0, throttle: 1.0, rudder: 1.0 };
         let got = slewed(far, &last, &model.airframe);
-        // The airframe has no rudder, so its command is not limited.
+        // an airframe without a rudder does not limit the rudder command
         let wanted = Command { aileron: 0.3, elevator: -0.1, throttle: 1.0, rudder };
         for (got, wanted) in [
             (got.aileron, wanted.aileron),

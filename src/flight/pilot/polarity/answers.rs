@@ -3,14 +3,14 @@
 use greylag_model::{GreyBox, Trim, TrimError, Twin};
 use greylag_physics::Command;
 
-/// Length of a response in states, including the one on which the step is commanded: 0.4 s. By then the roll rate has
-/// settled and the pitch rate nearly; later states take the last value.
+/// Length of a response in state frames of 10 ms, including the frame of the step: 0.4 s. By then the roll rate has
+/// settled and the pitch rate has nearly settled. Later frames take the last value.
 const SPAN: usize = 41;
-/// Size of the simulated step, of −1..1: small enough to be linear, large compared with rounding.
+/// Size of the simulated step of a command (−1..1): small enough to be linear, large compared with rounding.
 const STEP: f64 = 0.01;
 
-/// Roll-rate response to a unit step of the aileron command, and pitch-rate response to one of the elevator command,
-/// rad/s, per state of 10 ms, from level flight.
+/// Responses in straight flight: roll rate after a unit step of the aileron command, and pitch rate after a unit step
+/// of the elevator command. Both are in rad/s, with one value per state frame of 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answers {
     roll: [f64; SPAN],
@@ -18,13 +18,13 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// The responses of `model` in straight flight at `airspeed` (m/s).
+    /// The responses of `model` in straight flight at the true airspeed `airspeed` (m/s).
     ///
     /// # Errors
     ///
-    /// If the model has no straight-flight trim there.
+    /// If the model has no straight-flight trim at `airspeed`.
     pub fn of(model: &GreyBox, airspeed: f64) -> Result<Answers, TrimError> {
-        // 1000 m of altitude change a response by a tenth
+        // a change of altitude by 1000 m changes a response by a tenth
         let altitude = model.airframe.reference.altitude;
         let trim = Trim::straight(model, airspeed, altitude)?;
         let command = model.airframe.actuators.command(&trim.controls);
@@ -48,7 +48,7 @@ impl Answers {
         Ok(Answers { roll: answer(&rolled, 0), pitch: answer(&pitched, 1) })
     }
 
-    /// Change of the rate of `axis` (0 roll, 1 pitch), `states` after a unit step, rad/s.
+    /// Change of the rate of `axis` (0 roll, 1 pitch) `states` frames after a unit step, rad/s; 0 before the step.
     pub(super) fn after(&self, axis: usize, states: isize) -> f64 {
         let answer = if axis == 0 { &self.roll } else { &self.pitch };
         match usize::try_from(states) {
@@ -71,13 +71,13 @@ mod tests {
         )))
         .unwrap();
         let answers = Answers::of(&model, 20.0).unwrap();
-        // a command appears in the surfaces of the next state, in the rates of the one after
+        // a command appears in the surfaces of the next state, and in the rates of the state after that
         assert_eq!([answers.after(0, -1), answers.after(0, 0), answers.after(0, 1)], [0.0; 3]);
-        // Steady roll: Clδa δa · 2 V / (b |Clp|) = 0.1202 · 0.5235 · 40 / (2.1 · 0.4042) = 2.97 rad/s,
-        // of which sideslip, the product of inertia, the yaw rate take half back.
+        // Steady roll: Clδa δa · 2 V / (b |Clp|) = 0.1202 · 0.5235 · 40 / (2.1 · 0.4042) = 2.97 rad/s. Sideslip, the
+        // product of inertia and the yaw rate reduce it by half.
         let roll = answers.after(0, 20);
         assert!(roll > 1.0 && roll < 3.0, "{roll}");
-        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first: −0.9 rad/s after two states.
+        // q̇ = ½ρV² S c Cmδe δe / Jy = −43 rad/s² at first. After two states q is −0.9 rad/s.
         let pitch = answers.after(1, 4);
         assert!(pitch < -0.5 && pitch > -2.0, "{pitch}");
     }

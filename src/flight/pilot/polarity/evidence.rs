@@ -7,20 +7,20 @@ use nalgebra::{Matrix3, Vector3};
 use super::LONGEST;
 use super::answers::Answers;
 
-/// Largest additional delay of link and controller relative to the simulator, states.
+/// Largest additional delay of link and controller relative to the simulator, state frames of 10 ms.
 const LATENESS: isize = 9;
-/// Smallest number of rate changes for a regression.
+/// Smallest number of rate changes with which a regression is made.
 const LEAST: usize = 14;
-/// Largest lag-one autocorrelation of the regression residuals that is accounted for.
+/// Upper limit of the lag-one autocorrelation of the regression residuals.
 const MAX_AUTOCORRELATION: f64 = 0.9;
-/// Lead of the handover of control authority relative to the first state of the check, states. The notice of the
-/// handover shares the link with the states, and the controller samples its channels at its own time.
+/// Possible leads of the handover of control authority relative to the first state of the check, state frames. The
+/// notice of the handover shares the link with the states, and the controller samples its channels at its own time.
 const TAKEN: RangeInclusive<isize> = -1..=2;
 
 /// Estimated gain on the modelled response, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
-    /// 1 is the modelled response, −1 its opposite.
+    /// Gain: 1 is the modelled response, −1 the opposite response.
     pub gain: f64,
     /// Standard error of the gain estimate.
     pub error: f64,
@@ -29,23 +29,23 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// The gain in standard errors.
+    /// The gain divided by its standard error.
     pub(super) fn certainty(&self) -> f64 {
         self.gain / self.error
     }
 }
 
-/// Record of a check, per state of 10 ms from its start.
+/// Record of a sign check, one entry per state frame of 10 ms from the start of the check.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Evidence {
     /// Roll and pitch rate, rad/s; `None` for a lost state.
     rates: Vec<Option<[f64; 2]>>,
-    /// Changes of aileron and elevator command: the state on which they were commanded, and by how much.
+    /// Changes of the aileron and elevator commands: index of the state frame and size of each change.
     changes: [Vec<(isize, f64)>; 2],
 }
 
 impl Evidence {
-    /// Stores the rates of the state `index`; states after the check are ignored.
+    /// Stores the rates of state frame `index`, rad/s. States after the longest check are ignored.
     pub(super) fn rates(&mut self, index: usize, rates: [f64; 2]) {
         if (self.rates.len()..=LONGEST).contains(&index) {
             self.rates.resize(index + 1, None);
@@ -53,14 +53,14 @@ impl Evidence {
         }
     }
 
-    /// Stores a change of the command of `axis` on the state `index`.
+    /// Stores a change of the command of `axis` in reply to state frame `index`.
     pub(super) fn change(&mut self, axis: usize, index: usize, by: f64) {
         if by != 0.0 {
             self.changes[axis].push((index as isize, by));
         }
     }
 
-    /// Best estimates for roll and pitch with a common delay and handover time.
+    /// Best estimates for roll and pitch with a common delay and handover time; `None` if the record is too short.
     pub(super) fn fit(&self, answers: &Answers) -> Option<[Fit; 2]> {
         let both = (0..=LATENESS).flat_map(|late| {
             let answered = [0, 1].map(|axis| self.answered(answers, axis, late));
@@ -84,10 +84,10 @@ impl Evidence {
         states.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
 
-    /// Least squares of the rate's changes between states: gusts are a random walk, so that their changes are nearly
-    /// white; the standard error is enlarged by the remaining autocorrelation. Regressors: the modelled response to
-    /// the commands, the response to a step of unknown size at the handover, `taken` states before the first, and a
-    /// constant.
+    /// Least squares on the changes of the rate between states. Gusts are a random walk, so their changes are nearly
+    /// white. The standard error is increased by the remaining autocorrelation. There are three regressors: the
+    /// modelled response to the commands, the response to a step of unknown size at the handover, `taken` states before
+    /// the first, and a constant.
     fn axis(&self, answers: &Answers, axis: usize, answered: &[f64], taken: isize) -> Option<Fit> {
         let to_step = |state: isize| answers.after(axis, state + taken);
         let rows = || {
@@ -149,7 +149,7 @@ mod tests {
             (fit(-0.9, 8.0), right, SEEN[0], reversed(Axis::Roll)),
             (fit(-0.9, 8.0), right, SEEN[0] - 1, Verdict::Open),
             (right, fit(-0.9, 8.0), SEEN[1], reversed(Axis::Pitch)),
-            // Large and not certain; certain and too small to be an answer.
+            // Large but not certain; certain but too small for a response.
             (fit(-0.9, 6.9), right, SEEN[1], Verdict::Open),
             (fit(-0.09, 50.0), right, SEEN[1], Verdict::Open),
             (right, fit(0.09, 50.0), LONGEST - 1, Verdict::Open),
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn what_is_not_certain_in_the_end_is_no_answer_or_too_much_air() {
         let right = fit(0.9, 8.0);
-        // 0.2 + 3 · 0.09 is under half an answer, 0.6 + 3 · 0.3 is not.
+        // 0.2 + 3 · 0.09 is less than half of the modelled response, 0.6 + 3 · 0.3 is not.
         for (roll, pitch, fault) in [
             (fit(0.2, 2.2), right, Fault::Unanswered(Axis::Roll)),
             (right, fit(0.2, 2.2), Fault::Unanswered(Axis::Pitch)),
@@ -176,7 +176,8 @@ mod tests {
         }
     }
 
-    /// The record of an aircraft that responds as the model does, with `leftover` added to its rates from state to state.
+    /// The record of an aircraft that responds as the model does. `leftover` (rad/s) is added to its rates at each
+    /// state frame.
     fn record(answers: &Answers, states: usize, leftover: impl Fn(usize) -> f64) -> Evidence {
         let mut evidence = Evidence::default();
         let changes = [[(0, 0.06), (12, -0.12)], [(6, 0.06), (18, -0.12)]];
@@ -214,7 +215,7 @@ mod tests {
 
     #[test]
     fn gusts_that_wander_leave_more_doubt_than_as_large_ones_that_do_not() {
-        // Rate changes of ±0.01 rad/s whose sign alternates every nine states, or every state.
+        // Rate changes of ±0.01 rad/s: the sign alternates every nine states, or every state.
         let answers = x8();
         let doubt = |states: usize| {
             let gust = |index: usize| if (index / states).is_multiple_of(2) { 0.01 } else { -0.01 };

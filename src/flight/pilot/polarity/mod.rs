@@ -1,9 +1,10 @@
-//! The check of surface signs: whether the aircraft responds to the surfaces as the model predicts.
+//! The check of surface signs: does the aircraft respond to the surfaces as the model predicts?
 //!
-//! A flight controller can fly well by its own loops while the channel order, a reversal or a mixer between the companion's
-//! commands and the surfaces is wrong. Therefore, when control authority is given, the companion first commands level trim with
-//! small pulses of aileron and elevator, at different times. Rates are regressed on the modelled responses to these pulses; gusts
-//! are uncorrelated with them. The check ends when both signs are certain, usually after 0.3 s; the pulses grow until then.
+//! A flight controller can fly well with its own loops although the channel order, a reversal or a mixer between the
+//! companion's commands and the surfaces is wrong. When control authority is given, the companion therefore first
+//! commands level trim with small pulses of aileron and elevator, at different times. Measured rates are regressed on
+//! the modelled responses to these pulses. Gusts are uncorrelated with the pulses. The check ends when both signs are
+//! certain, usually after 0.3 s. Until then the pulses grow from round to round.
 
 mod answers;
 mod evidence;
@@ -14,9 +15,9 @@ use evidence::{Evidence, Fit};
 use greylag_link::vehicle::{Axis, Fault};
 use greylag_physics::{Command, State, Time};
 
-/// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8 and gives it a roll rate of 9 °/s.
+/// Pulse amplitudes of the rounds, normalised deflection: 0.06 is 1.9° for the X8 and causes a roll rate of 9 °/s.
 const PULSES: [f64; 3] = [0.06, 0.1, 0.15];
-/// Signs of a round's pulses, each of [`LENGTH`]: their effect on the attitude cancels.
+/// Signs of a round's pulses, each [`LENGTH`] state frames long. Their effects on the attitude cancel.
 const PATTERN: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
 /// Length of a pulse in state frames of 10 ms.
 const LENGTH: usize = 12;
@@ -26,14 +27,14 @@ const OFFSET: usize = 6;
 const ROUND: usize = PATTERN.len() * LENGTH + 2 * OFFSET;
 /// Number of state frames after which a check ends.
 const LONGEST: usize = PULSES.len() * ROUND;
-/// Ratio of the gain to its standard error above which a sign is certain; tested at every state frame.
+/// Ratio of the gain to its standard error above which a sign is certain. It is tested at every state frame.
 const CERTAIN: f64 = 7.0;
-/// State frames before the sign of aileron and of elevator is judged. By then the surface has moved both ways and the
-/// aircraft has responded: a single edge may coincide with a gust.
+/// State frames after which the signs of aileron and elevator are evaluated. By then the surface has moved both ways
+/// and the aircraft has responded. A single edge may coincide with a gust.
 const SEEN: [usize; 2] = [LENGTH + ANSWERED, OFFSET + LENGTH + ANSWERED];
 /// Number of state frames after a pulse edge within which the response appears.
 const ANSWERED: usize = 7;
-/// Smallest gain that counts as a response: a model may be wrong, but not by a factor of ten.
+/// Smallest gain that counts as a response. A model may be wrong, but not by a factor of ten.
 const ANSWER: f64 = 0.1;
 /// Change of bank or pitch that aborts the check, rad: 20°.
 const DEPARTED: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -62,11 +63,11 @@ struct Begun {
 /// Phase of a check.
 #[derive(Clone, Debug)]
 enum Stage {
-    /// No check is due: control authority is not demanded, or the check has passed.
+    /// No check is active: control authority is not demanded, or the check has ended.
     Rest,
     /// Control authority is demanded and not yet given.
     Waiting,
-    /// Control authority was given; the first state since may still be outstanding.
+    /// Control authority was given. The first state after that may still be outstanding.
     Running { begun: Option<Begun>, evidence: Evidence, last: Command },
 }
 
@@ -83,7 +84,7 @@ impl Check {
         Check { answers, stage: Stage::Rest }
     }
 
-    /// Starts to wait for control authority, which has been requested.
+    /// Starts to wait for the requested control authority.
     pub(super) fn await_authority(&mut self) {
         self.stage = Stage::Waiting;
     }
@@ -93,7 +94,7 @@ impl Check {
         self.stage = Stage::Rest;
     }
 
-    /// Starts the check on control authority: `in_force` is the last command to the surfaces.
+    /// Starts the check when control authority is given. `in_force` is the last command to the surfaces.
     pub(super) fn begin(&mut self, in_force: Command) {
         if matches!(self.stage, Stage::Waiting) {
             let evidence = Evidence::default();
@@ -101,12 +102,12 @@ impl Check {
         }
     }
 
-    /// Whether controllers must not fly yet.
+    /// Whether the check is waiting or running: controllers must not fly yet.
     pub(super) fn is_open(&self) -> bool {
         !matches!(self.stage, Stage::Rest)
     }
 
-    /// Takes the state of `now`; `level` is the level-trim command.
+    /// Evaluates the state at vehicle time `now`. `level` is the level-trim command.
     pub(super) fn see(&mut self, now: Time, state: &State, level: Command) -> Verdict {
         let Stage::Running { begun, evidence, .. } = &mut self.stage else { return Verdict::Open };
         let attitude = [state.roll, state.pitch];
@@ -115,7 +116,7 @@ impl Check {
         evidence.rates(index, [state.p, state.q]);
         let verdict = match evidence.fit(&self.answers) {
             Some(fits) => judged(&fits, index),
-            // states that were lost, or a clock that has jumped ahead
+            // too many states were lost, or the clock has jumped ahead
             None if index >= LONGEST => Verdict::Wrong(Fault::SignsUnknown),
             None => Verdict::Open,
         };
@@ -130,7 +131,8 @@ impl Check {
         verdict
     }
 
-    /// The command in reply to the state of `now` during the check: level trim with pulses.
+    /// The command in reply to the state of `now` during the check: level trim with pulses; `None` before the first
+    /// state.
     pub(super) fn command(&self, now: Time) -> Option<Command> {
         let Stage::Running { begun: Some(begun), .. } = &self.stage else { return None };
         let index = begun.index(now) as isize;
@@ -158,7 +160,7 @@ impl Begun {
     }
 }
 
-/// The pulse at state frame `index`, counted from the start of the surface's pulses.
+/// The pulse at state frame `index`, counted from the start of the surface's pulses, normalised deflection.
 fn pulse(index: isize) -> f64 {
     let Ok(index) = usize::try_from(index) else { return 0.0 };
     let (round, within) = (index / ROUND, index % ROUND);
@@ -168,7 +170,7 @@ fn pulse(index: isize) -> f64 {
     }
 }
 
-/// The verdict on the estimates after the state `index`.
+/// The verdict on the estimates after state frame `index`.
 fn judged(fits: &[Fit; 2], index: usize) -> Verdict {
     let certain = |axis: usize| {
         let fit = &fits[axis];
@@ -201,8 +203,8 @@ mod tests {
     use std::collections::VecDeque;
     use std::path::Path;
 
-    /// The verdict on the model itself, delayed by `late` states, with `wired` between commands and surfaces; also
-    /// the number of states it took.
+    /// Verdict on the model itself, and the number of state frames it took. Commands are delayed by `late` frames and
+    /// pass through `wired` to the surfaces.
     fn verdict(late: usize, wired: impl Fn([f64; 2]) -> [f64; 2]) -> (Verdict, u64) {
         verdict_after(2, late, wired)
     }
@@ -250,11 +252,11 @@ mod tests {
 
     #[test]
     fn right_signs_pass_however_late_the_commands_arrive() {
-        // Up to 60 ms, twice the delay of a serial line and a controller that samples its channels at 50 Hz.
+        // Up to 60 ms: twice the delay of a serial link with a controller that samples its channels at 50 Hz.
         for late in 0..=6 {
             let (verdict, states) = verdict(late, |surfaces| surfaces);
             let Verdict::Right(gains) = verdict else { panic!("{late}: {verdict:?}") };
-            // The modelled responses are those at 22 m/s, the aircraft flies at 20 m/s: 0.8 of the force.
+            // The modelled responses are for 22 m/s and the aircraft flies at 20 m/s, with 0.8 of the force.
             assert!(gains.iter().all(|gain| (0.5..1.2).contains(gain)), "{late}: {gains:?}");
             assert!(states < ROUND as u64, "{late}: after {states}");
         }
@@ -265,7 +267,7 @@ mod tests {
         for late in [0, 3, 6] {
             let roll = verdict(late, |[aileron, elevator]| [-aileron, elevator]).0;
             assert_eq!(roll, Verdict::Wrong(Fault::Reversed(Axis::Roll)), "{late}");
-            // A reversed trim throws the nose up before any pulse, sooner or later.
+            // A reversed trim pitches the nose up before the first pulse, whatever the lead of the handover.
             for early in 0..=4 {
                 let (pitch, _) =
                     verdict_after(early, late, |[aileron, elevator]| [aileron, -elevator]);
@@ -282,12 +284,12 @@ mod tests {
         assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Roll)));
         let (dead, _) = verdict(2, |[aileron, _]| [aileron, trim]);
         assert_eq!(dead, Verdict::Wrong(Fault::Unanswered(Axis::Pitch)));
-        // The left of two elevons is reversed: an aileron command pitches and an elevator command rolls.
+        // The left elevon is reversed: an aileron command pitches and an elevator command rolls.
         let (mixed, _) = verdict(2, |[aileron, elevator]| [elevator - trim, aileron + trim]);
         assert!(matches!(mixed, Verdict::Wrong(_)), "{mixed:?}");
     }
 
-    /// A clock jump, at the first states or later, ends the check. The check neither lasts for ever nor allocates
+    /// A clock jump, at the first states or later, ends the check. Otherwise the check would not end, or would allocate
     /// memory for the skipped states.
     #[test]
     fn a_clock_that_jumps_ahead_ends_the_check() {
@@ -330,7 +332,7 @@ mod tests {
                 let state = State { roll, pitch, ..State::NEUTRAL };
                 check.see(Time::from_micros(10_000 * k), &state, Command::IDLE)
             };
-            // In a turn: it is the change that counts, of more than 20°.
+            // In a turn, only a change of attitude by more than 20° ends the check.
             assert_eq!(see(0, 35.0, 15.0), Verdict::Open);
             assert_eq!(see(1, roll_deg, pitch_deg) == Verdict::Open, open, "{roll_deg}");
         }

@@ -10,7 +10,7 @@ use greylag_link::transport::{Arrival, Packet};
 use greylag_link::vehicle::Outputs;
 
 impl Control {
-    /// Forwards a client's frames to the controller.
+    /// Forwards a client's frames to the flight controller, if there is one.
     fn route(&mut self, host: Duration, packet: &Packet) {
         let Some(router) = &mut self.router else { return };
         router.learn(host, packet.peer, &packet.bytes);
@@ -48,7 +48,7 @@ impl Control {
         self.send_to_clients();
     }
 
-    /// Reports once that a peer does not sign, or not with our key.
+    /// Reports once that frames were refused because their signature is missing or invalid.
     fn report_refusals(&mut self) {
         let refused = self.ports.signing().map_or(0, |counts| counts.refused());
         if refused > 0 && !self.told_refusals {

@@ -1,4 +1,4 @@
-//! Vehicle side of the control thread: the newest state is answered, overtaken ones only recorded.
+//! Vehicle side of the control thread: it answers the newest state. Older queued states are only recorded.
 
 use std::time::{Duration, Instant};
 
@@ -14,10 +14,10 @@ use greylag_link::transport::Arrival;
 use greylag_link::vehicle::{Notice, Order, Telemetry};
 use greylag_physics::Time;
 
-/// Largest number of states per packet: a TCP chunk of 1024 bytes holds four.
+/// Largest number of states from one packet. A TCP chunk of 1024 bytes holds four.
 const STATES_PER_PACKET: usize = 8;
 
-/// A state with the packet that completed it.
+/// A state with the peer and the arrival time of the packet that completed it.
 #[derive(Clone, Copy)]
 struct Heard {
     state: Telemetry,
@@ -26,17 +26,18 @@ struct Heard {
 }
 
 impl Control {
-    /// Takes `arrival` and all that is queued behind it. In real time only the newest state is answered; in lockstep
-    /// the vehicle waits for each reply. After a stall, states are live from the vehicle time `live` on.
+    /// Handles `arrival` and all queued arrivals. In real time only the newest state is answered. In lockstep every
+    /// state is answered, because the vehicle waits for each reply. After a stall, states are live from the vehicle
+    /// time `live` on.
     pub(super) fn take_vehicles(&mut self, arrival: Option<Arrival>, live: Option<Time>) {
         let mut newest = arrival.and_then(|arrival| self.take_vehicle(arrival, None));
         if self.clock.pace() == Pace::RealTime {
-            // later arrivals are handled in the next round
+            // arrivals after this moment are handled in the next round
             for _ in 0..self.ports.from_vehicle.len() {
                 let Ok(arrival) = self.ports.from_vehicle.try_recv() else { break };
                 newest = self.take_vehicle(arrival, newest);
             }
-            // the program may have been stopped since the last check
+            // the program may have been suspended since the last check
             if let Some(live) = live.or_else(|| self.excuse_stall()) {
                 newest = self.catch_up(newest, live);
             }
@@ -47,8 +48,8 @@ impl Control {
         self.take_notices();
     }
 
-    /// Takes arrivals until a state is live: a full socket buffer holds the oldest states of a stall,
-    /// which are history.
+    /// Handles arrivals until a state is live, for at most 50 ms. After a stall a full socket buffer holds the oldest
+    /// states.
     fn catch_up(&mut self, mut newest: Option<Heard>, live: Time) -> Option<Heard> {
         let until = Instant::now() + CATCH_UP;
         while newest.is_none_or(|heard| heard.state.time < live) {
@@ -58,7 +59,7 @@ impl Control {
         newest
     }
 
-    /// Takes one arrival; returns the newest state, `newest` or one that it completed.
+    /// Handles one arrival. Returns the newest state: the last one that the arrival completed, otherwise `newest`.
     fn take_vehicle(&mut self, arrival: Arrival, newest: Option<Heard>) -> Option<Heard> {
         let packet = match arrival {
             Arrival::Packet(mut packet) => {
@@ -72,7 +73,7 @@ impl Control {
             Arrival::Opened(_) | Arrival::Closed(_) => return newest,
         };
         self.record(packet.arrived, &packet.bytes);
-        // The states are collected first, since each tick answers through the vehicle.
+        // The states are collected first, because the reply to each tick also uses `vehicle`.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
         let mut places = states.iter_mut();
         self.vehicle.handle(
@@ -133,7 +134,7 @@ impl Control {
         self.account(heard, &decision, plan, latency);
     }
 
-    /// Records timing and row of a tick, after its command is out.
+    /// Records timing and row of a tick, after its command is sent.
     fn account(&mut self, heard: &Heard, decision: &Decision, plan: Plan, latency: Duration) {
         let Heard { state, peer, arrived } = heard;
         if self.last_arrival.is_none() {
@@ -150,7 +151,7 @@ impl Control {
         self.timing.late_plans += u64::from(matches!(plan, Plan::Late | Plan::Busy));
         let share = (latency.as_secs_f64() / CYCLE.as_secs_f64()).min(1.0);
         self.load += LOAD_WEIGHT * (share - self.load);
-        // the positions of surfaces that we did not command are unknown
+        // surface positions are unknown while the companion does not command them
         match self.vehicle.moves_surfaces() {
             true => self.pilot.monitor(state),
             false => self.pilot.forget_residuals(),
@@ -170,7 +171,7 @@ impl Control {
             if let Some(words) = notice.ending() {
                 let now = self.clock.at(Instant::now());
                 self.note(Call::Disarm(now, true));
-                // forced disarming is never refused
+                // a forced disarming is never refused
                 let _ = self.pilot.disarm(now, true);
                 self.pilot.send_text(Severity::Critical, &words);
             }
@@ -187,7 +188,7 @@ impl Control {
         }
     }
 
-    /// Sends frames due on the vehicle's link, when there is a peer.
+    /// Sends the frames that are due on the vehicle's link, if its peer is known.
     pub(super) fn send_due(&mut self, host: Duration) {
         let Some(peer) = self.vehicle.peer().or(self.ports.vehicle_target()) else {
             return;

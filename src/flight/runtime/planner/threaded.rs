@@ -1,4 +1,4 @@
-//! A controller on its own thread: its plan is used at its tick or not at all.
+//! A controller on a separate thread. Its plan is used at the tick of its request or not at all.
 
 use std::time::{Duration, Instant};
 
@@ -8,20 +8,21 @@ use crate::threads::{Builder, JoinHandle, Receiver, RecvTimeoutError, Sender, bo
 use greylag_control::Controller;
 use greylag_physics::Command;
 
-/// A controller on its own thread.
+/// A controller on a separate thread.
 pub struct Threaded {
     requests: Option<Sender<(u64, Request)>>,
     pub(super) plans: Receiver<(u64, Command)>,
     thread: Option<JoinHandle<()>>,
     tick: u64,
-    /// A reset that the planner has not received, because it was busy.
+    /// Whether the controller is still to be reset, because the planner was busy at the last engagement.
     owed: bool,
     pub(super) deadline: Duration,
     pace: Pace,
 }
 
 impl Threaded {
-    /// Starts the thread. A plan is due `deadline` after its state frame; in lockstep it is waited for.
+    /// Starts the thread. In real time a plan is late `deadline` after the arrival of its state frame. In lockstep
+    /// there is no deadline.
     pub fn start(
         mut controller: Box<dyn Controller>,
         deadline: Duration,
@@ -52,7 +53,7 @@ impl Threaded {
     /// The plan for `request`, whose state arrived at `arrived`.
     pub fn plan(&mut self, request: &Request, arrived: Instant) -> Plan {
         self.tick += 1;
-        // plans of earlier ticks are obsolete
+        // plans for earlier ticks are obsolete
         while self.plans.try_recv().is_ok() {}
         let engage = request.engage || self.owed;
         let Some(requests) = &self.requests else {
@@ -86,10 +87,10 @@ impl Threaded {
 impl Drop for Threaded {
     fn drop(&mut self) {
         self.requests = None;
-        // the thread may block on its last plan, which is not taken any more
+        // the thread may block on its last plan, which nobody fetches
         while self.plans.recv().is_ok() {}
         if let Some(thread) = self.thread.take() {
-            // A panic there has been reported by its own thread.
+            // a panic of the controller has been reported by its thread
             let _ = thread.join();
         }
     }

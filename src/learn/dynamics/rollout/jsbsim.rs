@@ -1,4 +1,4 @@
-//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the last one.
+//! Rollouts in JSBSim's integration scheme: one model evaluation per step, with memory of the previous one.
 
 use crate::dynamics::kernel::InstructionSet;
 use crate::dynamics::packet::Packet;
@@ -18,7 +18,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         let mut last = None;
         for step in 0..=self.steps() {
             let at = self.at(step, state);
-            // this scheme integrates accelerations only, so that the residual has no rates of the angles
+            // This scheme integrates accelerations only. The residual's rates of roll and pitch angle are zero.
             let zero = R::zero();
             let learned = State { roll: zero, pitch: zero, ..self.learned(&at, step, trace) };
             let outputs = self.ask(&at);
@@ -51,7 +51,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         for step in (0..=self.steps()).rev() {
             let mut norms = [nothing(); 2];
             if step == 0 {
-                // the start state is recorded; only the memory depends on earlier steps
+                // The start state is recorded. Only the memory depends on the step before the start.
                 slope = nothing();
             } else {
                 let [error, prior, learned] = self.direct(step, trace, of);

@@ -1,4 +1,5 @@
-//! A block of rollouts: forward with a trace, then in reverse for the slopes, eqs. (20) and (22).
+//! A block of rollouts: a forward pass with a trace, then a reverse pass for the slopes, eqs. (20) and (22) of
+//! \[GSFM26\].
 
 mod jsbsim;
 mod rk4;
@@ -15,13 +16,13 @@ use greylag_physics::effects::Needs;
 use greylag_physics::rigid_body::Vector;
 use greylag_physics::{Controls, State};
 
-/// Points whose weight gradients are summed together, so that their data stays in the cache.
+/// Number of points whose weight gradients are summed together. Their data stays in the cache.
 const CHUNK: usize = 20;
 
 /// The model that is learned.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// The prior with its present coefficients; its own residual is not used.
+    /// The prior with its present coefficients. A residual of the prior is not used.
     pub prior: GreyBox,
     /// Network of the residual.
     pub network: Passes,
@@ -34,16 +35,16 @@ pub struct Subject {
 /// Whether the prior's coefficients are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorSlopes {
-    /// They are frozen.
+    /// The coefficients are frozen.
     None,
-    /// The slopes over all of them, and over Jxz, are summed.
+    /// The slopes over all coefficients and over Jxz are computed.
     All,
 }
 
 /// Recorded data of `Packet::WIDTH` rollouts.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded<R> {
-    /// States before the start, at the start, and after each step; roll in −π..π.
+    /// States one step before the start, at the start, and after each step, with roll in −π..π.
     pub states: Vec<[R; 8]>,
     /// Effective aileron, elevator, throttle and rudder, from the step before the start on.
     pub controls: Vec<[R; 4]>,
@@ -55,19 +56,19 @@ pub struct Recorded<R> {
     pub weight: Option<R>,
 }
 
-/// Data of a forward pass for the reverse pass. Step 0 is the one before the start, which [`Integrator::Jsbsim`]
-/// needs; RK4 leaves it out.
+/// Data of a forward pass for the reverse pass. Step 0 precedes the start of the rollout. [`Integrator::Jsbsim`] needs
+/// step 0, and RK4 omits it.
 #[derive(Clone, Debug)]
 pub struct Trace<R> {
     /// The states at which the model was evaluated: one per step, four per step for RK4.
     states: Vec<State<R>>,
-    /// The network's activations at each of them.
+    /// The network's activations at each of these states.
     units: Vec<R>,
     /// F_p and F_a at the start of each step.
     rates: Vec<[State<R>; 2]>,
     /// The states after each step.
     ends: Vec<State<R>>,
-    /// The acceleration in each step, and the memory before it.
+    /// The acceleration in each step, and the integrator's memory before the step.
     memory: Vec<[Vector<R>; 2]>,
     /// The network's slopes of a chunk of points.
     slopes: Vec<R>,
@@ -75,7 +76,7 @@ pub struct Trace<R> {
     coefficients: Vec<R>,
 }
 
-/// Results of a forward pass, summed over the rollouts that count.
+/// Results of a forward pass, summed over the rollouts with their weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Σ over steps of ‖(ŝ − s)/x_c‖².
@@ -150,7 +151,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         self.recorded.controls.len() - 1
     }
 
-    /// Integrates the block: the sums, and a value per lane that is finite where the path is.
+    /// Integrates the block. Returns the sums, and a value per lane that is finite if the lane's path is finite.
     #[inline(always)]
     pub fn forward(&self, trace: &mut Trace<R>) -> (Sums, R) {
         let totals = match self.subject.prior.integrator {
@@ -161,7 +162,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (Sums { error, prior, learned }, totals[0] + totals[1] + totals[2])
     }
 
-    /// Adds the slopes of the forward pass to `gradient`; `of` are those over the sums.
+    /// Adds the slopes of the objective over the trained parameters to `gradient`. `of` are the slopes over the sums of
+    /// the forward pass.
     #[inline(always)]
     pub fn reverse(&self, trace: &mut Trace<R>, of: &SumSlopes, gradient: &mut Gradient) {
         trace.coefficients.fill(R::zero());
@@ -207,7 +209,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         scales.rate(network.forward(scales.inputs(&at.state, &at.controls), units))
     }
 
-    /// x/x_c² and ‖x/x_c‖² of the rollouts that count.
+    /// x/x_c² and ‖x/x_c‖², weighted by rollout.
     #[inline(always)]
     fn weighted(&self, x: [R; 8]) -> ([R; 8], R) {
         let weight = self.recorded.weight.unwrap_or(R::from_f64(1.0));
@@ -221,7 +223,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         (half_slope, square)
     }
 
-    /// Weighted ŝ − s after `step`; roll wrapped to the shorter way round.
+    /// Weighted ŝ − s after `step`, with the roll error wrapped to −π..π.
     #[inline(always)]
     fn error(&self, step: usize, predicted: &State<R>) -> ([R; 8], R) {
         use std::f64::consts::{PI, TAU};
@@ -258,8 +260,8 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         ]
     }
 
-    /// Slopes through prior and residual at a point to the state there; adds those over the trained parameters.
-    /// Points come in falling order.
+    /// Backpropagates through prior and residual at a point. Returns the slopes over the state there, and adds the
+    /// slopes over the trained parameters. Points must come in descending order.
     #[inline(always)]
     fn point(
         &self,
@@ -310,7 +312,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
 /// A point of a rollout.
 #[derive(Clone, Copy)]
 struct Place {
-    /// The step it belongs to.
+    /// Step of the point.
     step: usize,
     /// Number of the point.
     point: usize,

@@ -7,9 +7,9 @@ use crate::dynamics::rollout::{Gradient, Pass, Place, SumSlopes, Trace, nothing,
 use greylag_model::STEP;
 use greylag_physics::State;
 
-/// Weights of the four slopes, in steps.
+/// Weights of the four slopes, s.
 const WEIGHTS: [f64; 4] = [STEP / 6.0, STEP / 3.0, STEP / 3.0, STEP / 6.0];
-/// Offset of each stage's state along the previous slope, in steps.
+/// Time of each stage's state along the previous slope, s.
 const AHEAD: [f64; 4] = [0.0, STEP / 2.0, STEP / 2.0, STEP];
 
 impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {

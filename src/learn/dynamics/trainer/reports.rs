@@ -28,14 +28,14 @@ pub enum TrainError {
         "the flights have no stretch of {0} samples without a gap, which one rollout takes; give longer logs, or shorter rollouts"
     )]
     Data(usize),
-    /// The bare prior cannot predict the flights at all.
+    /// The bare prior diverges on more than half of the rollouts.
     #[error(
-        "model {0} leaves the numbers on most rollouts before anything is learned: it is no model of this aircraft, or the logs are of another"
+        "model {0} diverges on most rollouts before training starts: it is not a model of this aircraft, or the logs are of another"
     )]
     Prior(String),
-    /// The loss is not finite.
+    /// The loss or its gradient was not finite in too many consecutive updates.
     #[error(
-        "the loss left the numbers at update {update}; what was learned before is kept in the last checkpoint: go on from it with a smaller learning rate"
+        "the loss is not finite at update {update}; the last checkpoint has the result of earlier updates: continue from it with a smaller learning rate"
     )]
     Diverged {
         /// Number of the update.
@@ -51,11 +51,11 @@ pub enum TrainError {
 pub struct Progress {
     /// Number of updates made.
     pub update: u64,
-    /// Length of the rollouts.
+    /// Length of the rollouts, steps of 10 ms.
     pub steps: usize,
-    /// Mean over the updates since the last report.
+    /// Loss, mean over the updates since the last report. `lost` is the sum over these updates.
     pub loss: Loss,
-    /// L_pred/L_prior, eq. (23), mean over the same updates.
+    /// L_pred/L_prior, eq. (23), mean over the updates since the last report.
     pub normalised: f64,
     /// Penalty weight λ of eq. (24).
     pub lambda: f64,
@@ -83,8 +83,8 @@ pub struct Learned {
     pub name: String,
     /// Value in the prior's file.
     pub start: f64,
-    /// Its present value.
+    /// Present value of the coefficient.
     pub value: f64,
-    /// The true value, where it is known.
+    /// The true value; `None` if it is unknown.
     pub truth: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Data of a training stage with one rollout length: windows, weights, order, the prior's error.
+//! Data of a training stage with one rollout length: windows, their weights and order, and the prior's error.
 
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use crate::dynamics::windows::{Track, Window, windows};
 use greylag_model::GreyBox;
 use greylag_num::stream;
 
-/// Number of windows for the bare prior's error, L_prior of eq. (23).
+/// Largest number of windows from which the bare prior's error, L_prior of eq. (23), is computed.
 const PRIOR_WINDOWS: usize = 4096;
 const SHUFFLE: u64 = 2;
 
@@ -29,7 +29,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// The rollouts of `steps` steps, and the error of the prior alone, `bare`, on them.
+    /// Collects the rollouts of `steps` steps, and computes the error of the bare prior, `bare`, on them.
     pub(super) fn new(
         bare: &Subject,
         recipe: &Recipe,
@@ -58,14 +58,14 @@ impl Stage {
             return Err(TrainError::Prior(bare.prior.name.clone()));
         }
         let prior_error = match recipe.criterion {
-            // a prior without any error gives no scale
+            // without any error of the prior the divisor would be zero
             Criterion::Scaled => loss.prediction.max(1e-12),
             Criterion::Plain => 1.0,
         };
         Ok(Stage { steps, prior_error, all, pass: u64::MAX, order: Vec::new() })
     }
 
-    /// The rollouts of an update; each epoch shuffles the data anew.
+    /// The rollouts of an update. Each epoch shuffles the data anew.
     pub(super) fn minibatch(&mut self, recipe: &Recipe, update: u64) -> &[Window] {
         let batch = recipe.batch.min(self.all.len());
         let passes = (self.all.len() / batch) as u64;
@@ -80,12 +80,12 @@ impl Stage {
     }
 }
 
-/// Weights of `all` by [`Recipe::floor`]; their mean is 1.
+/// Sets the weights of `all` by [`Recipe::floor`], scaled to a mean of 1.
 fn weigh(all: &mut [Window], model: &GreyBox, tracks: &[Track], steps: usize, floor: f64) {
     let mut weights: Vec<f64> =
         all.par_iter().map(|w| off_after(model, tracks, w, steps).powi(2)).collect();
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // a prior without any error gives no scale
+    // without any error of the prior the divisor would be zero
     let unit = mean(&weights).max(f64::MIN_POSITIVE);
     weights.iter_mut().for_each(|w| *w = 1.0 / (*w / unit + floor * floor));
     let unit = mean(&weights);

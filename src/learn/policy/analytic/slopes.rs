@@ -24,14 +24,15 @@ pub(super) struct Aircraft<R = f64> {
     pub(super) memory: Memory<R>,
 }
 
-/// Slopes of one step of an aircraft: of the next state over the present one, and of the reward over the next.
+/// Slopes of one step of an aircraft: of the next state over the present state and the action, and of the reward over
+/// the next state.
 pub(super) struct Step {
     pub(super) next: [[f32; INPUTS]; NUMBERS],
     pub(super) reward: [f32; NUMBERS],
 }
 
-/// Inputs of the model's step with their finite differences: index among the state variables, and difference (rad,
-/// m/s, rad/s, throttle, m/s²).
+/// Inputs of the model's step that are perturbed for finite differences: index among the state variables, and
+/// perturbation (rad, m/s, rad/s, throttle, m/s²).
 const MOVED: [(usize, f32); 14] = [
     (0, 2e-3),
     (1, 2e-3),
@@ -49,7 +50,7 @@ const MOVED: [(usize, f32); 14] = [
     (20, 0.2),
 ];
 
-/// Data common to all aircraft; shared by all threads.
+/// Data common to all aircraft, shared by all threads.
 #[derive(Clone, Copy)]
 pub(super) struct Flyer<'a> {
     pub(super) model: &'a GreyBox,
@@ -131,7 +132,7 @@ impl Flyer<'_> {
         (after, Step { next, reward: self.reward(&after, target) }, earned)
     }
 
-    /// State and memory after a step; their slopes go into `next`.
+    /// State and memory after a step. Writes their slopes into `next`.
     fn motion(&self, aircraft: &Aircraft, next: &mut [[f32; INPUTS]; NUMBERS]) -> Aircraft {
         let at: Aircraft<Block> = aircraft.map(|place, x| {
             let mut lanes = Block::from_f64(x);
@@ -148,7 +149,8 @@ impl Flyer<'_> {
         let (before, all) = (at.to_array(), after.to_array());
         for row in (0..8).chain(18..21) {
             for (k, (place, _)) in MOVED.iter().enumerate() {
-                // by what it really moved in single precision; a memory that the scheme does not have does not
+                // the perturbation after rounding to single precision; zero for a memory that the integration scheme
+                // lacks
                 let distance = before[*place].0[k + 1] - before[*place].0[0];
                 if distance != 0.0 {
                     next[row][*place] = (all[row].0[k + 1] - all[row].0[0]) / distance;
@@ -158,7 +160,7 @@ impl Flyer<'_> {
         after.map(|_, x| x.0[0].into())
     }
 
-    /// Actuators and last commands after a step; their slopes go into `next`.
+    /// Actuators and last commands after a step. Writes their slopes into `next`.
     fn actuation(
         &self,
         aircraft: &Aircraft,
@@ -193,8 +195,8 @@ impl Flyer<'_> {
         (plain.actuators, plain.previous)
     }
 
-    /// The slope of the reward of eq. (30) over the next state, with two changes: it is smoothed near the target, and
-    /// past a cap a tenth of the slope remains, so that the gradient does not vanish.
+    /// The slope of the reward of eq. (30) over the next state, with two changes. The slope is smoothed near the
+    /// target. Beyond a cap a tenth of the slope remains, because otherwise the gradient would vanish.
     pub(super) fn reward(&self, next: &Aircraft, target: &Target) -> [f32; NUMBERS] {
         let task = Task::PAPER;
         let slope = |x: f64, scale: f64, cap: f64| {
@@ -215,7 +217,7 @@ impl Flyer<'_> {
     }
 }
 
-/// For each observation, the index of its only state variable and the slope.
+/// For each observation, the index of the only state variable on which it depends, and the slope.
 pub(super) fn observation_slopes() -> [(usize, f32); OBSERVATIONS] {
     type D = Dual<13>;
     let at = |k: usize| D::variable(0.1, k);

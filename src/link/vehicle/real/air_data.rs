@@ -1,7 +1,7 @@
-//! Angle of attack and sideslip, estimated without vanes from the controller's other measurements.
+//! Angle of attack and sideslip without vanes, estimated from the flight controller's other measurements.
 //!
-//! An extended Kalman filter of three states, the velocity relative to the air in body axes
-//! (u, v, w), driven by accelerometers, gyros, attitude (Beard & McLain \[BM12\], eq. 3.15):
+//! An extended Kalman filter with three states, the velocity relative to the air in body axes (u, v, w).
+//! Accelerometers, gyros and attitude drive it (Beard & McLain \[BM12\], eq. 3.15):
 //!
 //! ```text
 //! u' = r v - q w - g sin θ         + ax
@@ -9,28 +9,29 @@
 //! w' = q u - p v + g cos θ cos φ   + az
 //! ```
 //!
-//! Three measurements correct it: the airspeed |(u, v, w)|; the climb rate, in air whose vertical
-//! velocity is zero in the mean; and a sideslip that is zero in the mean, or, where wind and
-//! velocity over ground are reported, the sideways velocity computed from them. The state is a
-//! velocity relative to the air, so a constant wind cancels; a steady updraught of 1 m/s shows as
-//! w/V, 3° at 20 m/s.
+//! Three measurements correct the state. The first is the airspeed |(u, v, w)|. The second is the climb rate, in air
+//! whose vertical velocity is zero in the mean. The third is a sideslip that is zero in the mean; if wind and velocity
+//! over ground are reported, the sideways velocity computed from them is used as well. The state is a velocity relative
+//! to the air, so a constant wind cancels. A steady updraught of 1 m/s causes an error of w/V in the angle of attack,
+//! 3° at 20 m/s.
 
 use greylag_physics::atmosphere::MIDDLE_GRAVITY;
 
-/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s² in a step of
-/// 10 ms: light turbulence changes the velocity of the air by about that.
+/// Process noise of the air-relative velocity (gusts, accelerometer noise), m/s². It is multiplied by the step of 10
+/// ms. Light turbulence changes the velocity of the air at about this rate.
 const PROCESS: f64 = 1.0;
 /// Standard deviation of the airspeed, m/s.
 const AIRSPEED: f64 = 0.5;
-/// Standard deviation of the climb rate as a measurement of the air-relative one, m/s.
+/// Standard deviation of the climb rate as a measurement relative to the air, m/s.
 const CLIMB: f64 = 0.5;
-/// Standard deviation of the pseudo-measurement v = 0 at every step, m/s: relative to the process
-/// noise it returns the sideslip to zero within a few seconds, so that drift is bounded and turns show.
+/// Standard deviation of the pseudo-measurement v = 0 at every step, m/s. Relative to the process noise it returns the
+/// sideslip to zero within a few seconds: drift is bounded, and turns remain visible.
 const SIDEWAYS: f64 = 5.0;
-/// Standard deviations of the estimated angle of attack and sideslip, rad. With an exact attitude and in calm air they are 0.2°
-/// and 0.3° to 0.5° for real ArduPlane, 0.1° and 0.2° for real PX4 (`tests/firmware/angles.py`); gusts add to them. A pitch error
-/// adds to the angle of attack, a heading error to the sideslip: 1° of pitch and 2° of heading are taken as two standard
-/// deviations (ArduPlane's own attitude was off by 0.7° and 0.9°; a compass may be off by more).
+/// Standard deviations of the estimated angle of attack and sideslip, rad. With an exact attitude and in calm air they
+/// are 0.2° and 0.3° to 0.5° for real ArduPlane, 0.1° and 0.2° for real PX4 (`tests/firmware/angles.py`). Gusts add to
+/// them. A pitch error adds to the angle of attack, a heading error to the sideslip. 1° of pitch and 2° of heading are
+/// taken as two standard deviations: ArduPlane's attitude errors were 0.7° and 0.9°, and a compass may have a larger
+/// error.
 pub const DEVIATION: [f64; 2] = [0.71 * DEGREE, 1.12 * DEGREE];
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Lowest airspeed at which the flow angles are estimated, m/s.
@@ -45,23 +46,24 @@ pub struct Measured {
     pub rates: [f64; 3],
     /// Specific force, m/s², FRD.
     pub specific_force: [f64; 3],
-    /// True airspeed V_a, m/s.
+    /// True airspeed V_a, m/s. Below 3 m/s the estimate restarts.
     pub airspeed: f64,
-    /// Climb rate, m/s; NaN when not reported.
+    /// Climb rate, m/s, positive upward; NaN if not reported.
     pub climb: f64,
-    /// Velocity over ground, NED, m/s; NaN when it has not been reported since the last update: an old
-    /// one has the wrong direction in a turn.
+    /// Velocity over ground, NED, m/s; NaN if none was received since the last update, because an old velocity has the
+    /// wrong direction in a turn.
     pub velocity: [f64; 3],
-    /// The air's velocity, NED, m/s; NaN when not reported.
+    /// Wind velocity, NED, m/s; NaN if not reported.
     pub wind: [f64; 3],
-    /// Standard deviation of the wind, and so of the sideways velocity computed from it, m/s.
+    /// Standard deviation of the wind, m/s. The sideways velocity computed from the wind has the same standard
+    /// deviation.
     pub wind_sd: f64,
 }
 
 /// Extended Kalman filter of the air-relative velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AirData {
-    /// u, v, w, m/s; none before the first measurement.
+    /// u, v, w, m/s; `None` before the first measurement.
     state: Option<[f64; 3]>,
     covariance: [[f64; 3]; 3],
 }
@@ -73,8 +75,8 @@ impl Default for AirData {
 }
 
 impl AirData {
-    /// Updates with a measurement `step` seconds after the last one; returns α and β, rad, or `None` below flying
-    /// speed or when the measurement is not finite.
+    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad; `None` below 3 m/s or if the
+    /// measurement is not finite.
     pub fn update(&mut self, m: &Measured, step: f64) -> Option<[f64; 2]> {
         let needed =
             m.attitude.iter().chain(&m.rates).chain(&m.specific_force).chain([&m.airspeed]);
@@ -82,7 +84,7 @@ impl AirData {
             *self = AirData::default();
             return None;
         }
-        // after a long gap, or one that is not finite, the estimate starts again
+        // the estimate restarts after a gap of more than 0.5 s and after a step that is not finite
         let step = match (0.0..=0.5).contains(&step) {
             true => step,
             false => {
@@ -131,7 +133,7 @@ impl AirData {
         let sideways = [0.0, 1.0, 0.0];
         let air = [0, 1, 2].map(|i| m.velocity[i] - m.wind[i]);
         if air.iter().all(|x| x.is_finite()) {
-            // The second column of the rotation body → NED.
+            // the second column of the rotation from body axes to NED
             let (sy, cy) = m.attitude[2].sin_cos();
             let side = [sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp];
             let measured: f64 = side.iter().zip(air).map(|(a, b)| a * b).sum();
@@ -144,16 +146,16 @@ impl AirData {
         self.state.map_or(0.0, |x| row.iter().zip(x).map(|(a, b)| a * b).sum())
     }
 
-    /// Updates with one scalar measurement: its row, innovation and standard deviation.
+    /// Updates with one scalar measurement: its row, innovation and standard deviation (m/s).
     fn scalar(&mut self, row: [f64; 3], innovation: f64, deviation: f64) {
         let Some(state) = &mut self.state else { return };
         let p = self.covariance;
         let cross: [f64; 3] = [0, 1, 2].map(|i| (0..3).map(|j| p[i][j] * row[j]).sum());
         let spread: f64 =
             row.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>() + deviation * deviation;
-        // an outlier counts for no more than three standard deviations
+        // an outlier counts as three standard deviations at most
         let limit = 3.0 * spread.sqrt();
-        // a NaN limit must not panic in the clamp; it does not limit
+        // a NaN limit must not panic in the clamp and does not limit
         let innovation = innovation.max(-limit).min(limit);
         for i in 0..3 {
             state[i] += cross[i] / spread * innovation;
@@ -164,7 +166,7 @@ impl AirData {
     }
 }
 
-/// Initial velocity: straight flight along the path given by airspeed and climb rate.
+/// Initial velocity (u, v, w), m/s: straight flight along the path given by airspeed and climb rate.
 fn beginning(m: &Measured) -> [f64; 3] {
     let climb = if m.climb.is_finite() { m.climb } else { 0.0 };
     let path = (climb / m.airspeed).clamp(-0.9, 0.9).asin();
@@ -239,14 +241,14 @@ mod tests {
         assert!(air.update(&level(), f64::NAN).is_some());
     }
 
-    /// A steady turn whose velocity relative to the air, in body axes, is `air` m/s; its measurement at `t` s.
+    /// Measurement at `t` seconds in a steady turn at the rate `turn` (rad/s), with the velocity `air` (m/s) relative
+    /// to the air in body axes.
     fn turning(air: [f64; 3], [roll, pitch]: [f64; 2], turn: f64, t: f64) -> Measured {
         let [u, v, w] = air;
         let yaw = 0.4 + turn * t;
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
         let [p, q, r] = [-turn * sp, turn * sr * cp, turn * cr * cp];
-        // The velocity is constant in body axes: the specific force is the acceleration that turns
-        // it, less gravity.
+        // The velocity is constant in body axes. The specific force is its acceleration in the turn, less gravity.
         let specific_force = [
             q * w - r * v + MIDDLE_GRAVITY * sp,
             r * u - p * w - MIDDLE_GRAVITY * cp * sr,
@@ -272,9 +274,9 @@ mod tests {
 
     #[test]
     fn the_angles_of_a_climbing_turn_with_sideslip_are_found() {
-        // Every measurement is consistent with the motion, so the filter has to find it with any weights. The
-        // pseudo-measurement of zero sideslip biases it by the fraction (0.05 / 5)². 0.03° is a fiftieth of the
-        // error that the LQI tolerates.
+        // Every measurement is consistent with the motion, so the filter must find it with any weights. The
+        // pseudo-measurement of zero sideslip biases it by the fraction (0.05 / 5)². 0.03° is a fiftieth of the error
+        // that the LQI tolerates.
         for (air, attitude, turn) in
             [([21.0, 1.5, 2.0], [0.6, 0.25], 0.35), ([19.0, -2.0, 0.5], [-0.9, -0.1], -0.6)]
         {
@@ -291,14 +293,14 @@ mod tests {
 
     #[test]
     fn the_first_state_is_straight_flight_along_the_path() {
-        // 10° of pitch on a path that rises by 6°: the angle of attack is 4° from the first state on.
+        // 10° of pitch on a path that climbs at 6°: the angle of attack is 4° from the first state on.
         let path = 6f64.to_radians();
         let air = [20.0 * 4f64.to_radians().cos(), 0.0, 20.0 * 4f64.to_radians().sin()];
         let climbing = turning(air, [0.0, 10f64.to_radians()], 0.0, 0.0);
         assert!((climbing.climb - 20.0 * path.sin()).abs() < 1e-9);
         let first = AirData::default().update(&climbing, 0.01).unwrap();
         assert!((first[0].to_degrees() - 4.0).abs() < 0.02, "{first:?}");
-        // Without a climb rate the path is taken to be level, and the angle is bounded.
+        // Without a climb rate the path counts as level, and the angle is bounded.
         let blind = Measured { climb: f64::NAN, attitude: [0.0, 0.1, 0.0], ..climbing };
         let [u, _, w] = beginning(&blind);
         assert!((w.atan2(u) - 0.1).abs() < 1e-12 && (u.hypot(w) - 20.0).abs() < 1e-9);
@@ -314,7 +316,7 @@ mod tests {
         let mut filter = AirData::default();
         let step = |k: u32| turning(air, [0.5, 0.3], 0.3, f64::from(k) * 0.01);
         let last = (0..3000).filter_map(|k| filter.update(&step(k), 0.01)).last().unwrap();
-        // atan(6 / 20) and asin(4 / 21.26).
+        // atan(6 / 20) and asin(4 / 21.26)
         let [alpha, beta] = last.map(f64::to_degrees);
         assert!((alpha - 16.699).abs() < 0.03 && (beta - 10.844).abs() < 0.03, "{alpha} {beta}");
         let slow = Measured { airspeed: 3.0, velocity: [3.0, 0.0, 0.0], ..level() };
@@ -323,7 +325,7 @@ mod tests {
 
     #[test]
     fn a_first_airspeed_that_was_wrong_is_forgotten_within_half_a_second() {
-        // 6 m/s too fast: the path seems flatter, the angle of attack larger by 1.4°.
+        // 6 m/s too fast: the path seems flatter, and the angle of attack larger by 1.4°.
         let (sin, cos) = 4f64.to_radians().sin_cos();
         let good = turning([20.0 * cos, 0.0, 20.0 * sin], [0.0, 10f64.to_radians()], 0.0, 0.0);
         let mut filter = AirData::default();
@@ -350,7 +352,7 @@ mod tests {
 
     #[test]
     fn a_glitch_moves_the_angles_by_a_tenth_of_a_degree() {
-        // An outlier of 40 m/s of climb: its innovation is limited to 1.5 m/s, and the gain is about a fiftieth.
+        // An outlier of 40 m/s in the climb rate. Its innovation is limited to 1.5 m/s, and the gain is about 1/50.
         let mut filter = AirData::default();
         let before = (0..400).filter_map(|_| filter.update(&level(), 0.01)).last().unwrap();
         let after = filter.update(&Measured { climb: 40.0, ..level() }, 0.01).unwrap();

@@ -1,4 +1,4 @@
-//! Assembles state frames from separate streams: each attitude completes one.
+//! Assembles state frames from separate streams. Each attitude message completes a frame.
 
 use std::time::Duration;
 
@@ -12,15 +12,15 @@ use greylag_physics::airframe::ActuatorFigures;
 use greylag_physics::atmosphere::{self, SEA_LEVEL_DENSITY};
 use greylag_physics::{Command, Controls, State, Time};
 
-/// Time between states, µs.
+/// Nominal time between states, µs.
 const PERIOD_US: u64 = 10_000;
-/// A step back of the clock by more than this is a restart, ms; less is a late datagram.
+/// Step back of the clock, ms, above which the controller has restarted. A smaller step back is a late datagram.
 const RESTART_MS: i32 = 1000;
-/// Age at which a part of the state is outdated.
+/// Age above which a part of the state is stale.
 const STALE: Duration = Duration::from_millis(300);
-/// Largest number of actuator-model steps run after a gap: a fifth of a second, longer than any transient.
+/// Largest number of actuator-model steps after a gap: 0.2 s, longer than any transient.
 const CATCH_UP: u64 = 20;
-/// The last value of a stream with its arrival time, host clock.
+/// The last value of a stream with its arrival time (host clock); `None` before the first value.
 type Heard<T> = Option<(Duration, T)>;
 
 /// The latest values of a controller's streams.
@@ -29,7 +29,7 @@ pub(super) struct Assembly {
     figures: ActuatorFigures,
     specific_force: Heard<[f64; 3]>,
     density: Heard<f64>,
-    /// Equivalent airspeed, altitude, climb rate.
+    /// Equivalent airspeed (m/s), altitude (m), climb rate (m/s).
     air: Heard<[f64; 3]>,
     incidence: Heard<[f64; 2]>,
     estimator: AirData,
@@ -39,7 +39,7 @@ pub(super) struct Assembly {
     actuators: Actuators,
     boot_ms: Option<u32>,
     last: Telemetry,
-    /// Standard deviation of the reported wind, m/s.
+    /// Assumed standard deviation of the reported wind, m/s.
     wind_sd: f64,
     /// Bit patterns of the last state's sensor values, to detect frozen sensors.
     shown: [u64; 13],
@@ -81,7 +81,7 @@ impl Assembly {
         }
     }
 
-    /// Roll and pitch of the last state, rad; NaN where implausible.
+    /// Roll and pitch of the last state, rad; NaN if implausible.
     pub(super) fn attitude(&self) -> [f64; 2] {
         match self.last.faults.contains(Faults::ATTITUDE) {
             true => [f64::NAN; 2],
@@ -89,7 +89,7 @@ impl Assembly {
         }
     }
 
-    /// Takes a measurement; an attitude completes a state. `command` is the actuators' command since the last state.
+    /// Processes a measurement. An attitude completes a state. `command` is the actuator command since the last state.
     pub(super) fn take(
         &mut self,
         host: Duration,
@@ -150,9 +150,9 @@ impl Assembly {
         }
         self.fill_force(host, &mut next);
         let climb = self.fill_air(host, &mut next);
-        // outdated parts do not count as frozen; they are a fault already
+        // stale parts do not count as frozen, because they are already a fault
         if self.stands_still(quaternion, rates) && next.faults.is_empty() {
-            // the estimator would go on by itself, and hide from the pilot that all sensors are frozen
+            // the estimator would continue by itself, and hide from the pilot that all sensors are frozen
             (next.state.alpha, next.state.beta) = (self.last.state.alpha, self.last.state.beta);
         } else {
             self.fill_incidence(host, &mut next, climb, step.as_secs_f64());
@@ -167,7 +167,7 @@ impl Assembly {
         Some(next)
     }
 
-    /// Whether every sensor value equals that of the last state bit by bit.
+    /// Whether every sensor value equals the value of the last state bit by bit.
     fn stands_still(&mut self, quaternion: [f64; 4], rates: [f64; 3]) -> bool {
         let force = self.specific_force.map_or([0.0; 3], |(_, force)| force);
         let air = self.air.map_or([0.0; 3], |(_, air)| air);
@@ -184,7 +184,7 @@ impl Assembly {
         }
     }
 
-    /// Fills true airspeed and altitude; returns the climb rate.
+    /// Fills in true airspeed and altitude. Returns the climb rate, m/s; NaN if it is stale.
     fn fill_air(&self, host: Duration, next: &mut Telemetry) -> f64 {
         let Some([equivalent, altitude, climb]) = fresh(self.air, host) else {
             next.faults.insert(Faults::LATE_AIR);
@@ -218,8 +218,8 @@ impl Assembly {
         };
         let estimated = self.estimator.update(&measured, step);
         let whole = !next.faults.contains(Faults::SPECIFIC_FORCE);
-        // ArduPilot derives AOA_SSA from the wind estimate of its filter, without vanes. With real ArduPlane the standard
-        // deviation of its sideslip error was 1.7°, that of this estimate 0.4°.
+        // ArduPilot derives AOA_SSA from its wind estimate, without vanes. With real ArduPlane the standard deviation
+        // of its sideslip error was 1.7°, that of this estimate 0.4°.
         match estimated.filter(|_| whole).or(reported) {
             Some([alpha, beta]) => (next.state.alpha, next.state.beta) = (alpha, beta),
             None => next.faults.insert(Faults::INCIDENCE),
@@ -231,7 +231,7 @@ impl Assembly {
         next.incidence_sd = air_data::DEVIATION.map(|sd| sd.hypot(gust));
     }
 
-    /// Vehicle time, unwrapped after 49 days of milliseconds, and its order relative to the last.
+    /// Vehicle time, and its order relative to the last state. The 32-bit count of milliseconds wraps after 49 days.
     fn order(&mut self, boot_ms: u32) -> (Time, Order) {
         let first = Time::from_micros(1000 * u64::from(boot_ms));
         let Some(before) = self.boot_ms else {
@@ -388,7 +388,7 @@ mod tests {
         assembly.take(host, &position(91.0), &Command::IDLE);
         let state = assembly.take(host, &attitude(20), &Command::IDLE).unwrap();
         assert!(state.position[0].is_nan() && state.velocity[0].is_nan());
-        // √(1.225 / 1.156), the density at 600 m of the standard atmosphere.
+        // √(1.225 / 1.156), with the density of the standard atmosphere at 600 m.
         assert!((state.state.airspeed - 20.588).abs() < 0.005, "{}", state.state.airspeed);
         assembly.take(host, &position(45.0), &Command::IDLE);
         let state = assembly.take(host, &attitude(30), &Command::IDLE).unwrap();

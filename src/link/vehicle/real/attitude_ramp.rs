@@ -1,30 +1,30 @@
-//! Rate limit on the attitude commanded to a controller.
+//! Rate limit on the attitude that is commanded to a flight controller.
 //!
-//! A step of the bank from one side to the other saturates a controller's loops, and its pitch error reaches 20°
-//! meanwhile. A ramp that the loops can follow keeps the attitude inside the envelope.
+//! A step of bank from one side to the other saturates a flight controller's loops. The pitch error then reaches 20°. A
+//! ramp that the loops can follow keeps the attitude inside the envelope.
 
 use greylag_physics::Time;
 
-/// Fastest change of the commanded roll and pitch, rad/s: below the limits that controllers set themselves (PX4's default is 70°/s in
-/// roll, 60°/s in pitch; ArduPilot's autotune takes 75°/s).
+/// Largest rate of the commanded roll and pitch, rad/s. It is below the limits of flight controllers: PX4's defaults
+/// are 70°/s in roll and 60°/s in pitch; ArduPilot's autotune takes 75°/s.
 const RATE: [f64; 2] = [45.0 * DEGREE, 20.0 * DEGREE];
-/// Gap between two states after which the ramp starts again, s.
+/// Longest time step of the ramp, s. A longer gap between two states counts as this long.
 const GAP_S: f64 = 0.1;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// The roll and pitch commanded last.
+/// The ramp, with the roll and pitch (rad) that were last commanded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeRamp {
     last: Option<(Time, [f64; 2])>,
 }
 
 impl AttitudeRamp {
-    /// Resets the ramp: the controller flies by itself.
+    /// Resets the ramp while the flight controller flies by itself.
     pub(super) fn rest(&mut self) {
         self.last = None;
     }
 
-    /// The roll and pitch to command on the ramp to `wanted`, rad, at `now`; the ramp starts at `seen`.
+    /// The roll and pitch to command at `now` on the ramp to `wanted`, rad. After a reset the ramp starts at `seen`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let (before, from) = self.last.unwrap_or((now, seen));
         let dt = now.since(before).as_secs_f64().min(GAP_S);

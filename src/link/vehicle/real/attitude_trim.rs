@@ -1,25 +1,25 @@
-//! Slow integral correction of the attitude commanded to a controller.
+//! Slow integral correction of the attitude that is commanded to a flight controller.
 //!
-//! The controller's loops leave a steady-state error of 0.3° to 1.8°. In steep turns, simulated loops whose elevator
-//! feed-forward does not fit the aircraft leave up to 9° of pitch for half a minute.
+//! The flight controller's loops leave a steady-state error of 0.3° to 1.8°. In steep turns, simulated loops with an
+//! elevator feed-forward that does not fit the aircraft leave up to 9° of pitch for half a minute.
 //!
-//! The error is integrated over seconds, within narrow bounds, and only while the wanted attitude is constant and nearly
-//! reached: constant errors are removed, transients are left to the controller.
+//! The error is integrated over seconds and within narrow bounds, while the wanted attitude is constant and nearly
+//! reached. Constant errors are removed. Transients are left to the flight controller.
 
 use greylag_physics::Time;
 
-/// Time constant of the integrator, s: five times slower than a controller's attitude loop.
+/// Time constant of the integrator, s: five times that of a flight controller's attitude loop.
 const TIME_S: f64 = 2.5;
-/// Largest correction, rad: the error of the simulated loops of PX4 and ArduPlane at 55° of bank and 20° nose down.
+/// Largest correction, rad. The simulated loops of PX4 and ArduPlane have this error at 55° of bank and 20° nose down.
 const MOST: f64 = 10.0 * DEGREE;
-/// Change of the wanted attitude that restarts settling, rad.
+/// Change of the wanted attitude that restarts the settling time, rad.
 const STILL: f64 = 0.5 * DEGREE;
-/// Time for which the wanted attitude must be constant before the error is integrated, s: after a step to the other
-/// bank PX4's roll rings this long, with a period of 5 s.
+/// Time for which the wanted attitude must be constant before the error is integrated, s. After a reversal of the bank,
+/// PX4's roll oscillates for this time with a period of 5 s.
 const SETTLING_S: f64 = 4.0;
-/// Error above which integration stops, rad: it is not a steady-state error.
+/// Error above which integration stops, rad, because it is not a steady-state error.
 const NEAR: f64 = 12.0 * DEGREE;
-/// Change of the wanted attitude beyond which the correction is reset, rad.
+/// Change of the wanted attitude that resets the correction, rad.
 const ANOTHER: f64 = 4.0 * DEGREE;
 /// Time between two states above which integration is skipped, s.
 const GAP_S: f64 = 0.1;
@@ -29,20 +29,20 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AttitudeTrim {
     added: [f64; 2],
-    /// The wanted attitude at which the correction was found, rad.
+    /// The wanted attitude at which the correction was integrated, rad.
     found_at: [f64; 2],
     last: Option<Time>,
-    /// The constant wanted attitude, and since when.
+    /// The constant wanted attitude, rad, and the time since which it has been constant.
     standing: Option<([f64; 2], Time)>,
 }
 
 impl AttitudeTrim {
-    /// Resets the correction: the controller flies by itself.
+    /// Resets the correction while the flight controller flies by itself.
     pub(super) fn rest(&mut self) {
         *self = AttitudeTrim::default();
     }
 
-    /// The roll and pitch to command, rad, for `wanted` and the measured attitude `seen` at `now`.
+    /// The roll and pitch to command at `now`, rad, for the wanted attitude `wanted` and the measured attitude `seen`.
     pub(super) fn command(&mut self, now: Time, wanted: [f64; 2], seen: [f64; 2]) -> [f64; 2] {
         let dt = self.last.replace(now).map_or(0.0, |last| now.since(last).as_secs_f64());
         let stands = self.standing.filter(|(stood, _)| !far(*stood, wanted, STILL));
@@ -51,11 +51,11 @@ impl AttitudeTrim {
         let settled = now.since(since).as_secs_f64() >= SETTLING_S;
         for axis in 0..2 {
             let added = &mut self.added[axis];
-            // a correction found in a turn to the right is wrong in one to the left
+            // the correction of a right turn is wrong in a left turn
             if (self.found_at[axis] - wanted[axis]).abs() > ANOTHER {
                 *added = 0.0;
             }
-            // the controller's error with respect to its command, which includes the correction
+            // error of the controller with respect to its command, which includes the correction
             let left = (wanted[axis] + *added - seen[axis]).abs();
             if settled && dt <= GAP_S && left <= NEAR {
                 *added = (*added + (wanted[axis] - seen[axis]) * dt / TIME_S).clamp(-MOST, MOST);
@@ -75,8 +75,8 @@ fn far(a: [f64; 2], b: [f64; 2], by: f64) -> bool {
 mod tests {
     use super::*;
 
-    /// Attitude error at each tick of 20 s of flight, rad, with a controller that follows within half a second and stays off by
-    /// `error` (rad). `wanted` is the wanted roll (rad) as a function of time (s); the flight starts there.
+    /// Attitude error at each tick of 20 s of flight, rad. The controller follows within half a second and keeps an
+    /// error of `error` (rad). `wanted` is the wanted roll (rad) as a function of time (s). The flight starts there.
     fn flown(error: f64, wanted: impl Fn(f64) -> f64) -> Vec<f64> {
         let (mut trim, mut roll) = (AttitudeTrim::default(), wanted(0.0));
         (0..2000)
@@ -92,8 +92,7 @@ mod tests {
 
     #[test]
     fn an_error_that_stays_is_gone_after_some_seconds() {
-        // 1.8° is the largest error that was measured with real firmware; it must fall below a
-        // tenth of a degree.
+        // 1.8° is the largest error measured with real firmware. It must fall below a tenth of a degree.
         let errors = flown(1.8 * DEGREE, |_| 0.8);
         assert!(errors[140].abs() > 1.5 * DEGREE, "the controller's own at first");
         assert!(errors[1400..].iter().all(|e| e.abs() < 0.1 * DEGREE), "{}", errors[1400] / DEGREE);
@@ -102,10 +101,10 @@ mod tests {
     #[test]
     fn the_trim_is_bounded_and_leaves_manoeuvres_alone() {
         let errors = flown(11.0 * DEGREE, |_| 0.8);
-        // 10° of 11° at the most.
+        // At most 10° of the 11° are removed.
         assert!((errors[1999].abs() / DEGREE - 1.0).abs() < 0.01, "{}", errors[1999] / DEGREE);
         assert!(flown(13.0 * DEGREE, |_| 0.8)[1999].abs() > 12.9 * DEGREE, "no error that stays");
-        // Half a hertz: the wanted attitude is never constant, so no correction is added.
+        // 0.5 Hz: the wanted attitude is never constant, so no correction is added.
         let sine = |t: f64| 0.3 * (3.1 * t).sin();
         let mut plain = 0.0;
         for (tick, error) in flown(0.01, sine).into_iter().enumerate() {
@@ -148,12 +147,12 @@ mod tests {
 
     #[test]
     fn the_trim_takes_its_time() {
-        // 4 s to settle, then a time of 2.5 s: after 7 s 0.54° of 1.8° are left, e^(−1.2) of it.
+        // After 4 s of settling time the time constant is 2.5 s: after 7 s, e^(−1.2) of 1.8° remains, 0.54°.
         let left = flown(1.8 * DEGREE, |_| 0.8)[700].abs() / DEGREE;
         assert!((left - 0.54).abs() < 0.05, "{left}");
     }
 
-    /// A trim of 1.8° that was found in a turn to the right, 20 s long.
+    /// A correction of 1.8°, integrated in a right turn of 20 s.
     fn trimmed() -> AttitudeTrim {
         let (mut trim, mut roll) = (AttitudeTrim::default(), 0.8);
         for tick in 0..2000 {

@@ -1,4 +1,4 @@
-//! Delay of the surface loop, estimated from the controller's parameters, and the remaining delay margin.
+//! Delay of the surface loop from the flight controller's parameters, and the remaining delay margin.
 
 use std::fmt;
 use std::time::Duration;
@@ -6,19 +6,20 @@ use std::time::Duration;
 use super::Real;
 use super::profile::{Authority, Stack};
 
-/// Delay of a second-order Butterworth low-pass at low frequencies, in cycles of its cut-off: √2 / 2π.
+/// Delay of a second-order Butterworth low-pass at low frequencies, in periods of its cut-off frequency: √2 / 2π.
 const LOW_PASS: f64 = 0.225;
-/// Sampling period of the sticks, s: ArduPilot samples its channels every 20 ms; PX4 takes each
-/// MANUAL_CONTROL, 10 ms apart.
+/// Sampling periods of the channels, s. ArduPilot samples its channels every 20 ms. PX4 takes each MANUAL_CONTROL, one
+/// per 10 ms.
 const CHANNELS_S: [f64; 2] = [0.02, 0.01];
-/// Remaining delay margin below which a warning is given, s; it covers the link and other delays known roughly.
+/// Remaining delay margin below which a warning is given, s. It covers the link and other delays that are known only
+/// roughly.
 const SCARCE_S: f64 = 0.015;
 
 /// Contributions to the delay of the loop, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delays {
     stack: Stack,
-    /// Cut-off of the gyros' low-pass, Hz, and its delay, s.
+    /// Cut-off frequency of the gyro low-pass, Hz, and its delay, s.
     gyros: (f64, f64),
     /// Loop rate (Hz) and period (s) of the flight controller; `None` if its delay is negligible (PX4).
     cycle: Option<(f64, f64)>,
@@ -49,12 +50,12 @@ impl fmt::Display for Delays {
 }
 
 impl Real {
-    /// Sets the delay margin of the loop through the surfaces.
+    /// Sets the delay margin of the loop through the surfaces; `None` if it is unknown.
     pub fn bear(&mut self, least: Option<Duration>) {
         self.bears = least;
     }
 
-    /// Delay contributions, once the parameters are read; `None` when attitudes are commanded.
+    /// The contributions to the delay; `None` before the parameters are read, and if attitudes are commanded.
     pub fn delays(&self) -> Option<Delays> {
         if self.profile.authority == Authority::Attitude {
             return None;
@@ -73,12 +74,12 @@ impl Real {
         Some(Delays { stack, gyros: (hz, low_pass), cycle, channels_s })
     }
 
-    /// Remaining delay margin, s, with a text on the contributions.
+    /// Remaining delay margin, s, and a text on its contributions; `None` if it is unknown.
     fn left(&self) -> Option<(f64, String)> {
         let (delays, bears) = (self.delays()?, self.bears?.as_secs_f64());
         let left = bears - delays.sum_s();
         let words = format!(
-            "{delays}: {:.0} of the {:.0} ms at which its loop swings by itself, {:.0} ms are left",
+            "{delays}: {:.0} of the {:.0} ms at which the loop oscillates; margin {:.0} ms",
             1e3 * delays.sum_s(),
             1e3 * bears,
             1e3 * left
@@ -86,21 +87,23 @@ impl Real {
         Some((left, words))
     }
 
-    /// The remaining delay margin as text; `None` where it is unknown.
+    /// The remaining delay margin as text; `None` if it is unknown.
     pub fn delay_words(&self) -> Option<String> {
         self.left().map(|(_, words)| words)
     }
 
-    /// Why the delay forbids flight by surfaces, with the remedy.
+    /// Reason for which the delay forbids control of the surfaces, with the remedy; `None` if the margin is positive or
+    /// unknown.
     pub fn delay_obstacle(&self) -> Option<String> {
         let (left, words) = self.left()?;
-        (left <= 0.0)
-            .then(|| format!("the controller bears no such delay: {words}; {}", self.shorter()))
+        (left <= 0.0).then(|| {
+            format!("the delay exceeds the controller's margin: {words}; {}", self.shorter())
+        })
     }
 
     pub(super) fn delay_warning(&self) -> Option<String> {
         let (left, words) = self.left()?;
-        (left < SCARCE_S).then(|| format!("little delay is left: {words}; {}", self.shorter()))
+        (left < SCARCE_S).then(|| format!("small delay margin: {words}; {}", self.shorter()))
     }
 
     fn shorter(&self) -> &'static str {

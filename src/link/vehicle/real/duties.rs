@@ -1,4 +1,4 @@
-//! Periodic duties: heartbeat, watchdog, requests of streams, parameters and modes.
+//! Periodic duties: heartbeat, watchdog, and requests of streams, parameters and modes.
 
 use std::time::Duration;
 
@@ -9,15 +9,16 @@ use crate::framing::Source;
 use crate::wire::controller as wire;
 
 const HEARTBEAT: Duration = Duration::from_secs(1);
-/// Interval of latency measurements.
+/// Interval between latency measurements.
 const TIME_SYNC: Duration = Duration::from_millis(200);
-/// Age of the last new state at which control authority is returned.
+/// Age of the newest state at which control authority is returned.
 const BLIND: Duration = Duration::from_millis(300);
-/// Silence after which a controller's own failsafe acts (COM_RC_LOSS_T, RC_OVERRIDE_TIME, …).
+/// Silence of the companion after which a flight controller's own failsafe acts (COM_RC_LOSS_T, RC_OVERRIDE_TIME, …).
 const DEAD: Duration = Duration::from_millis(500);
 
 impl Real {
-    /// Frames due at `host`, other than replies to states: heartbeat, requests, the return of control authority.
+    /// Frames other than replies that are due at `host`: heartbeat, requests, and the return of control authority.
+    /// `None` without such frames.
     pub fn due(&mut self, host: Duration) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         self.now = host;
@@ -34,11 +35,11 @@ impl Real {
         (!bytes.is_empty()).then_some(bytes)
     }
 
-    /// See [`crate::vehicle::Vehicle::excuse`]. After a silence longer than its timeout the controller's own failsafe
-    /// is active, and it keeps the aircraft.
+    /// See [`crate::vehicle::Vehicle::excuse`]. After a stall longer than 0.5 s the flight controller's own failsafe is
+    /// active. Control authority is then returned.
     pub fn excuse(&mut self, missed: Duration) {
         if self.engagement.steers() && missed > DEAD {
-            self.hand_back(format!("this computer was late by {:.1} s", missed.as_secs_f64()));
+            self.hand_back(format!("this computer stalled for {:.1} s", missed.as_secs_f64()));
         }
         self.last_state = self.last_state.map(|at| at + missed);
         if let Some(controller) = &mut self.controller {
@@ -47,13 +48,13 @@ impl Real {
         self.pulse.rest();
     }
 
-    /// Returns control authority when states or cycles are missing.
+    /// Returns control authority if heartbeats, states or cycles are missing, or if engagement has timed out.
     fn watch(&mut self, host: Duration) {
         if !self.engagement.steers() {
             self.pulse.rest();
             return self.remind(host);
         }
-        // a controller that tracks an attitude tolerates a slow companion
+        // a controller that tracks an attitude tolerates slow commands
         let surfaces = self.profile.authority == Authority::Surfaces;
         let scarce = self.pulse.cycle(host, self.survey.frames()).filter(|_| surfaces);
         let age = |at: Duration| host.saturating_sub(at);
@@ -69,11 +70,11 @@ impl Real {
         } else if let Some(why) =
             self.engagement.overdue(host, self.profile.stack, self.profile.authority)
         {
-            self.hand_back(format!("the controller did not go to {steered}: {why}"));
+            self.hand_back(format!("the controller did not enter {steered}: {why}"));
         }
     }
 
-    /// Reports that a return of control authority is not confirmed.
+    /// Reports that the return of control authority is not confirmed.
     fn remind(&mut self, host: Duration) {
         if self.engagement.unconfirmed(host) {
             let (steered, hold) =
@@ -121,7 +122,7 @@ impl Real {
         let message = wire::set_mode(to, mode.main, mode.sub);
         bytes.extend(self.write(&message));
         if !steer && (stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces) {
-            // the channels return to the radio
+            // the channels are returned to the radio
             let message = wire::channels_override(to, [0; 3]);
             bytes.extend(self.write(&message));
         }

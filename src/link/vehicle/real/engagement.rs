@@ -1,7 +1,7 @@
-//! Control authority: from the request to the flight controller to its return.
+//! Control authority: its request from the flight controller, and its return.
 //!
-//! The mode in HEARTBEAT or CURRENT_MODE decides. COMMAND_ACK does not: PX4 sends two for a mode, the first always
-//! ACCEPTED, and a link may lose either.
+//! The mode in HEARTBEAT or CURRENT_MODE decides. COMMAND_ACK does not decide, because PX4 sends two for a mode
+//! request, of which the first is always ACCEPTED. A link may also lose either of them.
 
 use std::time::Duration;
 
@@ -9,51 +9,51 @@ use super::profile::{Authority, Stack};
 
 /// Interval at which a mode request is repeated.
 pub(super) const ASK_AGAIN: Duration = Duration::from_millis(250);
-/// Timeout for the mode to be shown after the first request.
+/// Timeout from the first possible request until the controller shows the mode.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Time after which an unconfirmed return is reported: two heartbeats are due.
+/// Time after which an unconfirmed return is reported. Two heartbeats are due in this time.
 const UNCONFIRMED: Duration = Duration::from_secs(2);
-/// Time after engaging for which another mode is ignored: HEARTBEAT and CURRENT_MODE may overtake
-/// one another by a datagram.
+/// Time after engagement in which another mode is ignored. HEARTBEAT and CURRENT_MODE may arrive in the wrong order.
 const GRACE: Duration = Duration::from_millis(100);
 
 /// Phase of the engagement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Phase {
-    /// The controller flies, or its pilot does.
+    /// The controller or its pilot flies.
     Idle,
-    /// The steered mode is requested; meanwhile a stream of commands is sent, which the controller requires first.
+    /// The steered mode is being requested. Commands are already streamed, because the controller requires a stream
+    /// before the mode.
     Entering { since: Duration, asked: Option<Duration> },
     /// The companion has control authority.
     Engaged { since: Duration },
-    /// The controller's own mode is requested, until it is shown.
+    /// The controller's hold mode is requested until the controller shows another mode than the steered one.
     Releasing { since: Option<Duration>, asked: Option<Duration> },
 }
 
-/// Event derived from a mode that the controller shows.
+/// Event that follows from a mode shown by the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     /// No change of the phase.
     Nothing,
     /// The companion has control authority from now on.
     Engaged,
-    /// The controller or its pilot has taken control.
+    /// The controller, or its pilot, has taken control.
     Taken,
     /// The controller has confirmed the return.
     Confirmed,
 }
 
-/// The phase with the controller's replies.
+/// The phase of the engagement, with the controller's replies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Engagement {
     pub(super) phase: Phase,
-    /// Time for which commands are streamed before the mode is requested.
+    /// Time for which commands are streamed before the first mode request.
     lead: Duration,
     /// The last MAV_RESULT other than ACCEPTED.
     refused: Option<u8>,
-    /// Whether any request was accepted.
+    /// Whether any mode request was accepted.
     accepted: bool,
-    /// After a return, engaging is blocked until the demand has ended once.
+    /// Whether engagement is blocked: after a return, until the demand has ended once.
     barred: bool,
     /// Whether the unconfirmed return was reported.
     reminded: bool,
@@ -71,7 +71,7 @@ impl Engagement {
         }
     }
 
-    /// Whether commands are sent.
+    /// Whether the companion sends commands.
     pub(super) fn steers(&self) -> bool {
         matches!(self.phase, Phase::Entering { .. } | Phase::Engaged { .. })
     }
@@ -81,7 +81,7 @@ impl Engagement {
         matches!(self.phase, Phase::Engaged { .. })
     }
 
-    /// Starts engaging on demand; returns whether it starts now.
+    /// Starts engagement if it is demanded and not blocked. Returns whether it starts now.
     pub(super) fn begin(&mut self, host: Duration) -> bool {
         let begins = !self.barred && !self.steers();
         if begins {
@@ -91,7 +91,7 @@ impl Engagement {
         begins
     }
 
-    /// Ends the demand.
+    /// Registers the end of the demand, and releases control authority.
     pub(super) fn rest(&mut self) {
         self.barred = false;
         if self.steers() {
@@ -99,7 +99,7 @@ impl Engagement {
         }
     }
 
-    /// Returns control authority, until it is demanded again.
+    /// Returns control authority. Engagement is blocked until the demand has ended once.
     pub(super) fn hand_back(&mut self) {
         self.barred = true;
         self.release();
@@ -110,7 +110,7 @@ impl Engagement {
         self.reminded = false;
     }
 
-    /// Takes the reply to a mode request: no reply engages by itself.
+    /// Registers the MAV_RESULT of a mode request. No reply engages by itself.
     pub(super) fn answered(&mut self, result: u8) {
         match (self.phase, result) {
             (Phase::Entering { .. }, 0) => self.accepted = true,
@@ -120,7 +120,7 @@ impl Engagement {
         }
     }
 
-    /// Takes the mode that the controller shows: whether it is the steered one.
+    /// Registers whether the controller shows the steered mode.
     pub(super) fn shown(&mut self, host: Duration, steered: bool) -> Shown {
         match self.phase {
             // a mode that was active before the first request was chosen by the controller's pilot
@@ -141,7 +141,7 @@ impl Engagement {
         }
     }
 
-    /// Why engaging has timed out, if it has.
+    /// Reason for which engagement has timed out; `None` before the timeout.
     pub(super) fn overdue(
         &self,
         host: Duration,
@@ -161,7 +161,7 @@ impl Engagement {
         })
     }
 
-    /// Whether an unconfirmed return is to be reported now; at most once.
+    /// Whether an unconfirmed return of control authority is to be reported now. It is reported at most once.
     pub(super) fn unconfirmed(&mut self, host: Duration) -> bool {
         let Phase::Releasing { since: Some(since), .. } = self.phase else { return false };
         let late = host.saturating_sub(since) > UNCONFIRMED && !self.reminded;
@@ -169,7 +169,8 @@ impl Engagement {
         late
     }
 
-    /// The mode request due at `host`: `true` for the steered mode, `false` for the controller's own.
+    /// The mode request that is due at `host`: `true` for the steered mode, `false` for the controller's hold mode,
+    /// `None` without a request.
     pub(super) fn request(&mut self, host: Duration) -> Option<bool> {
         let due =
             |asked: Option<Duration>| asked.is_none_or(|at| host.saturating_sub(at) >= ASK_AGAIN);
@@ -230,7 +231,7 @@ mod tests {
         engagement.begin(ms(0));
         assert_eq!(engagement.request(ms(490)), None);
         assert_eq!(engagement.request(ms(500)), Some(true));
-        // PX4's pair of answers: its receiver's, then its commander's.
+        // PX4's two replies: from its receiver, then from its commander.
         engagement.answered(0);
         engagement.answered(1);
         assert!(matches!(engagement.phase, Phase::Entering { .. }));
@@ -256,7 +257,7 @@ mod tests {
         engagement.request(ms(0));
         engagement.shown(ms(10), true);
         engagement.hand_back();
-        // A minute in a dead link: four requests a second.
+        // One minute without a reply: four requests per second.
         let asked = (0..6000).filter(|i| engagement.request(ms(10 * i)) == Some(false)).count();
         assert_eq!(asked, 240);
         assert!(engagement.unconfirmed(ms(60_000)) && !engagement.unconfirmed(ms(60_010)));
@@ -274,7 +275,7 @@ mod tests {
             engagement.request(ms(0));
             assert_eq!(engagement.shown(ms(10), true), Shown::Engaged);
             assert_eq!(engagement.shown(ms(10 + late), false), shown);
-            // its pilot has control: nothing is begun until the demand has ended once
+            // the controller's pilot has control: engagement is blocked until the demand has ended once
             assert!(!engagement.begin(ms(200)));
             assert_eq!(engagement.is_engaged(), shown == Shown::Nothing);
             engagement.rest();
@@ -295,7 +296,7 @@ mod tests {
         ] {
             let mut engagement = Engagement::new(LEAD);
             engagement.begin(ms(0));
-            // In progress is no refusal.
+            // MAV_RESULT_IN_PROGRESS (5) is no refusal.
             [result, 5].into_iter().for_each(|result| engagement.answered(result));
             let said = engagement.overdue(ms(3501), stack, authority).unwrap();
             assert!(said.contains(words), "{said}");

@@ -1,34 +1,36 @@
-//! Intensity of the turbulence, from airspeed and velocity over ground.
+//! Turbulence intensity, estimated from airspeed and velocity over ground.
 //!
-//! Without vanes no sensor measures a gust from the side or from below: an estimated angle of attack or sideslip is wrong
-//! by the gust divided by the airspeed. Gusts along the path are measured, as the difference between the velocity over
-//! ground, less the mean wind, and the airspeed. At altitude all three components have the same intensity (MIL-F-8785C, 3.7.2).
+//! Without vanes no sensor measures a gust from the side or from below. An estimated angle of attack or sideslip has an
+//! error of the gust divided by the airspeed. Gusts along the path are measurable: they are the difference between the
+//! velocity over ground, less the mean wind, and the airspeed. At altitude all three components have the same intensity
+//! (MIL-F-8785C, 3.7.2).
 
 /// Time constant of the mean wind, s.
 const WIND_S: f64 = 10.0;
-/// Longest averaging time of the gusts' power, s.
+/// Longest averaging time of the mean square of the gusts, s.
 const AVERAGED_S: f64 = 60.0;
-/// Intensity assumed at first, m/s (moderate turbulence), and the averaging time that it counts for, s.
+/// Initial intensity, m/s (moderate turbulence), and the averaging time with which it is weighted, s.
 const SUPPOSED_MPS: f64 = 1.5;
 const SUPPOSED_S: f64 = 20.0;
-/// Length of gusts at altitude, m (MIL-F-8785C above 2000 ft).
+/// Scale length of gusts at altitude, m (MIL-F-8785C above 2000 ft).
 const LENGTH_M: f64 = 533.0;
-/// Factor on the gusts in the standard deviation of the flow angles. A gust lasts for half a minute and does not average out,
-/// so that the largest of a flight counts: 3.5 standard deviations, where independent errors count two.
+/// Factor on the gusts in the standard deviation of the flow angles. A gust lasts for half a minute and does not
+/// average out. The largest gust of a flight therefore counts: 3.5 standard deviations, where independent errors count
+/// two.
 const LASTING: f64 = 1.75;
-/// Lowest airspeed at which gusts are estimated, and the smallest by which a gust is divided, m/s.
+/// Lowest airspeed at which gusts are estimated, and lowest divisor of a gust, m/s.
 const SLOWEST_MPS: f64 = 3.0;
-/// Longest gap between two velocities, s.
+/// Longest gap between two velocities, s. After a longer gap the mean wind restarts.
 const GAP_S: f64 = 1.0;
 
-/// Running estimate of the gusts' standard deviation.
+/// Running estimate of the gusts' standard deviation, m/s.
 #[derive(Clone, Copy, Debug)]
 pub struct Gusts {
     /// Mean wind, NED, m/s.
     wind: Option<[f64; 3]>,
-    /// Mean square of the gusts along the path that the mean wind does not follow, m²/s².
+    /// Mean square of the gusts along the path, with a correction for the part that the mean wind absorbs, m²/s².
     power: f64,
-    /// Time averaged, s.
+    /// Present averaging time, s.
     averaged: f64,
     /// Time since the last velocity, s.
     since: f64,
@@ -41,8 +43,9 @@ impl Default for Gusts {
 }
 
 impl Gusts {
-    /// Takes a state `step` seconds after the last one: roll, pitch and yaw, α and β (rad), the true airspeed (m/s), and
-    /// the velocity over ground (NED, m/s), NaN where none was received with it. Below flying speed the estimate restarts.
+    /// Updates with a state `step` seconds after the last one: roll, pitch and yaw, α and β (rad), true airspeed (m/s),
+    /// and velocity over ground (NED, m/s). The velocity is NaN if none was received with the state. Below 3 m/s the
+    /// estimate restarts.
     pub fn update(
         &mut self,
         attitude: [f64; 3],
@@ -70,23 +73,24 @@ impl Gusts {
         (0..3).for_each(|i| wind[i] += off[i] * dt / (WIND_S + dt));
         let along: f64 = off.iter().zip(path).map(|(a, b)| a * b).sum();
         self.averaged = (self.averaged + dt).min(AVERAGED_S);
-        // the mean wind absorbs the slow part of the gusts; for a first-order process its share is known
+        // the mean wind absorbs the slow part of the gusts, a known fraction for a first-order process
         let whole = along.powi(2) * (1.0 + LENGTH_M / (airspeed * WIND_S));
         self.power += (whole - self.power) * dt / self.averaged;
     }
 
-    /// Standard deviation that gusts add to an angle of attack or sideslip estimated without vanes, rad; bands count two of it.
+    /// Standard deviation that gusts add to an angle of attack or sideslip estimated without vanes, rad. Bands are two
+    /// standard deviations wide to each side.
     pub fn incidence(&self, airspeed: f64) -> f64 {
         LASTING * self.deviation() / airspeed.max(SLOWEST_MPS)
     }
 
-    /// Standard deviation of each component of the gusts, m/s.
+    /// Standard deviation of each gust component, m/s.
     fn deviation(&self) -> f64 {
         self.power.sqrt()
     }
 }
 
-/// Unit vector of the velocity relative to the air, NED.
+/// Unit vector of the velocity relative to the air, in NED.
 fn towards([roll, pitch, yaw]: [f64; 3], [alpha, beta]: [f64; 2]) -> [f64; 3] {
     let (sr, cr) = roll.sin_cos();
     let (sp, cp) = pitch.sin_cos();
@@ -111,14 +115,15 @@ mod tests {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// A minute of turning flight in a wind of 5 m/s with gusts of `intensity` along the path, and a heading that is 2° off.
+    /// Estimated intensity (m/s) after a minute of turning flight in a wind of 5 m/s with gusts of `intensity` along
+    /// the path. The heading has an error of 2°.
     fn found(intensity: f64, mut seed: u64) -> f64 {
         let (mut gusts, mut gust, speed, step) = (Gusts::default(), 0.0, 18.0, 0.01);
         let decay = f64::exp(-0.1 * speed / LENGTH_M);
         for i in 0..6000 {
             let yaw = 0.02 * f64::from(i) * step;
             if i % 10 == 0 {
-                // twelve uniform numbers less six: a normal one
+                // twelve uniform numbers less six are nearly normal
                 let normal: f64 = (0..12).map(|_| uniform(&mut seed)).sum::<f64>() - 6.0;
                 gust = decay * gust + intensity * (1.0 - decay * decay).sqrt() * normal;
             }

@@ -1,4 +1,4 @@
-//! Handling of frames from the controller: sender, mode, state.
+//! Handling of received frames: identification of the controller, its modes and its states.
 
 use std::time::Duration;
 
@@ -60,7 +60,7 @@ impl Real {
                     self.survey.restart(host, id);
                 }
             }
-            // our own overrides may be reported as a radio
+            // overrides sent by the companion may be reported as a radio
             ControllerMessage::Receiver { alive } if !self.engagement.steers() => {
                 self.radio = Some(alive);
             }
@@ -117,7 +117,7 @@ impl Real {
         }
     }
 
-    /// Takes the mode that the controller shows.
+    /// Handles a mode that the controller shows.
     fn shown(&mut self, host: Duration, custom_mode: u32) {
         let steered = self.profile.stack.steered(self.profile.authority);
         let name = steered.name;
@@ -128,7 +128,7 @@ impl Real {
                 self.notices.push_back(Notice::Engaged);
             }
             Shown::Taken => self.notices.push_back(Notice::HandedBack(format!(
-                "the controller left {name} by itself or by its pilot's hand"
+                "the controller left {name}: its own decision or its pilot's"
             ))),
             Shown::Confirmed => self.say(
                 Severity::Notice,
@@ -137,15 +137,15 @@ impl Real {
         }
     }
 
-    /// Whether a reply is addressed to us; old firmware leaves the target zero.
+    /// Whether a reply is addressed to this companion. Old firmware leaves the target zero.
     fn is_us(&self, to: Source) -> bool {
         let system = self.system().unwrap_or(0);
         matches!(to, Source { system: 0, component: 0 })
             || to == Source { system, component: ONBOARD }
     }
 
-    /// Starts over with a controller that appears for the first time or again: parameters and channel directions are
-    /// unknown, and control authority is not taken before they are read.
+    /// Restarts with a controller that appears for the first time or again. Its parameters and channel directions are
+    /// then unknown. Engagement is refused until they are read.
     fn meet(&mut self, system: u8, autopilot: u8) {
         if self.engagement.steers() {
             self.hand_back("no heartbeat of the controller for 3 s".into());

@@ -1,16 +1,17 @@
-//! Conditions that prevent engaging, as texts with their remedies.
+//! Conditions that prevent engagement, as texts with their remedies.
 
 use super::profile::{Authority, Stack};
 use super::{ENOUGH, GONE, Real};
 use crate::framing::Source;
 
-/// Text for a controller that requires signatures when this companion does not sign.
+/// Text for a controller that requires signatures while this companion does not sign.
 const SHUT_OUT: &str = "the controller signs its frames and ignores ours, which carry no right \
                         signature: give its key with --sign and add --sign-vehicle";
 
 impl Real {
-    /// Warning about a radio in flight by surfaces. ArduPlane returns to the radio's sticks when the overrides end,
-    /// and stays in MANUAL until its ground-station failsafe acts, whose role the companion takes.
+    /// Warning about a radio while surfaces are commanded; `None` without a radio. When the overrides end, ArduPlane
+    /// returns to the radio's sticks in MANUAL. It leaves MANUAL only by its ground-station failsafe. The companion
+    /// acts as that ground station.
     pub fn radio_warning(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
@@ -23,17 +24,17 @@ impl Real {
         })
     }
 
-    /// Whether the controller signs its frames and has not replied to any request.
+    /// Whether the controller signs its frames and has not replied to any parameter request.
     pub fn is_shut_out(&self) -> bool {
         self.signs && self.parameters.is_silent()
     }
 
-    /// Why a refused stream is missing, with the remedy.
+    /// Reason for which the controller refused the stream `id`, with the remedy; `None` if it did not refuse.
     pub fn denial(&self, id: u32) -> Option<String> {
         self.requests.words(self.profile.stack).filter(|_| self.requests.is_denied(id))
     }
 
-    /// Why control authority cannot be taken now, with the remedy.
+    /// Reason for which control authority cannot be taken now, with the remedy; `None` if it can be taken.
     pub fn obstacle(&self) -> Option<String> {
         let Some(controller) = self.controller else {
             return Some(
@@ -63,11 +64,11 @@ impl Real {
             .or_else(|| self.thin_stream())
     }
 
-    /// The refusal if another component of the aircraft's system sends heartbeats.
+    /// Reason for a refusal, if another component of the aircraft's system sends heartbeats.
     ///
-    /// ArduPlane identifies its ground station by the system id alone, and this companion uses the aircraft's own. Once the
-    /// companion is dead, heartbeats of another component would keep the ground station's failsafe from acting, and the
-    /// aircraft would stay on the radio's sticks.
+    /// ArduPlane identifies its ground station by the system id alone, and this companion uses the aircraft's system
+    /// id. If the companion fails, heartbeats of another component keep the ground-station failsafe from acting. The
+    /// aircraft would then stay on the radio's sticks.
     fn hidden_death(&self) -> Option<String> {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
@@ -81,7 +82,7 @@ impl Real {
         ))
     }
 
-    /// A needed stream whose rate is too low.
+    /// Text about a required stream whose rate is too low; `None` without such a stream.
     fn thin_stream(&self) -> Option<String> {
         let thin = self
             .profile

@@ -1,6 +1,6 @@
-//! The controller's parameters: read one by one, checked against the profile.
+//! The flight controller's parameters, which are read one by one and checked against the profile.
 //!
-//! The rules (which parameter must have which value) are in `profile.rs`.
+//! The rules (the allowed values of each parameter) are in `profile.rs`.
 
 use std::time::Duration;
 
@@ -8,9 +8,9 @@ use super::profile::{Matters, Need, Presence, Rule};
 
 /// Interval between requests for the same parameter.
 const AGAIN: Duration = Duration::from_millis(400);
-/// Largest number of requests in flight, so that a slow link is not flooded.
+/// Largest number of requests per call. It spreads the requests over several calls for slow links.
 const AT_ONCE: usize = 4;
-/// Requests for one name before the controller counts as not having it.
+/// Number of requests for one name after which the controller counts as lacking the parameter.
 const TRIES: u32 = 5;
 /// Valid pulse widths of a channel, µs.
 const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
@@ -33,11 +33,11 @@ pub struct Parameters {
 /// Check result of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Standing {
-    /// Not yet reported.
+    /// The controller has not reported it yet.
     Unread,
-    /// The controller does not reply for it.
+    /// The controller does not reply to requests for it, although the rule requires it.
     Unknown,
-    /// The firmware lacks it, which is allowed.
+    /// The firmware lacks it, which the rule allows.
     Absent,
     /// The value fits the rule.
     Good(f64),
@@ -51,14 +51,14 @@ impl Parameters {
         Parameters { entries: rules.iter().map(entry).collect() }
     }
 
-    /// Clears the reported values, as when the controller has restarted.
+    /// Clears the reported values, for instance after a restart of the controller.
     pub(super) fn forget(&mut self) {
         for entry in &mut self.entries {
             (entry.value, entry.tries, entry.asked) = (None, 0, None);
         }
     }
 
-    /// Names to request at `host`.
+    /// Names of the parameters to request at `host`.
     pub(super) fn due(&mut self, host: Duration) -> Vec<&'static str> {
         let mut names = Vec::new();
         for entry in &mut self.entries {
@@ -75,7 +75,7 @@ impl Parameters {
         names
     }
 
-    /// Stores a reported value; parameters outside the rules are ignored.
+    /// Stores a reported value. Parameters outside the rules are ignored.
     pub(super) fn take(&mut self, name: &str, value: f64) {
         for entry in &mut self.entries {
             if let Some(at) = entry.rule.names.iter().position(|known| *known == name) {
@@ -84,25 +84,26 @@ impl Parameters {
         }
     }
 
-    /// Whether none was reported although all were requested.
+    /// Whether all parameters were requested and none was reported.
     pub(super) fn is_silent(&self) -> bool {
         self.entries.iter().all(|entry| entry.value.is_none() && entry.tries > 0)
     }
 
-    /// The value of a parameter, once reported.
+    /// The value of a parameter; `None` before it is reported.
     pub(super) fn get(&self, name: &str) -> Option<f64> {
         let entry = self.entries.iter().find(|entry| entry.rule.names.contains(&name))?;
         entry.value.map(|(_, value)| value)
     }
 
-    /// Each relevant parameter under the name that the controller uses, with its check result and the remedy.
-    /// `radio`: whether the controller receives one.
+    /// Each relevant parameter under the name that the controller uses, with its check result and the remedy. `radio`
+    /// is whether the controller receives a radio.
     pub fn report(&self, system: u8, radio: bool) -> Vec<(&'static str, Standing, String)> {
         let matters = |entry: &&Entry| radio || entry.rule.matters == Matters::Always;
         self.entries.iter().filter(matters).map(|entry| entry.report(system)).collect()
     }
 
-    /// Why the profile cannot be flown with these parameters: each violation with its remedy.
+    /// Reason for which the profile cannot be used with these parameters: each violation with its remedy; `None` if all
+    /// fit.
     pub(super) fn obstacle(&self, system: u8, radio: bool) -> Option<String> {
         let report = self.report(system, radio);
         let unread = report.iter().filter(|(_, standing, _)| *standing == Standing::Unread).count();
@@ -154,7 +155,7 @@ impl Entry {
 }
 
 impl Need {
-    /// Whether the rule allows this value at a controller of system id `system`.
+    /// Whether the rule allows this value for a controller with the system id `system`.
     pub fn allows(self, value: f64, system: u8) -> bool {
         match self {
             Need::OneOf(values) => values.contains(&value),
@@ -256,7 +257,7 @@ mod tests {
         assert_eq!(parameters.due(Duration::ZERO), both);
         assert!(parameters.due(AGAIN - Duration::from_millis(1)).is_empty());
         assert_eq!(parameters.due(AGAIN), both);
-        // Of two names each has its five tries.
+        // Each of two names is requested five times.
         let mut parameters = Parameters::new(Stack::Ardupilot.rules(Authority::Surfaces));
         let asked: Vec<_> = (0..200).flat_map(|step| parameters.due(AGAIN * step)).collect();
         for name in ["MAV_GCS_SYSID", "SYSID_MYGCS", "RC_OPTIONS"] {

@@ -17,31 +17,31 @@ pub enum Stack {
 /// Quantities that the companion commands to the flight controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Authority {
-    /// Surfaces and throttle, as sticks in MANUAL.
+    /// Surfaces and throttle, as stick positions in MANUAL.
     Surfaces,
-    /// Attitude and thrust, in OFFBOARD or GUIDED: the controller's own loops command the surfaces.
+    /// Attitude and thrust, in OFFBOARD or GUIDED. The flight controller's loops command the surfaces.
     Attitude,
 }
 
 /// Flight stack and authority of a real flight controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// The flight stack it runs.
+    /// Flight stack of the controller.
     pub stack: Stack,
-    /// The quantities it is commanded.
+    /// Quantities that the controller is commanded.
     pub authority: Authority,
-    /// Actuator dynamics of the aircraft, whose state the controller does not report.
+    /// Actuator dynamics of the aircraft. The controller does not report actuator states.
     pub actuators: ActuatorFigures,
 }
 
-/// A mode in the stack's own numbers.
+/// A mode in the numbers of its flight stack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StackMode {
-    /// The name that its ground stations show.
+    /// Name of the mode in ground stations.
     pub name: &'static str,
-    /// Main mode of PX4, the mode of ArduPilot.
+    /// PX4's main mode, or ArduPilot's mode number.
     pub main: u8,
-    /// Sub mode of PX4.
+    /// PX4's sub mode; 0 for ArduPilot.
     pub sub: u8,
 }
 
@@ -54,11 +54,11 @@ const fn mode(name: &'static str, main: u8, sub: u8) -> StackMode {
 pub struct Stream {
     /// Message id of the stream.
     pub id: u32,
-    /// Message name for texts.
+    /// Name of the message in texts.
     pub name: &'static str,
     /// Requested rate, Hz.
     pub hz: f64,
-    /// Whether the flight requires it.
+    /// Whether engagement requires this stream.
     pub needed: bool,
     /// Frame length in MAVLink 2 without truncation, bytes.
     pub bytes: u32,
@@ -83,7 +83,7 @@ const ARDUPILOT_STREAMS: [Stream; 7] = [
     stream(11020, "AOA_SSA", 50.0, false, 16),
     stream(33, "GLOBAL_POSITION_INT", 10.0, false, 28),
     stream(168, "WIND", 2.0, false, 12),
-    // whether a radio is bound
+    // reports whether a radio is bound
     stream(1, "SYS_STATUS", 1.0, false, 43),
 ];
 
@@ -94,37 +94,37 @@ pub enum Need {
     OneOf(&'static [f64]),
     /// A value in this closed interval.
     Between(f64, f64),
-    /// The companion's own system id.
+    /// The system id of the companion, which is that of the controller.
     OurSystem,
-    /// A plausible pulse width of a channel, µs; the value is used.
+    /// A plausible pulse width of a channel, µs. The companion uses the value for scaling.
     Pulse,
     /// A bit mask without any of these bits.
     Without(u32),
 }
 
-/// Whether firmware may lack a parameter.
+/// Whether the firmware may lack a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Presence {
-    /// Firmware without it does not fit the profile.
+    /// Firmware without the parameter does not fit the profile.
     Required,
-    /// Some releases do not have it.
+    /// Some releases lack the parameter.
     Optional,
 }
 
-/// A parameter that is checked before engaging.
+/// A parameter that is checked before engagement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
-    /// Its names, newest release first; one of them suffices.
+    /// Names of the parameter, newest release first. One of them suffices.
     pub names: &'static [&'static str],
-    /// Constraint on its value.
+    /// Constraint on the value.
     pub need: Need,
-    /// Value to set when the constraint is violated.
+    /// Value to set if the constraint is violated.
     pub remedy: f64,
     /// Purpose of the parameter, as text.
     pub why: &'static str,
-    /// Whether firmware may lack it.
+    /// Whether the firmware may lack the parameter.
     pub presence: Presence,
-    /// Condition under which it is checked.
+    /// Condition under which the parameter is checked.
     pub matters: Matters,
 }
 
@@ -217,7 +217,8 @@ const ARDUPILOT_SURFACES: [Rule; 31] = [
     with_radio(rule(&["FS_LONG_TIMEOUT"], Need::Between(1.5, 3.0), 2.0, RADIO)),
     optional(with_radio(rule(&["MAV_GCS_SYSID_HI"], Need::OneOf(ZERO), 0.0, STATION))),
     rule(&["RC_OPTIONS"], Need::Without(2), 32.0, "bit 1 makes it ignore overrides"),
-    // Until 4.7 RCMAP assigns the channels and their options are 0; later the options assign them, and there is no RCMAP.
+    // Until 4.7, RCMAP assigns the channels and their options are 0. Later releases assign them by the options and lack
+    // RCMAP.
     optional(rule(&["RCMAP_ROLL"], Need::OneOf(ONE), 1.0, ROLL)),
     optional(rule(&["RCMAP_PITCH"], Need::OneOf(&[2.0]), 2.0, PITCH)),
     optional(rule(&["RCMAP_THROTTLE"], Need::OneOf(&[3.0]), 3.0, THROTTLE)),
@@ -247,7 +248,7 @@ const STATION: &str =
     "a radio is bound: a ground station's heartbeats would hide that the companion is dead";
 const FILTER: &str = "a low-pass of the gyros makes the loop late";
 const SCALE: &str = "the pulses are scaled by it";
-/// Loop rate of the controller, Hz: state at 100 Hz needs 125 Hz; below 200 Hz there is no flight experience.
+/// Loop rate of the controller, Hz. States at 100 Hz need 125 Hz. There is no flight experience below 200 Hz.
 const LOOP_RATE: Need = Need::Between(200.0, 2000.0);
 
 const ARDUPILOT_ATTITUDE: [Rule; 2] = [
@@ -269,7 +270,7 @@ impl Stack {
         }
     }
 
-    /// The stack of a MAV_AUTOPILOT.
+    /// The stack with this MAV_AUTOPILOT; `None` if it has no profile.
     pub fn of(autopilot: u8) -> Option<Stack> {
         [Stack::Px4, Stack::Ardupilot].into_iter().find(|stack| stack.autopilot() == autopilot)
     }
@@ -284,9 +285,9 @@ impl Stack {
         }
     }
 
-    /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every
-    /// 100 ms, and its stick input passes through another module first: it refused 2 of 3 requests at 150 ms, none at
-    /// 300 ms. ArduPilot requires no stream, and early sticks would act in LOITER.
+    /// Time for which commands are streamed before the steered mode is requested. PX4 checks its requirements every 100
+    /// ms, and its stick input first passes through another module. It refused 2 of 3 requests at 150 ms, none at 300
+    /// ms. ArduPilot requires no stream. Early sticks would act in LOITER.
     pub fn lead(self) -> Duration {
         match self {
             Stack::Px4 => Duration::from_millis(500),
@@ -294,7 +295,7 @@ impl Stack {
         }
     }
 
-    /// The controller's own mode, requested on return of control authority.
+    /// The mode that is requested on return of control authority.
     pub fn hold(self) -> StackMode {
         match self {
             Stack::Px4 => mode("HOLD", 4, 3),
@@ -302,7 +303,7 @@ impl Stack {
         }
     }
 
-    /// The streams to request.
+    /// The telemetry streams to request.
     pub fn streams(self) -> &'static [Stream] {
         match self {
             Stack::Px4 => &PX4_STREAMS,
@@ -310,7 +311,7 @@ impl Stack {
         }
     }
 
-    /// The parameters to check.
+    /// The parameters to check before engagement.
     pub fn rules(self, authority: Authority) -> &'static [Rule] {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => &PX4_SURFACES,
@@ -320,7 +321,7 @@ impl Stack {
         }
     }
 
-    /// State frames per command: ArduPilot samples the channels at 50 Hz.
+    /// State frames per command. ArduPilot samples its channels at 50 Hz, every second frame.
     pub fn frames_per_command(self, authority: Authority) -> u64 {
         match (self, authority) {
             (Stack::Px4, Authority::Surfaces) => 1,
@@ -330,7 +331,7 @@ impl Stack {
 }
 
 impl StackMode {
-    /// The `custom_mode` of this mode in a heartbeat.
+    /// The `custom_mode` of this mode in a heartbeat of `stack`.
     pub fn custom(self, stack: Stack) -> u32 {
         match stack {
             Stack::Px4 => u32::from(self.main) << 16 | u32::from(self.sub) << 24,

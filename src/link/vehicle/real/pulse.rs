@@ -1,4 +1,4 @@
-//! Watchdog of flight by surfaces: rates of received states, lost frames and executed cycles.
+//! Watchdog while surfaces are commanded: rates of received states, lost frames and executed cycles.
 
 use std::time::Duration;
 
@@ -9,8 +9,8 @@ const RATE: f64 = 100.0;
 /// Fraction of the nominal rate below which control authority is returned.
 const LEAST: f64 = 0.4;
 
-/// Fraction of lost frames in two consecutive windows that is too high: commands are then lost as often, and surfaces
-/// that receive every fourth command oscillate. A single gap of 0.2 s stays below it.
+/// Largest fraction of lost frames in each of two consecutive windows. Commands are then lost as often. Surfaces that
+/// receive only every fourth command oscillate. A single gap of 0.2 s stays below the limit.
 const LOSSY: f64 = 0.35;
 
 /// Counters of states and cycles in the open window.
@@ -19,7 +19,7 @@ pub(super) struct Pulse {
     since: Option<Duration>,
     states: u32,
     cycles: u32,
-    /// Frames received and lost at the window's start.
+    /// Total frames received and lost at the window's start.
     before: Option<[u64; 2]>,
     /// Whether the previous window lost too many frames.
     lossy: bool,
@@ -36,8 +36,8 @@ impl Pulse {
         *self = Pulse::default();
     }
 
-    /// Counts a cycle at `host`; returns the shortage in the window that it closes. `frames`: totals received and
-    /// lost.
+    /// Counts a cycle at `host`. Returns a text about the shortage in the window that this cycle closes; `None` without
+    /// one. `frames` are the total frames received and lost.
     pub(super) fn cycle(&mut self, host: Duration, frames: [u64; 2]) -> Option<String> {
         self.cycles += 1;
         let before = *self.before.get_or_insert(frames);
@@ -72,7 +72,7 @@ impl Pulse {
 mod tests {
     use super::*;
 
-    /// The shortage reported in a second of cycles every `cycle_ms`, every `state`-th of them with a state.
+    /// The shortage reported in 1 s with a cycle every `cycle_ms` and a state in every `state`-th cycle.
     fn second(cycle_ms: u64, state: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         (0..1000 / cycle_ms).find_map(|i| {
@@ -83,7 +83,7 @@ mod tests {
         })
     }
 
-    /// The shortage reported in two seconds with `lost` of ten frames lost from `from_ms` to `to_ms`.
+    /// The shortage reported in 2 s, with `lost` of ten frames lost from `from_ms` to `to_ms`.
     fn lossy(lost: u64, from_ms: u64, to_ms: u64) -> Option<String> {
         let mut pulse = Pulse::default();
         let mut frames = [0, 0];
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn each_window_begins_where_the_last_ended() {
-        // No state from the second window on: that is known when it is over, half a second later.
+        // No state from the second window on. The shortage is reported when this window closes, at 1 s.
         let mut pulse = Pulse::default();
         let said = (0..200).find_map(|i| {
             if i <= 50 {

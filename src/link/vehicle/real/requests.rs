@@ -11,12 +11,12 @@ pub(super) enum Answer {
     Nothing,
     /// The message is sent at its rate from now on.
     Granted(u32),
-    /// The message is not sent at its rate; repeating the request is useless.
+    /// The message is not sent at the requested rate. A repeated request is useless.
     Denied,
 }
 
-/// Pending stream requests. A reply does not name its message: replies come in the order of the requests, and lost
-/// ones are discarded with the next round.
+/// Pending stream requests. A reply does not name its message, but replies come in the order of the requests. Requests
+/// without a reply are discarded at the next round.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Requests {
     waiting: VecDeque<u32>,
@@ -26,12 +26,12 @@ pub(super) struct Requests {
 }
 
 impl Requests {
-    /// Starts a new round.
+    /// Starts a new round of requests, and discards requests without a reply.
     pub(super) fn turn(&mut self) {
         self.waiting.clear();
     }
 
-    /// Whether a message may be requested; notes the request.
+    /// Whether a message may be requested. If so, the request is stored.
     pub(super) fn ask(&mut self, id: u32) -> bool {
         let may = !self.denied.contains(&id);
         if may {
@@ -40,12 +40,12 @@ impl Requests {
         may
     }
 
-    /// Takes the MAV_RESULT for the oldest request.
+    /// Registers the MAV_RESULT of the oldest request.
     pub(super) fn answered(&mut self, result: u8) -> Answer {
         let Some(id) = self.waiting.pop_front() else { return Answer::Nothing };
         match result {
             0 if self.granted.insert(id) => Answer::Granted(id),
-            // Denied, unsupported.
+            // MAV_RESULT_DENIED, MAV_RESULT_UNSUPPORTED
             2 | 3 => {
                 self.denied.insert(id);
                 Answer::Denied
@@ -59,14 +59,14 @@ impl Requests {
         self.denied.contains(&id)
     }
 
-    /// The refused streams that the flight requires, as text; returned once.
+    /// The refused streams that engagement requires, as text. They are returned only once.
     pub(super) fn complaint(&mut self, stack: Stack) -> Option<String> {
         let words = self.words(stack).filter(|_| !self.reported)?;
         self.reported = true;
         Some(words)
     }
 
-    /// The refused streams that the flight requires, as text with the remedy.
+    /// The refused streams that engagement requires, as text with the remedy; `None` if none was refused.
     pub(super) fn words(&self, stack: Stack) -> Option<String> {
         let denied = |stream: &&Stream| stream.needed && self.denied.contains(&stream.id);
         let names: Vec<String> = stack
@@ -92,12 +92,12 @@ mod tests {
     fn what_is_denied_is_asked_for_no_more_and_said_once() {
         let mut requests = Requests::default();
         assert!([31, 105, 74, 33].into_iter().all(|id| requests.ask(id)));
-        // ArduPlane with a loop of 50 Hz: 40 Hz at most.
+        // ArduPlane with a loop rate of 50 Hz sends 40 Hz at most.
         let answers = [2, 2, 2, 0].map(|result| requests.answered(result));
         assert_eq!(answers[2..], [Answer::Denied, Answer::Granted(33)]);
         requests.turn();
         assert!(!requests.ask(31) && requests.ask(33));
-        // A grant that is repeated is nothing new.
+        // A repeated grant changes nothing.
         assert_eq!(requests.answered(0), Answer::Nothing);
         let words = requests.complaint(Stack::Ardupilot).unwrap();
         assert!(words.contains("ATTITUDE_QUATERNION at 100 Hz") && words.contains("reboot"));

@@ -1,16 +1,16 @@
-//! Conversion of commands to sticks: thousandths for PX4, pulse widths for ArduPilot.
+//! Conversion of commands to stick positions: thousandths for PX4, pulse widths for ArduPilot.
 
 use super::parameters::Parameters;
 use greylag_physics::Command;
 
-/// Rounds to integers and carries the remainder over to the next command, so that the mean is exact.
+/// Rounds to integers and carries the remainder over to the next command. The mean is then exact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Rounding(f64);
 
 impl Rounding {
     fn round(&mut self, wanted: f64, low: f64, high: f64) -> f64 {
         let whole = (wanted + self.0).round().clamp(low, high);
-        // the part of the command beyond the stop is discarded
+        // the part of the command beyond the limit is not carried over
         self.0 = (wanted + self.0 - whole).clamp(-0.5, 0.5);
         whole
     }
@@ -45,10 +45,10 @@ impl Channel {
 }
 
 impl Sticks {
-    /// x (+ nose down), y (+ right) and z of MANUAL_CONTROL, in thousandths.
+    /// Axes of MANUAL_CONTROL in thousandths: x (positive nose down), y (positive right), z (throttle).
     ///
-    /// PX4 in MANUAL: roll torque = y · FW_MAN_R_SC + TRIM_ROLL, pitch torque (nose up) =
-    /// −x · FW_MAN_P_SC + TRIM_PITCH.
+    /// In MANUAL, PX4 computes roll torque = y · FW_MAN_R_SC + TRIM_ROLL and pitch torque (nose up) = −x · FW_MAN_P_SC
+    /// + TRIM_PITCH.
     pub(super) fn thousandths(&mut self, command: &Command, parameters: &Parameters) -> [i16; 3] {
         let read = |name: &str, default: f64| parameters.get(name).unwrap_or(default);
         let roll = (command.aileron - read("TRIM_ROLL", 0.0)) / read("FW_MAN_R_SC", 1.0);
@@ -61,9 +61,9 @@ impl Sticks {
         ]
     }
 
-    /// Pulse widths of channels 1 to 3, µs, by RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
+    /// Pulse widths of channels 1 to 3 (roll, pitch, throttle), µs, from RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
     ///
-    /// ArduPilot's pitch stick is positive nose up, opposite to our elevator.
+    /// ArduPilot's pitch channel is positive nose up, the elevator command positive nose down.
     pub(super) fn pulses(&mut self, command: &Command, parameters: &Parameters) -> [u16; 3] {
         let [one, two, three] = [1, 2, 3].map(|n| channel(n, parameters));
         let wanted = [
@@ -108,7 +108,7 @@ mod tests {
         }
         for (sum, wanted) in sums.iter().zip([command.elevator, command.aileron, command.throttle])
         {
-            // Half a count, carried over a thousand commands.
+            // Rounding errs by at most half a count over a thousand commands.
             assert!((sum * 1e-6 - wanted).abs() < 1e-6, "{sum} for {wanted}");
         }
     }
@@ -136,7 +136,7 @@ mod tests {
                 .pulses(&Command { aileron, elevator, throttle, rudder: 0.0 }, &parameters)
         };
         assert_eq!(sent(0.0, 0.0, 0.0), [1450, 1500, 1000]);
-        // Right aileron on a reversed channel is a shorter pulse; elevator down is stick forward.
+        // Right aileron on a reversed channel is a shorter pulse. Elevator down is stick forward.
         assert_eq!(sent(1.0, 1.0, 1.0), [1000, 1100, 2000]);
         assert_eq!(sent(-1.0, -0.5, 0.25), [2000, 1700, 1250]);
     }
@@ -155,7 +155,7 @@ mod tests {
         {
             parameters.take(name, value);
         }
-        // (0.3 − 0.1) / 0.5 and (0.25 − 0.05) / 0.8.
+        // (0.3 − 0.1) / 0.5 and (0.25 − 0.05) / 0.8
         assert_eq!(sent(&parameters, 0.3, 0.25, 0.5), [250, 400, 500]);
     }
 
@@ -177,7 +177,7 @@ mod tests {
             let [roll, _, throttle] = Sticks::default().pulses(&command, &parameters);
             (roll, throttle)
         };
-        // The throttle's channel is reversed: closed is its longest pulse.
+        // The throttle channel is reversed: idle is the longest pulse.
         assert_eq!(sent(-0.5, 0.0), (1200, 2000));
         assert_eq!(sent(0.5, 0.25), (1700, 1750));
         assert_eq!(sent(0.0, 1.0), (1400, 1000));

@@ -1,13 +1,13 @@
-//! Measured quality of a link: rates, gaps, jitter, latency.
+//! Measured quality of a link: rates, lost frames, jitter and round-trip times.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// Length of the window for rates.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Largest delay of a late frame in sequence numbers; one further back is a restart of the counter.
+/// Largest lag of a late frame, sequence numbers. With a larger lag the sender has restarted its counter.
 const LATE: u32 = 32;
-/// Number of round-trip times kept.
+/// Largest number of round-trip times that are kept.
 const TRIPS: usize = 256;
 
 /// Statistics of one message.
@@ -30,7 +30,7 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// Standard deviation of the interval between two frames, ms.
+    /// Standard deviation of the interval between two frames, ms; 0 with fewer than three frames.
     pub fn jitter_ms(&self) -> f64 {
         match self.frames {
             0..3 => 0.0,
@@ -70,12 +70,12 @@ impl Survey {
     /// Counts a frame of the controller.
     pub(super) fn frame(&mut self, host: Duration, id: u32, sequence: u8, bytes: usize) {
         match self.sequence.map(|before| sequence.wrapping_sub(before)) {
-            // the same frame twice
+            // a repeated frame
             Some(0) => {}
-            // late: it was counted as lost
+            // a late frame was counted as lost before
             Some(back) if u32::from(back) > 256 - LATE => self.lost = self.lost.saturating_sub(1),
             Some(ahead) => {
-                // more than half the counter is a new start
+                // a step of more than half the counter is a restart
                 self.lost += if ahead <= 128 { u64::from(ahead - 1) } else { 0 };
                 self.sequence = Some(sequence);
             }
@@ -88,7 +88,7 @@ impl Survey {
         self.messages.entry(id).or_insert(fresh).note(host, bytes);
     }
 
-    /// Restarts a message's statistics, as when its rate was granted.
+    /// Restarts a message's statistics, for instance when its rate was granted.
     pub(super) fn restart(&mut self, host: Duration, id: u32) {
         if let Some(traffic) = self.messages.get_mut(&id) {
             let Traffic { hz, in_window, .. } = *traffic;
@@ -96,13 +96,13 @@ impl Survey {
         }
     }
 
-    /// A message's mean rate over its counting time, one second at least, Hz.
+    /// Mean rate of a message over its counting time, Hz. The counting time is at least 1 s.
     pub fn mean_hz(&self, traffic: &Traffic) -> f64 {
         let last = self.span.map_or(Duration::ZERO, |(_, last)| last);
         traffic.frames as f64 / last.saturating_sub(traffic.since).max(WINDOW).as_secs_f64()
     }
 
-    /// Closes windows that are over at `host`; whether one was closed.
+    /// Closes the window if it is over at `host`. Returns whether it was closed.
     pub(super) fn turn(&mut self, host: Duration) -> bool {
         let ends = *self.window_ends.get_or_insert(host + WINDOW);
         if host < ends {
@@ -125,7 +125,7 @@ impl Survey {
         self.trips.push_back(time);
     }
 
-    /// A message's rate in the last window, Hz; 0 when it was not received.
+    /// Rate of message `id` in the last complete window, Hz; 0 if it was not received.
     pub fn hz(&self, id: u32) -> f64 {
         self.messages.get(&id).map_or(0.0, |traffic| traffic.hz)
     }
@@ -140,12 +140,12 @@ impl Survey {
         self.messages.iter().map(|(id, traffic)| (*id, traffic))
     }
 
-    /// Frames received and lost, from gaps in the sequence numbers.
+    /// Total frames received, and total frames lost according to gaps in the sequence numbers.
     pub(super) fn frames(&self) -> [u64; 2] {
         [self.received, self.lost]
     }
 
-    /// Fraction of frames lost, from gaps in the sequence numbers.
+    /// Fraction of frames lost (0..1), from gaps in the sequence numbers.
     pub fn loss(&self) -> f64 {
         let all = self.received + self.lost;
         if all == 0 { 0.0 } else { self.lost as f64 / all as f64 }
@@ -172,14 +172,14 @@ mod tests {
         }
         survey.frame(Duration::from_secs(8), 0, 10, 21);
         let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
-        // Nine in eight seconds.
+        // Nine frames in 8 s.
         assert_eq!(rate, Some(9.0 / 8.0));
     }
 
     #[test]
     fn jitter_is_counted_from_the_granting_of_the_rate() {
         let mut survey = Survey::default();
-        // 4 Hz before, 50 Hz after.
+        // 4 Hz before the restart, 50 Hz after it.
         (0..8).for_each(|i| survey.frame(Duration::from_millis(250 * i), 74, i as u8, 32));
         survey.restart(Duration::from_secs(2), 74);
         (0..100)
@@ -193,7 +193,7 @@ mod tests {
         let mut survey = Survey::default();
         let mut sequence = 250u8;
         for i in 0..300u64 {
-            // Each tenth frame is lost; those left come every 10 ms, 1 ms early or late.
+            // Every tenth frame is lost. The other frames come every 10 ms, 1 ms early or late.
             sequence = sequence.wrapping_add(1);
             let host = Duration::from_micros(10_000 * i + if i % 2 == 0 { 1000 } else { 0 });
             survey.turn(host);
@@ -202,10 +202,10 @@ mod tests {
             }
         }
         assert!((survey.hz(31) - 90.0).abs() < 2.0, "{}", survey.hz(31));
-        // The last one lost is not known yet: 29 of 299.
+        // The last lost frame is not detected yet: 29 of 299.
         assert!((survey.loss() - 29.0 / 299.0).abs() < 1e-9);
         let traffic = survey.messages().next().unwrap().1;
-        // Intervals of 9, 11 and, over a lost frame, 20 ms.
+        // Intervals of 9 ms and 11 ms, and of 20 ms over a lost frame.
         assert!((2.0..5.0).contains(&traffic.jitter_ms()), "{}", traffic.jitter_ms());
         assert_eq!((survey.hz(105), survey.windows()), (0.0, 2));
     }
@@ -219,7 +219,7 @@ mod tests {
         }
         survey.frame(Duration::from_secs(13), 0, 10, 21);
         let rate = survey.messages().find(|(id, _)| *id == 22).map(|(_, t)| survey.mean_hz(t));
-        // Nine in eight seconds, whatever the host's clock showed at first.
+        // Nine frames in 8 s, independent of the host's clock at the start.
         assert_eq!(rate, Some(9.0 / 8.0));
     }
 
@@ -230,7 +230,7 @@ mod tests {
             survey.frame(Duration::ZERO, 0, sequence, 21);
         }
         assert_eq!(survey.frames()[1], 0);
-        // five are missing, then the controller starts again
+        // five frames are missing, then the controller restarts
         survey.frame(Duration::ZERO, 0, 9, 21);
         survey.frame(Duration::ZERO, 0, 150, 21);
         assert_eq!(survey.frames()[1], 5);
@@ -258,7 +258,7 @@ mod tests {
         for (i, ms) in [0, 10, 30].into_iter().enumerate() {
             survey.frame(Duration::from_millis(ms), 31, i as u8, 60);
         }
-        // 10 and 20 ms: √(2 · 5²) with one degree of freedom.
+        // Intervals of 10 ms and 20 ms: √(2 · 5²) ms with one degree of freedom.
         let jitter = survey.messages().next().unwrap().1.jitter_ms();
         assert!((jitter - 7.071).abs() < 0.001, "{jitter}");
     }

@@ -11,7 +11,8 @@ use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 const SETPOINT_EVERY: u64 = 10;
 
 impl Flight {
-    /// The client's actions at a step: it arms when possible, then sends the setpoint of the present leg.
+    /// Performs the client's actions at a step. The client makes the requests that are due and arms when possible. At
+    /// 10 Hz it sends the setpoint of the present leg.
     pub(super) fn client(&mut self, step: u64, now_s: f64, host: Duration, acting: &[Fault]) {
         if acting.iter().any(|fault| fault.kind == FaultKind::Client) {
             return;
@@ -37,14 +38,14 @@ impl Flight {
             if self.armed {
                 self.follower.asked = true;
                 self.desk.pilot().attitude_setpoint(now, setpoint);
-                // refused only if the link is lost at this moment: the companion then flies HOLD
+                // The request is refused only if the link is lost at this moment. The companion then flies HOLD.
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
         self.desk.pilot().attitude_setpoint(now, setpoint);
     }
 
-    /// Requests of the client other than setpoints.
+    /// Passes a request other than a setpoint to the companion.
     fn ask(&mut self, now_s: f64, host: Duration, what: Asking) {
         let now = self.desk.now(host);
         let verdict = match (what, mode_of(what)) {
@@ -59,11 +60,12 @@ impl Flight {
         self.hear_texts(now_s);
     }
 
-    /// The mode change by which a ground station takes control from the companion, over a link of its own.
+    /// Applies the mode change by which a ground station takes control from the companion. The ground station has its
+    /// own link.
     pub(super) fn take_over(&mut self, step: u64) {
         let asked = &self.scenario.asked;
         let taken = asked.iter().any(|a| a.what == Asking::TakeOver && at_step(a.at_s) == step);
-        // if the flight controller flies by itself already, the companion sees no change
+        // if the flight controller already flies by itself, the companion sees no mode change
         let steered = self.aircraft.is_steered();
         if taken && self.aircraft.take_over() && steered {
             self.follower.asked = false;
@@ -71,7 +73,7 @@ impl Flight {
     }
 }
 
-/// The step of a time, s.
+/// Step at time `at_s`, s.
 fn at_step(at_s: f64) -> u64 {
     (100.0 * at_s) as u64
 }

@@ -1,10 +1,10 @@
-//! A writer that becomes a full disk at a given time.
+//! A writer that simulates a disk which becomes full.
 
 use std::io::{Error, ErrorKind, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A writer that fails as a full disk from a given time on.
+/// A writer that discards its bytes. While `full` is set, writing fails as on a full disk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Disk {
     pub(super) full: Arc<AtomicBool>,

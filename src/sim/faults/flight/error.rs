@@ -25,7 +25,7 @@ pub enum FaultsError {
     Parameter {
         /// Name of the parameter.
         name: String,
-        /// Its value as a multiple of the default.
+        /// Value of the parameter as a multiple of its default.
         times: f64,
         /// Reason of the refusal.
         why: String,

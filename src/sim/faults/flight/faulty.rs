@@ -13,7 +13,7 @@ use crate::faults::judge::{Exposure, Finding};
 use crate::faults::mix::{Fault, FaultKind};
 
 impl Flight {
-    /// Steps until the companion is scheduled again.
+    /// Steps of 10 ms until the companion is scheduled again; 0 if it is not suspended.
     pub(super) fn nap(&mut self, acting: &[Fault]) -> u64 {
         let starved = acting.iter().find(|fault| fault.kind == FaultKind::Starvation);
         let Some(Fault { strength, .. }) = starved else { return 0 };
@@ -24,13 +24,14 @@ impl Flight {
         }
     }
 
-    /// Ends the companion, and starts another when the fault ends; returns whether one is running.
+    /// Ends the companion when its fault starts, and starts another one when the fault ends. Returns whether a
+    /// companion is running.
     pub(super) fn is_alive(&mut self, acting: &[Fault]) -> bool {
         let killed = acting.iter().any(|fault| fault.kind == FaultKind::Killed);
         if killed && !self.killed {
             // the recording ends with the companion
             self.disk = None;
-            // there is a recorder for each such fault
+            // there is a spare companion for each fault of this kind
             if let Some(next) = self.spares.pop() {
                 self.desk = next;
             }
@@ -62,7 +63,7 @@ impl Flight {
             let s = fault.strength;
             match fault.kind {
                 FaultKind::Frozen => distortion.frozen = true,
-                // an iced pitot tube holds its speed, or shows less and less
+                // a blocked pitot tube shows a constant airspeed of 0.4 to 1.4 times cruise
                 FaultKind::Airspeed => {
                     distortion.airspeed_mps = Some(0.4 * self.cruise + self.cruise * s)
                 }
@@ -72,7 +73,7 @@ impl Flight {
                 FaultKind::Disk => {
                     self.disk.iter().for_each(|disk| disk.full.store(true, Ordering::Relaxed));
                 }
-                // the clock starts again
+                // the vehicle's clock restarts at zero
                 FaultKind::Reboot => self.clock_us = -(10_000 * step as i64),
                 _ => {}
             }
@@ -81,7 +82,7 @@ impl Flight {
         distortion
     }
 
-    /// Waits until the recorder's thread has met the full disk, whose report is required.
+    /// Waits up to 3 s for the companion's report of the full disk. A missing report is a finding.
     pub(super) fn hear_of_the_disk(&mut self, now_s: f64) {
         if self.disk.as_ref().is_none_or(|disk| !disk.full.load(Ordering::Relaxed)) {
             return;

@@ -1,5 +1,5 @@
-//! Flights under the model monitor, with a simulated ArduPlane whose attitude estimate has errors: its false alarms
-//! and its detection delays.
+//! False alarms and detection delays of the model monitor, in flights with a simulated ArduPlane whose attitude
+//! estimate has errors.
 
 use std::time::Duration;
 
@@ -18,15 +18,16 @@ use greylag_link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 
 /// Random stream of attitude errors and winds.
 const DRAWN: u64 = 30;
-/// Bounds of the uniformly drawn errors of roll, pitch and heading, degrees: alignment, compass.
+/// Bounds (±) of the uniformly drawn errors of roll, pitch and heading, degrees. They represent alignment and compass
+/// errors.
 pub const ATTITUDE_DEG: [f64; 3] = [1.0, 1.0, 2.0];
 /// Bound of each uniformly drawn wind component, m/s.
 const WIND_MPS: f64 = 4.0;
-/// Duration of a flight and time of its failure, s.
+/// Duration of a flight, s.
 const FLIGHT_S: f64 = 60.0;
-/// Time at which a surface jams, s: the companion is engaged within ten.
+/// Time at which a surface jams, s. The companion is engaged within the first 10 s.
 pub const FAILS_S: f64 = 25.0;
-/// Roll and pitch of the legs, degrees, and their duration, s.
+/// Roll and pitch of the legs, degrees. Each leg lasts `LEG_S` seconds.
 const LEGS: [[f64; 2]; 6] =
     [[0.0, 2.0], [25.0, 3.0], [-20.0, 5.0], [0.0, 0.0], [-35.0, 4.0], [15.0, 6.0]];
 const LEG_S: f64 = 5.0;
@@ -40,7 +41,7 @@ pub enum Failure {
     StuckElevator,
     /// The aileron jams in flight.
     StuckAileron,
-    /// Ice: drag by the simulator's effect `drag_alpha2=100`, twice the aircraft's at cruise.
+    /// Ice: the simulator's effect `drag_alpha2=100`, with which the drag at cruise is twice the aircraft's.
     Ice,
     /// A centre of gravity 4 cm aft.
     ShiftedLoad,
@@ -67,7 +68,8 @@ impl Failure {
         }
     }
 
-    /// The simulator's effect that represents it, active from the start.
+    /// The simulator's effect that represents the failure, active from the start. `None` for a surface that jams in
+    /// flight.
     fn effect(self) -> Option<&'static str> {
         match self {
             Failure::Ice => Some("drag_alpha2=100"),
@@ -82,19 +84,19 @@ impl Failure {
 pub struct Watched {
     /// Errors of roll, pitch and yaw, degrees.
     pub attitude_error_deg: [f64; 3],
-    /// Time from which the failure is observable for the companion: the failure, or engagement with it, s; `None` if
-    /// it was never engaged.
+    /// Time from which the companion can observe the failure, s. It is the time of the failure, or of the first
+    /// engagement if the failure is active from the start. `None` if the companion was never engaged.
     pub since_s: Option<f64>,
-    /// Reports with their times, s.
+    /// Reports of the monitor with their times, s.
     pub said: Vec<(f64, String)>,
 }
 
 impl CompanionFactory {
-    /// Flies for a minute under the monitor; all random numbers follow from `seed`.
+    /// Flies for 60 s under the monitor. All random numbers follow from `seed`.
     ///
     /// # Errors
     ///
-    /// If the aircraft cannot be loaded.
+    /// If the flight cannot be set up; `FaultsError` lists the reasons.
     pub fn watched(&self, seed: u64, failure: Failure) -> Result<Watched, FaultsError> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(DRAWN);
@@ -134,7 +136,7 @@ impl CompanionFactory {
     }
 }
 
-/// A companion and its client at a simulated controller.
+/// A companion with its client and a simulated flight controller.
 struct Bench {
     controller: FlightController,
     desk: Desk,
@@ -152,7 +154,7 @@ impl Bench {
         self.watched.since_s = self.watched.since_s.map(|_| FAILS_S);
     }
 
-    /// Advances 10 ms; `false` when the flight has ended on the ground or with a state that is not finite.
+    /// Advances 10 ms. Returns `false` when the flight has ended on the ground or with a state that is not finite.
     fn step(&mut self, step: u64) -> bool {
         let (at_s, host) = (step as f64 * 0.01, Duration::from_millis(1000 + 10 * step));
         let (mut down, mut up) = (Vec::new(), Vec::new());
@@ -164,7 +166,7 @@ impl Bench {
             if text.words.starts_with("engaged") {
                 self.watched.since_s.get_or_insert(at_s);
             }
-            if text.words.contains("is not the model's") {
+            if text.words.contains("deviates from the model") {
                 self.watched.said.push((at_s, text.words));
             }
         }
@@ -172,7 +174,7 @@ impl Bench {
         matches!(self.controller.fly(), Ok(None))
     }
 
-    /// The client: arms when possible, then sends its legs.
+    /// Sends the setpoint of the present leg, and arms when possible.
     fn client(&mut self, step: u64, at_s: f64, host: Duration) {
         let [roll, pitch] = LEGS[(at_s / LEG_S) as usize % LEGS.len()].map(f64::to_radians);
         let setpoint = AttitudeSetpoint { roll, pitch, thrust: None };
@@ -181,7 +183,7 @@ impl Bench {
         if !self.armed && step.is_multiple_of(10) {
             self.armed = self.desk.arm(host) == Verdict::Accepted;
             if self.armed {
-                // a refusal means that the link is lost at this moment: HOLD is flown
+                // The request is refused only if the link is lost at this moment. The companion then flies HOLD.
                 let _ = self.desk.pilot().set_mode(now, Mode::Offboard);
             }
         }
@@ -189,13 +191,13 @@ impl Bench {
 }
 
 impl Watched {
-    /// Delay from the failure to the first report, s; `None` without one.
+    /// Delay from `since_s` to the first report after it, s; `None` if no report follows.
     pub fn delay_s(&self) -> Option<f64> {
         let since = self.since_s?;
         self.said.iter().map(|(at, _)| at - since).find(|delay| *delay >= 0.0)
     }
 
-    /// Number of reports before the failure.
+    /// Number of reports before `since_s`. All reports count if there is no failure.
     pub fn false_alarms(&self, failure: Failure) -> usize {
         let healthy =
             |at: f64| failure == Failure::None || self.since_s.is_none_or(|since| at < since);

@@ -1,4 +1,4 @@
-//! Quantities of a running flight that the flight rules are evaluated on.
+//! Quantities of a running flight from which the flight rules are evaluated.
 
 use super::Flight;
 use crate::faults::mix::{Fault, FaultKind};
@@ -7,16 +7,17 @@ use greylag_flight::pilot::{Decision, Source, TICK_S};
 use greylag_link::autopilot::{Autopilot, Mode, Status};
 use greylag_link::vehicle::Vehicle;
 
-/// Time constants of the low-pass on a surface, and of the mean square of the remainder, s.
+/// Time constants, s: of the low-pass filter on a surface deflection, and of the mean square of the high-pass
+/// remainder.
 const SLOW_S: f64 = 0.5;
 const MEAN_S: f64 = 1.0;
-/// Difference of targets, rad, that counts as a new target.
+/// Smallest difference of roll or pitch, rad, that counts as a new target.
 const SAME: f64 = 1e-3;
 
-/// Updates the quantities from step to step.
+/// Quantities that are updated at every step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Follower {
-    /// Whether the companion is requested to fly, and no other pilot has taken control since.
+    /// Whether a client has requested the companion to fly and no other pilot has taken control since then.
     pub(super) asked: bool,
     decision: Option<Decision>,
     fresh: bool,
@@ -32,7 +33,7 @@ pub(super) struct Follower {
     surfaces: [Fast; 2],
 }
 
-/// High-pass of a surface's deflection with its mean square.
+/// High-pass filter of a surface deflection, with the mean square of its output.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fast {
     slow: f64,
@@ -69,13 +70,13 @@ impl Follower {
         (self.decision, self.fresh) = (Some(*decision), true);
     }
 
-    /// Resets after the companion has ended: its decisions are void, and its successor is not engaged.
+    /// Resets the quantities after the companion was killed. Its decisions are void, and its successor is not engaged.
     pub(super) fn died(&mut self) {
         (self.decision, self.fresh, self.asked) = (None, false, false);
         (self.held_s, self.moved) = (0.0, 0.0);
     }
 
-    /// Time for which the same attitude has been commanded and flown.
+    /// Updates the time for which the companion has controlled to the same attitude.
     fn steady(&mut self, flown: bool) {
         let target = self.decision.map_or([0.0; 2], |d| [d.target.roll, d.target.pitch]);
         let same = target.iter().zip(self.target).all(|(a, b)| (a - b).abs() < SAME);
@@ -85,7 +86,7 @@ impl Follower {
 }
 
 impl Flight {
-    /// Stores the sample of a step, where samples are requested.
+    /// Stores the sample of a step if samples are requested.
     pub(super) fn sample(&mut self, now_s: f64, acting: &[Fault]) {
         let Some(trace) = &mut self.trace else { return };
         let Status { mode, armed, failsafe, .. } = self.desk.pilot().status();
@@ -112,7 +113,7 @@ impl Flight {
         follower.age_s =
             if std::mem::take(&mut follower.fresh) { 0.0 } else { follower.age_s + TICK_S };
         let inputs = self.aircraft.inputs();
-        // where attitudes are commanded, the surfaces are the controller's own
+        // where the companion commands attitudes, the flight controller moves the surfaces
         let ours = steered && self.desk.vehicle().flies_surfaces();
         let [aileron, elevator] = &mut follower.surfaces;
         aileron.update(if ours { inputs.aileron } else { aileron.slow });

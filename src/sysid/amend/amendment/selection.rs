@@ -1,4 +1,4 @@
-//! Forward selection of the requested effects: each fit is judged by free runs over held-out flights.
+//! Forward selection of the requested effects: free runs over held-out flights decide on each fit.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -20,29 +20,29 @@ const ROUNDS: usize = 3;
 /// A model with the effects accepted so far, and their fit.
 #[derive(Clone)]
 pub(super) struct Selection {
-    /// The fit of the model's own coefficients alone, with its held-out scores.
+    /// The fit of the model without added effects, with its held-out scores.
     pub(super) tuned: (Fit, Vec<HorizonScore>),
     pub(super) fit: Fit,
     pub(super) after: Vec<HorizonScore>,
-    /// The effects that joined, in order.
+    /// The accepted effects, in order.
     accepted: Vec<Added>,
     /// The outcome for every requested effect.
     pub(super) effects: Vec<AddedEffect>,
 }
 
-/// The selection's inputs: what is requested, the flights to fit to, the judge.
+/// Inputs of the selection: options, flights of the fit, judge with the held-out flights.
 pub(super) struct Ask<'a> {
     pub(super) options: &'a Options,
     pub(super) train: &'a [Flight],
     pub(super) judge: &'a Judge<'a>,
     pub(super) progress: &'a Progress<'a>,
-    /// Number of fits begun; the first one tunes the prior.
+    /// Number of fits that have begun; the first fit has no added effects.
     pub(super) begun: AtomicUsize,
 }
 
 impl Ask<'_> {
-    /// Selects the effects that improve `model`: first those that a diagnosis found together, jointly, then the
-    /// others one by one.
+    /// Selects the effects that improve `model`. Effects that a diagnosis found together are first tried jointly. The others are
+    /// tried one by one.
     pub(super) fn selected(&self, model: &GreyBox) -> Result<Selection, AmendError> {
         let tuned = match &self.options.tuned {
             Some(known) => known.clone(),
@@ -65,13 +65,13 @@ impl Ask<'_> {
         self.rest(model, first)
     }
 
-    /// Tries, one by one, the effects of `model` that the selection `so_far` lacks. An effect refused while another
-    /// was missing is tried again once that one has joined.
+    /// Tries, one by one, the requested effects that the selection `so_far` lacks. A rejected effect is tried again after another
+    /// effect has been accepted.
     fn rest(&self, model: &GreyBox, so_far: Selection) -> Result<Selection, AmendError> {
         let Options { effects, refused, .. } = self.options;
         let mut best = (so_far.fit, so_far.after);
         let mut accepted: Vec<&Added> = so_far.accepted.iter().collect();
-        // each with the number of effects in the model when it was tried, 0 for those that have joined
+        // each verdict with the number of effects in the model when the effect was tried, 0 for accepted effects
         let verdict = |added: &Added| {
             let tried = so_far.effects.iter().find(|e| e.id == added.id && e.joined);
             tried.map(|tried| (tried.clone(), 0))
@@ -100,9 +100,10 @@ impl Ask<'_> {
         Ok(Selection { tuned: so_far.tuned, fit: best.0, after: best.1, accepted, effects })
     }
 
-    /// Fits the effects that a diagnosis found in one model, without those to whose estimates there are objections. A gross
-    /// error that one effect corrects can hide the gain of another one, so that one-by-one trials would miss it. `None` if
-    /// fewer than two remain, or if held-out flights are not predicted better.
+    /// Jointly fits the effects that a diagnosis found, and leaves out effects with implausible estimates.
+    ///
+    /// A large error that one effect corrects can hide the gain of another effect. Trials one by one would miss this other
+    /// effect. `None` if fewer than two effects remain, or if held-out flights are not predicted better.
     fn together(
         &self,
         model: &GreyBox,
@@ -121,7 +122,7 @@ impl Ask<'_> {
             return Ok(None);
         }
         let Some(mut kept) = fitted(&all)? else { return Ok(None) };
-        // an effect that the model's own coefficients can represent would widen all intervals
+        // an effect that coefficients of the model can represent would widen all intervals
         let mut fewer = all.clone();
         fewer.retain(|a| !judge::doubled(&a.id, &kept.0.parameters));
         if fewer.len() < all.len()
@@ -146,15 +147,15 @@ impl Ask<'_> {
         Ok(None)
     }
 
-    /// Tries the other conventions of `model`, whose selection is `best`, one by one; a convention that was refused
-    /// is tried again once another has been adopted.
+    /// Tries the alternatives to the conventions of `model` one by one; `best` is the selection for `model`. A rejected
+    /// alternative is tried again after another one has been adopted.
     pub(super) fn with_conventions(
         &self,
         model: &GreyBox,
         mut best: Selection,
     ) -> Result<(Selection, Vec<Tried>), AmendError> {
         let mut base = model.clone();
-        // each with the number of conventions that had been adopted when it was tried
+        // each verdict with the number of alternatives that had been adopted when it was reached
         let mut verdicts: [Option<(Tried, usize)>; Convention::ALL.len()] = Default::default();
         for _ in 0..ROUNDS {
             for (k, convention) in Convention::ALL.into_iter().enumerate() {
@@ -185,8 +186,8 @@ impl Ask<'_> {
         Ok((best, verdicts.into_iter().flatten().map(|(tried, _)| tried).collect()))
     }
 
-    /// The selection for `other`, the model under another convention, with the accepted effects. The remaining effects
-    /// are tried again only if the held-out error falls or the fit follows its shots more closely.
+    /// The selection for `other`, the model under another convention, with the accepted effects. The other requested effects
+    /// are tried again only if the held-out error decreases or the fit follows its shots more closely. `None` if the fit fails.
     fn under(&self, other: &GreyBox, best: &Selection) -> Result<Option<Selection>, AmendError> {
         let joined: Vec<&Added> = best.accepted.iter().collect();
         let Some(fit) = settled(self.with_effects(other, &joined, &best.fit.model))? else {
@@ -201,7 +202,7 @@ impl Ask<'_> {
         }
     }
 
-    /// Fits `model` with `effects`, starting from their values in `near` where it has them.
+    /// Fits `model` with `effects`. Effects that `near` contains start at their values in `near`.
     fn with_effects(
         &self,
         model: &GreyBox,
@@ -213,7 +214,7 @@ impl Ask<'_> {
             let own = format!("{}.", added.id);
             let fitted = near.coefficients().iter().filter(|c| c.name.starts_with(&own));
             let fitted: Vec<f64> = fitted.map(|c| c.value).collect();
-            // the starting values of a curve are its prior, so they must not come from an earlier fit
+            // the starting values of a curve are its prior means: they must not come from an earlier fit
             let start = match fitted.is_empty() || parameters::SLIGHT.contains(&added.id.as_str()) {
                 true => added.start.clone(),
                 false => Some(fitted),
@@ -235,8 +236,8 @@ impl Ask<'_> {
         output_error::fit(model, self.train, &options, &progress)
     }
 
-    /// Shares of the whole work done before and after the next fit. Some effects are tried twice, so the last share
-    /// stays below one.
+    /// Shares of the whole selection that are done before and after the next fit. They are limited to 0.98, because some effects
+    /// are tried twice.
     fn done(&self) -> [f64; 2] {
         let begun = self.begun.load(Ordering::Relaxed) as f64;
         let planned = 1.0 + self.options.effects.len() as f64;
@@ -245,7 +246,7 @@ impl Ask<'_> {
 }
 
 impl Selection {
-    /// Held-out free-run error at the horizon of judgement; NaN if no run reaches it.
+    /// Held-out free-run error at the longest horizon up to 5 s that a run reaches; NaN if there is none.
     fn error(&self) -> f64 {
         judge::judged(&self.after).unwrap_or(f64::NAN)
     }

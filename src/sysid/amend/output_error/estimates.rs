@@ -1,4 +1,4 @@
-//! Results of a finished fit: estimates with their intervals, by flight too, and notes for the reader.
+//! Results of a finished fit: estimates with their intervals, estimates of each flight, and notes for the user.
 
 use std::sync::Arc;
 
@@ -15,20 +15,20 @@ use crate::amend::result::{FittedFlight, FlightEstimate, OwnConstant, Parameter}
 use crate::amend::shooting::Shot;
 use greylag_model::{GreyBox, Known};
 
-/// Two-sided 95 % point of the normal distribution.
+/// Half width of a 95 % interval in standard deviations of a normal distribution.
 const NORMAL_95: f64 = 1.96;
-/// A prior whose width is at least this share of the range of the bounds adds no information to them.
+/// A prior whose standard deviation is at least this share of the range of the bounds adds no information to the bounds.
 const WIDE: f64 = 0.5;
-/// A coefficient counts as learned if its posterior width is below this share of the prior's.
+/// The flights excite a coefficient if its posterior standard deviation is below this share of its prior standard deviation.
 const LEARNED: f64 = 0.7;
-/// Error correlation beyond which two coefficients are confounded.
+/// Magnitude of the error correlation above which two coefficients are confounded.
 const SAME: f64 = 0.9;
 /// Last change of a coefficient, in standard deviations, above which a fit has not converged.
 const UNSETTLED: f64 = 0.5;
-/// Last change, in standard deviations, above which no estimate of the fit is usable, if the step was accepted.
+/// Last change of a coefficient, in standard deviations, above which no estimate is usable if the last step was accepted.
 const LOST: f64 = 5.0;
 
-/// Note that names the coefficients that were held, if there are any.
+/// Note that names the held coefficients; `None` if there are none.
 fn held_note(held: &[String]) -> Option<String> {
     (!held.is_empty()).then(|| {
         format!(
@@ -39,7 +39,7 @@ fn held_note(held: &[String]) -> Option<String> {
     })
 }
 
-/// Whether `value` lies at a bound of `free`, to a millionth of their range.
+/// Whether `value` lies at a bound of `free`, within a millionth of the range of the bounds.
 fn at_bound(free: &Free, value: f64) -> bool {
     let (low, high) = free.bounds;
     let at = |bound: f64| (value - bound).abs() <= 1e-6 * (high - low);
@@ -47,17 +47,17 @@ fn at_bound(free: &Free, value: f64) -> bool {
 }
 
 impl Search<'_> {
-    /// Holds the undetermined coefficients at the model's own values, and returns their names.
+    /// Holds the undetermined coefficients at their values in the model file, and returns their names.
     ///
-    /// A coefficient is undetermined if its prior is as wide as its bounds and its 95 % interval contains both bounds. If
-    /// all coefficients are undetermined, none is held.
+    /// A coefficient is undetermined if its prior standard deviation is at least half the range of its bounds and its 95 %
+    /// interval contains both bounds. If all coefficients are undetermined, none is held.
     pub(super) fn hold_undetermined(&mut self) -> Vec<String> {
         let Some(cholesky) = self.system().information.cholesky() else { return Vec::new() };
         let inverse = cholesky.inverse();
         let undetermined = |(k, f): (usize, &Free)| {
             let (value, half) = (self.place.theta[k], NORMAL_95 * inverse[(k, k)].sqrt());
             let wide = f.width >= WIDE * (f.bounds.1 - f.bounds.0);
-            // data that drive a value to a bound do carry information about it
+            // data that drive a value to a bound contain information about it
             let inside = !at_bound(f, value);
             let holds_all = value - half <= f.bounds.0 && value + half >= f.bounds.1;
             !f.added && wide && inside && holds_all
@@ -76,8 +76,10 @@ impl Search<'_> {
         names
     }
 
-    /// The fit at the present estimates, with intervals. Its model is `given`, which has no trims of flights, with the
-    /// estimated coefficients; `held` names the undetermined ones.
+    /// The fit at the present estimates, with intervals.
+    ///
+    /// Its model is `given` with the estimated coefficients and without terms for trims. `held` names the undetermined
+    /// coefficients.
     pub(super) fn finish(self, given: &GreyBox, held: &[String]) -> Result<Fit, AmendError> {
         let model_name = || self.base.name.clone();
         if self.change.0.is_nan() || (self.change.0 > LOST && !self.stuck) {
@@ -151,7 +153,7 @@ impl Search<'_> {
         let (size, constants) = (self.of_flight(), self.asked.constants());
         let count = self.flights.len();
         let place = |flight: usize, which: usize| self.free.len() + flight * size + which;
-        // less the mean of the flights, which is confounded with the model's coefficient
+        // estimate less the mean over the flights: this mean is confounded with the model's coefficient
         let beside_mean = |flight: usize, which: usize| {
             let value =
                 |k: usize| self.place.own[k].unknowns(&self.asked).nth(which).unwrap_or(0.0);
@@ -213,8 +215,8 @@ impl Search<'_> {
         self.free.iter().enumerate().map(one).collect()
     }
 
-    /// Estimates of each flight alone, to first order: one step from the common optimum with that flight's equations
-    /// and the prior.
+    /// Estimates from each flight alone, to first order: one step from the common optimum with the equations of the flight and
+    /// the prior.
     fn by_flight(&self, system: &System) -> Vec<Vec<FlightEstimate>> {
         let count = self.free.len();
         let mut all = vec![Vec::new(); count];
@@ -247,9 +249,10 @@ impl Search<'_> {
         all
     }
 
-    /// Factor by which intervals widen for disagreement between flights (Birge ratio, at least 1): the root mean
-    /// square of the flights' own estimates less the common one, in standard deviations of the difference. It covers
-    /// errors that are constant within a flight, such as that of a clock.
+    /// Factor on the intervals for disagreement between flights (Birge ratio, at least 1).
+    ///
+    /// The factor is the root mean square difference between the estimates of single flights and the common estimate, in standard
+    /// deviations of the difference. It covers errors that are constant within a flight, for example a clock skew.
     fn disagreement(&self, sd: &[f64], by_flight: &[Vec<FlightEstimate>]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (k, f) in self.free.iter().enumerate() {
@@ -283,7 +286,7 @@ impl Search<'_> {
         std::array::from_fn(|k| (square(k) / count).sqrt())
     }
 
-    /// The parameter that has not converged, in words, if there is one.
+    /// Sentence on the parameter that has not converged; `None` if all have converged.
     fn unsettled(&self) -> Option<String> {
         let (change, parameter) = (self.change.0, &self.free[self.change.1].name);
         (change > UNSETTLED).then(|| {

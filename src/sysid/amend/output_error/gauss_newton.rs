@@ -1,4 +1,4 @@
-//! A damped Gauss–Newton step within bounds and largest steps, and its size in standard deviations.
+//! Damped Gauss–Newton step, limited by bounds and largest steps, and its size in standard deviations.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ pub(super) struct System {
 }
 
 impl Search<'_> {
-    /// Coefficients less their prior means, then the constants of each flight.
+    /// Coefficients less their prior means, then the constants of each flight less their prior means.
     pub(super) fn unknowns(&self, place: &Place) -> DVector<f64> {
         let coefficients = self.free.iter().zip(&place.theta).map(|(f, x)| x - f.prior);
         let mut all: Vec<f64> = coefficients.collect();
@@ -45,7 +45,7 @@ impl Search<'_> {
         DVector::from_vec(all.iter().map(|sd| sd.powi(-2)).collect())
     }
 
-    /// Indices of the unknowns of a shot among all unknowns.
+    /// Indices of the unknowns of a shot in `flight` among all unknowns.
     pub(super) fn places(&self, flight: usize) -> Vec<usize> {
         let count = self.free.len();
         let size = self.of_flight();
@@ -75,7 +75,7 @@ impl Search<'_> {
         System { shots, information, gradient, prior }
     }
 
-    /// Takes one damped step; returns whether the point moved.
+    /// Takes one damped step that decreases the cost. Returns false if the cost does not decrease with any damping.
     pub(super) fn step(&mut self, system: &System, damping: &mut f64) -> Result<bool, AmendError> {
         let before = self.cost(&self.place);
         for _ in 0..8 {
@@ -93,7 +93,7 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// The damped step, restricted to bounds and largest steps.
+    /// The damped step, limited by the coefficients' bounds and largest steps.
     fn solve(&self, system: &System, damping: f64) -> Result<DVector<f64>, AmendError> {
         let singular = || AmendError::Singular { model: self.base.name.clone() };
         let mut held: Vec<Option<f64>> = vec![None; system.gradient.len()];
@@ -110,7 +110,7 @@ impl Search<'_> {
             for (k, known) in held.iter().enumerate().filter_map(|(k, h)| h.map(|h| (k, h))) {
                 right[k] = system.information[(k, k)] * known;
             }
-            // scaled to a unit diagonal, so that units do not matter
+            // scaled to a unit diagonal: the result does not depend on the units
             for (a, b) in (0..scale.len()).flat_map(|a| (0..scale.len()).map(move |b| (a, b))) {
                 matrix[(a, b)] *= scale[a] * scale[b];
             }
@@ -133,7 +133,7 @@ impl Search<'_> {
         Err(singular())
     }
 
-    /// Largest decrease and increase of a coefficient.
+    /// Largest decrease (negative) and increase of coefficient `k` in one step.
     fn room(&self, k: usize, f: &Free) -> (f64, f64) {
         let here = self.place.theta[k];
         ((f.bounds.0 - here).max(-f.stride), (f.bounds.1 - here).min(f.stride))
@@ -160,7 +160,7 @@ impl Search<'_> {
         next
     }
 
-    /// Largest change of a coefficient in its standard deviations, with the coefficient's index.
+    /// Largest change of a coefficient in its standard deviations, and the coefficient's index.
     fn in_deviations(&self, system: &System, step: &DVector<f64>) -> (f64, usize) {
         let Some(cholesky) = system.information.clone().cholesky() else {
             return (f64::INFINITY, 0);

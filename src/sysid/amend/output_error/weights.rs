@@ -1,22 +1,22 @@
-//! Weights of states, shots and initial states in a search.
+//! Weights of states and shots in a search, and the choice of its starting point.
 
 use super::Search;
 use crate::amend::normal::Place;
 use crate::amend::shooting;
 use greylag_num::statistics::{correlation_length, quantile};
 
-/// Least standard deviations of residuals, in the units of the state: the error of the models' steps and of the
+/// Smallest standard deviations of residuals, in the units of the state: the errors of the models' discrete steps and of the
 /// interpolated deflections without noise.
 const FLOOR: [f64; 8] = [5e-4, 5e-4, 0.01, 2e-3, 2e-3, 2e-3, 5e-4, 5e-4];
-/// A shot is down-weighted if its mean square residual exceeds the typical one by this factor.
+/// A shot is down-weighted if its weighted mean square residual exceeds the median of all shots by this factor.
 const OUTLYING: f64 = 6.0;
 
 impl Search<'_> {
-    /// Sets the weights from the present residuals: the inverse variance of each state, all divided by one
-    /// correlation length.
+    /// Sets the weights from the present residuals: inverse variance of each state divided by a common correlation length, and
+    /// lower weights for outlying shots.
     ///
-    /// With a correlation length for each state the iteration of weights has no useful fixed point: a state that
-    /// drifts has a longer correlation, so a lower weight, so it drifts more, until the fit ignores it.
+    /// With separate correlation lengths, the iteration of the weights would have no useful fixed point. A state that drifts has
+    /// a longer correlation length and therefore a lower weight. It then drifts more, until the fit ignores this state.
     pub(super) fn reweigh(&mut self) {
         let residuals = self.residuals();
         let square = |r: &[[f64; 8]], k: usize| r.iter().map(|x| x[k] * x[k]).sum::<f64>();
@@ -41,8 +41,8 @@ impl Search<'_> {
         }
     }
 
-    /// Restarts at `given`, the model's own coefficients, if its shots of `length_s` follow the flights more closely
-    /// than those from the equation-error estimate, which a kink of a table or a delayed sensor can mislead.
+    /// Restarts at `given`, the coefficients of the model file, if shots of `length_s` (s) with them follow the flights more
+    /// closely than with the equation-error estimate. A kink of a table or a delayed sensor can bias the equation-error estimate.
     pub(super) fn start_from_the_closer(&mut self, given: &[f64], length_s: f64) {
         self.shots = shooting::cut(self.flights, length_s);
         self.place.starts = vec![[0.0; 8]; self.shots.len()];
@@ -52,7 +52,7 @@ impl Search<'_> {
         }
     }
 
-    /// Sum over the shots of their root mean square residual, which no single diverged shot dominates.
+    /// Sum over the shots of their weighted root mean square residuals. A single diverged shot does not dominate this sum.
     fn distance(&self, place: &Place) -> f64 {
         let square =
             |r: &[f64; 8]| (0..8).map(|k| self.weights.output[k] * r[k] * r[k]).sum::<f64>();
@@ -61,7 +61,7 @@ impl Search<'_> {
     }
 }
 
-/// Geometric mean of the states' correlation lengths, samples.
+/// Geometric mean of the states' correlation lengths, in samples.
 fn common_length(residuals: &[Vec<[f64; 8]>]) -> f64 {
     let of_state = |k: usize| -> Vec<Vec<f64>> {
         residuals.iter().map(|r| r.iter().map(|x| x[k]).collect()).collect()
@@ -88,7 +88,7 @@ mod tests {
                 row[2] = k as f64;
             }
         }
-        // its own would be in the hundreds; the geometric mean of eight takes the eighth root
+        // the correlation length of this state is several hundred samples; the geometric mean of eight takes the eighth root
         let all = common_length(&drifting);
         assert!((1.3..3.0).contains(&all), "{all}");
     }

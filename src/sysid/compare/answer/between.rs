@@ -1,11 +1,11 @@
-//! The answer of a comparison: the first model, then each other model against it.
+//! Answer of a comparison: free-run error of the first model, and of each other model relative to the first.
 
 use super::{ANSWER_S, Answer, Seen, Stage, Subject, Way};
 use crate::compare::forecast::ForecastResult;
 use crate::compare::result::ModelResult;
 use crate::weak_form::prepared::Prepared;
 
-/// The answer about `models` over `flights`; a single model is compared with the best forecast without aerodynamics.
+/// The answer about `models` over `flights`. The best forecast without aerodynamics is the baseline.
 pub fn between(
     models: &[ModelResult],
     flights: &[Prepared],
@@ -16,7 +16,7 @@ pub fn between(
         model: &model.name,
         scores: &model.free_run,
     });
-    // at the horizon of the answer, or the longest below it
+    // error at the longest horizon up to ANSWER_S that a run reaches
     let error = |f: &ForecastResult| {
         let reached = f.free_run.iter().filter(|s| s.runs > 0 && s.horizon_s <= ANSWER_S);
         let last = reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s));

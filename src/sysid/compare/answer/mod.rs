@@ -1,5 +1,5 @@
-//! The answer box: by how much the error falls, by which effect, and what remains. Composed here for terminal, page,
-//! workbench and JSON.
+//! Short answer: change of the free-run error, the effects that were added, and the largest remaining error. Terminal,
+//! web page, workbench and JSON all show this answer.
 
 pub(super) mod between;
 mod numbers;
@@ -10,27 +10,28 @@ use serde::Serialize;
 use super::result::HorizonScore;
 pub use numbers::{Baseline, Decisive, InUse, Left, Numbers, Step, Way};
 
-/// Horizon of the answer, s; a shorter one where no run reaches it.
+/// Preferred horizon of an answer, s. If the flights are too short for it, the answer takes the longest shorter horizon that
+/// runs of every model reach.
 pub const ANSWER_S: f64 = 5.0;
 
-/// The answer in sentences, with the numbers in them.
+/// An answer in sentences, with their numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Answer {
-    /// Fall of the error, step by step, with the flights it was measured on.
+    /// Change of the free-run error with each step, and the flights on which the error was computed.
     pub error: String,
-    /// Description of the effect, its decisive coefficient and the change of the predictions; empty if nothing was
-    /// added.
+    /// Effects with their most significant coefficients, and the state whose prediction improves most; empty if there are
+    /// neither.
     pub effect: String,
     /// Largest remaining prediction error.
     pub left: String,
-    /// The next command, ready to be copied; empty if none is known.
+    /// The recommended next command; empty if there is none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub next: String,
     /// All numbers of the sentences.
     pub numbers: Numbers,
 }
 
-/// A model in the sequence from the given to the last one.
+/// A model in the sequence from the given model to the last model.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a> {
     /// Derivation from the model before it.
@@ -41,34 +42,34 @@ pub struct Stage<'a> {
     pub scores: &'a [HorizonScore],
 }
 
-/// Relation of the free runs' flights to the fit.
+/// Relation between the flights of the free runs and the flights of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// The flights that the model was fitted to are not known.
+    /// The flights of the fit are unknown.
     Unknown,
-    /// The model was fitted to this many of the flights.
+    /// Number of the flights to which the model was fitted.
     Of(usize),
-    /// The flights are the last third of a flight whose rest was fitted.
+    /// The flights are the last third of a flight; the first two thirds were fitted.
     LastThird,
 }
 
 /// Input of an answer.
 #[derive(Clone, Debug)]
 pub struct Subject<'a> {
-    /// Models in the order of improvement; the first is the given one.
+    /// Models in the order of derivation; the first is the given model.
     pub stages: Vec<Stage<'a>>,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Relation of the flights to the fit.
+    /// Relation between `flights` and the flights of the fit.
     pub seen: Seen,
-    /// Effects that the last model has and the first has not, each with its most significant coefficient.
+    /// Effects that the last model has and the first model lacks, each with its most significant coefficient.
     pub effects: Vec<Decisive>,
     /// Name and errors of a forecast without aerodynamics.
     pub baseline: Option<(&'a str, &'a [HorizonScore])>,
 }
 
 impl Answer {
-    /// The empty answer, before any result is known.
+    /// The empty answer, for the time before the first result.
     pub fn nothing() -> Answer {
         Answer::of(&Subject {
             stages: Vec::new(),
@@ -180,7 +181,7 @@ mod tests {
             "On 2 flights not fitted the error at 5 s falls from 0.0873 to 0.0234 by tuning (−73 %) and to 0.00083 with \
              drag_beta2 (another −96 %)."
         );
-        // the effect lowers the scaled error of airspeed most, from 0.05 to 0.002; the largest one left is sideslip's, 0.0067
+        // the effect reduces the scaled error of airspeed most, from 0.05 to 0.002; sideslip keeps the largest, 0.0067
         assert_eq!(
             answer.effect,
             "drag_beta2 (drag rises with the square of sideslip): CDbeta2 = 0.991 (95 %: 0.986 to 0.997). With it the \

@@ -1,21 +1,21 @@
-//! The numbers of an answer.
+//! Numbers of an answer: errors, their changes, coefficients of the added effects.
 
 use serde::Serialize;
 
 use super::{ANSWER_S, Seen, Stage, Subject};
 use crate::compare::result::{HorizonScore, StateScore};
 
-/// Derivation of a model from the one before it.
+/// Derivation of a model from the model before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// It is the given model, the first one.
+    /// The given model, the first of the sequence.
     Given,
-    /// The model's own coefficients were fitted.
+    /// The coefficients of the model before it were fitted.
     Tuned,
     /// Effects were added, and all coefficients refitted.
     Effects,
-    /// It is a different model.
+    /// A different model, compared with the first one.
     Other,
 }
 
@@ -26,9 +26,10 @@ pub struct Step {
     pub way: Way,
     /// Name of the model.
     pub model: String,
-    /// Free-run error at the horizon: NRMSE, the root mean square over the eight states, each over its scale x_c.
+    /// Free-run error at the horizon of the answer: NRMSE, the root mean square over runs and states of error / x_c.
     pub error: f64,
-    /// Change against the step before, or for a different model against the first one, %. `None` for the first.
+    /// Change of `error` relative to the step before, %; relative to the first step for `Way::Other`. `None` for the first
+    /// step.
     pub change_percent: Option<f64>,
 }
 
@@ -47,27 +48,29 @@ pub struct Decisive {
     pub ci95: [f64; 2],
     /// Unit of `value`; may be empty.
     pub unit: String,
-    /// Ids of effects that the flights cannot distinguish from this one.
+    /// Identifiers of effects that the flights cannot distinguish from this effect.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<String>,
 }
 
 impl Decisive {
-    /// Significance: the value divided by the width of its interval.
+    /// Significance: magnitude of `value` divided by the width of its 95 % interval. 0 if the quotient is not finite.
     pub fn clearness(value: f64, ci95: [f64; 2]) -> f64 {
         let clear = value.abs() / (ci95[1] - ci95[0]);
         if clear.is_finite() { clear } else { 0.0 }
     }
 }
 
-/// The state whose prediction improves most, relative to its scale, by the last step.
+/// The state whose root mean square error, relative to its scale x_c, decreases most.
+///
+/// A last model with added effects is compared with the model before it, any other last model with the first one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InUse {
     /// State with its unit, as in `State::NAMES`.
     pub state: &'static str,
-    /// Root mean square error before the step, in that unit.
+    /// Root mean square error of the earlier model, in the unit of `state`.
     pub before: f64,
-    /// Root mean square error after the step, in that unit.
+    /// Root mean square error of the last model, in the unit of `state`.
     pub after: f64,
 }
 
@@ -76,7 +79,7 @@ pub struct InUse {
 pub struct Left {
     /// State with its unit, as in `State::NAMES`.
     pub state: &'static str,
-    /// Root mean square error, in that unit.
+    /// Root mean square error, in the unit of `state`.
     pub rmse: f64,
 }
 
@@ -96,23 +99,23 @@ pub struct Numbers {
     pub horizon_s: f64,
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Number of these flights that a fit has used; `None` (null) if that is not known.
+    /// Number of these flights that a fit has used; `None` (null) if it is unknown.
     pub fitted_flights: Option<usize>,
-    /// Whether the flights are the last third of a flight whose rest was fitted.
+    /// Whether the flights are the last third of a flight whose first two thirds were fitted.
     pub last_third: bool,
-    /// The models, from the given to the last one.
+    /// The models, from the given model to the last model; empty if no horizon is reached.
     pub steps: Vec<Step>,
     /// Change of the error from the first to the last model, %; NaN (null) for a single model.
     pub change_percent: f64,
-    /// The best forecast without aerodynamics, where the models are compared with some.
+    /// The best forecast without aerodynamics; `None` if the answer has none, or if no run of the forecast reaches the horizon.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline: Option<Baseline>,
-    /// Effects that the last model has and the first has not.
+    /// Effects that the last model has and the first model lacks.
     pub effects: Vec<Decisive>,
-    /// The state whose prediction they improve most.
+    /// The state whose prediction improves most; `None` if no prediction improves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_use: Option<InUse>,
-    /// The state with the largest remaining error.
+    /// The state with the largest remaining error; `None` if no horizon is reached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<Left>,
 }
@@ -155,7 +158,8 @@ impl Numbers {
     }
 }
 
-/// The longest horizon up to [`ANSWER_S`] that runs of every model reach; without one, the shortest that they reach.
+/// The longest horizon up to [`ANSWER_S`] that runs of every model reach, s. If there is none, the shortest horizon that runs
+/// of every model reach.
 fn horizon(stages: &[Stage]) -> Option<f64> {
     let first = stages.first()?;
     let reached = |s: &&HorizonScore| {

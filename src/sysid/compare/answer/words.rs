@@ -1,8 +1,8 @@
-//! The sentences of an answer.
+//! Wording of an answer's sentences, from its numbers.
 
 use super::numbers::{Decisive, InUse, Left, Numbers, Step, Way};
 
-/// Sentence on the fall of the error.
+/// Sentence on the free-run error and its change with each step.
 pub fn error(n: &Numbers) -> String {
     let Some((first, rest)) = n.steps.split_first() else {
         return "No free run is long enough for an error to be given.".into();
@@ -58,7 +58,7 @@ pub fn error(n: &Numbers) -> String {
     text + "."
 }
 
-/// Sentence on the effects, each with its decisive coefficient, and the change of the predictions.
+/// Sentences on the effects with their most significant coefficients, and on the state whose prediction improves most.
 pub fn effect(n: &Numbers) -> String {
     let mut said: Vec<String> = n.effects.iter().map(one).collect();
     let subject = match (n.steps.len(), n.effects.len()) {
@@ -109,7 +109,7 @@ fn in_use(n: &Numbers, used: &InUse, subject: &str) -> String {
     )
 }
 
-/// Sentence on the largest remaining error.
+/// Sentence on the largest remaining error; empty if there is no error.
 pub fn left(n: &Numbers) -> String {
     n.left.as_ref().map_or(String::new(), |Left { state, rmse }| {
         let (name, unit, factor) = people(state);
@@ -138,7 +138,7 @@ pub fn summary(n: &Numbers) -> String {
     }
 }
 
-/// The flights in words: "On 2 flights not fitted".
+/// Phrase for the flights on which the error was computed, for example "On 2 flights not fitted".
 fn on(n: &Numbers) -> String {
     let all = n.flights.len();
     let flights = if all == 1 { "1 flight".into() } else { format!("{all} flights") };
@@ -200,7 +200,7 @@ fn by(n: &Numbers, step: &Step) -> String {
     }
 }
 
-/// A change in percent with its sign; one decimal place below 10 % and from 98 to 100 %.
+/// A change `p` (%) as text with its sign. Magnitudes below 10 % and from 98 to 100 % have one decimal place.
 fn percent(p: f64) -> String {
     let sign = if p > 0.0 { "+" } else { "−" };
     match p.abs() {
@@ -240,7 +240,7 @@ fn lower(text: &str) -> String {
     }
 }
 
-/// Colloquial name and unit of a state, and the factor from its SI unit.
+/// Name and unit of a state in the sentences, and the factor from the state's SI unit.
 fn people(state: &str) -> (&str, &'static str, f64) {
     let degrees = 1f64.to_degrees();
     match state {

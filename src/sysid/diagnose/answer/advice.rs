@@ -1,14 +1,14 @@
-//! Advice on the next flight.
+//! Advice on the manoeuvres of the next flight.
 
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
 use crate::diagnose::answer::sentences::figures;
 use crate::diagnose::search::stepwise::Found;
 use greylag_physics::catalogue::describe;
 
-/// Largest number of hints on effects that these data could not have shown.
+/// Largest number of recommendations for candidates whose evidence is near the threshold.
 const UNSEEN: usize = 2;
 
-/// Advice on the next flight, the most useful first.
+/// Advice on the next flight, in descending order of usefulness; empty if there is none.
 pub fn advice(
     found: &Found,
     verdict: Verdict,
@@ -20,7 +20,7 @@ pub fn advice(
         for other in &c.indistinguishable_from {
             list.push(Advice {
                 manoeuvre: separating(&c.id),
-                why: format!("it tells {} from {other}", c.id),
+                why: format!("it distinguishes {} from {other}", c.id),
                 between: Some([c.id.clone(), other.clone()]),
             });
         }
@@ -30,7 +30,7 @@ pub fn advice(
         if let [a, b] = open[..] {
             list.push(Advice {
                 manoeuvre: separating(&a.id),
-                why: format!("{} is the closest shape; this tells whether it is the cause", a.id),
+                why: format!("{} is the closest shape; this shows whether it is the cause", a.id),
                 between: Some([a.id.clone(), b.id.clone()]),
             });
         }

@@ -1,20 +1,23 @@
-//! An effect's contribution over the regime variable that shows it best.
+//! Curve of an effect's contribution over the regime variable that explains most of its variance.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::Curve;
 use crate::diagnose::regression::gather::Column;
 use crate::diagnose::search::round::Round;
 
-/// Number of bins of equal count, by which the variable is chosen.
+/// Number of bins of equal count for the choice of the variable.
 const PLACES: usize = 12;
-/// Number of bins of equal width, in which the curve is drawn; bins of equal count end where windows are sparse.
+/// Number of bins of equal width for the curve. Bins of equal count would not reach the ends of the range, where windows are
+/// sparse.
 const WIDTHS: usize = 24;
-/// Variables that describe the circumstances rather than the flight state, and are not plotted.
+/// Variables that do not describe the flight state and are not plotted.
 const NOT_SHOWN: [RegimeVariable; 3] =
     [RegimeVariable::Altitude, RegimeVariable::Time, RegimeVariable::Flight];
 
-/// The curve of `contribution` (flight by flight) in the first of `channels`. `relative` is its standard deviation
-/// relative to itself; `left` states whether the round's residual still contains it.
+/// The curve of `contribution` (one entry a flight) in the first of `channels`.
+///
+/// `relative` is the relative standard deviation of the contribution. `left` states whether the residual of the round still
+/// contains the contribution.
 pub fn curve(
     round: &Round,
     contribution: &[Column],
@@ -41,9 +44,10 @@ pub fn curve(
     over_the_best(id, made, scatter, &regimes, relative)
 }
 
-/// The curve of an effect in a channel over the regime variable that shows it best, from values at each window: its
-/// contribution (`made`), measured less the model without it (`scatter`), both in the channel's unit, and the
-/// window's regime. `relative` is the standard deviation of the contribution relative to itself.
+/// The curve of an effect in channel `id` over the regime variable that explains most of the contribution's variance.
+///
+/// For each window, `made` is the contribution and `scatter` is measured − model without the effect, both in the channel's
+/// unit. `regimes` holds the windows' regime variables. `relative` is the relative standard deviation of the contribution.
 pub fn over_the_best(
     id: ChannelId,
     made: Vec<f64>,
@@ -77,7 +81,7 @@ pub fn over_the_best(
     })
 }
 
-/// Means of x and y in bins of equal count over x.
+/// Means of `x` and `y` in bins of equal count over `x`.
 fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|a, b| x[*a].total_cmp(&x[*b]));
@@ -87,7 +91,7 @@ fn bins(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     order.chunks(size).map(|bin| [mean(bin, x), mean(bin, y)]).collect()
 }
 
-/// Means of x and y in bins of equal width over the whole range of x; empty bins are left out.
+/// Means of `x` and `y` in bins of equal width over the whole range of `x`. Empty bins are left out.
 fn over_the_range(y: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let (low, high) =
         x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
@@ -116,14 +120,14 @@ mod tests {
 
     #[test]
     fn a_curve_reaches_as_far_as_the_data() {
-        // most windows lie within ±1, as in flight; a few reach ±10
+        // most windows lie within ±1, a few reach ±10
         let x: Vec<f64> = (0..200)
             .map(|k| if k % 20 == 0 { k as f64 / 10.0 - 10.0 } else { (k as f64).sin() })
             .collect();
         let y: Vec<f64> = x.iter().map(|x| x * x).collect();
         let curve = over_the_range(&y, &x);
         let (first, last) = (curve[0], curve[curve.len() - 1]);
-        // a bin is 0.8 wide, so its mean lies within that of the end
+        // a bin is 0.8 wide: the means of the end bins lie within 0.8 of the ends
         assert!(first[0] < -9.2 && last[0] > 7.2, "{first:?} {last:?}");
         assert!((first[1] - first[0].powi(2)).abs() < 0.2);
     }

@@ -1,4 +1,4 @@
-//! Decoys, columns that cannot be effects: candidates reversed in time, candidates with randomized phases.
+//! Decoys: regression columns that cannot be effects, namely candidates reversed in time or with randomized phases.
 
 use std::f64::consts::TAU;
 
@@ -13,15 +13,15 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::Found;
 use greylag_num::stream::{Stream, stream};
 
-/// Random stream for the phases.
+/// Number of the random stream for the phases.
 const DECOYS: u64 = 84;
-/// Largest number of candidates turned into decoys.
+/// Largest number of candidates from which decoys are made.
 const MOST: usize = 6;
-/// Longest series, in windows, that is transformed at once; longer ones are randomized in pieces, to bound the cost
-/// of the transform.
+/// Longest series, in windows, that is transformed at once. Longer series are randomized in pieces to limit the cost of the
+/// transform.
 const PIECE: usize = 256;
 
-/// The decoys of the best linear candidates of the last round with their evidence.
+/// The decoys of the best linear candidates of the last round, with their evidence.
 pub fn decoys(found: &Found, seed: u64) -> Vec<Decoy> {
     let round = found.round();
     let mut random = stream(seed, &[DECOYS]);

@@ -1,8 +1,9 @@
-//! The smallest amount of an effect that the flights would have shown.
+//! The smallest detectable amount of an effect.
 //!
-//! For an effect that is linear in its constants, their standard deviations suffice. An effect on the deflections is
-//! not linear near zero: a lag is confounded with a clock error there, and a dead zone has no effect. It is evaluated
-//! at increasing amounts on the flights' own deflections, with all nuisances projected out each time.
+//! For an effect that is linear in its coefficients, this amount follows from the standard deviations of the coefficients.
+//! An effect on the deflections is not linear near zero: a small lag is confounded with a clock error, and a small dead zone
+//! has no effect. Such an effect is evaluated at several amounts on the deflections of the flights. All nuisances are
+//! projected out at each amount.
 
 use std::collections::BTreeMap;
 
@@ -18,16 +19,17 @@ use crate::diagnose::search::round::Round;
 const TRIED: usize = 8;
 /// Largest factor between one amount and the next.
 const STRIDE: f64 = 8.0;
-/// Assumed exponent of the evidence over the amount, until two amounts have been evaluated.
+/// Assumed exponent in evidence ∝ amountⁿ until two amounts have been evaluated.
 const POWER: f64 = 2.0;
-/// Least and largest exponent accepted from two amounts.
+/// Smallest and largest exponent n that is derived from two amounts.
 const POWERS: [f64; 2] = [0.5, 4.0];
-/// The search ends at an amount whose evidence is within this relative distance of the one sought.
+/// The search ends at an amount whose evidence differs from the required evidence by less than this share.
 const CLOSE: f64 = 0.1;
 
-/// For each candidate of `round`, the smallest amount of its first free coefficient whose evidence would have
-/// exceeded `threshold` with a probability of five in six. Candidates without such an amount are left out: shapes
-/// that have no small amount, and effects that would not show at any possible amount.
+/// For each candidate of `round`, the smallest amount of its first free coefficient, in the coefficient's unit, whose
+/// evidence exceeds `threshold` with a probability of five in six.
+///
+/// Candidates without a detectable amount are left out.
 pub fn detectable(round: &Round, threshold: f64) -> BTreeMap<&'static str, f64> {
     let straight = round.trials.iter().filter(|t| t.points[0].contribution.is_none());
     let mut all: BTreeMap<&'static str, f64> =
@@ -43,13 +45,13 @@ fn linear(round: &Round, trial: &Trial, threshold: f64) -> Option<f64> {
     amount.is_finite().then_some(amount)
 }
 
-/// Detectability of a direction against noise.
+/// Detectability of an effect's contribution in the noise.
 struct Shown {
-    /// Standard deviation of its amount due to the noise alone.
+    /// Standard deviation of the amount due to noise alone.
     alone: f64,
-    /// Ratio of the blocks' scatter to the noise's, at least 1.
+    /// Ratio of the standard deviation from the scatter of blocks to that from noise, at least 1.
     scatter: f64,
-    /// Penalty of the free constants, ln n each.
+    /// Penalty on the evidence: ln n for each free coefficient, with n independent samples.
     penalty: f64,
 }
 
@@ -61,8 +63,8 @@ impl Shown {
         Some(Shown { alone, scatter: (robust / alone).max(1.0), penalty })
     }
 
-    /// The amount, in standard deviations, at which gain and Wald statistic both exceed `threshold` even if noise
-    /// lowers it by one standard deviation.
+    /// The amount, in standard deviations, at which gain and Wald statistic both exceed `threshold` even if noise reduces the
+    /// estimate by one standard deviation.
     fn needed(&self, threshold: f64) -> f64 {
         let threshold = threshold.max(0.0);
         let by_gain = (threshold + self.penalty).sqrt();
@@ -74,14 +76,14 @@ impl Shown {
 struct Sought<'a> {
     entry: &'a Entry,
     trial: &'a Trial,
-    /// Least and largest possible size.
+    /// Smallest and largest possible size.
     bounds: [f64; 2],
     size: f64,
-    /// The largest size that is not detectable, with its evidence as a share of the required one.
+    /// The largest size that is not detectable, and the ratio of its evidence to the required evidence.
     hidden: Option<[f64; 2]>,
-    /// The smallest size that is detectable, likewise.
+    /// The smallest size that is detectable, and the ratio of its evidence to the required evidence.
     seen: Option<[f64; 2]>,
-    /// The size evaluated last, likewise.
+    /// The size evaluated last, and the ratio of its evidence to the required evidence.
     last: Option<[f64; 2]>,
     found: Option<f64>,
 }
@@ -106,21 +108,21 @@ impl<'a> Sought<'a> {
         Some(sought)
     }
 
-    /// Converts a size to an amount and back: a lower limit is a larger effect.
+    /// Converts a size to an amount and back. For a limit, the size is the reciprocal: a lower limit is a larger effect.
     fn turned(&self, x: f64) -> f64 {
         let starts = self.entry.about.entry.map_or(&[][..], |e| e.starts);
         let falls = starts.first().map(|s| s[0]) > starts.last().map(|s| s[0]);
         if falls { x.recip() } else { x }
     }
 
-    /// Records that the size evaluated reached `ratio` of the required evidence, and chooses the next one.
+    /// Records the `ratio` of the evidence at the present size to the required evidence, and chooses the next size.
     fn tried(&mut self, ratio: f64) {
         if (ratio - 1.0).abs() < CLOSE {
             self.found = Some(self.size);
             return;
         }
         let ratio = ratio.max(1e-6);
-        // at a bound, the same size is tried again
+        // at a bound, the same size is evaluated twice
         let other = self.last.filter(|[size, _]| *size != self.size);
         let power = other.map_or(POWER, |[size, before]| {
             ((ratio / before).ln() / (self.size / size).ln()).clamp(POWERS[0], POWERS[1])
@@ -141,7 +143,7 @@ impl<'a> Sought<'a> {
         self.size = next.clamp(self.bounds[0], self.bounds[1]);
     }
 
-    /// The best estimate of the amount sought.
+    /// The best estimate of the smallest detectable amount; `None` if no evaluated size is detectable.
     fn amount(&self) -> Option<f64> {
         let size = self.found.or(self.seen.map(|[size, _]| size))?;
         Some(self.turned(size))
@@ -169,7 +171,7 @@ fn operators(round: &Round, threshold: f64) -> Vec<(&'static str, f64)> {
     sought.iter().filter_map(|s| Some((s.trial.id, s.amount()?))).collect()
 }
 
-/// Evidence of each of `sought` at its size, as a share of the required one.
+/// Ratio of the evidence to the required evidence for each of `sought` at its present size.
 fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>> {
     let na = round.known.len();
     let last = na + sought.len();
@@ -191,7 +193,7 @@ fn ratios(round: &Round, threshold: f64, sought: &[&Sought]) -> Option<Vec<f64>>
     shared.truncate(na);
     let p = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &shared)?;
     let one = |(k, s): (usize, &&Sought)| {
-        // nothing at all is no direction
+        // an effect without any contribution has the ratio 0
         let shown = Shown::new(&p, s.trial, &[k]).filter(|_| p.total[(k, k)] > 0.0);
         shown.map_or(0.0, |shown| 1.0 / (shown.alone * shown.needed(threshold)))
     };
@@ -203,7 +205,7 @@ mod tests {
     use super::*;
     use greylag_physics::inputs::Kind;
 
-    /// Searches for the amount of the effect `id`, if its evidence is a power of its size and sufficient at `amount`.
+    /// Result of the search for the effect `id`, if its evidence is a power of its size and sufficient at `amount`.
     fn sought(id: &str, amount: f64, power: f64) -> Option<f64> {
         let entry = Entry { about: Kind::from_id(id)?.describe(), operator: true };
         let id = entry.about.id;
@@ -221,21 +223,21 @@ mod tests {
 
     #[test]
     fn the_amount_is_found_however_fast_the_evidence_grows() {
-        // a lag beside a late clock grows with its square, a dead zone straight
+        // the evidence of a lag confounded with a clock skew is quadratic, that of a dead zone linear
         for (id, amount) in [("actuator_lag", 2e-3), ("dead_zone", 1e-4), ("backlash", 0.1)] {
             for power in [1.0, 2.0] {
                 let found = sought(id, amount, power).unwrap();
                 assert!((found / amount - 1.0).abs() < 1.1 * CLOSE, "{id}: {found} for {amount}");
             }
         }
-        // a lower limit is more of it
+        // a lower limit is a larger effect
         let found = sought("rate_limit", 3.0, 2.0).unwrap();
         assert!((found / 3.0 - 1.0).abs() < 1.1 * CLOSE, "{found}");
     }
 
     #[test]
     fn what_never_shows_has_no_amount() {
-        // its evidence is 1 % of what is needed at the largest lag there is
+        // at the largest possible lag, the evidence is 1 % of the required evidence
         assert_eq!(sought("actuator_lag", 20.0, 2.0), None);
     }
 }

@@ -1,23 +1,23 @@
-//! Checks for physically impossible figures of a flight; with one of them, no statement about forces is valid.
+//! Checks for physically impossible estimates. If one estimate is impossible, no statement about forces is valid.
 
 use crate::diagnose::answer::result::Tuned;
 use crate::diagnose::answer::sentences::with_interval;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 use greylag_num::statistics::mean;
 
-/// Range of airspeed scales (measured over true) of a working pitot tube; a badly placed static port causes 10 to 15
-/// %.
+/// Range of airspeed scales (measured / true) of a working pitot tube. A badly placed static port causes errors of 10 to
+/// 15 %.
 const SCALES: [f64; 2] = [0.8, 1.25];
-/// Largest mean vertical wind over a flight, m/s: thermals have up- and downdraughts that average out.
+/// Largest plausible mean vertical wind over a flight, m/s. The mean over the up- and downdraughts of thermals is small.
 const VERTICAL_MPS: f64 = 3.0;
-/// Largest distance of a constant from its prior mean, in prior standard deviations, that is plausible.
+/// Largest plausible distance of a constant from its prior mean, in prior standard deviations.
 const BELIEVED: f64 = 6.0;
-/// Standard deviations beyond which a coefficient's sign is certain.
+/// Number of standard deviations by which an estimate must exceed a limit to count as impossible.
 const SURELY: f64 = 4.0;
-/// Share of its prior below which a lift slope is implausible for a wing.
+/// Share of the prior mean below which a lift slope is implausible.
 const NO_WING: f64 = 0.2;
 
-/// The impossible figures, a sentence each, with what to check.
+/// A sentence for each impossible estimate, with advice on what to check.
 pub fn impossible(flights: &[&Reconstruction], tuned: &[Tuned]) -> Vec<String> {
     let of_flight = |flight: &&Reconstruction| {
         let speeds: Vec<f64> = flight
@@ -38,7 +38,7 @@ fn sentence(flight: &str, n: &Nuisance, why: &str) -> String {
     format!("{flight}: {} is found at {}: {why}.", n.name, with_interval(n.value, n.sd, n.unit))
 }
 
-/// Why the estimate of a constant is impossible, with what to check.
+/// Reason why the estimate of a constant is impossible, with advice on what to check; `None` if it is possible.
 fn why(n: &Nuisance) -> Option<&'static str> {
     let name = n.name.as_str();
     let beyond =
@@ -62,7 +62,7 @@ fn why(n: &Nuisance) -> Option<&'static str> {
     }
 }
 
-/// A mean wind faster than the aircraft flies, as a sentence.
+/// Sentence on a mean wind that is faster than the mean airspeed (m/s); `None` if the wind is slower.
 fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     let of = |name: &str| {
         flight.nuisances.iter().find(|n| n.name == name).filter(|n| n.moved().abs() > 0.0)
@@ -79,7 +79,7 @@ fn wind(flight: &Reconstruction, airspeed: f64) -> Option<String> {
     })
 }
 
-/// A coefficient that no aircraft in flight can have, as a sentence.
+/// Sentence on a damping derivative with the wrong sign or a lift slope near zero; `None` for other coefficients.
 fn coefficient(t: &Tuned) -> Option<String> {
     let own = t.name.rsplit('.').next()?;
     let damps = ["Cmq", "Clp", "Cnr"].contains(&own);

@@ -1,10 +1,10 @@
-//! Sensor errors and wind, estimated by the reconstruction without any aerodynamics.
+//! Significant sensor errors and wind, from the estimates of the reconstruction, which uses no aerodynamics.
 
 use crate::diagnose::answer::result::Measurement;
 use crate::flight_path::reconstruction::{Nuisance, Reconstruction};
 
-/// Kinds of constants: name prefix, id in the catalogue, nominal value, and the deviation that is negligible because
-/// it is within the filters' own errors or a trim.
+/// Kinds of constants: prefix of the name, identifier in the catalogue, nominal value, largest negligible deviation in the
+/// constant's unit. A negligible deviation is within the errors of the reconstruction, or of the size of a trim.
 const KINDS: [(&str, &str, f64, f64); 15] = [
     ("gyro_bias", "imu_bias", 0.0, 0.005),
     ("gyro_drift", "imu_bias", 0.0, 5e-5),
@@ -22,11 +22,13 @@ const KINDS: [(&str, &str, f64, f64); 15] = [
     ("skew_actuators", "actuators_late", 0.0, 0.015),
     ("skew_", "clock_skew", 0.0, 0.005),
 ];
-/// Standard deviations beyond which a constant differs from its nominal value.
+/// Number of standard deviations beyond which a constant differs from its nominal value.
 const CLEARLY: f64 = 4.0;
 
-/// Sensor errors and wind of each flight. Late actuators may equally be a property of the aircraft, which the search
-/// for effects decides, so they are never asserted here.
+/// Sensor errors and wind of each flight.
+///
+/// A delay of the actuators is never asserted here: it may be a property of the aircraft. The search for effects decides on
+/// it.
 pub fn measurement(flights: &[&Reconstruction]) -> Vec<Measurement> {
     let of = |flight: &&Reconstruction| {
         let name = flight.name.clone();

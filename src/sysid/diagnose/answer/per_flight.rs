@@ -1,4 +1,4 @@
-//! Constants of each flight, fitted beside the aerodynamics: its trims, and the misalignment of its measured axes.
+//! Constants of each flight that are fitted together with the aerodynamics: trims, and misalignment of the measured axes.
 
 use std::collections::HashSet;
 
@@ -10,16 +10,17 @@ use crate::diagnose::search::round::Round;
 use crate::per_flight::{Constant, askew};
 use greylag_num::statistics::correlation_length;
 
-/// Standard deviations beyond which a constant differs from zero.
+/// Number of standard deviations beyond which a constant differs from zero.
 const CLEARLY: f64 = 4.0;
-/// Prior standard deviations beyond which a constant is implausible: it probably compensates for a missing effect.
+/// Number of prior standard deviations beyond which a constant is implausible. It then probably compensates for a missing
+/// effect.
 const BELIEVED: f64 = 3.0;
-/// Misalignment within the accuracy of mounting, rad.
+/// Largest misalignment within the accuracy of mounting, rad.
 const MOUNTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
-/// Least standard deviation of a misalignment angle, rad: in simulated flights with aligned axes the estimates were
-/// 0.05° off, beside a flight with misaligned axes up to 0.34°.
+/// Smallest standard deviation of a misalignment angle, rad. In simulated flights with aligned axes, the estimates were wrong
+/// by 0.05°; in a fit together with a misaligned flight, by up to 0.34°.
 const LEAST: f64 = 0.15 * std::f64::consts::PI / 180.0;
-/// A trim below this share of its usual standard deviation is negligible.
+/// A trim below this share of its prior standard deviation is negligible.
 const MATTERS: f64 = 0.2;
 
 /// Misalignment angles of each flight in `round`; empty unless they were estimated.
@@ -80,14 +81,14 @@ struct Fitted {
 }
 
 impl Fitted {
-    /// Whether its distance from zero is implausible.
+    /// Whether the constant's distance from zero is implausible.
     fn is_implausible(&self) -> bool {
         self.value.abs() > BELIEVED * self.constant.width
     }
 }
 
-/// Flights for which nothing is asserted: where one constant compensates for another cause, the constants correlated
-/// with it are not reliable either.
+/// Flights with an implausible constant, for which nothing is asserted. The constant compensates for another cause, and the
+/// constants correlated with it are not reliable.
 fn astray(fitted: &[Fitted]) -> HashSet<String> {
     fitted.iter().filter(|f| f.is_implausible()).map(|f| f.flight.clone()).collect()
 }
@@ -106,7 +107,7 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         let places: Vec<usize> = (0..flights).map(|k| place(k, which)).collect();
         let own = places[flight];
         let share = 1.0 / flights as f64;
-        // the mean of all flights is confounded with the model's coefficient, so differences are known better
+        // the mean over all flights is confounded with the model's coefficient: differences from the mean are more certain
         let weights: Vec<f64> =
             (0..flights).map(|k| f64::from(u8::from(k == flight)) - share).collect();
         let pairs = places.iter().zip(&weights);
@@ -131,11 +132,11 @@ fn fitted(round: &Round) -> Vec<Fitted> {
         .collect()
 }
 
-/// Robust covariance of the known parameters: a sandwich estimate whose rows are weighted, flight by flight and channel by
-/// channel, by the residual's mean square times its correlation length.
+/// Robust covariance of the known parameters by a sandwich estimate. The weight of a row is the residual's mean square times
+/// its correlation length in the same flight and channel.
 ///
-/// The noise is whitened by channel over all flights, which underestimates the uncertainty in a flight whose residual is
-/// larger or slower than the others'.
+/// The whitening of the noise is common to all flights for each channel. It underestimates the uncertainty in a flight whose
+/// residual is larger or slower than in the others.
 fn sandwich(round: &Round) -> DMatrix<f64> {
     let p = &round.projected;
     let count = round.known.len();
@@ -167,8 +168,8 @@ fn sandwich(round: &Round) -> DMatrix<f64> {
     &p.covariance * meat * &p.covariance
 }
 
-/// Ratio of the flight's residual to its noise, at least 1: with a missing effect, estimates are less certain than
-/// noise alone suggests.
+/// Ratio of the flight's residual to its noise, at least 1. If an effect is missing, estimates are less certain than the
+/// noise suggests.
 fn misfit(round: &Round, flight: usize) -> f64 {
     let of = round.projected.by_channel.iter().zip(&round.cells.flight_of_block);
     let own = of.filter(|(_, of)| **of == flight).flat_map(|(channels, _)| channels);
@@ -185,7 +186,7 @@ pub fn askew_sentences(measurement: &[Measurement]) -> Vec<String> {
     });
     let one = |(flight, all): (&str, String)| {
         format!(
-            "{flight}: the measured axes stand askew, {all} (95 %; {}), fitted beside the aerodynamics.",
+            "{flight}: the measured axes are misaligned, {all} (95 %; {}), fitted together with the aerodynamics.",
             askew::ID
         )
     };
@@ -210,7 +211,7 @@ pub fn trim_sentences(trims: &[FlightTrim]) -> Vec<String> {
     by_flight(trims).into_iter().map(one).collect()
 }
 
-/// Consecutive entries of the same flight, joined into one sentence.
+/// Joins the texts of consecutive entries of the same flight.
 fn by_flight<'a>(all: impl Iterator<Item = (&'a str, String)>) -> Vec<(&'a str, String)> {
     let mut joined: Vec<(&str, String)> = Vec::new();
     for (flight, words) in all {

@@ -36,7 +36,7 @@ pub fn against_axes(
     mut found: Found,
 ) -> Result<Found, DiagnoseError> {
     let Some(tilted) = worth(&problem, &found) else { return Ok(found) };
-    report(progress, "explaining the flights by axes that stand askew", 0.9)?;
+    report(progress, "explaining the flights by misaligned axes", 0.9)?;
     let other = search(&tilted, model, options, &part(progress, [0.9, 0.95]))?;
     let cost = |problem: &Problem, of: &Found| cost(problem, &found, of);
     let (Some(effects), Some(axes)) = (cost(&problem, &found), cost(&tilted, &other)) else {

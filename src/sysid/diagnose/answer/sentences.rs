@@ -121,8 +121,8 @@ fn undecided(content: &Content) -> String {
              moment; log faster and unfiltered.",
             removable(content.found)
         ),
-        _ => "These flights cannot say whether the model lacks anything: in every channel the remaining errors of the \
-             sensors may account for all that is left; log what is noted below, or fly with better sensors."
+        _ => "These flights cannot say whether the model lacks anything: in every channel the uncertainty of the \
+             sensor errors may explain the whole residual; log what is noted below, or fly with better sensors."
             .into(),
     }
 }
@@ -159,7 +159,7 @@ fn beyond(content: &Content) -> Vec<String> {
     let more = found.remainder.total > found.remainder.total_threshold;
     if verdict == Verdict::Effect && more && found.learnable() >= SHOWN {
         all.push(format!(
-            "Beside that, a flexible model could remove {:.1} % of what the tuned model left beyond noise, \
+            "In addition, a flexible model could remove {:.1} % of what the tuned model left beyond noise, \
              more than by chance.",
             100.0 * found.learnable()
         ));

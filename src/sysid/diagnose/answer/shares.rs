@@ -1,4 +1,4 @@
-//! Unexplained residual of each channel, with the model's own coefficients as tuned.
+//! Unexplained residual of each channel after tuning, and the tuned coefficients.
 
 use crate::compare::{ChannelId, RegimeVariable};
 use crate::diagnose::answer::result::{ChannelLeft, Tuned};
@@ -10,11 +10,11 @@ use greylag_num::statistics::mean;
 
 /// Number of bins over a regime variable.
 const BINS: usize = 5;
-/// A bin is reported if its mean exceeds this many standard deviations.
+/// A bin is reported if its mean exceeds this number of standard errors.
 const WORTH: f64 = 4.0;
 const SYMBOLS: [&str; 6] = ["D", "L", "Y", "l", "m", "n"];
 
-/// Unexplained residual of every channel that the flights allow.
+/// Unexplained residual of every channel that the flights measure.
 pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLeft> {
     let (before, after) = (found.unexplained, found.left());
     let residual = found.round().tuned_residual();
@@ -30,7 +30,7 @@ pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLe
     (0..SYMBOLS.len()).filter(|k| before[*k].is_finite()).map(of).collect()
 }
 
-/// The regime in which a channel's mean residual is most significant, in words.
+/// The regime in which a channel's mean residual is most significant, in words; `None` if none is significant.
 fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     let mut points: Vec<([f64; RegimeVariable::CONTINUOUS.len()], f64)> = Vec::new();
     for (flight, left) in round.flights.iter().zip(residual) {
@@ -57,7 +57,7 @@ fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
             if z > WORTH && best.as_ref().is_none_or(|(other, _)| z > *other) {
                 let id = ChannelId::ALL[channel];
                 let words = format!(
-                    "{} {:+.3} {} beside the model at {} {:.1} to {:.1} {}",
+                    "{} {:+.3} {} off the model at {} {:.1} to {:.1} {}",
                     id.name(),
                     m,
                     id.unit(),
@@ -73,7 +73,7 @@ fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
     best.map(|(_, words)| words)
 }
 
-/// The model's own coefficients as tuned in the last round.
+/// The coefficients of `model` as tuned in the last round.
 pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
     let round = found.round();
     let p = &round.projected;

@@ -1,4 +1,4 @@
-//! Free forms: formulas searched freely in a grammar, where the library's shapes leave a residual.
+//! Free forms: a search over the formulas of a grammar if the shapes of the library leave a residual.
 
 use super::forward::{Ask, Climbed, ORDER, candidates};
 use super::free::search::{Fitted, Searched, searched};
@@ -12,18 +12,20 @@ use crate::progress::{Progress, part, report};
 use greylag_model::GreyBox;
 use greylag_physics::Channel;
 
-/// Free forms are tried if a flexible model could remove a further error of more than this share of the error that the
-/// library's formula already removes.
+/// Free forms are tried if a flexible model could remove an additional error of more than this share of the error that the
+/// library's formula removes.
 const MATERIAL: f64 = 0.02;
-/// The simplest form whose error reduction is within this share of the best one's is chosen, because even an exact
-/// formula of a strong effect leaves a residual of that order, from errors of the reconstructed path.
+/// The simplest form is chosen whose error reduction is within this share of the best reduction. Even an exact formula of a
+/// strong effect leaves a residual of this order, due to errors of the reconstructed path.
 const BEHIND: f64 = 0.01;
-/// Minimum further reduction of the squared whitened error that justifies a larger formula.
+/// Smallest additional reduction of the squared whitened error that justifies a larger formula.
 const WORTH: f64 = 10.0;
 
-/// Reason why free forms are tried, and the channels. `None` if the library's formula suffices: a flexible model removes
-/// hardly more, one shape is enough for the channel, and no significant second one was left out. `None` also if the model
-/// cannot be evaluated over the flights, or if no channel counts.
+/// Reason why free forms are tried, and the channels.
+///
+/// `None` if the library's formula suffices: a flexible model hardly removes more, one shape is enough for the channel, and
+/// no significant second shape was left out. `None` also if the model cannot be evaluated over the flights, or if no channel
+/// is included.
 pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel>)> {
     let counted = |c: &usize| ask.channels[*c];
     if library.terms.is_empty() {
@@ -58,7 +60,8 @@ pub(super) fn doubt(ask: &Ask, library: &Climbed) -> Option<(String, Vec<Channel
     Some((why.into(), vec![library.terms[0].form.channel]))
 }
 
-/// Searches free forms for `channels` in the residual of `tuned`, then selects among them and the library's best forms.
+/// Searches free forms for `channels` in the residual of the library's first round, then selects among these forms and the
+/// library's best forms, starting from `tuned`.
 /// `None` if the library's search tried nothing, or if the model cannot be evaluated over the flights.
 ///
 /// # Errors
@@ -79,7 +82,7 @@ pub(super) fn beyond(
             all.push((*channel, found));
         }
     }
-    report(progress, "judging the best free forms beside the library's", 0.8)?;
+    report(progress, "comparing the best free forms with the library's", 0.8)?;
     let mut forms: Vec<Form> =
         library.terms.iter().map(|t| t.form).chain(library.class.clone()).collect();
     for finalist in all.iter().flat_map(|(_, s)| &s.finalists) {
@@ -96,7 +99,7 @@ pub(super) fn beyond(
         ..*ask
     };
     let Some(climbed) = ask.climb(tuned.clone()) else { return Ok(None) };
-    // a form's reduction includes that from coefficients which no longer compensate for its absence
+    // with a form, coefficients no longer compensate for its absence: the form's reduction includes this part
     let falls = all.iter().flat_map(|(_, s)| s.front.iter().map(|f| f.fall));
     let whole = falls.fold(library.excess, f64::max);
     let rung = |f: &Fitted, threshold: f64| Rung {
@@ -122,12 +125,13 @@ fn as_of_library(form: Form) -> Form {
     of.into_iter().find(same).unwrap_or(form)
 }
 
-/// Whether the formula `free` replaces the library's.
+/// Whether the formula `free` replaces the formula of the library.
 ///
-/// - With the same structure and other constants, it must reduce the error by more than `WORTH` beyond the library's,
-///   which takes its constants from quantiles of the flights and does not fit them.
-/// - If it is simpler, it may reduce the error less, by `WORTH` or the share `BEHIND`, whichever is larger.
-/// - Otherwise it must reduce the error more by that amount.
+/// - With the same structure and other constants, `free` must reduce the error by more than `WORTH` beyond the library's
+///   formula. The library takes its constants from quantiles of the flights and does not fit them.
+/// - A simpler formula may reduce the error less. The largest difference is `WORTH` or the share `BEHIND` of the library's
+///   reduction, whichever is larger.
+/// - Any other formula must reduce the error more by at least this difference.
 pub(super) fn better(free: &Climbed, library: &Climbed) -> bool {
     let taken = |c: &Climbed| c.removed() * library.excess;
     let more = taken(free) - taken(library);

@@ -1,4 +1,4 @@
-//! The effect file of a proposed formula.
+//! Text of a proposed formula, and its effect file.
 
 use super::grades;
 use super::library::{Form, Shape};
@@ -11,11 +11,11 @@ pub struct Term {
     pub form: Form,
     /// Estimated coefficient, in the form's unit.
     pub value: f64,
-    /// The coefficient's standard deviation.
+    /// Standard deviation of the coefficient, in the form's unit.
     pub sd: f64,
 }
 
-/// Bounds of a coefficient: ± this many times the sum of its magnitude and three standard deviations.
+/// Factor in the bounds of a coefficient: ± this factor times the sum of its magnitude and three standard deviations.
 const ROOM: f64 = 10.0;
 
 /// `x` to four significant figures.
@@ -52,7 +52,7 @@ fn names(k: usize, term: &Term) -> Vec<String> {
     (0..count).map(|i| format!("w{}{}", k + 1, letter(i))).collect()
 }
 
-/// The effect file of `terms` with free thresholds; `from` states which flights it was found in.
+/// The effect file of `terms` with free thresholds; `from` names the flights of the search.
 pub fn file(terms: &[Term], description: &str, alike: &[String], from: &str) -> String {
     let quoted = |text: &str| toml::Value::from(text).to_string();
     let mut text = format!(
@@ -121,7 +121,7 @@ mod tests {
             term(true, Shape::Beyond(Variable::Beta, 0.07), -0.01),
             term(true, Shape::Lagged(Variable::Aileron, 0.12), 0.02),
         ];
-        // a name as macOS writes it, which Rust and TOML escape in different ways
+        // a file name in the Unicode form of macOS; Rust and TOML escape it differently
         let text =
             file(&terms, "It \"yaws\".", &["yaw = k*throttle^2".into()], "e\u{301}te\u{301}.csv");
         let effect = reader::parse(&text).unwrap_or_else(|why| panic!("{why}\n{text}"));

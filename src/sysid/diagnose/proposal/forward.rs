@@ -1,4 +1,4 @@
-//! Forward selection of terms: the best form joins while it is significant and reduces the error enough.
+//! Forward selection of terms: adds the best form as long as it is significant and reduces the error enough.
 
 use super::draft::{self, Term};
 use super::grades;
@@ -19,15 +19,15 @@ use greylag_physics::formula::Variable;
 
 /// Largest number of terms of a formula.
 const MOST: usize = 3;
-/// A further term must remove at least this share of what the first term removes.
+/// A further term must remove at least this share of the error that the first term removes.
 const WORTH: f64 = 0.05;
-/// Tuning passes after a term has joined.
+/// Number of tuning passes after a term has been added.
 const SETTLING: usize = 2;
 /// Unexplained share of the variance beyond noise from which a channel is searched; the diagnosis's adequate level.
 const FAILING: f64 = 5e-4;
-/// The same relative to the worst channel: a smaller deficit is searched for after the worst one has been corrected.
+/// Unexplained share, relative to the worst channel, from which a channel is searched.
 const BESIDE: f64 = 0.05;
-/// Standard deviations by which joint tuning may change a coefficient; a larger change shows confounded terms.
+/// Number of standard deviations by which joint tuning may change a coefficient. A larger change shows confounded terms.
 const MOVED: f64 = 5.0;
 /// Largest number of channels that are searched.
 const CHANNELS: usize = 3;
@@ -35,7 +35,7 @@ const CHANNELS: usize = 3;
 pub(super) const ORDER: [Channel; 6] =
     [Channel::Drag, Channel::Lift, Channel::Side, Channel::Roll, Channel::Pitch, Channel::Yaw];
 
-/// The channels that the diagnosis leaves unexplained, the one with the most removable error relative to chance first.
+/// The channels that the diagnosis leaves unexplained, in descending order of removable error relative to its chance level.
 pub(super) fn failing(found: &Found) -> Vec<Channel> {
     let tuned = &found.unexplained;
     let removable = |c: usize| {
@@ -50,13 +50,13 @@ pub(super) fn failing(found: &Found) -> Vec<Channel> {
     all.into_iter().map(|c| ORDER[c]).collect()
 }
 
-/// The forms of the library in `channels`, each as a candidate.
+/// The forms of the library in `channels`, with their entries for the regression.
 pub(super) fn forms(problem: &Problem, channels: &[Channel]) -> Vec<(Form, Entry)> {
     let threshold = |v: Variable, q: f64| rounded(magnitude(problem, v, q));
     candidates(channels.iter().flat_map(|c| library::forms(*c, &threshold)))
 }
 
-/// `forms`, each as a candidate.
+/// `forms` with their entries for the regression.
 pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)> {
     let entry = |form: Form| {
         let effect = form.effect().ok()?;
@@ -65,12 +65,12 @@ pub(super) fn candidates(forms: impl Iterator<Item = Form>) -> Vec<(Form, Entry)
     forms.filter_map(entry).collect()
 }
 
-/// `x` to two significant figures, so that thresholds are readable.
+/// `x` to two significant figures, for readable thresholds.
 fn rounded(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
 
-/// A quantile of the magnitude of a variable over the flights.
+/// Quantile `share` of the magnitude of a variable over the flights.
 fn magnitude(problem: &Problem, variable: Variable, share: f64) -> f64 {
     let mut values: Vec<f64> = Vec::new();
     for instant in problem.flights.iter().flat_map(|f| f.segments.iter().flatten()) {
@@ -95,11 +95,11 @@ pub(super) struct Ask<'a> {
     pub problem: &'a Problem,
     pub options: &'a Options,
     pub forms: &'a [(Form, Entry)],
-    /// Channels whose error counts, in the order of the regression.
+    /// Channels whose error is included, in the order of the regression.
     pub channels: [bool; 6],
-    /// Least evidence of the first term, whatever chance reaches among `forms`, in case these are preselected.
+    /// Smallest evidence of the first term, independent of the chance level among `forms`, for preselected forms.
     pub least: f64,
-    /// A simpler form may remove less error than the best one, by this share of the error that the best one removes.
+    /// A simpler form may remove less error than the best form, by this share of the error that the best form removes.
     pub behind: f64,
 }
 
@@ -116,7 +116,7 @@ pub(super) struct Outcome {
 /// State and result of a forward search.
 pub(super) struct Climbed {
     pub outcome: Outcome,
-    /// The first term as found; `None` if there is none.
+    /// The first term as it was found; `None` if there is none.
     pub first: Option<Term>,
     /// All terms with their tuned coefficients.
     pub terms: Vec<Term>,
@@ -128,8 +128,8 @@ pub(super) struct Climbed {
     pub excess: f64,
     /// The first round; `None` if there was nothing to try.
     pub round: Option<Round>,
-    /// Whether a further term was significant and removed enough of the error but was not added: the present terms
-    /// then compensate for another form.
+    /// Whether a further term was significant and removed enough of the error but was not added. The present terms then
+    /// compensate for another form.
     pub significant_left_out: bool,
     first_fall: f64,
 }
@@ -155,8 +155,8 @@ struct Stage<'a> {
 }
 
 impl Ask<'_> {
-    /// Adds terms to `model` one by one while each is significant and removes enough. `None` if the model cannot be
-    /// evaluated over the flights.
+    /// Adds terms to `model` one by one as long as each is significant and removes enough of the error. `None` if the model
+    /// cannot be evaluated over the flights.
     pub(super) fn climb(&self, model: GreyBox) -> Option<Climbed> {
         let given = model.clone();
         let excess = self.excess(&model)?.max(1.0);
@@ -200,8 +200,8 @@ impl Ask<'_> {
         Some(c)
     }
 
-    /// Records the best form of a round in the front and, if it passes, adds it to the terms and the model; returns
-    /// whether it was added. `None` if the model with it cannot be evaluated over the flights.
+    /// Records the best form of a round in the front, and adds an accepted form to the terms and the model. Returns whether it
+    /// was added. `None` if the model with the form cannot be evaluated over the flights.
     fn joins(&self, c: &mut Climbed, given: &GreyBox, stage: &Stage) -> Option<bool> {
         let &Stage { round, scores, place, threshold } = stage;
         let (trial, score) = &scores[place];
@@ -214,13 +214,13 @@ impl Ask<'_> {
         c.outcome.front.push(Rung {
             formula: draft::formula(&c.terms),
             complexity: c.complexity(),
-            // a term also frees the coefficients that compensated for its absence, which are counted in its fall
+            // with a term, coefficients no longer compensate for its absence: the term's reduction includes this part
             removed: (before + score.fall / c.excess).min(1.0),
             evidence: score.evidence,
             threshold,
             chosen: false,
         });
-        // reset below if the term joins
+        // reset below if the term is added
         let much = score.fall > WORTH * c.excess;
         c.significant_left_out = !first && score.evidence > threshold && much;
         if score.evidence <= threshold || !worth {
@@ -236,7 +236,7 @@ impl Ask<'_> {
             return Some(false);
         };
         let removed = held_out::removed(self.problem, given, &tuned, &self.channels)?;
-        // a term that moves the others' coefficients far, or does not lower the error, duplicates one of them
+        // a term that changes other coefficients strongly, or does not reduce the error, duplicates another term
         if c.terms.iter().any(|t| moved(t, &tuned)) || removed <= before {
             c.terms.pop();
             return Some(false);
@@ -272,7 +272,7 @@ impl Ask<'_> {
         Some(checks::excess(&Round::new(self.problem, model.clone(), &[])?, &self.channels))
     }
 
-    /// The model of `round` with a trial added, all coefficients tuned together; `Some(None)` if it cannot join.
+    /// The model of `round` with a trial added and all coefficients tuned. `Some(None)` if the trial cannot join the model.
     fn tuned(&self, round: &Round, trial: usize, score: &Score) -> Option<Option<GreyBox>> {
         let mut model = round.with(score);
         if model.join_most(round.trials[trial].id, &score.values).is_err() {
@@ -284,7 +284,7 @@ impl Ask<'_> {
         Some(Some(model))
     }
 
-    /// Share of the block bootstraps in which the form at index `place`, or one indistinguishable from it, is best.
+    /// Share of the block bootstraps in which the form at index `place`, or an indistinguishable form, is best.
     fn selected(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> f64 {
         let alike = checks::class(round, scores, place);
         let members: Vec<usize> =
@@ -296,7 +296,7 @@ impl Ask<'_> {
         }
     }
 
-    /// The simplest form among those as good as the best one.
+    /// Index of the simplest form among the forms that are as good as the best form.
     fn winner(&self, round: &Round, scores: &[(usize, Score)]) -> Option<usize> {
         let fits = |k: &usize| {
             let (trial, score) = &scores[*k];
@@ -312,7 +312,7 @@ impl Ask<'_> {
                 .collect(),
             false => checks::class(round, scores, best),
         };
-        // a simpler one in its place must be as likely, or as good in practice
+        // a simpler form must be about as likely, or remove almost as much error
         let likely = |k: &usize| {
             let slack =
                 (LIKELY + NODE * (size(best) as f64 - size(*k) as f64)).max(self.behind * own.fall);
@@ -323,8 +323,8 @@ impl Ask<'_> {
         simpler.min_by_key(|k| (size(*k), *k)).or(Some(best))
     }
 
-    /// Forms that these flights cannot distinguish from the one at index `place`, with their evidence. If the forms
-    /// were preselected from more, larger ones are excluded, since one always exists.
+    /// Forms that these flights cannot distinguish from the form at index `place`, with their evidence. Among preselected forms,
+    /// larger forms are excluded, because there is always a larger form that fits as well.
     fn alike(&self, round: &Round, scores: &[(usize, Score)], place: usize) -> Vec<(Form, f64)> {
         let own = self.form(round.trials[scores[place].0].id).map_or(0, |f| f.shape.complexity());
         checks::class(round, scores, place)
@@ -339,8 +339,7 @@ impl Ask<'_> {
             .collect()
     }
 
-    /// Whether a form similar to the winner removes significantly more for its size: the simpler form is as good in
-    /// practice but is not the true one.
+    /// Whether a similar form removes significantly more error for its size. The chosen form is then an approximation.
     fn surpassed(&self, stage: &Stage) -> bool {
         let &Stage { round, scores, place, .. } = stage;
         let size = |k: usize| {
@@ -374,7 +373,7 @@ impl Ask<'_> {
     }
 }
 
-/// Objection to a form whose amount differs between flights, as for an effect of the catalogue.
+/// Objection to a form whose coefficient differs between flights, with the criterion for effects of the catalogue.
 fn contradicted(round: &Round, trial: usize, score: &Score) -> Option<String> {
     let by_flight = checks::by_flight(round, &round.trials[trial], score);
     checks::contradict(score.values[0], &by_flight)
@@ -391,9 +390,9 @@ fn moved(term: &Term, model: &GreyBox) -> bool {
     })
 }
 
-/// A simpler form may remove this much less of the squared error; its likelihood ratio is then e⁻².
+/// A simpler form may remove less of the squared whitened error by this amount; its likelihood ratio is then e⁻².
 const LIKELY: f64 = 4.0;
-/// Additional allowance for each node that it has less: with each node there are about e times as many forms.
+/// Additional allowance for each node that the simpler form has less. With each node there are about e times as many forms.
 const NODE: f64 = 2.0;
-/// Correlation tolerance at which contributions are the same form, written in two ways.
+/// Two contributions are the same form, written in different ways, if their correlation differs from ±1 by less than this.
 const SAME: f64 = 1e-9;

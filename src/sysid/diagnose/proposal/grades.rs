@@ -1,5 +1,4 @@
-//! Properties that a form shares with those that the flights cannot distinguish from it, and their description in
-//! words.
+//! Properties of a form that the flights determine, and the description of a form in words.
 
 use super::free::{self, trend::plain};
 use super::library::{Form, Shape};
@@ -9,7 +8,7 @@ use greylag_physics::formula::Variable;
 
 /// Trend of a form with each of its variables.
 fn trend(form: &Form) -> Option<String> {
-    // a lag has no effect in the steady state
+    // in the steady state, a lagged control equals the control
     let shape = match form.shape {
         Shape::Lagged(v, _) => Shape::Linear(v),
         shape => shape,
@@ -17,7 +16,7 @@ fn trend(form: &Form) -> Option<String> {
     free::trend::trend(&shape.text(None))
 }
 
-/// The properties that `best` and all of `alike`, which these flights cannot distinguish from it, have in common.
+/// The properties that `best` and all forms `alike` have in common. The flights cannot distinguish `alike` from `best`.
 pub fn grades(best: &Form, alike: &[Form]) -> Grades {
     let same = |of: &dyn Fn(&Form) -> bool| alike.iter().all(of);
     let variables = sorted(best);
@@ -60,7 +59,7 @@ fn long(v: Variable) -> &'static str {
     }
 }
 
-/// Dependence of the form's channel on its variables, in words, for a coefficient of that `value`.
+/// Dependence of the form's channel on its variables, in words, for the coefficient `value`.
 pub fn words(form: &Form, value: f64) -> String {
     let runs = if value < 0.0 { "falls" } else { "grows" };
     let how = match form.shape {

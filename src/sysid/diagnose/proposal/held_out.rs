@@ -1,4 +1,4 @@
-//! Test of a formula on held-out flights.
+//! Test of a formula on held-out flights: removed share of the error, compared with chance.
 
 use super::draft::Term;
 use super::forward::ORDER;
@@ -13,8 +13,10 @@ use crate::diagnose::search::stepwise::HELD_OUT;
 use greylag_model::GreyBox;
 use greylag_physics::formula::Written;
 
-/// Share of the error beyond noise in `channels` that `after` removes from that of `before`. Both use the noise level
-/// of `after`, since a better model would otherwise be penalised for its smaller noise.
+/// Share of the error beyond noise of the model `before`, in `channels`, that the model `after` removes. `None` if a model
+/// cannot be evaluated over the flights.
+///
+/// Both errors use the noise level of `after`. A better model would otherwise be penalised for its smaller noise.
 pub(super) fn removed(
     problem: &Problem,
     before: &GreyBox,
@@ -28,7 +30,8 @@ pub(super) fn removed(
     Some(1.0 - left / all.max(1.0))
 }
 
-/// Reduction by `terms`, with their coefficients fixed, of the residual of `model` on held-out flights.
+/// Reduction of the residual of `model` on held-out flights by `terms` with fixed coefficients. `None` if the model cannot be
+/// evaluated over the flights.
 pub(super) fn tested(
     problem: &Problem,
     model: &GreyBox,
@@ -62,12 +65,12 @@ pub(super) fn tested(
         with.join_most(effect.about.id, &values).ok()?;
     }
     let removed = removed(problem, model, &with, &channels)?;
-    // at least zero, because a negative reduction is no improvement
+    // at least zero: a negative reduction is not an improvement
     let threshold = chance.last().copied().unwrap_or(f64::INFINITY).max(0.0);
     Some(HeldOut { flights, removed, fall: measured, threshold })
 }
 
-/// Objection to the formula from the held-out flights, if any.
+/// Objection to the formula from the held-out flights; `None` if there is none.
 pub(super) fn objection(tested: &HeldOut) -> Option<String> {
     if tested.fall <= tested.threshold {
         return Some(format!(

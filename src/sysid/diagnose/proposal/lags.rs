@@ -1,7 +1,7 @@
-//! Controls through a first-order lag, where the library's formula uses them directly or leaves a residual.
+//! Candidates with controls through a first-order lag, in addition to the library's formula.
 //!
-//! The shapes of the library depend on the present alone. A moment that follows an engine or a flap with a delay
-//! looks like the control itself to them, and the residual follows the control's rate, which no shape contains.
+//! The shapes of the library depend only on present values. A moment that follows an engine or a flap with a delay is
+//! therefore fitted with the present control. The residual then follows the rate of the control, which no shape contains.
 
 use super::forward::{Ask, Climbed, candidates};
 use super::library::{self, CONTROLS, Form};
@@ -9,8 +9,8 @@ use greylag_model::GreyBox;
 use greylag_physics::Channel;
 use greylag_physics::formula::Variable;
 
-/// The lags worth trying beside the library's formula: those of its own controls, and of all controls in the channels
-/// `doubted`, where it leaves a residual.
+/// The lagged forms to try: lags of the controls in the library's formula, and of all controls in the channels `doubted`, in
+/// which the formula leaves a residual.
 pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     let mut all: Vec<Form> = Vec::new();
     for term in &library.terms {
@@ -27,8 +27,8 @@ pub(super) fn forms(library: &Climbed, doubted: &[Channel]) -> Vec<Form> {
     kept
 }
 
-/// Repeats the search with `lags` beside the library's result and the forms indistinguishable from it. `None` if the
-/// model cannot be evaluated over the flights.
+/// Repeats the search with `lags`, the library's result and the forms indistinguishable from this result. `None` if the model
+/// cannot be evaluated over the flights.
 pub(super) fn climb(
     ask: &Ask,
     library: &Climbed,

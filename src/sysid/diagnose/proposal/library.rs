@@ -1,4 +1,4 @@
-//! Library of shapes: functions of one or two variables, times a known factor of a channel.
+//! Library of shapes: functions of one or two variables. A form multiplies a shape with a known factor of its channel.
 
 use super::free::Free;
 use greylag_physics::Channel;
@@ -6,7 +6,7 @@ use greylag_physics::formula::dimension::Dimension;
 use greylag_physics::formula::file::channel_name;
 use greylag_physics::formula::{Variable, Written, register};
 
-/// Variables of shapes that scale with dynamic pressure; all are dimensionless.
+/// Variables of shapes that scale with dynamic pressure; angles in rad, all dimensionless.
 pub(super) const OF_AIR: [Variable; 9] = [
     Variable::Alpha,
     Variable::Beta,
@@ -18,7 +18,7 @@ pub(super) const OF_AIR: [Variable; 9] = [
     Variable::Rudder,
     Variable::Throttle,
 ];
-/// Variables of shapes that do not scale with it: thrust, gyroscopic and inertial moments.
+/// Variables of shapes that do not scale with dynamic pressure: thrust, gyroscopic and inertial moments.
 pub(super) const BESIDE_AIR: [Variable; 7] = [
     Variable::Throttle,
     Variable::Airspeed,
@@ -34,13 +34,13 @@ const BANDED: [Variable; 5] =
 /// Controls that may act through a lag.
 pub(super) const CONTROLS: [Variable; 4] =
     [Variable::Aileron, Variable::Elevator, Variable::Rudder, Variable::Throttle];
-/// Starting time constant of a lag, s; the search also starts at a quarter and at 1.75 times of it.
+/// Starting time constant of a lag, s. The search also starts at 0.25 and 1.75 times this value.
 const LAG_S: f64 = 0.2;
 /// Longest time constant of a lag, s.
 const LONGEST_LAG_S: f64 = 3.0;
-/// Starting coefficient of a lag, so small that the first step changes the coefficient alone.
+/// Starting coefficient of a lag. It is so small that the first step changes only the coefficient.
 const AMOUNT: f64 = 1e-6;
-/// Thresholds, as quantiles of the variable's magnitude in the flights.
+/// Thresholds and dead bands, as quantiles of the variable's magnitude in the flights.
 pub(super) const QUANTILES: [f64; 2] = [0.5, 0.75];
 
 /// Dependence of an amount on its variables.
@@ -58,22 +58,22 @@ pub enum Shape {
     Product(Variable, Variable),
     /// Product of one variable and another's magnitude, v |w|.
     ByMagnitude(Variable, Variable),
-    /// Excess of v over a threshold, zero below it.
+    /// Excess of v over a threshold; zero below the threshold.
     Above(Variable, f64),
     /// Excess of v over a dead band, with its sign.
     Beyond(Variable, f64),
-    /// The control v through a first-order lag of that many seconds; as a candidate, the time constant is free.
+    /// The control v through a first-order lag with a time constant, s. The time constant of a candidate is free.
     Lagged(Variable, f64),
     /// An expression of the free forms.
     Free(&'static Free),
 }
 
-/// A shape with the channel it acts in and its factor.
+/// A shape with its channel and its factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Form {
-    /// Channel in which it acts.
+    /// Channel in which the form acts.
     pub channel: Channel,
-    /// Whether it scales with dynamic pressure.
+    /// Whether the form scales with dynamic pressure.
     pub of_air: bool,
     /// Dependence on its variables.
     pub shape: Shape,
@@ -95,7 +95,7 @@ impl Shape {
         }
     }
 
-    /// The formula, its constants by `names` if these are given.
+    /// The formula as text, with `names` in place of the constants' values if `names` is given.
     pub fn text(&self, names: Option<&[String]>) -> String {
         let name = Variable::name;
         let number = |c: f64| match names {
@@ -178,9 +178,9 @@ impl Form {
     /// Identifier among the candidates.
     pub fn id(&self) -> String {
         let text = match self.shape {
-            // too long for an id
+            // the text is too long for an identifier
             Shape::Free(free) => format!("free_{:x}", number_of(&free.text(None))),
-            // its time constant is free
+            // without the time constant, which is free
             Shape::Lagged(v, _) => format!("lag {}", v.name()),
             shape => shape.text(None),
         };
@@ -193,11 +193,11 @@ impl Form {
         )
     }
 
-    /// The form with the constants that a search estimated: `values` are the coefficient, then these.
+    /// The form with the constants that a search has estimated. `values` holds the coefficient, then the constants.
     pub fn fitted(self, values: &[f64]) -> Form {
         match (self.shape, values) {
             (Shape::Lagged(v, _), [_, tau, ..]) => {
-                // three figures, so that it can be read
+                // three figures, for a readable text
                 let tau = format!("{tau:.2e}").parse().unwrap_or(*tau);
                 Form { shape: Shape::Lagged(v, tau), ..self }
             }
@@ -205,10 +205,10 @@ impl Form {
         }
     }
 
-    /// The effect of this form alone with a fixed threshold; a lag's time constant is free.
+    /// The effect that consists of this form, with a fixed threshold. The time constant of a lag is free.
     ///
     /// # Errors
-    /// Its file cannot be read, which does not happen for the library's forms.
+    /// The text of the effect file is not valid. This does not happen for forms of the library.
     pub fn effect(&self) -> Result<&'static Written, String> {
         match self.shape {
             Shape::Lagged(v, _) => self.through_lag(v, LAG_S, &self.id()),
@@ -216,7 +216,7 @@ impl Form {
         }
     }
 
-    /// The effect of a control through a lag; the search starts at `tau`, and one width to either side.
+    /// The effect of a control through a lag. The search starts at `tau` (s) and at 0.75 `tau` to either side.
     fn through_lag(&self, v: Variable, tau: f64, id: &str) -> Result<&'static Written, String> {
         register::read(&format!(
             "schema = 1\nid = \"{id}\"\ndescription = \"A control through a lag.\"\nsource = \"greylag propose\"\n\
@@ -232,7 +232,7 @@ impl Form {
         ))
     }
 
-    /// The effect of this form alone with its constants at their values. A lag's time constant remains a parameter.
+    /// The effect that consists of this form, with fixed constants. The time constant of a lag remains a parameter.
     ///
     /// # Errors
     /// As [`Form::effect`].
@@ -255,7 +255,7 @@ impl Form {
     }
 }
 
-/// Forms in `channel` of the controls `of`, each through a lag.
+/// Forms in `channel` with each control among `of` through a lag.
 pub fn lags(channel: Channel, of: &[Variable]) -> Vec<Form> {
     let form = |of_air, v| Form { channel, of_air, shape: Shape::Lagged(v, LAG_S) };
     let with_air = of.iter().filter(|v| CONTROLS.contains(v)).map(|v| form(true, *v));
@@ -270,7 +270,7 @@ fn number_of(text: &str) -> u64 {
     })
 }
 
-/// All forms in `channel`; `threshold` gives the quantile of the magnitude of a variable.
+/// All forms of the library in `channel`. `threshold` returns a quantile of the magnitude of a variable.
 pub fn forms(channel: Channel, threshold: &dyn Fn(Variable, f64) -> f64) -> Vec<Form> {
     let mut shapes: Vec<(bool, Shape)> = Vec::new();
     for (of_air, variables) in [(true, &OF_AIR[..]), (false, &BESIDE_AIR[..])] {

@@ -1,4 +1,4 @@
-//! Proposal of a formula for an effect outside the catalogue: searched, tested on other flights, described in words.
+//! Proposal of a formula for an effect outside the catalogue: search, test on held-out flights, description in words.
 
 mod beyond;
 mod draft;

@@ -1,4 +1,4 @@
-//! The proposal in sentences.
+//! Wording of a proposal: formula, certain properties, free forms, test on held-out flights.
 
 use super::draft::Term;
 use super::free::grammar::MOST_NODES;
@@ -8,7 +8,7 @@ use super::result::{HeldOut, Proposal};
 use crate::diagnose::answer::sentences::figures;
 use greylag_physics::formula::Variable;
 
-/// `text` with a capital first letter and a full stop.
+/// `text` with an upper-case first letter and a full stop.
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect()) + "."

@@ -1,4 +1,4 @@
-//! The residual that a search for a formula uses, as a table for other programs.
+//! Export of the residual that a search for a formula uses, as a CSV table.
 
 use std::fmt::Write;
 
@@ -11,10 +11,11 @@ use crate::flight_path::reconstruction::Reconstruction;
 use greylag_model::GreyBox;
 use greylag_physics::formula::file::channel_name;
 
-/// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV. Each window of the weak form (0.37 s,
-/// half overlapping) has one row: the index of the flight from 0, the mean of each variable over the window (SI units),
-/// dynamic pressure times wing area (`qbar_S`, N), and the residual of each channel (N or N m; empty where it is not
-/// measured) in the column `left_` followed by the channel's name.
+/// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV.
+///
+/// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index of the flight from 0, the
+/// mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the residual of each
+/// channel (N or N m; empty if it is not measured). The name of a residual's column is `left_` followed by the channel.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).

@@ -1,4 +1,4 @@
-//! The candidates: every effect of the catalogue that a model lacks, with its regressor columns.
+//! Candidates of a diagnosis: the effects that a model lacks, with their regressor columns.
 
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ const MOVED: f64 = 0.02;
 /// Largest change of a shape constant within which its linearisation is used, as a share of its value.
 pub const REACH: f64 = 0.35;
 
-/// Factor between the points weaker than an input effect's first start.
+/// Factor between successive points that are weaker than an input effect's first starting value.
 const SMALLER: f64 = 2.5;
 
 /// An effect that may be missing.
@@ -26,19 +26,19 @@ const SMALLER: f64 = 2.5;
 pub struct Entry {
     /// Description of the effect.
     pub about: Description,
-    /// Whether it is an input effect, acting on the deflections.
+    /// Whether it is an input effect, which acts on the deflections.
     pub operator: bool,
 }
 
 impl Entry {
-    /// Whether it comes from a file, so that no prior on its amounts exists.
+    /// Whether the effect comes from an effect file and therefore has no prior on its coefficients.
     fn written(&self) -> bool {
         Kind::from_id(self.about.id).is_some_and(|kind| kind.written().is_some())
     }
 }
 
-/// The effects of the catalogue and those of files with ids in `with` that `model` lacks and that can be searched
-/// for, without those of `without`.
+/// The effects that `model` lacks and that can be searched for, without those in `without`. They are effects of the catalogue
+/// and the effects from files in `with`.
 pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<Entry> {
     let of = |about: Description, operator| Entry { about, operator };
     let physical = on_air().map(|about| of(about, false));
@@ -61,7 +61,7 @@ pub fn candidates(model: &GreyBox, with: &[String], without: &[String]) -> Vec<E
         .collect()
 }
 
-/// Columns of candidates over all flights; each flight's list has the same length.
+/// Columns of candidates over all flights. The lists of all flights have the same length.
 pub struct Columns {
     /// The candidates, which refer to columns by index.
     pub trials: Vec<Trial>,
@@ -69,8 +69,8 @@ pub struct Columns {
     pub columns: Vec<Vec<Column>>,
 }
 
-/// Columns of `entries` for `flights` under `model`; `refined` gives additional points at which the nonlinear ones
-/// are linearised.
+/// Columns of `entries` for `flights` under `model`. `refined` holds additional points at which nonlinear candidates are
+/// linearised.
 pub fn columns(
     model: &GreyBox,
     flights: &[Ready],
@@ -113,7 +113,7 @@ fn starts(entry: &Entry) -> &'static [&'static [f64]] {
     entry.about.entry.map_or(&[], |e| e.starts)
 }
 
-/// Points at which an input effect is weaker than at its first start; accurate sensors may still detect it there.
+/// Points at which an input effect is weaker than at its first starting value. Accurate sensors may detect such weak effects.
 fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     let (Some(first), Some(last)) = (starts(entry).first(), starts(entry).last()) else {
         return Vec::new();
@@ -121,18 +121,18 @@ fn smaller(entry: &Entry) -> Vec<Vec<f64>> {
     if !entry.operator {
         return Vec::new();
     }
-    // starts that decrease are limits, whose effect is weaker the higher they are
+    // decreasing starting values are limits: a higher limit is a weaker effect
     let factor = if first[0] < last[0] { 1.0 / SMALLER } else { SMALLER };
     vec![vec![first[0] * factor.powi(2)], vec![first[0] * factor]]
 }
 
-/// Whether an effect is linear in all its constants.
+/// Whether an effect is linear in all its coefficients.
 pub fn straight(entry: &Entry) -> bool {
     starts(entry).is_empty()
 }
 
-/// `model` with all of `entries` that can join it, at zero or the bound nearest to it, and these entries with their
-/// values.
+/// `model` with all of `entries` that can join it, and these entries with their values. The values are zero or the bound
+/// nearest to zero.
 pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec<f64>)>) {
     let mut everything = model.clone();
     let mut joined = Vec::new();
@@ -143,14 +143,14 @@ pub fn with_all(model: &GreyBox, entries: &[Entry]) -> (GreyBox, Vec<(Entry, Vec
             joined.push((*e, values));
         }
     }
-    // coefficients that some of them would replace keep their values
+    // coefficients that joined effects would replace keep their values
     for c in model.coefficients() {
         everything.set_coefficient(&c.name, c.value);
     }
     (everything, joined)
 }
 
-/// Indices of the coefficients that a search estimates: all but gains that are one in every start.
+/// Indices of the coefficients that a search estimates: all except linear coefficients that are 1 in every starting point.
 pub fn free(entry: &Entry) -> Vec<usize> {
     let linear = entry.about.coefficients.len() - entry.about.shape;
     (0..entry.about.coefficients.len())
@@ -161,7 +161,7 @@ pub fn free(entry: &Entry) -> Vec<usize> {
 }
 
 impl Columns {
-    /// Adds the linear candidates: one model with all of `entries` at zero gives their columns in one pass.
+    /// Adds the linear candidates. One model with all of `entries` at zero gives their columns in one pass.
     fn add_linear(&mut self, model: &GreyBox, flights: &[Ready], entries: &[Entry]) {
         let (everything, joined) = with_all(model, entries);
         let wanted = model.coefficients().len()..everything.coefficients().len();
@@ -174,7 +174,7 @@ impl Columns {
                 let (low, high) = model.size().bounds(c);
                 (k, next + k, [low, high])
             });
-            // coefficients without effect in the flights, such as those of a missing rudder, stay at zero
+            // coefficients without effect in the flights, for example of a missing rudder, stay at zero
             let free = free.filter(|(_, column, _)| self.acts(*column)).collect();
             let trial = Trial {
                 id: e.about.id,
@@ -224,7 +224,7 @@ impl Columns {
         self.columns.iter().any(|list| list[column].iter().flatten().any(moved))
     }
 
-    /// Records the channels in which a trial acts, and keeps the trial if there is one.
+    /// Records the channels in which a trial acts, and keeps the trial if it acts in any channel.
     fn finish(&mut self, mut trial: Trial, flights: &[Ready]) {
         let own: Vec<usize> = trial
             .points
@@ -248,8 +248,8 @@ impl Columns {
     }
 }
 
-/// Columns of a nonlinear candidate at `values`: its contribution, then its derivatives with respect to its free
-/// coefficients, by flight; `None` if the values are not possible.
+/// Columns of a nonlinear candidate at `values` for each flight: the contribution, then the derivatives with respect to the
+/// free coefficients. `None` if the candidate cannot join the model with these values.
 fn curved_columns(
     model: &GreyBox,
     flights: &[Ready],

@@ -1,4 +1,4 @@
-//! Division of flights into cells: one channel of one flight, its finite windows in runs and blocks.
+//! Division of flights into cells. A cell is one channel of one flight, with its finite windows in runs and blocks.
 
 use nalgebra::DMatrix;
 
@@ -7,7 +7,7 @@ use crate::diagnose::regression::gather::Column;
 use crate::diagnose::regression::local::CHANNELS;
 use crate::diagnose::regression::whiten::Whitener;
 
-/// Length of a block of windows whose errors are taken as correlated, s.
+/// Length of a block of windows whose errors are treated as correlated, s.
 pub const BLOCK_S: f64 = 4.0;
 
 /// Columns of one flight with their indices among all columns.
@@ -93,7 +93,7 @@ fn cell(flight: usize, channel: usize, ready: &Ready, block_of: &[usize]) -> Cel
 }
 
 impl Cell {
-    /// The runs of `values`, one for each window of the flight.
+    /// The runs of `values`, which has one entry for each window of the flight.
     pub fn split(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let mut start = 0;
         let cut = |&end: &usize| {
@@ -104,7 +104,7 @@ impl Cell {
         self.runs.iter().map(cut).collect()
     }
 
-    /// `values` whitened, one for each row.
+    /// Whitened `values`, one entry for each finite window.
     pub fn whitened(&self, values: &[f64], whitener: &Whitener) -> Vec<f64> {
         self.split(values).iter().flat_map(|run| whitener.apply(run)).collect()
     }
@@ -122,7 +122,7 @@ impl Cell {
         (places.clone(), DMatrix::from_vec(self.windows.len(), places.len(), data))
     }
 
-    /// Rows of each block: block number, first row, one past the last.
+    /// Rows of each block: block number, first row, last row + 1.
     pub fn rows_of_blocks(&self) -> Vec<(usize, usize, usize)> {
         let mut rows: Vec<(usize, usize, usize)> = Vec::new();
         for (row, block) in self.blocks.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A flexible model without physics: random Fourier features of state, deflections and their past.
+//! Flexible model without physics: random Fourier features of state, deflections and earlier deflections.
 
 use std::f64::consts::TAU;
 
@@ -12,18 +12,19 @@ use crate::weak_form::prepared::Prepared;
 use greylag_model::{GreyBox, Integrator};
 use greylag_num::stream::{Stream, stream};
 
-/// Random stream for the features.
+/// Number of the random stream for the features.
 const FEATURES: u64 = 81;
 /// Number of cosines.
 const COSINES: usize = 40;
-/// Number of their variables: α, β, V, p, q, r, deflections and throttle now, earlier deflections, the rate of α.
+/// Number of variables: α, β, V, p, q, r, present aileron, elevator and throttle, earlier aileron and elevator less the
+/// present ones, rate of α.
 const VARIABLES: usize = 12;
 /// Number of features: the variables themselves and the cosines.
 pub const COUNT: usize = VARIABLES + COSINES;
-/// Standard deviation of the cosines' frequencies per standard deviation of a variable, so that a feature varies by
-/// about one half-period over the flights.
+/// Standard deviation of the cosines' frequencies, rad per standard deviation of a variable. A feature varies by about one
+/// half-period over the flights.
 const BEND: f64 = 0.5;
-/// Time over which the rate of α is differenced, s; a shorter one would amplify noise.
+/// Time over which α is differenced to its rate, s. A shorter time would amplify noise.
 const SPAN_S: f64 = 0.06;
 /// Delay of the earlier deflections, s.
 const AGO_S: f64 = 0.08;
@@ -34,7 +35,8 @@ struct Cosine {
     phase: f64,
 }
 
-/// Features of every flight, multiplied by dynamic pressure; the same in all channels.
+/// Columns of the features for every flight, multiplied by dynamic pressure times wing area (N). All force channels have the
+/// same columns, and all moment channels.
 pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column>> {
     let spread = spread(flights, variables);
     let mut random = stream(seed, &[FEATURES]);
@@ -43,7 +45,7 @@ pub fn features(model: &GreyBox, flights: &[Ready], seed: u64) -> Vec<Vec<Column
         let one = gather(&flight.acting, Integrator::Jsbsim, COUNT, |place, add| {
             let z = standard(variables(&flight.acting, place.segment, place.index), &spread);
             let pressure = model.air(&place.at.state, place.at.altitude).q_s;
-            // forces are averaged over samples, moments over steps: one column for each of the two
+            // forces are averaged over samples, moments over steps: one column for forces, one for moments
             for channel in [0, 3] {
                 for (k, z) in z.iter().enumerate() {
                     add(k, channel, pressure * z);
@@ -93,8 +95,8 @@ fn variables(flight: &Prepared, segment: usize, index: usize) -> [f64; VARIABLES
     ]
 }
 
-/// Mean and standard deviation over all flights of each variable; `of` extracts the variables from a flight, a
-/// segment and an index.
+/// Mean and standard deviation of each variable over all flights. `of` returns the variables for a flight, the index of a
+/// segment and the index of a sample.
 pub fn spread<const N: usize>(
     flights: &[Ready],
     of: impl Fn(&Prepared, usize, usize) -> [f64; N],
@@ -118,7 +120,7 @@ pub fn spread<const N: usize>(
     })
 }
 
-/// `raw` standardised: less its mean, in standard deviations.
+/// Standardised variables: `raw` less the mean, in standard deviations.
 pub fn standard<const N: usize>(raw: [f64; N], spread: &[[f64; 2]; N]) -> [f64; N] {
     std::array::from_fn(|k| (raw[k] - spread[k][0]) / spread[k][1])
 }

@@ -1,4 +1,4 @@
-//! Kernel averages over every window of a flight, with each sample evaluated once.
+//! Kernel averages over every window of a flight. Overlapping windows share the evaluation of a sample.
 
 use rayon::prelude::*;
 
@@ -12,26 +12,28 @@ use greylag_physics::Controls;
 /// Values for each window in each of the channels D, L, Y, l, m, n; an empty list means zeros.
 pub type Column = [Vec<f64>; CHANNELS];
 
-/// Number of windows that one task processes, to avoid evaluating samples of overlapping windows twice.
+/// Number of adjacent windows that one task processes. Samples in their overlap are evaluated once.
 const GROUP: usize = 16;
-/// Largest number of windows that contain one sample.
+/// Largest number of windows to which one sample contributes.
 const OVERLAP: usize = 4;
 
 /// A sample to evaluate.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
-    /// Index of its segment.
+    /// Index of the sample's segment.
     pub segment: usize,
-    /// Index within the segment.
+    /// Index of the sample in its segment.
     pub index: usize,
-    /// Sample that gives the state.
+    /// Sample with the state.
     pub at: &'a Instant,
-    /// Controls to evaluate it with.
+    /// Controls for the evaluation.
     pub controls: &'a Controls,
 }
 
-/// Averages the amounts that `evaluate` reports, as `add(column, channel, amount)`, over each window: forces over the
-/// samples; moments over integration steps, or over the samples if they are taken at instants.
+/// Averages the amounts that `evaluate` reports with `add(column, channel, amount)` over each window.
+///
+/// Forces are averaged over the samples. Moments are averaged over integration steps, or over the samples if these are values
+/// at instants.
 pub fn gather(
     flight: &Prepared,
     integrator: Integrator,
@@ -62,7 +64,7 @@ pub fn gather(
     out
 }
 
-/// Runs of at most [`GROUP`] windows of one segment: first, and one past the last.
+/// Runs of at most [`GROUP`] windows of one segment: first window, last window + 1.
 fn groups(flight: &Prepared) -> Vec<(usize, usize)> {
     let mut groups: Vec<(usize, usize)> = Vec::new();
     for (w, window) in flight.windows.iter().enumerate() {
@@ -100,7 +102,7 @@ fn group(
                 let k = index - start;
                 let step = match flight.sampling {
                     Sampling::Held => kernel.step.get(k).copied().unwrap_or(0.0),
-                    // both ends of a step count half: the mean of the two steps beside the sample
+                    // both ends of a step count half: the weight is the mean of the two steps adjacent to the sample
                     Sampling::Instants => kernel.sample[k],
                 };
                 holders[count] = (w - first, kernel.sample[k], step);
@@ -130,7 +132,7 @@ fn group(
     sums
 }
 
-/// Rates of `of` for every window by the kernel's derivative (smoothed differentiation).
+/// Rates (1/s) of the quantities `of` for every window, by the kernel's derivative (smoothed differentiation).
 pub fn rates<const N: usize>(
     flight: &Prepared,
     of: impl Fn(&Instant) -> [f64; N],

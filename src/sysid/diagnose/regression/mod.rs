@@ -1,4 +1,4 @@
-//! The regression behind the ranking: columns, whitening, elimination of nuisance parameters (Frisch–Waugh–Lovell).
+//! The regression of the ranking: columns, whitening, elimination of nuisance parameters (Frisch–Waugh–Lovell).
 
 pub(super) mod catalogue;
 pub(super) mod cells;

@@ -1,4 +1,4 @@
-//! Noise of each channel, from the residual of the richest plausible model: its spectrum, its level, its blocks.
+//! Noise of each channel, estimated from the residual of a rich model: spectrum, level, and residuals by blocks.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -8,7 +8,7 @@ use crate::diagnose::regression::whiten::Whitener;
 
 /// Order of the autoregressive whitening.
 const ORDER: usize = 8;
-/// Ridge parameter of the rich fit, as a share of a column's own square.
+/// Ridge parameter of the rich fit, relative to a column's squared norm.
 const RIDGE: f64 = 1e-4;
 /// Number of alternations between whitening and fit.
 const PASSES: usize = 2;
@@ -18,12 +18,13 @@ const PASSES: usize = 2;
 pub struct Noise {
     /// Whitener of each channel.
     pub whiteners: [Whitener; CHANNELS],
-    /// Whitened residual of the rich fit, one list for each cell, each block corrected for the reduction by the fit.
+    /// Whitened residual of the rich fit, one list for each cell. Each block is corrected for the reduction of its variance by
+    /// the fit.
     pub residuals: Vec<Vec<f64>>,
 }
 
 impl Noise {
-    /// Estimates the noise from the residual in index `last` after a fit of the `rich` columns, by flight.
+    /// Estimates the noise from the residual in column `last` after a fit of the other columns in `rich`, one entry a flight.
     pub fn estimate(cells: &Cells, rich: &[Placed], last: usize) -> Noise {
         let mut residuals = vec![Vec::new(); cells.list.len()];
         let whiteners = std::array::from_fn(|channel| {
@@ -117,8 +118,8 @@ impl Fit {
         Some(Fit { scale, inverse, solution })
     }
 
-    /// The residual of `rows`, each block b multiplied by (I − H_bb)^(−1/2), so that its variance is that before the
-    /// fit (Bell and McCaffrey 2002, "CR2").
+    /// The residual of `rows`, with each block b multiplied by (I − H_bb)^(−1/2). This restores the variance before the fit (Bell
+    /// and McCaffrey 2002, "CR2").
     fn unshrunk(&self, cell: &Cell, rows: &Rows) -> Vec<f64> {
         let left = &rows.y - &rows.x * &self.solution;
         let mut out = vec![0.0; left.len()];
@@ -134,7 +135,7 @@ impl Fit {
                 .unwrap_or_else(|| DMatrix::zeros(scaled.nrows(), scaled.ncols()));
             let hat = half.tr_mul(&half);
             let turn = (DMatrix::identity(to - from, to - from) - hat).symmetric_eigen();
-            // a block that the fit can follow altogether carries no information on the noise
+            // a block that the fit can follow completely contains no information on the noise
             let root = turn.eigenvalues.map(|e| e.max(0.04).sqrt().recip());
             let part = turn.eigenvectors.tr_mul(&left.rows(from, to - from));
             let part = &turn.eigenvectors * part.component_mul(&root);
@@ -144,7 +145,7 @@ impl Fit {
     }
 }
 
-/// The residual before whitening, by runs.
+/// The residual before whitening, one list a run.
 fn raw_residual(cell: &Cell, rich: &[Placed], last: usize, fit: &Fit) -> Vec<Vec<f64>> {
     let mut left = vec![0.0; cell.windows.iter().max().map_or(0, |w| w + 1)];
     for (place, column) in &rich[cell.flight] {

@@ -1,4 +1,4 @@
-//! Regressor columns of each flight's own constants.
+//! Regressor columns of the constants of each flight: misalignment angles and trims.
 
 use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::gather::{Column, gather, rates};
@@ -21,7 +21,7 @@ pub fn columns(asked: &PerFlight, model: &GreyBox, flight: &Ready) -> Vec<Column
     columns
 }
 
-/// Columns of the trims, which are linear in the wrench.
+/// Columns of the trims. Forces and moments are linear in the trims.
 fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let count = model.coefficients().len();
     match trims::joined(model) {
@@ -30,8 +30,8 @@ fn of_trims(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     }
 }
 
-/// Columns of the misalignment angles of gyros, accelerometers and path: all quantities measured in those axes
-/// rotate, the angular acceleration included.
+/// Columns of the misalignment angles of gyros, accelerometers and path. All quantities measured in these axes rotate,
+/// including the angular acceleration.
 fn of_axes(model: &GreyBox, flight: &Ready) -> Vec<Column> {
     let angles = askew::NAMES.len();
     let mut columns = gather(&flight.acting, model.integrator, angles, |place, add| {

@@ -1,4 +1,4 @@
-//! Evidence for each candidate: the smaller of the penalised gain and the block-robust Wald statistic.
+//! Evidence for each candidate: the smaller of the penalised gain in likelihood and the block-robust Wald statistic.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,56 +7,56 @@ use crate::diagnose::regression::projected::{Grams, scaled_inverse};
 /// A point at which a candidate is linearised.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Values of all its coefficients.
+    /// Values of all coefficients of the candidate.
     pub values: Vec<f64>,
-    /// Candidate column of its contribution there; `None` for a linear candidate, whose point is zero.
+    /// Index of the column of the contribution at this point; `None` for a linear candidate, whose contribution is zero.
     pub contribution: Option<usize>,
-    /// Free coefficients: index in `values`, candidate column of the derivative, lowest and highest value within
-    /// which the linearisation is used.
+    /// Free coefficients: index in `values`, index of the derivative's column, and the range of values in which the linearisation
+    /// is used.
     pub free: Vec<(usize, usize, [f64; 2])>,
 }
 
-/// A candidate effect in terms of columns.
+/// A candidate effect, with the indices of its columns.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Identifier of the effect.
     pub id: &'static str,
-    /// Points of linearisation; a single one for linear candidates.
+    /// Points of linearisation; a linear candidate has a single point.
     pub points: Vec<Point>,
-    /// Number of independent rows in the channels in which it acts.
+    /// Number of independent rows n in the channels in which the effect acts.
     pub support: f64,
-    /// Channels in which it acts.
+    /// Channels in which the effect acts: D, L, Y, l, m, n.
     pub channels: [bool; 6],
 }
 
 /// Score of a candidate.
 #[derive(Clone, Debug)]
 pub struct Score {
-    /// Evidence, the smaller of `fall` less d ln n and `wald`.
+    /// Evidence: the smaller of `fall` less d ln n and `wald`, for d free coefficients and n independent rows.
     pub evidence: f64,
     /// Block-robust Wald statistic of the free coefficients.
     pub wald: f64,
-    /// Ranking criterion: the evidence if it is not positive, else the geometric mean of penalised gain and Wald
-    /// statistic. Far above chance, the smaller of the two would rank by how evenly an effect is spread over the
+    /// Ranking criterion: the geometric mean of penalised gain and Wald statistic, or the evidence if the evidence is not
+    /// positive. Far above the chance level, a ranking by evidence would depend on how evenly an effect is spread over the
     /// blocks.
     pub order: f64,
     /// Reduction of the squared whitened error.
     pub fall: f64,
     /// Values of all coefficients.
     pub values: Vec<f64>,
-    /// Standard deviations of the free ones, zero for the others.
+    /// Standard deviations of the free coefficients; zero for the other coefficients.
     pub deviations: Vec<f64>,
     /// Weights of the candidate columns in the fitted contribution.
     pub weights: Vec<(usize, f64)>,
-    /// Index of the point that it started from.
+    /// Index of the point of linearisation.
     pub point: usize,
 }
 
-/// Products of the candidate columns with a residual, in total and by block.
+/// Products of the candidate columns with a residual: total, and by block.
 pub struct Draw {
-    /// Product over all blocks and the prior.
+    /// Products over all blocks and the prior.
     pub total: DVector<f64>,
-    /// Product over each block.
+    /// Products over each block.
     pub blocks: Vec<DVector<f64>>,
 }
 
@@ -70,7 +70,7 @@ impl Draw {
 }
 
 impl Trial {
-    /// The best score over the trial's points under `draw`.
+    /// The score with the largest reduction of the error over the trial's points, for the residual of `draw`.
     pub fn score(&self, p: &Grams, draw: &Draw) -> Option<Score> {
         let scores = (0..self.points.len()).filter_map(|k| self.score_at(p, draw, k));
         scores.max_by(|a, b| a.fall.total_cmp(&b.fall))
@@ -118,8 +118,8 @@ impl Trial {
         })
     }
 
-    /// `step` limited to where the linearisation is used, one coefficient after the other, and whether any
-    /// coefficient was limited.
+    /// `step` limited to the range of the linearisation, one coefficient after the other. Also returns whether a coefficient was
+    /// limited.
     fn within(
         &self,
         point: &Point,
@@ -139,7 +139,7 @@ impl Trial {
             let (index, _, [low, high]) = point.free[k];
             held[k] = true;
             step[k] = (point.values[index] + step[k]).clamp(low, high) - point.values[index];
-            // the others again, those held fixed
+            // the other coefficients are estimated again with the limited coefficients fixed
             let open: Vec<usize> = (0..step.len()).filter(|i| !held[*i]).collect();
             if open.is_empty() {
                 break;
@@ -179,7 +179,7 @@ fn pick(vector: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
     DVector::from_iterator(columns.len(), columns.iter().map(|c| vector[*c]))
 }
 
-/// Wald statistic θ' V⁻¹ θ with the blocks' scatter in V, and the standard deviations.
+/// Wald statistic θ' V⁻¹ θ with the covariance V from the scatter of the blocks, and the standard deviations.
 fn joint_wald(
     p: &Grams,
     draw: &Draw,
@@ -198,7 +198,7 @@ fn joint_wald(
         meat += correction * &score * score.transpose();
     }
     let covariance = inverse * meat * inverse;
-    // the blocks' scatter may by chance be smaller than what the noise alone must leave
+    // by chance, the scatter of the blocks may be smaller than the noise allows
     let deviations =
         (0..columns.len()).map(|k| covariance[(k, k)].max(inverse[(k, k)]).sqrt()).collect();
     let wald = scaled_inverse(&covariance).map_or(0.0, |v| theta.dot(&(v * theta)));
@@ -221,7 +221,7 @@ fn ray_wald(p: &Grams, draw: &Draw, weights: &[(usize, f64)], linear: f64, squar
     if amount > 0.0 && meat > 0.0 { linear * linear / meat } else { 0.0 }
 }
 
-/// Standard deviations of the first of `columns` fitted together: from the noise alone, and from the scatter of the
+/// Standard deviations of the first coefficient in a joint fit of `columns`: from the noise alone, and from the scatter of the
 /// blocks of `null`.
 pub fn deviations(p: &Grams, null: &Draw, columns: &[usize]) -> Option<(f64, f64)> {
     let inverse = scaled_inverse(&select(&p.total, columns))?;

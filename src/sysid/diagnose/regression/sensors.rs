@@ -31,30 +31,30 @@ pub const LATE_PLACE: usize = SENSORS - 2;
 /// Index of the actuators' blur.
 pub const BLUR_PLACE: usize = SENSORS - 1;
 
-/// Least standard deviations (rad/s, rad, relative, m/s², s), since a filter's covariance covers only the errors it
-/// models.
+/// Smallest standard deviations (rad/s, rad, relative, m/s², s). The covariance of the reconstruction covers only modelled
+/// errors.
 const FLOOR: [f64; SENSORS - 3] =
     [2e-4, 2e-4, 2e-4, 1e-3, 1e-3, 3e-3, 0.01, 0.01, 0.01, 5e-4, 5e-4, 2e-3, 5e-4];
-/// Prior width of the delay of angular accelerations behind the moments, s: a simulator with explicit Euler steps at
-/// 400 Hz has 1.25 ms, a gyro's low-pass filter of 100 Hz 1.6 ms.
+/// Prior standard deviation of the delay of angular accelerations relative to the moments, s. The delay is 1.25 ms in a
+/// simulator with explicit Euler steps at 400 Hz, and 1.6 ms with a gyro's low-pass filter of 100 Hz.
 const MOMENTS_LATE: f64 = 1.5e-3;
-/// The same if the log holds a simulator's own steps, which are compared as such.
+/// Prior standard deviation of this delay if the log holds the steps of a simulator, s.
 const MOMENTS_ON_TIME: f64 = 1e-6;
-/// Prior width of the actuators' delay, samples: its 95 % interval is ±1.5 samples.
+/// Prior standard deviation of the actuators' delay, in sampling intervals: the 95 % interval is ±1.5 sampling intervals.
 const SKEW_SAMPLES: f64 = 0.77;
-/// Mean and standard deviation of the actuators' blur, squared samples: a record that is late by a fraction of a
-/// sample lies between the present value and the mean of both neighbouring samples, whose blur is 1/8.
+/// Prior mean and standard deviation of the actuators' blur, in squared sampling intervals. A record that is late by a
+/// fraction of a sample lies between a sample and the mean of two adjacent samples, whose blur is 1/8.
 pub const BLURRED: [f64; 2] = [1.0 / 16.0, 1.0 / 24.0];
 
-/// Prior mean of each sensor error.
+/// Prior mean of the sensor error with the index `which`, in its unit.
 pub fn mean(which: usize) -> f64 {
     if which == BLUR_PLACE { BLURRED[0] } else { 0.0 }
 }
 
-/// Prior widths of the sensor errors of a flight with a sampling interval of `dt` (s).
+/// Prior standard deviations of the sensor errors of a flight with the sampling interval `dt` (s), in their units.
 pub fn widths(flight: &Reconstruction, dt: f64) -> [f64; SENSORS] {
     let stated = |name: &str| {
-        // the vanes share a clock
+        // both vanes have the same delay
         let name = if matches!(name, "skew_alpha" | "skew_beta") { "skew_vanes" } else { name };
         flight.deviation(name).unwrap_or(0.0)
     };

@@ -1,8 +1,8 @@
-//! Noise shared by columns and residual, and the spurious evidence it causes.
+//! Noise that columns and residual share, and the spurious evidence that it causes.
 //!
-//! Gyro noise and the path's error enter the residual as well as the columns, so their products are not zero on
-//! average. The bias is estimated by disturbing the flights again with noise of the same kind: the products of the
-//! resulting changes of column and residual have the same mean.
+//! Gyro noise and the error of the path are contained in the residual and in the columns. The mean of their product is
+//! therefore not zero. This bias is estimated with additional simulated noise of the same distribution: the products of the
+//! resulting changes of columns and residual have the same mean.
 
 use rand_distr::{Distribution, StandardNormal};
 
@@ -13,16 +13,17 @@ use crate::flight_path::reconstruction::Reconstruction;
 use crate::weak_form::prepared::Prepared;
 use greylag_num::stream::stream;
 
-/// Random stream for the disturbance.
+/// Number of the random stream for the simulated noise.
 const DISTURBANCE: u64 = 85;
 
-/// Error of the path's V, α and β: noise of their sensors, and the share of the past that the smoother keeps in a
-/// sample.
+/// Errors of the path's V, α and β: standard deviation of the sensor noise (m/s, rad, rad), and the factor by which the
+/// smoother's weight decreases from one sample to the next.
 pub type PathError = [[f64; 2]; 3];
 
-/// The steady-state smoother of a flight with a sampling interval of `dt` (s), which weighs the measured value
-/// against the integrated rates: with variances R of the measurement and q of an integration step, its memory is
-/// √(R/q) samples to either side.
+/// Path errors of a flight with the sampling interval `dt` (s), for a steady-state smoother.
+///
+/// The smoother combines the measured value with the integrated rates. With the variances R of the measurement and q of an
+/// integration step, its memory is √(R/q) samples to either side.
 pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     let [fx, fy, fz] = flight.force_noise.map(|x| if x.is_finite() { x } else { 0.0 });
     let [_, _, v, p, q, r, alpha, beta] = flight.noise.map(|x| if x.is_finite() { x } else { 0.0 });
@@ -39,14 +40,14 @@ pub fn path_error(flight: &Reconstruction, dt: f64) -> PathError {
     [of(v, fx), of(alpha, (fz / speed).hypot(q)), of(beta, (fy / speed).hypot(r).hypot(0.1 * p))]
 }
 
-/// `flight` disturbed again with noise of its inertial sensors, vanes and airspeed, filtered as by the smoother of
-/// its path; `which` holds the index of the flight and that of the draw.
+/// `flight` with additional simulated noise of inertial sensors, vanes and airspeed. The noise of the path is filtered like in
+/// the smoother. `which` holds the index of the flight and the number of the draw.
 pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 2]) -> Prepared {
     let mut random = stream(seed, &[DISTURBANCE, which[0] as u64, which[1] as u64]);
     let mut unit = || -> f64 { StandardNormal.sample(&mut random) };
     let mut out = flight.clone();
     for segment in &mut out.segments {
-        // V, α, β: error of the integrated rates, and the measurement's error less that one
+        // V, α, β: error of the integrated rates, and error of the measurement less error of the integrated rates
         let mut drift: [Vec<f64>; 3] = Default::default();
         let mut measured: [Vec<f64>; 3] = Default::default();
         let mut sum = [0.0; 3];
@@ -81,8 +82,8 @@ pub fn disturbed(flight: &Prepared, path: &PathError, seed: u64, which: [usize; 
     out
 }
 
-/// First-order low-pass filters forward and backward, which keep `kept` of the past; they start from the mean of the
-/// first samples within their memory.
+/// First-order low-pass filters forward and backward with the pole `kept`. Each starts from the mean of the first samples
+/// within its memory.
 fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     let pass = |x: &mut dyn Iterator<Item = f64>, start: f64| {
         let mut y = start;
@@ -101,8 +102,10 @@ fn both_ways(x: &[f64], kept: f64) -> Vec<f64> {
     back
 }
 
-/// Products of a disturbance's changes of the columns before `last` with its change of the residual at index `last`,
-/// by flight; the same index in `before` and `after` means the same column.
+/// Products of the changes of columns and residual due to simulated noise, by flight.
+///
+/// The residual has the index `last`, the columns have smaller indices. An index means the same column in `before` and
+/// `after`.
 pub fn products(
     cells: &Cells,
     before: &[Placed],
@@ -128,7 +131,7 @@ pub fn products(
     sums
 }
 
-/// `after` less `before`, index by index; channels missing in one of them stay empty.
+/// `after` less `before` for each index. A channel that is missing in one of them stays empty.
 fn differences(before: &Placed, after: &Placed) -> Placed {
     let of = |(place, new): &(usize, Column)| {
         let (_, old) = before.iter().find(|(p, _)| p == place)?;

@@ -1,19 +1,19 @@
 //! Autoregressive whitening of a channel.
 
-/// Share of the variance treated as white, so that no frequency counts as free of noise.
+/// Share of the variance that is treated as white. No frequency then counts as free of noise.
 const FLOOR: f64 = 1e-3;
 
-/// Linear predictors of a value from those before it: of each order up to the largest.
+/// Linear predictors of a value from the previous values, of each order up to the largest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Whitener {
-    /// Weights of the k previous values in `predictors[k]`, the nearest first.
+    /// `predictors[k]` holds the weights of the k previous values, the most recent first.
     predictors: Vec<Vec<f64>>,
     /// Standard deviation of each predictor's residual.
     deviations: Vec<f64>,
 }
 
 impl Whitener {
-    /// Fits to `runs` by Levinson's recursion, up to `order`.
+    /// Fits predictors up to `order` to `runs` by Levinson's recursion.
     pub fn fit(runs: &[Vec<f64>], order: usize) -> Whitener {
         let mut covariance: Vec<f64> = (0..=order).map(|lag| autocovariance(runs, lag)).collect();
         if !(covariance[0].is_finite() && covariance[0] > 0.0) {
@@ -39,7 +39,7 @@ impl Whitener {
         fitted
     }
 
-    /// Prediction residual of `run`, in standard deviations.
+    /// Prediction residuals of `run`, in standard deviations.
     pub fn apply(&self, run: &[f64]) -> Vec<f64> {
         let order = self.predictors.len() - 1;
         (0..run.len())
@@ -51,14 +51,14 @@ impl Whitener {
             .collect()
     }
 
-    /// The same whitener for noise `factor` times as large.
+    /// The whitener for noise with standard deviations multiplied by `factor`.
     pub fn scaled(mut self, factor: f64) -> Whitener {
         self.deviations.iter_mut().for_each(|d| *d *= factor);
         self
     }
 }
 
-/// Mean of x(k) x(k + lag) over the count of all values, which keeps the sequence positive definite.
+/// Sum of x(k) x(k + lag) divided by the number of all values. This divisor keeps the sequence positive definite.
 fn autocovariance(runs: &[Vec<f64>], lag: usize) -> f64 {
     let count: usize = runs.iter().map(Vec::len).sum();
     let of = |run: &Vec<f64>| run.iter().zip(run.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
@@ -75,12 +75,12 @@ mod tests {
     fn a_moving_average_becomes_white_with_unit_variance() {
         let mut random = stream(3, &[]);
         let noise: Vec<f64> = (0..20_001).map(|_| StandardNormal.sample(&mut random)).collect();
-        // as neighbouring half-overlapping windows share their noise
+        // half-overlapping windows share noise like this moving average
         let run: Vec<f64> = noise.windows(2).map(|w| 3.0 * (w[1] - 0.6 * w[0])).collect();
         let white = Whitener::fit(std::slice::from_ref(&run), 8).apply(&run);
         let runs = [white];
         let [zero, one, two] = [0, 1, 2].map(|lag| autocovariance(&runs, lag));
-        // 20 000 samples: correlations scatter by 0.007
+        // 20 000 samples: the standard deviation of a correlation is 0.007
         assert!((zero - 1.0).abs() < 0.04, "{zero}");
         assert!(one.abs() < 0.03 && two.abs() < 0.03, "{one} {two}");
     }

@@ -1,6 +1,6 @@
-//! Checks of an effect beyond its evidence: held-out segments, bootstraps, agreement of the flights.
+//! Checks of an effect in addition to its evidence: held-out segments, bootstraps, agreement of the flights.
 //!
-//! They are computed here; their thresholds are in `stepwise/examine.rs` and `stepwise/judge.rs`.
+//! The thresholds of the checks are in `stepwise/examine.rs` and `stepwise/judge.rs`.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -16,29 +16,30 @@ use greylag_num::stream::stream;
 
 /// Number of folds of the held-out segments.
 const FOLDS: usize = 5;
-/// Random stream for the bootstraps.
+/// Number of the random stream for the bootstraps.
 const BOOTSTRAPS: u64 = 82;
-/// Correlation beyond which contributions cannot be distinguished.
+/// Magnitude of the correlation above which contributions cannot be distinguished.
 pub const ALIKE: f64 = 0.9;
 /// Difference of evidence below which effects cannot be distinguished.
 pub const CLOSE: f64 = 10.0;
-/// Uncertainty of the noise level, as squared error per row: with nothing missing it was −0.03 to 0.07.
+/// Uncertainty of the noise level, as squared whitened error per row. Without a missing effect, the error beyond noise was
+/// −0.03 to 0.07.
 const UNSURE: f64 = 0.1;
-/// Standard deviations of the noise's square beyond which a remaining residual is significant.
+/// Number of standard deviations of the squared noise above which a remaining residual is significant.
 const DOUBT: f64 = 4.0;
-/// Least share of a flight's information on an amount that must come from its excitation rather than from noise in
-/// its columns.
+/// Smallest share of a flight's information on a coefficient that is due to excitation, not to noise in the columns.
 const LEAST_SIGNAL: f64 = 0.5;
-/// Reduction, in prior standard deviations, of the prior's misfit beyond which a candidate may merely replace an
-/// adjustment of existing coefficients.
+/// Reduction of the prior's misfit, in prior standard deviations, above which a candidate may only replace an adjustment of
+/// existing coefficients.
 const PRIOR_MISFIT: f64 = 5.0;
-/// Least share of such a candidate's reduction that must be prior misfit for it to count as such.
+/// Share of prior misfit in a candidate's reduction above which the candidate counts as such a replacement.
 const PRIOR_SHARE: f64 = 0.9;
-/// Number of candidates that compete in a bootstrap.
+/// Number of candidates that are compared in a bootstrap.
 const COMPETING: usize = 8;
 
-/// Share of the squared error beyond noise that the candidate removes from held-out segments, in the channels in which it
-/// acts. A segment is one block. Every fifth one is held out in turn, and the amounts are fitted to the others.
+/// Share of the squared error beyond noise that the candidate removes from held-out blocks, in the channels in which it acts.
+///
+/// Every fifth block is held out in turn. The coefficients are fitted to the other blocks. NaN if this fit is singular.
 pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     let p = &round.projected;
     let last = p.width();
@@ -70,7 +71,7 @@ pub fn heldout_reduction(round: &Round, trial: &Trial, score: &Score) -> f64 {
     taken / excess(round, &trial.channels).max(taken).max(1.0)
 }
 
-/// Squared error of a model beyond noise.
+/// Squared whitened error of a model beyond noise, by channel.
 #[derive(Clone, Debug)]
 pub struct Beyond {
     excess: [f64; 6],
@@ -78,8 +79,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// The error of the model of `round`, which must have no candidates: a fit with all candidates' columns follows
-    /// their noise and leaves as little as half of it in the moments.
+    /// The error of the model of `round`. The round must have no candidates: a fit with the columns of all candidates follows
+    /// the noise, of which as little as half may remain in the moments.
     pub fn of(round: &Round) -> Beyond {
         let only = |c: usize| std::array::from_fn(|k| k == c);
         Beyond {
@@ -88,11 +89,12 @@ impl Beyond {
         }
     }
 
-    /// Share remaining in `channels` beside `fall`, which an effect removed from them, if it exceeds chance.
+    /// Remaining share of the error in `channels` after an effect has removed `fall`. `None` if the remaining error does not
+    /// exceed chance.
     pub fn share(&self, channels: &[usize], fall: f64) -> Option<f64> {
         let own = |of: &[f64; 6]| channels.iter().map(|c| of[*c]).sum::<f64>();
         let (left, rows) = (own(&self.excess), own(&self.rows));
-        // the square of white noise scatters by √(2n)
+        // the sum of n squares of white noise has the standard deviation √(2n)
         let beyond_doubt = left > f64::max(DOUBT * (2.0 * rows).sqrt(), UNSURE * rows);
         beyond_doubt.then(|| left / (left + fall))
     }
@@ -113,7 +115,8 @@ fn rows(round: &Round, channels: &[bool; 6]) -> f64 {
     (0..6).filter(|c| channels[*c]).map(|c| all[c]).sum()
 }
 
-/// Directions that may be scaled in a contribution: each column of a linear candidate, a nonlinear one as a whole.
+/// Directions that are scaled in a contribution: each column of a linear candidate, or the whole contribution of a nonlinear
+/// candidate.
 fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     match trial.points[score.point].contribution {
         None => score.weights.iter().map(|(c, _)| vec![(*c, 1.0)]).collect(),
@@ -121,9 +124,10 @@ fn directions(trial: &Trial, score: &Score) -> Vec<Vec<(usize, f64)>> {
     }
 }
 
-/// Whether the candidate mostly replaces an adjustment of existing coefficients: its reduction is the prior misfit of
-/// coefficients that the data moved far from their prior, and hardly any error of the flights, which those
-/// coefficients remove as well.
+/// Whether the candidate mostly replaces an adjustment of existing coefficients.
+///
+/// The candidate then reduces the prior misfit of coefficients that the data move far from their prior. It hardly reduces the
+/// error of the flights, because the adjusted coefficients remove the same error.
 pub fn absorbs_prior_error(round: &Round, score: &Score) -> bool {
     let prior = &round.projected.prior;
     let last = round.projected.width();
@@ -139,7 +143,7 @@ pub fn correlation(round: &Round, a: &Score, b: &Score) -> f64 {
     of(a, b) / (of(a, a) * of(b, b)).sqrt()
 }
 
-/// Indices in `scores` of the effects that these data cannot distinguish from the one at `of`, without `of` itself.
+/// Indices in `scores` of the effects that these data cannot distinguish from the effect at index `of`.
 pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> {
     let (_, own) = &scores[of];
     (0..scores.len())
@@ -153,8 +157,9 @@ pub fn class(round: &Round, scores: &[(usize, Score)], of: usize) -> Vec<usize> 
         .collect()
 }
 
-/// Share of `count` block bootstraps in which one of the trials of `class` ranks first among those of `open`, which
-/// are sorted from the best; blocks are drawn flight by flight.
+/// Share of `count` block bootstraps in which a trial of `class` ranks first among the trials of `open`.
+///
+/// `open` is in descending order of rank. Blocks are drawn separately for each flight.
 pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) -> f64 {
     let seed = round.seed;
     let by_flight: Vec<Vec<usize>> = (0..round.flights.len())
@@ -187,10 +192,12 @@ pub fn selected(round: &Round, open: &[usize], class: &[usize], count: usize) ->
     wins as f64 / count.max(1) as f64
 }
 
-/// The first free coefficient estimated from each flight alone, with its standard deviation; NaN where a flight
-/// carries no information. Sensor errors are fitted anew for each flight; the other coefficients keep the estimates
-/// and uncertainties from all flights together. A flight with little excitation could not re-estimate them: noise in
-/// its regressors biases the coefficients toward zero (errors in variables).
+/// Estimate of the first free coefficient from each flight alone, with its standard deviation. NaN for a flight without
+/// information.
+///
+/// Sensor errors are estimated again for each flight. The model's coefficients keep the estimates and standard deviations
+/// from all flights. A flight with little excitation could not re-estimate them: noise in its regressors biases coefficients
+/// toward zero (errors in variables).
 pub fn by_flight(round: &Round, trial: &Trial, score: &Score) -> Vec<[f64; 2]> {
     (0..round.flights.len())
         .map(|flight| one_flight(round, trial, score, flight).unwrap_or([f64::NAN; 2]))
@@ -225,13 +232,13 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     let by_itself = Trial { points: vec![point], ..trial.clone() };
     let grams = p.grams();
     let found = by_itself.score(&grams, &Draw::measured(&grams))?;
-    // a residual beyond noise, for example due to another missing effect, may bias the estimate: wider deviations
+    // a residual beyond noise, for example due to another missing effect, may bias the estimate: the deviation is raised
     let misfit = misfit(&p, &trial.channels, found.fall);
     let [value, sd] = [found.values[first], misfit * found.deviations[first]];
     if contribution.is_some() {
         return Some([value, sd]);
     }
-    // sensor noise in the columns looks like excitation but carries no information: its part is subtracted
+    // sensor noise in the columns resembles excitation but contains no information: its part is subtracted
     let disturbed = alone(&round.disturbed, flight, na, &columns);
     let added = less(&disturbed, &placed);
     let feint = p.others(&cells, &added, &noise.whiteners);
@@ -244,7 +251,7 @@ fn one_flight(round: &Round, trial: &Trial, score: &Score, flight: usize) -> Opt
     (share > LEAST_SIGNAL).then(|| [amounts[0], sd / share])
 }
 
-/// Ratio of the residual in `channels` after a reduction of `fall` to the noise, at least 1.
+/// Ratio of the residual in `channels`, after a reduction of its square by `fall`, to the noise; at least 1.
 fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     let own = |of: &[(f64, usize); 6]| (0..6).filter(|c| channels[*c]).map(|c| of[c]).collect();
     let all: Vec<Vec<(f64, usize)>> = p.by_channel.iter().map(own).collect();
@@ -253,13 +260,14 @@ fn misfit(p: &Projected, channels: &[bool; 6], fall: f64) -> f64 {
     ((square - fall) / rows.max(1) as f64).max(1.0).sqrt()
 }
 
-/// Nuisance parameters with the model's coefficients as estimated from all flights together with `score`'s effect.
+/// Nuisance parameters, with priors of the model's coefficients from their joint estimate with the effect of `score` from all
+/// flights.
 fn together(round: &Round, score: &Score) -> Vec<Known> {
     let p = &round.projected;
     let mut all = round.known.clone();
     for (k, known) in all.iter_mut().take(round.coefficients.len()).enumerate() {
         let given: f64 = score.weights.iter().map(|(c, w)| w * p.taken[(k, *c)]).sum();
-        // the change due to the effect has the same relative uncertainty as the effect, 1 / √wald
+        // the change due to the effect has the same relative standard deviation as the effect, 1 / √wald
         let astray = given.powi(2) / score.wald.max(1.0);
         known.offset = p.tuned[k] - given;
         known.width = (p.covariance[(k, k)].max(0.0) + astray).sqrt().min(known.width);
@@ -267,7 +275,7 @@ fn together(round: &Round, score: &Score) -> Vec<Known> {
     all
 }
 
-/// Nuisance columns of one flight and the candidate columns `columns`, renumbered; the other flights have none.
+/// Nuisance columns of one flight and its renumbered candidate columns `columns`. The lists of the other flights are empty.
 fn alone(placed: &[Placed], flight: usize, na: usize, columns: &[usize]) -> Vec<Placed> {
     let own = &placed[flight];
     let mut list: Placed = own.iter().take_while(|(p, _)| *p < na).cloned().collect();
@@ -289,8 +297,8 @@ fn less(a: &[Placed], b: &[Placed]) -> Vec<Placed> {
     a.iter().zip(b).map(of).collect()
 }
 
-/// Whether flights contradict the common `value`: significantly the other sign, or a significantly different amount
-/// by at least half of it.
+/// Whether a flight contradicts the common `value`. Its estimate then has significantly the opposite sign, or differs
+/// significantly and by more than half of `value`. `flights` holds estimates and standard deviations.
 pub fn contradict(value: f64, flights: &[[f64; 2]]) -> bool {
     flights.iter().any(|[own, sd]| {
         let other_sign = own * value < 0.0 && own.abs() > 3.0 * sd;

@@ -1,8 +1,8 @@
 //! Delay of the recorded actuators, estimated from forces and moments together.
 //!
-//! A surface with a delay looks like a surface recorded early, but the throttle is recorded on the same clock: its
-//! effect on the forces distinguishes the two. Free runs, in which thrust is only an acceleration, do not distinguish
-//! them.
+//! A delayed surface and an early record of the surface have the same effect on the moments. The throttle is recorded with
+//! the same clock: its effect on the forces shows the clock error. Free runs, in which thrust is only an acceleration, do not
+//! distinguish both causes.
 
 use crate::diagnose::regression::columns::SENSORS;
 use crate::diagnose::regression::sensors;
@@ -14,12 +14,12 @@ use crate::per_flight::PerFlight;
 use crate::weak_form::prepared::Prepared;
 use greylag_model::GreyBox;
 
-/// Number of fits, each relinearised at the last estimate.
+/// Number of fits; each fit is linearised at the estimate of the previous one.
 const PASSES: usize = 4;
 /// Seed of the random draws of shared noise.
 const SEED: u64 = 1;
 
-/// Uncertainty of a flight after its reconstruction.
+/// Standard deviations of the sensor errors and of the path of a flight after its reconstruction.
 #[derive(Clone, Copy, Debug)]
 pub struct Doubt {
     sensors: [f64; SENSORS],
@@ -27,13 +27,13 @@ pub struct Doubt {
 }
 
 impl Doubt {
-    /// Uncertainty of `flight` at a sampling interval of `dt` (s).
+    /// The standard deviations for `flight` at the sampling interval `dt` (s).
     pub fn of(flight: &Reconstruction, dt: f64) -> Doubt {
         Doubt { sensors: sensors::widths(flight, dt), path: shared::path_error(flight, dt) }
     }
 }
 
-/// A model fitted to forces and moments, with the actuators' delays estimated along.
+/// A model fitted to forces and moments together with the actuators' delays.
 pub struct Clocks {
     /// The model with its fitted coefficients.
     pub model: GreyBox,
@@ -41,9 +41,10 @@ pub struct Clocks {
     pub late: Vec<[f64; 2]>,
 }
 
-/// Fits `model` to `flights` together with their actuator delays and the constants of each flight that `per_flight`
-/// selects. The first `given` coefficients have their prior widths, the others have no prior. `None` if the model
-/// cannot be evaluated over the flights.
+/// Fits `model` to `flights` together with their actuator delays and the constants of each flight that `per_flight` selects.
+///
+/// The first `given` coefficients have their prior standard deviations. The others have no prior. `None` if the model cannot
+/// be evaluated over the flights.
 pub fn clocks(
     model: &GreyBox,
     given: usize,

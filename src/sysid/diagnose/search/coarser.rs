@@ -1,19 +1,20 @@
 //! Discretisation error of a fit, estimated by the same fit on every other sample.
 //!
-//! An interval covers noise only. Between two samples of 20 or 40 ms surfaces and rates move on, and the resulting
-//! error of a sum over samples is not noise: it is the same in every flight and does not average out.
+//! A confidence interval covers only noise. With a sampling interval of 20 or 40 ms, surfaces and rates change between two
+//! samples. The resulting error of a sum over samples is not noise: it is the same in every flight and its mean is not zero.
 
 use crate::diagnose::search::round::{Problem, Round};
 use crate::diagnose::search::settling::SETTLING;
 use greylag_logs::Sampling;
 
-/// Share of the change between half and all samples that remains with all samples, used as a standard deviation. A
-/// third holds for sums whose error grows with the square of the sampling interval.
+/// Standard deviation of the discretisation error with all samples, as a share of the change between half of the samples and
+/// all samples. The share is one third if the error is proportional to the square of the sampling interval.
 const LEFT: f64 = 1.0 / 3.0;
 
-/// Standard deviation of each coefficient of the model of `round` due to the discretisation, in the order of the
-/// model's list and in their units. Zero where it is not known, that is without a fit on half the samples, and for a
-/// simulator's own steps, whose sums are exact.
+/// Standard deviation of each coefficient of the model of `round` due to the discretisation, in the order and the units of
+/// the model's coefficients.
+///
+/// Zero if the fit on half of the samples fails, and for the steps of a simulator, whose sums are exact.
 pub fn left_by_sums(problem: &Problem, round: &Round) -> Vec<f64> {
     let fine = round.tuned();
     let none = vec![0.0; fine.coefficients().len()];
@@ -31,7 +32,7 @@ pub fn left_by_sums(problem: &Problem, round: &Round) -> Vec<f64> {
     left.map(|x| if x.is_finite() { x } else { 0.0 }).collect()
 }
 
-/// The same flights with every other sample.
+/// The problem with every other sample of its flights.
 fn halved(problem: &Problem) -> Problem {
     Problem {
         flights: problem.flights.iter().map(|f| f.every_other()).collect(),
@@ -57,7 +58,7 @@ mod tests {
 
     const STEP_S: f64 = 0.01;
 
-    /// 40 s of `model` with swaying surfaces, a sample at every `every`-th step, without any noise or specific force.
+    /// 40 s of `model` with sinusoidal surfaces, sampled at every `every`-th step, without noise and specific force.
     fn flown(model: &GreyBox, every: usize, sampling: Sampling) -> Reconstruction {
         let surfaces = |time: f64| Controls {
             aileron: 0.03 * (5.0 * time).sin() + 0.05 * (23.0 * time).sin(),

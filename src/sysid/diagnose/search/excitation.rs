@@ -1,15 +1,15 @@
-//! Check that the flights contain the excitation that a diagnosis needs.
+//! Check whether the flights contain enough excitation for a diagnosis.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::flight_path::reconstruction::Instant;
 use crate::weak_form::prepared::Prepared;
 use greylag_logs::rudder::MOVES_RAD;
 
-/// Least duration of flight, s.
+/// Smallest total duration of the flights, s.
 const LEAST_S: f64 = 10.0;
 
-/// A requirement: name and reader of a variable, its least standard deviation, the factor to the unit of that deviation,
-/// the unit, and the manoeuvre that excites the variable.
+/// A requirement: name and reader of a variable, smallest standard deviation, factor from SI to the unit of this deviation,
+/// unit, and manoeuvre that excites the variable.
 type Need = (&'static str, fn(&Instant) -> f64, f64, f64, &'static str, &'static str);
 
 const NEEDS: [Need; 4] = [
@@ -22,7 +22,7 @@ const NEEDS: [Need; 4] = [
 /// Notes on the variables with too little excitation for a diagnosis.
 ///
 /// # Errors
-/// The flights are too short, or at least three of aileron, elevator, throttle and angle of attack hardly move.
+/// The flights are shorter than 10 s, or at least three of aileron, elevator, throttle and angle of attack hardly move.
 pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
     let seconds = flights.iter().fold(0.0, |sum, f| sum + f.sample_count() as f64 * f.dt);
     if seconds < LEAST_S {
@@ -45,8 +45,7 @@ pub fn check(flights: &[Prepared]) -> Result<Vec<String>, DiagnoseError> {
         .collect())
 }
 
-/// The variation of a variable in words. If it never moves, the log probably has the wrong channel, rather than too little
-/// excitation.
+/// The variation of a variable in words. If the variable is constant, the log probably has the wrong channel.
 fn small(name: &str, moved: f64, unit: &str) -> String {
     match moved == 0.0 {
         true => format!(
@@ -56,12 +55,12 @@ fn small(name: &str, moved: f64, unit: &str) -> String {
     }
 }
 
-/// Whether the rudder moves in `flights`, so that its effects can be searched for.
+/// Whether the rudder moves enough in `flights` for a search for rudder effects.
 pub fn moves_rudder(flights: &[Prepared]) -> bool {
     deviation(flights, |i| i.controls.rudder) > MOVES_RAD
 }
 
-/// Pooled standard deviation about the mean of each flight.
+/// Pooled standard deviation of a variable about the mean of each flight, in the variable's unit.
 fn deviation(flights: &[Prepared], of: fn(&Instant) -> f64) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for flight in flights {

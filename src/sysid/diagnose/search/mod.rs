@@ -1,4 +1,4 @@
-//! The stepwise search: rounds, checks of a candidate, thresholds by a bootstrap under the null.
+//! The stepwise search: rounds, checks of a candidate, thresholds from null flights.
 
 pub(super) mod checks;
 pub(crate) mod clocks;

@@ -1,4 +1,4 @@
-//! Level of chance: the best candidate's evidence in flights without a missing effect.
+//! Chance level: evidence of the best candidate in simulated flights without a missing effect (null flights).
 
 use nalgebra::DVector;
 use rand::RngExt;
@@ -9,11 +9,11 @@ use crate::diagnose::regression::projected::Projected;
 use crate::diagnose::regression::rank::{Draw, Trial};
 use greylag_num::stream::stream;
 
-/// Random stream for the null flights.
+/// Number of the random stream for the null flights.
 const NULLS: u64 = 80;
 
-/// Null flight `k`: the noise of each block with a random sign, and prior errors drawn within the prior's widths. The
-/// channels of a block share one sign.
+/// Null flight `k`: the noise of each block with a random sign, and random errors with the prior's standard deviations. All
+/// channels of a block have the same sign.
 pub fn draw(p: &Projected, seed: u64, k: usize) -> Draw {
     let mut random = stream(seed, &[NULLS, k as u64]);
     let mut total = DVector::zeros(p.width());
@@ -47,8 +47,10 @@ pub fn best(p: &Projected, trials: &[Trial], seed: u64, count: usize) -> Vec<f64
     best
 }
 
-/// The quantile 1 − `level` of the distribution of `sample`, as a Gumbel law with the sample's mean and standard
-/// deviation, which approximates the maximum of many. Infinite for fewer than five finite values.
+/// The quantile 1 − `level` of a Gumbel distribution with the mean and standard deviation of `sample`. Infinite for fewer than
+/// five finite values.
+///
+/// The Gumbel distribution approximates the maximum of many values.
 pub fn threshold(sample: &[f64], level: f64) -> f64 {
     let finite: Vec<f64> = sample.iter().copied().filter(|x| x.is_finite()).collect();
     let count = finite.len() as f64;
@@ -75,7 +77,7 @@ mod tests {
             || (0..20).map(|_| -2.0 * random.random::<f64>().ln()).fold(0.0, f64::max);
         let sample: Vec<f64> = (0..4000).map(|_| largest()).collect();
         let found = threshold(&sample, 0.01);
-        // 4000 draws: the scale is good to about 2 %
+        // 4000 draws: the standard deviation of the scale is about 2 %
         assert!((found / exact - 1.0).abs() < 0.06, "{found} {exact}");
     }
 }

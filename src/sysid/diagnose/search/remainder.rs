@@ -1,4 +1,4 @@
-//! Error that a flexible model without physics could still remove, cross-validated by flight.
+//! Error that a flexible model without physics could remove, cross-validated by flight.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::RngExt;
@@ -11,15 +11,15 @@ use greylag_num::stream::stream;
 
 /// Ridge parameters tried, as shares of a feature's mean square.
 const RIDGES: [f64; 4] = [1e-3, 1e-2, 1e-1, 1.0];
-/// Random stream for the null draws.
+/// Number of the random stream for the draws of noise.
 const NULLS: u64 = 83;
-/// Number of folds into which a single flight is divided; of several flights, each one is a fold.
+/// Number of folds into which a single flight is divided. With several flights, each flight is a fold.
 const FOLDS: usize = 3;
 
-/// Removable error, channel by channel.
+/// Removable error, by channel and in total.
 #[derive(Clone, Debug)]
 pub struct Remainder {
-    /// Reduction of the squared whitened error on flights that the flexible model was not fitted to.
+    /// Reduction of the squared whitened error on flights to which the flexible model was not fitted.
     pub removable: [f64; 6],
     /// Reduction that chance reaches, by channel.
     pub threshold: [f64; 6],
@@ -43,8 +43,8 @@ struct Fold {
     others: Vec<Cholesky<f64, Dyn>>,
 }
 
-/// Error that a flexible model could remove from the residual of `round`; the thresholds come from `count` draws of
-/// noise.
+/// Error that a flexible model could remove from the residual of `round`. The thresholds have the significance `level` and
+/// come from `count` draws of noise.
 pub fn remainder(round: &Round, count: usize, level: f64) -> Remainder {
     let channels: Vec<Option<Channel>> =
         (0..6).into_par_iter().map(|c| channel(round, c)).collect();
@@ -112,8 +112,10 @@ fn channel(round: &Round, channel: usize) -> Option<Channel> {
 /// Features, noise and residual of one cell.
 type Projected = (DMatrix<f64>, DVector<f64>, DVector<f64>);
 
-/// Whitened features of unit size, noise and residual of each cell, with the nuisance parameters projected out: by
-/// plain least squares, since otherwise a flexible model would pick up the bias from shared noise.
+/// Whitened features of unit RMS, noise and residual of each cell, with the nuisance parameters projected out.
+///
+/// The projection is ordinary least squares without the correction for shared noise. A flexible model would otherwise fit the
+/// bias due to shared noise.
 fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> {
     let na = round.known.len();
     let mut all = Vec::new();
@@ -165,8 +167,8 @@ fn projected_features(round: &Round, cells: &[usize]) -> Option<Vec<Projected>> 
 }
 
 impl Channel {
-    /// Reduction of the squared error of held-out folds by the best ridge parameter, at least zero; for the data, or
-    /// for noise whose blocks have `signs`.
+    /// Reduction of the squared error of held-out folds with the best ridge parameter, at least zero. The target is the residual,
+    /// or noise with `signs` of its blocks.
     fn gain(&self, signs: Option<&[f64]>) -> f64 {
         let targets: Vec<DVector<f64>> = self
             .folds

@@ -1,4 +1,4 @@
-//! Ranking of the candidate effects, and tuning of the model after one of them has been added.
+//! Ranking of the candidate effects, and tuning of the model after a candidate has been added.
 
 use crate::diagnose::options::Options;
 use crate::diagnose::regression::rank::Score;
@@ -6,17 +6,17 @@ use crate::diagnose::search::nulls;
 use crate::diagnose::search::round::{Beside, Problem, Round};
 use greylag_model::GreyBox;
 
-/// Number of tuning passes after an effect was added; nonlinear effects need several to converge.
+/// Number of tuning passes after an effect has been added. Nonlinear effects need several passes to converge.
 pub const SETTLING: usize = 3;
-/// Largest relative change of a mass or inertia estimate in tuning. Beyond it, the accelerations of the model from which
-/// it was estimated were too wrong.
+/// Largest relative change of a mass or inertia estimate in tuning. A larger change shows that the model's accelerations were
+/// too inaccurate for the estimate.
 const ASTRAY: f64 = 0.1;
 
 /// A round of the search with the scores of its candidates.
 pub struct Ranked {
     /// The round that was ranked.
     pub round: Round,
-    /// The candidates, best evidence first.
+    /// Indices and scores of the candidates, in descending order of rank.
     pub scores: Vec<(usize, Score)>,
     /// Best evidence in each null flight.
     pub nulls: Vec<f64>,
@@ -24,8 +24,8 @@ pub struct Ranked {
     pub threshold: f64,
 }
 
-/// Ranks the candidates of `round`. If the model's accelerations are too wrong for candidates of mass and inertia, those of
-/// a better model are used.
+/// Ranks the candidates of `round`. If the model's accelerations are too inaccurate for candidates of mass and inertia, the
+/// accelerations of a better model are used.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -40,10 +40,10 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     }
 }
 
-/// The round with accelerations of another model: its own after the best change of mass or inertia was added and tuned.
+/// The round with accelerations of another model: the model after the best change of mass or inertia was added and tuned.
 ///
-/// `None` if that is not needed. With a grossly wrong inertia the model's accelerations are wrong, and so are the
-/// regressors computed from them: the estimates then differ between flights and are all too small.
+/// `None` if this is not necessary. A large error of the inertia causes wrong accelerations of the model, and wrong
+/// regressors. The estimates then differ between flights and are all too small.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {
@@ -69,7 +69,7 @@ fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     Round::beside(problem, round.model.clone(), &round.entries, beside)
 }
 
-/// `model` after `passes` of tuning weighted by the noise of `round`, and its squared error before the last pass.
+/// `model` after `passes` tuning passes with the noise of `round`, and its squared whitened error before the last pass.
 pub fn settled(
     problem: &Problem,
     round: &Round,

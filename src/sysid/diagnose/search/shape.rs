@@ -1,9 +1,9 @@
-//! Residual shape: products of states and deflections that still explain the residual beside an effect, which shows
-//! that the effect's formula differs from the true one.
+//! Residual shape: products of states and deflections that explain part of the residual. If they explain the residual after
+//! an effect was added, the formula of the effect differs from the true one.
 //!
-//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects large errors
-//! only. Here a few terms, as in aerodynamic tables, are fitted to the same flights and compared with their reduction
-//! of noise.
+//! The flexible model of [`remainder`](super::remainder) must generalise to other flights and detects only large errors.
+//! Here, a few terms like those of aerodynamic tables are fitted to the same flights. Their reduction of the error is
+//! compared with their reduction of noise.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,20 +23,20 @@ use greylag_num::statistics::mean;
 const NAMES: [&str; 9] = ["α", "β", "V", "p", "q", "r", "δa", "δe", "throttle"];
 /// Number of squares and pairwise products.
 const PRODUCTS: usize = NAMES.len() * (NAMES.len() + 1) / 2;
-/// Second derivatives of the deflections, in which a lag differs from a delay.
+/// Second derivatives of the deflections: in these terms, a lag differs from a delay.
 const BENT: [&str; 2] = ["δa″", "δe″"];
 /// Number of terms of a channel.
 const TERMS: usize = PRODUCTS + BENT.len();
-/// Ridge parameter that keeps nearly collinear terms solvable, as a share of a term's square.
+/// Ridge parameter for nearly collinear terms, relative to a term's squared norm.
 const RIDGE: f64 = 1e-4;
-/// Standard deviations beyond which the terms' reduction is significant.
+/// Number of standard deviations beyond which the terms' reduction is significant.
 const DOUBT: f64 = 4.0;
-/// Squared error per row that the terms may remove because of remaining errors of sensors and path.
+/// Squared whitened error per row that the terms may remove because of remaining errors of sensors and path.
 const UNSURE: f64 = 0.1;
-/// Squared error per row above which the terms alone indicate a missing effect; without one, they remove 0.13 at
-/// most.
+/// Squared whitened error per row above which the terms alone indicate a missing effect. Without a missing effect, they
+/// remove at most 0.13.
 const ALARM: f64 = 0.15;
-/// Squared whitened error that second derivatives may remove; with right models up to 25.
+/// Squared whitened error that second derivatives may remove. With correct models, they remove up to 25.
 const BENDING: f64 = 30.0;
 
 /// Reduction of the squared whitened error by the terms, by channel.
@@ -48,12 +48,12 @@ pub struct Shape {
 /// Reduction in one channel.
 #[derive(Clone, Debug)]
 struct Taken {
-    /// Reduction beyond that of noise.
+    /// Reduction of the residual's squared error less the mean reduction of noise.
     left: f64,
-    /// Standard deviation of the reduction of noise.
+    /// Standard deviation of the terms' reduction of noise.
     doubt: f64,
     rows: f64,
-    /// Index of the term that reduces the error most by itself.
+    /// Index of the term that alone reduces the error most.
     most: usize,
     /// Reduction by the second derivatives alone.
     bent: f64,
@@ -65,8 +65,8 @@ impl Shape {
         self.left_in(&[channel], ALARM).map(|_| name(self.channels[channel].most))
     }
 
-    /// Share that the terms remove in `channels` beside `fall`, the reduction by effects, if it is significant, with
-    /// the term that removes most.
+    /// Share of the terms in the reduction by terms and effects in `channels`, and the name of the term that removes most. `fall`
+    /// is the reduction by effects. `None` if the terms' reduction is not significant.
     pub fn beside(&self, channels: &[usize], fall: f64) -> Option<(f64, String)> {
         let left = self.left_in(channels, UNSURE)?;
         let own = channels.iter().map(|c| &self.channels[*c]);
@@ -74,8 +74,8 @@ impl Shape {
         Some((left / (left + fall), name(most)))
     }
 
-    /// Share over all channels that second derivatives of the deflections remove beside `fall`, the reduction
-    /// by an effect; zero if it is not more than with right models.
+    /// Share of the second derivatives of the deflections in the reduction by these and by an effect, over all channels. `fall`
+    /// is the reduction by the effect. Zero if the derivatives do not remove more than with correct models.
     pub fn bends_beside(&self, fall: f64) -> f64 {
         let bent = self.channels.iter().map(|c| c.bent).filter(|bent| *bent > BENDING).sum::<f64>();
         bent / (bent + fall).max(f64::MIN_POSITIVE)
@@ -92,8 +92,8 @@ impl Shape {
     }
 }
 
-/// Reduction by the terms of the residual of `round`, a model without candidates, compared with `count` draws of
-/// noise. `None` if the terms cannot be fitted.
+/// Reduction of the residual of `round` by the terms, compared with `count` draws of noise. The round must have no
+/// candidates. `None` if the terms cannot be fitted.
 pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     let na = round.known.len();
     let last = na + CHANNELS * TERMS;
@@ -106,7 +106,7 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
         list
     };
     let placed: Vec<Placed> = round.placed.iter().zip(&round.flights).map(place).collect();
-    // plain least squares: a residual corrected for shared noise does not lie in the columns' span
+    // ordinary least squares: a residual corrected for shared noise is not in the span of the columns
     let p = Projected::new(&round.cells, &placed, last, &round.known, &round.noise, &[])?;
     let measured = p.total.column(p.width()).into_owned();
     let draws: Vec<DVector<f64>> =
@@ -121,8 +121,8 @@ pub fn shape(round: &Round, count: usize) -> Option<Shape> {
     Some(Shape { channels: (0..CHANNELS).map(of).collect::<Option<_>>()? })
 }
 
-/// Reduction by terms with the Gram matrix `gram` and the products `measured` with a residual, compared with that of
-/// `draws` of noise.
+/// Reduction by terms with the Gram matrix `gram` and the products `measured` with the residual, compared with their products
+/// `draws` with noise.
 fn taken(
     gram: &DMatrix<f64>,
     measured: &DVector<f64>,
@@ -149,13 +149,13 @@ fn taken(
     })
 }
 
-/// Terms of `flight`, channel by channel, each multiplied by dynamic pressure.
+/// Columns of the terms of `flight`, by channel, multiplied by dynamic pressure times wing area.
 fn terms(model: &GreyBox, flight: &Ready, spread: &[[f64; 2]; NAMES.len()]) -> Vec<Column> {
     let sides = gather(&flight.acting, Integrator::Jsbsim, TERMS, |place, add| {
         let z = standard(variables(&flight.acting, place.segment, place.index), spread);
         let pressure = model.air(&place.at.state, place.at.altitude).q_s;
         let bends = bends(&flight.acting, place.segment, place.index);
-        // forces are averaged over samples, moments over steps: one column for each of the two
+        // forces are averaged over samples, moments over steps: one column for forces, one for moments
         for side in [0, CHANNELS / 2] {
             for (k, (i, j)) in pairs().enumerate() {
                 add(k, side, pressure * z[i] * z[j]);

@@ -1,4 +1,4 @@
-//! Unexplained share of each channel.
+//! Explained and unexplained shares of each channel's variance beyond noise.
 
 use crate::compare::ChannelId;
 use crate::diagnose::regression::gather::Column;
@@ -7,13 +7,13 @@ use crate::diagnose::search::round::Round;
 use crate::weak_form::windows::{self, Series};
 use greylag_num::statistics::mean;
 
-/// Variance of a channel beyond its noise, and the variance of that noise, both in squared units of the channel.
+/// Variance of a channel beyond its noise, and variance of the noise, in the channel's unit squared.
 struct Measured {
     variance: f64,
     noise: f64,
 }
 
-/// Measured variances of every channel in the flights of `first`; `None` where it is not measured.
+/// Measured variances of every channel in the flights of `first`; `None` for a channel that is not measured.
 fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     let series: Vec<Vec<Series>> =
         first.flights.iter().map(|f| windows::channels(&first.model, &f.measured)).collect();
@@ -37,8 +37,8 @@ fn mean_square(residual: &[Column], channel: usize) -> f64 {
     mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
 }
 
-/// Share of each channel's variance beyond noise that remains in `residual`, a column for each flight, under the
-/// model of `first`; NaN where the flights do not measure the channel.
+/// Share of each channel's variance beyond noise that remains in `residual` (one column a flight), with the noise under the
+/// model of `first`. NaN if the flights do not measure the channel.
 pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {
@@ -49,8 +49,8 @@ pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     })
 }
 
-/// Share of each channel's variance beyond noise by which the mean square residual falls from `before` to `after`;
-/// negative if it rises, 0 where the flights do not measure the channel.
+/// Decrease of the mean square residual from `before` to `after` as a share of each channel's variance beyond noise. Negative
+/// for an increase; 0 if the flights do not measure the channel.
 pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {

@@ -1,4 +1,4 @@
-//! Errors of the path in draws of every sensor's noise, and changes of the constants for given air-data residuals.
+//! Simulated errors of the path from random sensor noise, and changes of the constants for given air-data residuals.
 
 use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,18 +14,18 @@ use crate::flight_path::path::{CHANNELS, Path};
 use greylag_logs::Sampling;
 use greylag_num::stream::Stream;
 
-/// A path disturbed by an error like that of the estimate.
+/// Paths with a simulated error of the same distribution as the error of the estimate.
 #[derive(Clone, Debug)]
 pub struct Erring {
     /// Path of each track.
     pub paths: Vec<Path>,
-    /// Noise of the gyros of each track, rad/s.
+    /// Simulated noise of the gyros p, q, r for each track, rad/s.
     pub gyro: Vec<Vec<[f64; 3]>>,
 }
 
 impl Problem<'_> {
-    /// Change of the constants of [`calm`](Self::calm) if the air-data sensors had the residuals `others`, by
-    /// stretch, then instant.
+    /// Changes of the constants of [`calm`](Self::calm) if the air-data sensors had the residuals `others`, indexed by stretch
+    /// and instant. `None` if the equations are singular.
     pub fn moved_by(
         &self,
         found: &Found,
@@ -46,7 +46,8 @@ impl Problem<'_> {
         }))
     }
 
-    /// Error of the estimated path in one draw of the noise of every sensor, with the constants held.
+    /// The estimated paths with the error from one random draw of the noise of every sensor. The constants are held. `None` if
+    /// the equations are singular.
     pub fn erring(&self, found: &Found, random: &mut Stream) -> Option<Erring> {
         let mut erring = Erring { paths: found.paths.clone(), gyro: Vec::new() };
         for (track, path) in self.log.tracks.iter().zip(&mut erring.paths) {
@@ -60,7 +61,7 @@ impl Problem<'_> {
         Some(erring)
     }
 
-    /// Adds one draw of its error to `path`; returns the gyros' noise in it, rad/s.
+    /// Adds one random draw of the estimation error to `path`. Returns the drawn noise of the gyros, rad/s.
     fn err<const N: usize>(
         &self,
         track: &Track,

@@ -1,4 +1,4 @@
-//! Channels of a log, each with its kind of interpolation.
+//! Channels of a log with their kinds of interpolation, and the check of the required channels.
 
 use super::{Periods, Present};
 use crate::flight_path::ReconstructError;
@@ -69,7 +69,8 @@ impl Channels {
         }
     }
 
-    /// Checks the required channels; the error names one that is missing or constant.
+    /// Checks that the required channels have samples, and that the sensors among them are not constant. The error names the
+    /// first channel that fails.
     pub(super) fn check(&self, flight: &str) -> Result<(), ReconstructError> {
         let missing =
             |channel, column| ReconstructError::Missing { flight: flight.into(), channel, column };

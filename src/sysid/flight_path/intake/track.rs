@@ -1,4 +1,4 @@
-//! A stretch on a uniform clock: measurements where available, commands held, deflections always.
+//! Resampling of a stretch to uniform time steps. Measurements may be missing, commands are held, deflections are complete.
 
 use super::channels::Channels;
 use super::{Present, Track};
@@ -8,7 +8,7 @@ use greylag_physics::actuators::Actuators;
 use greylag_physics::atmosphere::{Atmosphere, Density};
 use greylag_physics::{Command, Controls};
 
-/// Time over which the climb rate is differenced from the altitude, s.
+/// Interval over which the altitude is differenced to the climb rate, and between two entries of the integrated heading, s.
 const CLIMB_WINDOW: f64 = 1.0;
 
 pub(super) fn track(
@@ -65,8 +65,8 @@ pub(super) fn track(
     track
 }
 
-/// Computes the vertical velocity from the altitude, once every [`CLIMB_WINDOW`], so that each altitude error enters
-/// once.
+/// Computes the vertical velocity (m/s, down) from the altitude once every [`CLIMB_WINDOW`]. The intervals do not overlap:
+/// no part of the altitude is used twice.
 fn climb(track: &mut Track, step: f64) {
     let half = (CLIMB_WINDOW / step / 2.0).round().max(1.0) as usize;
     let mut k = half;
@@ -77,8 +77,8 @@ fn climb(track: &mut Track, step: f64) {
     }
 }
 
-/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and enters it as a measurement once every
-/// [`CLIMB_WINDOW`]. Without any measured heading, the path's heading would be undetermined.
+/// Integrates the heading from the gyros, ψ̇ = (q sin φ + r cos φ) / cos θ, and stores it as a measurement once every
+/// [`CLIMB_WINDOW`]. Without a measured heading, the heading of the path would be undetermined.
 fn heading(track: &mut Track, step: f64) {
     let every = (CLIMB_WINDOW / step).round().max(1.0) as usize;
     let (mut yaw, mut last) = (0.0, [0.0; 2]);
@@ -93,7 +93,7 @@ fn heading(track: &mut Track, step: f64) {
     }
 }
 
-/// The command in force at `t` (s); `None` without aileron, elevator or throttle. A rudder that is not logged is zero.
+/// The last command at or before `t` (s); `None` if aileron, elevator or throttle is missing. A missing rudder is zero.
 fn command(channels: &Channels, t: f64) -> Option<Command> {
     let [aileron, elevator, throttle, rudder] =
         std::array::from_fn(|i| channels.commands[i].held(t));
@@ -102,7 +102,8 @@ fn command(channels: &Channels, t: f64) -> Option<Command> {
     command.is_finite().then_some(command)
 }
 
-/// Deflections at `times`: as logged, else from the commands through the actuator model.
+/// Deflections (rad) and throttle position (0..1) at `times` (s): the logged positions, or the commands passed through the
+/// actuator model.
 pub(super) fn controls(channels: &Channels, times: &[f64], options: &Options) -> Vec<Controls> {
     let f = &options.actuators;
     let sent = |t: f64| {

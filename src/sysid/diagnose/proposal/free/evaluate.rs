@@ -1,10 +1,11 @@
-//! Evaluation of expressions over all samples at once.
+//! Evaluation of an expression over all samples.
 
 use greylag_physics::formula::Variable;
 use greylag_physics::formula::expression::{Expression, Function, Node};
 
-/// Values of `of` at `count` samples, `variable` giving those of each variable; NaN where a part of the expression
-/// depends on more than the present sample.
+/// Values of the expression `of` at `count` samples. `variable` returns the values of a variable at all samples.
+///
+/// NaN if the expression depends on other samples than the present one, for example through a lag.
 pub fn evaluate<'a>(
     of: &Expression,
     constants: &[f64],

@@ -22,18 +22,18 @@ pub struct Free {
 pub struct Reach {
     /// The variable itself.
     pub variable: Variable,
-    /// The quantiles 0.5, 0.75 and 0.95 of its magnitude.
+    /// The quantiles 0.5, 0.75 and 0.95 of the variable's magnitude.
     pub levels: [f64; 3],
 }
 
 impl Reach {
-    /// Whether it has the same sign in all flights.
+    /// Whether the variable is positive in all flights.
     fn positive(&self) -> bool {
         positive(self.variable)
     }
 }
 
-/// Whether `variable` is positive in all flights.
+/// Whether `variable` is positive in all flights: throttle and airspeed.
 pub fn positive(variable: Variable) -> bool {
     matches!(variable, Variable::Throttle | Variable::Airspeed)
 }
@@ -43,20 +43,20 @@ pub fn positive(variable: Variable) -> bool {
 pub struct Atom {
     /// The expression and its constants.
     pub free: Free,
-    /// Whether products are divided by it.
+    /// Whether the atom is a divisor in products.
     pub below: bool,
     kind: Kind,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// It has no constant.
+    /// The atom has no constant.
     Plain,
-    /// Its constant is the middle one of the levels tried.
+    /// The atom's constant is the middle one of the levels tried.
     Middle,
-    /// Its constant is one of the other levels.
+    /// The atom's constant is one of the other levels.
     Outer,
-    /// It is a function of a sum and enters no product.
+    /// The atom is a function of a sum and is not combined with other atoms.
     Sum,
 }
 
@@ -102,7 +102,7 @@ fn scaled(v: Expression) -> Expression {
 }
 
 impl Grammar {
-    /// Builds the expressions of `variables`; variables that do not vary in the flights are left out.
+    /// Builds the expressions of `variables`. Variables whose 0.95 quantile is zero are left out.
     pub fn new(variables: &[Reach]) -> Grammar {
         let moving: Vec<Reach> = variables.iter().filter(|r| r.levels[2] > 0.0).copied().collect();
         let mut grammar = Grammar { atoms: Vec::new(), candidates: Vec::new() };
@@ -149,7 +149,7 @@ impl Grammar {
             if !reach.positive() {
                 let deadband = || call(Function::Deadband, [v(), c()]);
                 all.push(deadband());
-                // what is within the dead band: a saturation
+                // the variable less its dead band: a saturation
                 all.push(call(Function::Subtract, [v(), deadband()]));
                 let below = call(Function::Add, [v(), c()]);
                 all.push(call(Function::Min, [below, zero()]));
@@ -216,7 +216,7 @@ impl Grammar {
         }
     }
 
-    /// Adds the product of `parts` if each variable occurs once, it is small enough, and its units are consistent.
+    /// Adds the product of `parts` if each variable occurs once, the product is small enough, and its units are consistent.
     fn keep(&mut self, parts: Vec<usize>) {
         let atoms: Vec<&Atom> = parts.iter().map(|p| &self.atoms[*p]).collect();
         let of_one: Vec<Variable> =
@@ -274,7 +274,7 @@ impl Free {
         units::dimension(&self.expression, &plain).ok().flatten()
     }
 
-    /// The formula as a factor of a product, with the constants' values or `names`.
+    /// The formula as a factor of a product, with the values of the constants or `names` in their place.
     pub fn text(&self, names: Option<&[String]>) -> String {
         let numbers: Vec<String> = self.constants.iter().map(|c| format!("{c}")).collect();
         let names: Vec<&str> = names.unwrap_or(&numbers).iter().map(String::as_str).collect();

@@ -1,8 +1,8 @@
 //! Search over free forms, for residuals that no shape of the library explains.
 //!
 //! All expressions of a [`grammar`] of at most nine nodes are evaluated on the whitened residual of a channel
-//! ([`screen`]), the constants of the best ones are fitted ([`refine`]), and the same search over null flights, which
-//! lack nothing, determines the thresholds ([`search`]).
+//! ([`screen`]). The constants of the best expressions are fitted ([`refine`]). The same search over null flights, in which
+//! the model lacks no effect, determines the thresholds ([`search`]).
 
 mod evaluate;
 pub mod grammar;

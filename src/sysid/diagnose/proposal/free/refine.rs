@@ -9,16 +9,16 @@ use crate::diagnose::regression::projected::scaled_inverse;
 
 /// Largest number of Gauss–Newton steps.
 const STEPS: usize = 6;
-/// Largest number of times a step is halved.
+/// Largest number of trials of a step, which is halved after each failed trial.
 const HALVINGS: usize = 4;
 /// Finite-difference step of a constant, as a share of its value.
 const MOVED: f64 = 0.01;
 /// Largest change of a constant in one step, as a share of its value.
 const REACH: f64 = 0.5;
-/// Convergence tolerance: least relative increase of the reduction in a step.
+/// Convergence tolerance: relative increase of the error reduction in a step below which the search ends.
 const RELATIVE_TOLERANCE: f64 = 1e-4;
 
-/// A channel with the form's factor.
+/// Data of a channel, and the factor of the form.
 pub struct Place<'a> {
     /// Whitened data of the channel.
     pub screen: &'a Screen<'a>,
@@ -36,7 +36,7 @@ impl Place<'_> {
         self.screen.projected(&DVector::from_vec(self.screen.column(values)))
     }
 
-    /// Fits the constants of `free` so that it removes as much of `target` as possible; returns the form and the reduction.
+    /// Fits the constants of `free` for the largest reduction of the square of `target`. Returns the form and the reduction.
     pub fn refined(&self, free: &Free, target: &DVector<f64>) -> (Free, f64) {
         let mut best = free.constants.clone();
         let mut column = self.column(free, &best);
@@ -65,8 +65,8 @@ impl Place<'_> {
         (Free { expression: free.expression.clone(), constants: best }, fall)
     }
 
-    /// Step of the constants by Kaufman's approximation: derivatives of the contribution with the part along the
-    /// column itself projected out.
+    /// Step of the constants by Kaufman's approximation: the part of the derivatives along the column is projected out. `None` if
+    /// the form has no constants or the step is not finite.
     fn step(
         &self,
         free: &Free,

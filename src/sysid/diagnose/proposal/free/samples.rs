@@ -1,4 +1,4 @@
-//! Values of the variables at every sample of the flights, and their averages over windows.
+//! Values of the variables of free forms at every sample of the flights, and their averages over windows.
 
 use crate::diagnose::proposal::free::evaluate::evaluate;
 use crate::diagnose::search::round::Round;
@@ -40,7 +40,7 @@ pub struct Samples {
     lengths: [f64; 2],
 }
 
-/// A window: its first sample, and the weights from there on.
+/// A window: index of its first sample, and the weights of the samples from there on.
 pub struct Average<'a> {
     first: usize,
     weights: &'a [f64],
@@ -80,7 +80,7 @@ impl Samples {
                 own.push(places.len());
                 for (k, at) in segment.iter().enumerate() {
                     places.push((at, &at.controls));
-                    // a step of RK4 begins here and ends at the next sample with the controls of this one
+                    // a step of RK4 starts at this sample and ends at the next sample, with the controls of this sample
                     ends.push((segment.get(k + 1).unwrap_or(at), &at.controls));
                 }
             }
@@ -102,17 +102,18 @@ impl Samples {
         }
     }
 
-    /// Values of a variable, if it can be computed.
+    /// Values of a variable at every sample, SI units; `None` if free forms cannot contain the variable.
     pub fn variable(&self, variable: Variable) -> Option<&[f64]> {
         self.values.iter().find(|(v, _)| *v == variable).map(|(_, x)| &x[..])
     }
 
-    /// Values of an expression.
+    /// Values of an expression at every sample.
     pub fn of(&self, expression: &Expression, constants: &[f64]) -> Vec<f64> {
         evaluate(expression, constants, self.pressure.len(), &|v| self.variable(v))
     }
 
-    /// Factor of a coefficient in `channel`: dynamic pressure times wing area, times a length for moments, or one.
+    /// Factor of a coefficient in `channel` at every sample: dynamic pressure times wing area (N), for moments also times span or
+    /// chord (N m). 1 if the form does not scale with dynamic pressure.
     pub fn factor(&self, channel: Channel, of_air: bool) -> Vec<f64> {
         let length = match channel {
             Channel::Roll | Channel::Yaw => self.lengths[0],
@@ -125,7 +126,7 @@ impl Samples {
         }
     }
 
-    /// One value for each sample: for channels that average over integration steps, the mean of both ends.
+    /// One value for each sample. For channels that average over integration steps, the value is the mean of a step's ends.
     pub fn merged(&self, mut values: Vec<f64>) -> Vec<f64> {
         if values.len() > self.count {
             let (start, end) = values.split_at_mut(self.count);
@@ -170,7 +171,7 @@ fn moment(channel: Channel) -> bool {
 }
 
 impl Average<'_> {
-    /// The window's average of `values`, one for each sample.
+    /// The window's average of `values`, which has one entry for each sample.
     pub fn of(&self, values: &[f64]) -> f64 {
         let own = &values[self.first..];
         self.weights.iter().zip(own).map(|(w, x)| w * x).sum()

@@ -1,8 +1,8 @@
-//! Evaluation of all forms on the whitened residual of one channel, and on that of null flights.
+//! Evaluation of all forms on the whitened residual of one channel, in the flights and in null flights.
 //!
-//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)) with the
-//! model's own coefficients projected out, except for noise shared between columns and residual, which the round
-//! corrects for the best forms.
+//! The statistics are those of the library's round ([`Score`](crate::diagnose::regression::rank::Score)), with the model's
+//! coefficients projected out. They contain no correction for noise that columns and residual share. The round applies this
+//! correction to the best forms.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -17,10 +17,10 @@ use greylag_physics::Channel;
 
 use super::samples::{Average, Samples};
 
-/// Random stream for the null flights.
+/// Number of the random stream for the null flights.
 const NULLS: u64 = 84;
 
-/// One channel of all flights, prepared to evaluate any column.
+/// One channel of all flights, prepared for the evaluation of any column.
 pub struct Screen<'a> {
     round: &'a Round,
     samples: &'a Samples,
@@ -29,11 +29,11 @@ pub struct Screen<'a> {
     windows: Vec<Vec<Average<'a>>>,
     /// Whitened columns of the nuisance parameters.
     known: DMatrix<f64>,
-    /// Square roots of their prior weights.
+    /// Reciprocals of the prior standard deviations of the nuisance parameters; 0 without a prior.
     roots: DVector<f64>,
     /// Covariance of the nuisance parameters times `known`ᵀ.
     taken: DMatrix<f64>,
-    /// Residual of the tuned model, and the noise.
+    /// Whitened residual of the tuned model; `noise` is the whitened noise.
     residual: DVector<f64>,
     noise: DVector<f64>,
     /// First and one-past-last row of each block, with the block's number.
@@ -46,15 +46,15 @@ pub struct Screen<'a> {
 /// Statistics of a projected column.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// Square of the projected column.
+    /// Squared norm of the projected column.
     square: f64,
     /// Product of the projected column with the residual.
     linear: f64,
-    /// Part of the square in the prior's rows.
+    /// Part of `square` in the rows of the prior.
     prior: f64,
-    /// Products with residual, noise and itself, by block.
+    /// Products of the projected column with residual, noise and itself, by block.
     blocks: Vec<[f64; 3]>,
-    /// Change of each nuisance parameter for a unit of the column, in prior widths.
+    /// Change of each nuisance parameter for a unit of the column, in prior standard deviations.
     prior_shift: Vec<f64>,
 }
 
@@ -67,7 +67,7 @@ pub struct Reached {
     pub evidence: f64,
 }
 
-/// A null flight: the sign of each block's noise, and the prior's error in prior widths.
+/// A null flight: the sign of each block's noise, and the errors of the nuisance parameters in prior standard deviations.
 pub struct Null {
     signs: Vec<f64>,
     prior: DVector<f64>,
@@ -171,14 +171,14 @@ impl<'a> Screen<'a> {
         stacked(column - &self.known * &taken, -self.roots.component_mul(&taken))
     }
 
-    /// Residual of the tuned model, followed by that of the prior.
+    /// Whitened residual of the tuned model, followed by the rows of the prior.
     pub fn residual(&self) -> DVector<f64> {
         let tuned = self.round.known.iter().zip(self.round.projected.tuned.iter());
         let off = DVector::from_iterator(self.roots.len(), tuned.map(|(k, t)| k.offset - t));
         stacked(self.residual.clone(), self.roots.component_mul(&off))
     }
 
-    /// Null flight number `k`.
+    /// Null flight number `k`; it depends on `seed` and `k` only.
     pub fn null(&self, seed: u64, k: usize) -> Null {
         let mut random = stream(seed, &[NULLS, k as u64]);
         let mut sign = || if random.random::<bool>() { 1.0 } else { -1.0 };
@@ -187,7 +187,7 @@ impl<'a> Screen<'a> {
         Null { signs, prior }
     }
 
-    /// Residual of the tuned model in that null flight, followed by that of the prior.
+    /// Whitened residual of the tuned model in the null flight `null`, followed by the rows of the prior.
     pub fn residual_of(&self, null: &Null) -> DVector<f64> {
         let mut noise = self.noise.clone();
         for &(from, to, b) in &self.blocks {
@@ -231,12 +231,12 @@ impl<'a> Screen<'a> {
         let evidence = gain.min(wald);
         match evidence.is_finite() {
             true => Reached { fall, evidence },
-            // a column that is zero, infinite or the model's own
+            // a column that is zero, infinite or a combination of the model's columns
             false => Reached { fall: 0.0, evidence: f64::NEG_INFINITY },
         }
     }
 
-    /// Penalty for a coefficient and `constants`, which the reduction must exceed.
+    /// Penalty for a coefficient and `constants` shape constants. The reduction of the squared error must exceed this penalty.
     pub fn price(&self, constants: usize) -> f64 {
         (1 + constants) as f64 * self.support.max(2.0).ln()
     }

@@ -1,4 +1,4 @@
-//! Search over free forms: evaluates a whole grammar, fits the best forms, and builds a front of size against fit.
+//! Search over free forms: evaluates a whole grammar, fits the best forms, and finds the best form of each size.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ use greylag_physics::formula::{Variable, file};
 
 /// Number of forms evaluated at once.
 const BATCH: usize = 64;
-/// Batches between two progress reports.
+/// Number of batches between two progress reports.
 const REPORT_EVERY: usize = 32;
 /// Number of forms of each size whose constants are fitted.
 const FITTED: usize = 8;
@@ -37,9 +37,9 @@ pub struct Fitted {
     pub size: usize,
     /// Reduction of the squared whitened error.
     pub fall: f64,
-    /// The reduction less what its constants and the number of forms of its size achieve by chance.
+    /// The reduction less the penalties for its constants and for the number of forms of its size.
     pub worth: f64,
-    /// Evidence of the form.
+    /// The smaller of the penalised reduction and the block-robust Wald statistic.
     pub evidence: f64,
 }
 
@@ -49,13 +49,13 @@ pub struct Searched {
     pub tried: usize,
     /// Evidence that the same search reaches in null flights.
     pub threshold: f64,
-    /// The best form of each size, if it is better than all smaller ones.
+    /// The best form of each size, if it reduces the error more than all smaller forms.
     pub front: Vec<Fitted>,
-    /// Forms that enter the round, the best first.
+    /// Forms that enter the round, in descending order of `worth`.
     pub finalists: Vec<Fitted>,
 }
 
-/// The forms that scale with dynamic pressure, or those that do not.
+/// The forms that scale with dynamic pressure, or the forms that do not.
 struct Side {
     of_air: bool,
     grammar: Grammar,
@@ -63,7 +63,7 @@ struct Side {
     kept: Vec<Kept>,
 }
 
-/// Searches the free forms in `channel` of the residual of `round`; `None` if no flight measures it.
+/// Searches the free forms in `channel` of the residual of `round`. `None` if no flight measures the channel.
 ///
 /// # Errors
 /// `progress` cancelled.
@@ -108,7 +108,7 @@ pub fn searched(
     }))
 }
 
-/// The variables with their ranges in the flights.
+/// The `variables` that can be computed, with their ranges in the flights.
 fn reaches(samples: &Samples, variables: &[Variable]) -> Vec<Reach> {
     let of = |variable: &Variable| {
         let all = samples.variable(*variable)?;
@@ -126,7 +126,7 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Side {
-    /// Evaluates all forms; `on_progress` receives the number done.
+    /// Evaluates all forms; `on_progress` receives the number of forms that are done.
     fn keep(
         &mut self,
         screen: &Screen,
@@ -181,8 +181,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Penalty of a form of `size` with `constants`: for its coefficients, and for the choice among all forms of its
-    /// size.
+    /// Penalty of a form of `size` nodes with `constants`. It covers the form's coefficients, and the choice among all forms of
+    /// this size.
     fn price(&self, size: usize, constants: usize) -> f64 {
         self.screen.price(constants) + 2.0 * (self.counts[size].max(1) as f64).ln()
     }
@@ -216,7 +216,7 @@ impl Search<'_> {
         fitted
     }
 
-    /// `free` with its score; `None` if an effect file cannot hold it.
+    /// `free` with its score; `None` if an effect file cannot represent the form.
     fn judged(&self, side: &Side, free: Free) -> Option<Fitted> {
         let mut values = self.samples.of(&free.expression, &free.constants);
         values.iter_mut().zip(&side.factor).for_each(|(x, f)| *x *= f);
@@ -232,7 +232,7 @@ impl Search<'_> {
         Some(Fitted { form, size, fall: reached.fall, worth, evidence: reached.evidence })
     }
 
-    /// Best evidence of the search in each null flight; the constants of the best form are fitted as in the flights.
+    /// Best evidence of the search in each null flight. The constants of the best form are fitted as in the measured flights.
     fn nulls(&self, sides: &[Side], options: &Options) -> Vec<f64> {
         let of = |k: usize| {
             let null = self.screen.null(options.seed, k);
@@ -254,14 +254,14 @@ impl Search<'_> {
                 let (_, fall) = side.place(self).refined(&free, &target);
                 fall - self.screen.price(candidate.constants) - most
             });
-            // what fitting adds to the best gain it may add to the best evidence
+            // the fit may increase the best evidence as much as the best gain
             evidence + fitted.max(0.0)
         };
         (0..options.nulls).into_par_iter().map(of).collect()
     }
 }
 
-/// The best of each size that reduces the error more than all smaller ones.
+/// The best form of each size, if it reduces the error more than all smaller forms.
 fn front(fitted: &[Fitted]) -> Vec<Fitted> {
     let mut front: Vec<Fitted> = Vec::new();
     for size in 1..=MOST_NODES + 1 {
@@ -275,7 +275,7 @@ fn front(fitted: &[Fitted]) -> Vec<Fitted> {
     front
 }
 
-/// The front, and the best of the other forms.
+/// The front and the best other forms, at most `FINALISTS` in all, in descending order of `worth`.
 fn finalists(fitted: Vec<Fitted>) -> Vec<Fitted> {
     let front = front(&fitted);
     let mut all: Vec<Fitted> = front.clone();

@@ -1,4 +1,4 @@
-//! Trend of a shape with each of its variables, determined by sampling.
+//! Trend of a shape with each of its variables (monotonic or not, odd or even), determined by sampling.
 
 use super::evaluate::evaluate;
 use super::grammar::positive;
@@ -8,15 +8,17 @@ use greylag_physics::formula::parser;
 
 /// Values of a variable at which a shape is sampled, as shares of its range.
 const ALONG: [f64; 8] = [0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0];
-/// Values of the other variables meanwhile, as shares of their ranges.
+/// Constant values of the other variables, as shares of their ranges.
 const BESIDE: [f64; 3] = [0.9, 0.37, 0.71];
 /// Share of a variable's possible range that flights typically cover.
 const FLOWN: f64 = 0.3;
-/// Differences below this share of the largest value count as rounding.
+/// Differences below this share of the largest value count as rounding errors.
 const ROUNDING: f64 = 1e-9;
 
-/// The trend of `shape` with each of its variables, in words that are equal if the trends are; `None` if it is no
-/// formula. A rate counts as the same variable whether or not it is divided by the airspeed.
+/// The trend of `shape` with each of its variables, in words. Equal trends have equal words. `None` if `shape` is not a
+/// formula.
+///
+/// A body rate and the same rate divided by the airspeed count as one variable.
 pub fn trend(shape: &str) -> Option<String> {
     let expression = parser::parse(shape, &[]).ok()?;
     let variables = expression.variables();
@@ -26,7 +28,7 @@ pub fn trend(shape: &str) -> Option<String> {
     Some(all.join(" "))
 }
 
-/// Name of a variable; a rate has the same name whether or not it is divided by the airspeed.
+/// Name of a variable. A body rate and the same rate divided by the airspeed have one name.
 pub fn plain(v: Variable) -> &'static str {
     match v {
         Variable::RollRateHat => "p",
@@ -36,12 +38,12 @@ pub fn plain(v: Variable) -> &'static str {
     }
 }
 
-/// Typical range of the variable in flight: `FLOWN` of its possible range, or all of it for a positive variable.
+/// Typical range of the variable in flight: `FLOWN` times its largest possible value, or this value for a positive variable.
 fn reach(v: Variable) -> f64 {
     if positive(v) { v.range()[1] } else { FLOWN * v.range()[1] }
 }
 
-/// The trend along one variable, the others held constant.
+/// The trend with variable `v`, in words; the other variables are constant.
 fn along(expression: &Expression, variables: &[Variable], v: Variable) -> String {
     let values = |sign: f64| {
         let columns: Vec<(Variable, Vec<f64>)> = variables
@@ -78,7 +80,7 @@ fn along(expression: &Expression, variables: &[Variable], v: Variable) -> String
     format!("{turns}{parity} {}", plain(v))
 }
 
-/// Whether `values` are monotonic.
+/// Whether `values` are monotonic, within rounding errors relative to `size`.
 fn runs(values: &[f64], size: f64) -> bool {
     let steps = || values.windows(2).map(|w| w[1] - w[0]);
     let least = ROUNDING * size;

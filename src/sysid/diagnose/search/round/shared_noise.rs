@@ -1,4 +1,4 @@
-//! Spurious products from noise shared by columns and residual, estimated by drawing the noise again.
+//! Spurious products from noise that columns and residual share, estimated with simulated noise.
 
 use crate::diagnose::regression::shared;
 use rayon::prelude::*;
@@ -11,8 +11,8 @@ use crate::diagnose::regression::columns::Ready;
 use crate::diagnose::regression::noise::Noise;
 use greylag_model::GreyBox;
 
-/// Draws over which the product of shared noise is averaged. With a single draw, an inertia error that was not there
-/// reached an evidence of 3, 11 or 19 depending on the seed.
+/// Number of draws over which the product of shared noise is averaged. With a single draw, a non-existent inertia error
+/// reached an evidence of 3, 11 or 19, depending on the seed.
 const DRAWS: usize = 8;
 
 /// Inputs of a round.
@@ -29,7 +29,7 @@ pub(super) fn sum(lists: &[Vec<f64>]) -> Vec<f64> {
     (0..count).map(|k| lists.iter().map(|list| list[k]).sum()).collect()
 }
 
-/// The flights disturbed again with noise of draw number `draw`.
+/// The flights with additional simulated noise of draw number `draw`.
 pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
     let flights = of.problem.flights.par_iter().zip(&of.problem.path).enumerate();
     flights
@@ -40,9 +40,10 @@ pub(super) fn disturbed(of: &Setting, draw: usize) -> Vec<Ready> {
         .collect()
 }
 
-/// Spurious products from shared noise, by flight and index, of the nuisance parameters and the linear candidates,
-/// which come first: the mean of `DRAWS` draws if there are candidates to judge, one draw if a model is only settled.
-/// Also returns those columns with the noise of the first draw.
+/// Spurious products from shared noise, by flight and column, for the nuisance parameters and then the linear candidates.
+///
+/// The products are means of `DRAWS` draws if there are candidates, else of one draw. Also returns the columns with the noise
+/// of the first draw.
 pub(super) fn shared(
     of: &Setting,
     cells: &Cells,
@@ -55,7 +56,7 @@ pub(super) fn shared(
     let everything = catalogue::with_all(of.model, &straight).0;
     let drawn = |draw: usize| {
         let flights = disturbed(of, draw);
-        // the model's own columns and the candidates' in one pass
+        // columns of the model and of the candidates in one pass
         let all = |flight: &Ready| {
             let mut own = flight.linear(&everything, 0..everything.coefficients().len());
             let candidates = own.split_off(of.model.coefficients().len());
@@ -65,7 +66,7 @@ pub(super) fn shared(
         let (known, _, mut after) = known(of.problem, of.model, &flights, columns);
         let made = Columns { trials: Vec::new(), columns: candidates };
         let end = place(&mut after, known.len(), &made, &flights);
-        // the residual keeps the index that it has in `before`
+        // the residual keeps its index in `before`
         for list in &mut after {
             list.iter_mut().filter(|(p, _)| *p == end).for_each(|(p, _)| *p = last);
         }

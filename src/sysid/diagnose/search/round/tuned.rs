@@ -1,4 +1,4 @@
-//! Models and columns that a round's fit yields.
+//! Models, residuals and contributions that follow from the fit of a round.
 
 use super::Round;
 use crate::diagnose::regression::catalogue::{self};
@@ -9,7 +9,7 @@ use crate::diagnose::regression::rank::Score;
 use greylag_model::GreyBox;
 
 impl Round {
-    /// The model with its coefficients as estimated together with `score`'s effect.
+    /// The model with its coefficients as estimated together with the effect of `score`. The effect is not added.
     pub fn with(&self, score: &Score) -> GreyBox {
         let p = &self.projected;
         let mut model = self.model.clone();
@@ -22,14 +22,14 @@ impl Round {
         model
     }
 
-    /// Largest change of a coefficient by tuning, in its standard deviations.
+    /// Largest change of a coefficient by tuning, in standard deviations of the coefficient.
     pub fn stride(&self) -> f64 {
         let p = &self.projected;
         let of = |k: usize| p.tuned[k].abs() / p.covariance[(k, k)].sqrt();
         (0..self.coefficients.len()).map(of).filter(|x| x.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Residual of the tuned model, sensor errors removed, by flight.
+    /// Residual of the tuned model without sensor errors, by flight.
     pub fn tuned_residual(&self) -> Vec<Column> {
         let na = self.known.len();
         let of = |placed: &Placed| {
@@ -65,7 +65,7 @@ impl Round {
         self.placed.iter().map(of).collect()
     }
 
-    /// Residual with `score`'s effect and the nuisance parameters as estimated together with it, by flight.
+    /// Residual with the effect of `score` and the nuisance parameters from the joint estimate, by flight.
     pub fn residual_with(&self, score: &Score) -> Vec<Column> {
         let added = self.contribution(score);
         let given = |place: usize| -> f64 {
@@ -97,7 +97,8 @@ impl Round {
         taken
     }
 
-    /// Channels in which `score` reduces the error by at least a tenth of its largest reduction, the largest first.
+    /// Channels in which `score` reduces the error by more than a tenth of its largest reduction, in descending order of the
+    /// reduction.
     pub fn channels_of(&self, score: &Score) -> Vec<usize> {
         let taken = self.taken_by(score);
         let most = taken.iter().fold(0.0_f64, |a, b| a.max(*b));
@@ -107,8 +108,8 @@ impl Round {
         channels
     }
 
-    /// The model with its coefficients as estimated from data and prior; those of asserted effects limited to their
-    /// bounds.
+    /// The model with its coefficients as estimated from data and prior. Coefficients of asserted effects are limited to their
+    /// bounds, and changes of mass and inertia to physically possible bodies.
     pub fn tuned(&self) -> GreyBox {
         let mut model = self.model.clone();
         let linear = model.linear();
@@ -150,7 +151,7 @@ impl Round {
     }
 }
 
-/// Physical bounds of a coefficient.
+/// Physical bounds of the coefficient with the index `index`; `None` if the coefficient belongs to no effect.
 fn bounds(model: &GreyBox, index: usize) -> Option<(f64, f64)> {
     let (id, own) = model.coefficients()[index].name.split_once('.')?;
     let about = model.effects().find(|about| about.id == id)?;

@@ -109,9 +109,10 @@ impl Found {
         let Some(first) = self.selected.iter().position(refused) else { return };
         let (refused, later) = self.selected.split_at_mut(first + 1);
         for effect in later.iter_mut().filter(|s| s.refused.is_empty()) {
-            effect
-                .refused
-                .push(format!("it was found beside {}, which is refused", refused[first].id));
+            effect.refused.push(format!(
+                "it was found together with {}, which is refused",
+                refused[first].id
+            ));
         }
     }
 }

@@ -1,20 +1,22 @@
-//! Run-off between candidate effects with similar evidence, each added to the model and tuned.
+//! Comparison of candidate effects with similar evidence: each is added to the model, and the model is tuned.
 
 use super::found::Found;
 use crate::diagnose::search::checks;
 use crate::diagnose::search::round::Problem;
 use crate::diagnose::search::settling::{SETTLING, settled};
 
-/// A candidate is a contender if its order (see `Score::order`) exceeds this share of the best one's.
+/// A candidate is a contender if its ranking criterion (`Score::order`) exceeds this share of the best candidate's criterion.
 const CONTENDING: f64 = 0.2;
-/// Least correlation of its contribution with the best one's.
+/// Smallest magnitude of the correlation between the contributions of a contender and of the best candidate.
 const CONTENDING_CORRELATION: f64 = 0.6;
 /// Largest number of contenders, the best candidate included.
 const CONTENDERS: usize = 4;
 
-/// Decides between close contenders: each is added to the model and tuned with the same noise, since the linearisation
-/// about the model without them cannot distinguish them. The best one is ranked first; the others are divided into
-/// clearly worse and equally good ones.
+/// Decides between close contenders: each contender is added to the model, and the model is tuned with the same noise. The
+/// linearisation about the model without them cannot distinguish the contenders.
+///
+/// The best contender is ranked first. The others are recorded as clearly worse or as equally good. `None` if there is
+/// nothing to decide.
 pub(super) fn run_off(problem: &Problem, found: &mut Found) -> Option<()> {
     let round = found.last.as_ref().unwrap_or(&found.first);
     let (_, best) = found.scores.first()?;
