@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use greylag::logs::csv::Tolerance;
-use greylag::logs::{Log, LogError, Options, parse};
+use greylag::logs::{Log, LogError, Options, inspect, parse};
 use logs_support::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -128,6 +128,28 @@ fn memory_stays_within_a_multiple_of_the_file() {
     let (read, most) = mutate(200, 1500, 3);
     println!("{read} of 200 read as logs; at most {most:.1} times the file's size");
     assert!(read > 60, "{read}");
+}
+
+/// What a look at 200,000 rows of any format may take: a table of them alone is 46 MB.
+const LOOK: usize = 30_000_000;
+
+#[test]
+fn a_look_at_a_long_log_takes_less_than_its_table() {
+    let rows = samples(200_000);
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in
+        [("l.ulg", ulog(&rows)), ("l.bin", dataflash(&rows)), ("l.csv", csv(&rows))]
+    {
+        let path = folder.path().join(name);
+        std::fs::write(&path, &bytes).unwrap();
+        drop(bytes);
+        let before = LIVE.get();
+        PEAK.set(before);
+        let log = inspect(&path, &Options::default()).unwrap();
+        let peak = PEAK.get() - before;
+        println!("{name}: {} rows kept, {:.1} MB", log.flight.samples.len(), peak as f64 / 1e6);
+        assert!(peak < LOOK, "{name}: {peak} bytes");
+    }
 }
 
 /// A ULog record.

@@ -200,7 +200,7 @@ impl Reading {
             refuse_problems(path, &log.findings)?;
         }
         let options = flight_path::Options::of(name, model, clock).down_to(log.flies.sustained_s);
-        let flight = reconstruct(&log.flight, &options)
+        let flight = reconstruct(log.flight, &options)
             .with_context(|| format!("cannot use flight log {}", path.display()))?;
         Ok((flight, log.findings))
     }

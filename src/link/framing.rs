@@ -5,9 +5,12 @@
 //! are accepted without a check of the signature, which `signing::Signer::believed` does. Frames with any other
 //! incompatibility flag are refused, as the MAVLink guide requires.
 
-use mavlink::calculate_crc;
+mod checksum;
+mod record;
 
 use super::wire::crc_extra;
+use checksum::checksum;
+pub use record::{Whole, whole};
 
 /// Start marker of MAVLink 1.
 const STX_V1: u8 = 0xFE;
@@ -145,7 +148,7 @@ fn examine(bytes: &[u8]) -> Candidate<'_> {
     let Some(extra) = crc_extra(id) else {
         return Candidate::Unknown { len };
     };
-    if calculate_crc(&bytes[1..end], extra).to_le_bytes() != bytes[end..end + CHECKSUM] {
+    if checksum(&bytes[1..end], extra).to_le_bytes() != bytes[end..end + CHECKSUM] {
         return Candidate::BadCrc;
     }
     Candidate::Frame(Frame {
@@ -382,7 +385,7 @@ pub fn write(
             bytes.extend_from_slice(&payload[..len]);
         }
     }
-    let crc = calculate_crc(&bytes[1..], extra);
+    let crc = checksum(&bytes[1..], extra);
     bytes.extend(crc.to_le_bytes());
     Some(bytes)
 }

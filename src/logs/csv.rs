@@ -105,38 +105,39 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     if !raw.missing.is_empty() {
         return Err(raw.missing.remove(0));
     }
-    settle(raw, path, tolerance)
+    match settle(raw, path, tolerance) {
+        (_, Some(error)) => Err(error),
+        (reading, None) => Ok(reading),
+    }
 }
 
-/// The error that [`settle`] would return for this table, if any.
-pub(super) fn poor(raw: &Raw, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
-    refusal(&raw.judged(rows::Rows::count), path, tolerance)
-}
-
-fn refusal(rows: &rows::Rows, path: &Path, tolerance: Tolerance) -> Option<CsvError> {
-    rows.refused(tolerance).map(|first| CsvError::Unusable {
+/// Drops the unusable rows; an error beside the others if they are too many.
+pub(super) fn settle(
+    mut raw: Raw,
+    path: &Path,
+    tolerance: Tolerance,
+) -> (Reading, Option<CsvError>) {
+    let rows = raw.judged(|rows, number, row, kept| {
+        rows.judged(number, row, kept.last().map(|last| last.time_s))
+    });
+    let error = rows.refused(tolerance).map(|first| CsvError::Unusable {
         path: path.to_owned(),
         dropped: rows.dropped,
         rows: rows.total,
         reasons: rows.reasons(),
         first,
-    })
-}
-
-/// Drops the unusable rows, and refuses the table if they are too many.
-pub(super) fn settle(raw: Raw, path: &Path, tolerance: Tolerance) -> Result<Reading, CsvError> {
-    let rows = raw.judged(rows::Rows::take);
-    if let Some(error) = refusal(&rows, path, tolerance) {
-        return Err(error);
-    }
-    Ok(reading(raw, rows, path))
+    });
+    (reading(raw, rows, path), error)
 }
 
 /// Keeps every row that is later than the last one, complete or not, for inspection of the table.
-pub(super) fn keep_all(raw: Raw, path: &Path) -> Reading {
-    let rows = raw.judged(|rows, number, sample| match sample {
-        Some(sample) => rows.take_incomplete(number, sample),
-        None => rows.take(number, None),
+pub(super) fn keep_all(mut raw: Raw, path: &Path) -> Reading {
+    let rows = raw.judged(|rows, number, row, kept| {
+        let last = kept.last().map(|last| last.time_s);
+        match row {
+            Some(row) => rows.later(number, row, last),
+            None => rows.judged(number, None, last),
+        }
     });
     reading(raw, rows, path)
 }

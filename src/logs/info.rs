@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::columns::COLUMNS;
+use super::columns::{BLOCK, COLUMNS, index};
 use super::finding::{Finding, Severity};
 use super::mapping::TEXT;
 use super::phases::{self, Phase, PhaseKind};
@@ -136,12 +136,22 @@ fn rudder(log: &Log) -> Option<Finding> {
 /// Share of the rows, or of the time by its own rate, that a column must cover to count as there.
 const PRESENT: f64 = 0.5;
 
-/// Whether `column` covers enough of the log to count as there.
-fn has(log: &Log, column: &str) -> bool {
+/// Number of rows that each column fills.
+fn filled(samples: &[Sample]) -> [usize; COLUMNS.len()] {
+    let mut counts = [0; COLUMNS.len()];
+    for block in samples.chunks(BLOCK) {
+        for (count, (_, get, _)) in counts.iter_mut().zip(COLUMNS) {
+            *count += block.iter().filter(|s| get(s).is_finite()).count();
+        }
+    }
+    counts
+}
+
+/// Whether `column`, of which so many rows are `filled`, covers enough of the log to count as there.
+fn has(log: &Log, filled: &[usize; COLUMNS.len()], column: &str) -> bool {
     let samples = &log.flight.samples;
     let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
-    let get = COLUMNS.iter().find(|c| c.0 == column).map(|c| c.1);
-    let count = get.map_or(0, |get| samples.iter().filter(|s| get(s).is_finite()).count());
+    let count = index(column).map_or(0, |place| filled[place]);
     let channel = log.channels.iter().find(|c| c.columns.iter().any(|x| x == column));
     let rate = channel.map_or(f64::INFINITY, |c| c.rate_hz);
     // Of a long log, only stretches are in memory.
@@ -206,7 +216,8 @@ const INCIDENCE: &str = "alpha, beta";
 
 fn purposes(log: &Log) -> Vec<Purpose> {
     let samples = &log.flight.samples;
-    let has = |column: &str| has(log, column);
+    let filled = filled(samples);
+    let has = |column: &str| has(log, &filled, column);
     let lacking = |columns: &[&str]| -> Vec<String> {
         columns.iter().filter(|c| !has(c)).map(|c| (*c).to_owned()).collect()
     };

@@ -60,19 +60,19 @@ fn said(what: &str, key: &str, delay_s: f64) -> Option<Finding> {
 }
 
 /// The rows of the longest stretch of a log at even times.
-struct Grid {
-    rows: Vec<Sample>,
+struct Grid<'a> {
+    rows: Vec<&'a Sample>,
     times: Vec<f64>,
 }
 
-impl Grid {
-    fn of(rows: &[Sample]) -> Option<Grid> {
+impl<'a> Grid<'a> {
+    fn of(rows: &'a [Sample]) -> Option<Grid<'a>> {
         let complete = |s: &&Sample| {
             s.specific_force_mps2.iter().chain(&s.attitude_rad).all(|x| x.is_finite())
         };
         let until = rows.first()?.time_s + 3.0 * LONGEST_S;
         let looked_at = rows.iter().take_while(|s| s.time_s < until);
-        let rows: Vec<Sample> = looked_at.filter(complete).copied().collect();
+        let rows: Vec<&Sample> = looked_at.filter(complete).collect();
         let mut best = 0..0;
         let mut start = 0;
         for i in 1..=rows.len() {
@@ -95,8 +95,13 @@ impl Grid {
 
     /// A column at the even times; `None` where it is too slow or absent.
     fn series(&self, get: impl Fn(&Sample) -> f64) -> Option<Vec<f64>> {
-        let own: Vec<(f64, f64)> =
-            self.rows.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite()).collect();
+        self.at_even_times(self.rows.iter().copied().map(get))
+    }
+
+    /// The `values` of the rows at the even times; `None` where they are too slow or absent.
+    fn at_even_times(&self, values: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
+        let pairs = self.rows.iter().map(|s| s.time_s).zip(values);
+        let own: Vec<(f64, f64)> = pairs.filter(|(_, x)| x.is_finite()).collect();
         let rate = own.len() as f64 / (self.times.len() as f64 * STEP_S);
         if rate < 2.0 {
             return None;
@@ -111,7 +116,8 @@ impl Grid {
 
     /// Acceleration in earth axes at the even times, m/s².
     fn forces(&self) -> Vec<Vector3<f64>> {
-        let axis = |k: usize| self.series(|s| earth(s)[k]).unwrap_or_default();
+        let all: Vec<Vector3<f64>> = self.rows.iter().copied().map(earth).collect();
+        let axis = |k: usize| self.at_even_times(all.iter().map(|f| f[k])).unwrap_or_default();
         let [n, e, d] = [axis(0), axis(1), axis(2)];
         n.iter().zip(&e).zip(&d).map(|((n, e), d)| Vector3::new(*n, *e, *d)).collect()
     }

@@ -46,7 +46,11 @@ const FAR_PART: f64 = 0.4;
 impl Quality {
     /// The quality of a column's samples at increasing times (s), all finite.
     pub fn of(column: &str, times: &[f64], values: &[f64]) -> Quality {
-        let period = period_s(times);
+        Quality::at(column, times, values, period_s(times))
+    }
+
+    /// The quality of samples with the median period `period` (s).
+    pub(super) fn at(column: &str, times: &[f64], values: &[f64], period: f64) -> Quality {
         if values.len() < ENOUGH || period <= 0.0 {
             return Quality::default();
         }
@@ -138,6 +142,9 @@ pub(super) fn frozen_of(
     values: &[f64],
     mut stays: Vec<(f64, f64)>,
 ) -> Vec<(f64, f64)> {
+    if stays.is_empty() {
+        return stays;
+    }
     let limit = if hangs(column) { frozen_s(&changes(times, values)) } else { None };
     stays.retain(|(from, to)| limit.is_some_and(|limit| to - from > limit));
     stays

@@ -78,16 +78,8 @@ impl Rows {
         Rows { sparse, ..Rows::default() }
     }
 
-    /// Takes row `number`; `None` is a row that could not be read.
-    pub fn take(&mut self, number: usize, sample: Option<Sample>) {
-        let last = self.samples.last().map(|last| last.time_s);
-        if let Some(sample) = self.judged(number, sample, last) {
-            self.samples.push(sample);
-        }
-    }
-
-    /// Counts row `number` as [`Rows::take`] does, without keeping it.
-    pub fn count(&mut self, number: usize, sample: Option<Sample>) {
+    /// Counts row `number`, without keeping it.
+    fn count(&mut self, number: usize, sample: Option<Sample>) {
         let usable = self.judged(number, sample, self.counted_s);
         self.counted_s = usable.map(|row| row.time_s).or(self.counted_s);
     }
@@ -112,8 +104,13 @@ impl Rows {
         Rows { samples: rows, ..self }
     }
 
-    /// Row `number` if it is usable after one of the time `last`; counts it.
-    fn judged(&mut self, number: usize, row: Option<Sample>, last: Option<f64>) -> Option<Sample> {
+    /// Row `number` if it is usable after one of the time `last`; counts it. `None` is a row that could not be read.
+    pub fn judged(
+        &mut self,
+        number: usize,
+        row: Option<Sample>,
+        last: Option<f64>,
+    ) -> Option<Sample> {
         self.total += 1;
         let row = row.map(at_rest);
         match row.map_or(Some(Reason::Unreadable), |row| self.fault(&row, last)) {
@@ -135,13 +132,19 @@ impl Rows {
 
     /// Takes every row that is later than the last one, complete or not.
     pub fn take_incomplete(&mut self, number: usize, sample: Sample) {
-        let later = self.samples.last().is_none_or(|last| sample.time_s > last.time_s);
+        let last = self.samples.last().map(|last| last.time_s);
+        let later = self.later(number, sample, last);
+        self.samples.extend(later);
+    }
+
+    /// Row `number`, complete or not, if it is later than the time `last`; counts it.
+    pub fn later(&mut self, number: usize, sample: Sample, last: Option<f64>) -> Option<Sample> {
+        let later = last.is_none_or(|last| sample.time_s > last);
         if later && sample.time_s.is_finite() {
             self.total += 1;
-            self.samples.push(sample);
-        } else {
-            self.take(number, None);
+            return Some(sample);
         }
+        self.judged(number, None, last)
     }
 
     /// The first dropped row, if there are too many of them.
@@ -201,12 +204,18 @@ mod tests {
         }
     }
 
+    fn take(rows: &mut Rows, number: usize, row: Option<Sample>) {
+        let last = rows.samples.last().map(|last| last.time_s);
+        let usable = rows.judged(number, row, last);
+        rows.samples.extend(usable);
+    }
+
     #[test]
     fn a_pitot_at_rest_costs_no_row() {
         // −3.6 to −1.1 m/s stand in a PX4 log before its flight; −20 m/s is another unit or a fault
         let mut rows = Rows::default();
         for (k, airspeed) in [-3.6, -1.1, 0.2, 17.0, -20.0].into_iter().enumerate() {
-            rows.take(k + 1, Some(row(k as f64, airspeed)));
+            take(&mut rows, k + 1, Some(row(k as f64, airspeed)));
         }
         let speeds: Vec<f64> = rows.samples.iter().map(|s| s.airspeed_mps).collect();
         assert_eq!(speeds, [0.0, 0.0, 0.2, 17.0]);
@@ -219,7 +228,7 @@ mod tests {
         let airspeed = |k: usize| if k.is_multiple_of(10) { 17.0 } else { f64::NAN };
         let all: Vec<Sample> = (0..1000).map(|k| row(k as f64 * 0.02, airspeed(k))).collect();
         let mut rows = Rows::with_sparse_columns_of(&all);
-        all.iter().enumerate().for_each(|(k, s)| rows.take(k + 1, Some(*s)));
+        all.iter().enumerate().for_each(|(k, s)| take(&mut rows, k + 1, Some(*s)));
         assert_eq!((rows.samples.len(), rows.dropped), (1000, 0));
     }
 
@@ -227,7 +236,7 @@ mod tests {
     fn the_reasons_are_counted() {
         let mut rows = Rows::default();
         let samples = [Some(row(1.0, 17.0)), Some(row(0.5, 17.0)), Some(row(2.0, f64::NAN)), None];
-        samples.into_iter().enumerate().for_each(|(k, s)| rows.take(k + 1, s));
+        samples.into_iter().enumerate().for_each(|(k, s)| take(&mut rows, k + 1, s));
         assert_eq!(
             rows.reasons(),
             "1 hold what is no number, 1 lack a needed column, 1 are not later than the row before"

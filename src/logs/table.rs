@@ -51,29 +51,32 @@ const MEASURED: [&str; 9] = [
     "vd_mps",
 ];
 
-/// A rule with its data.
+/// A rule with the times of its data. The values of one track at a time are computed: together those of a long log
+/// take as much memory as its topics.
 struct Track<'a> {
     rule: Rule,
     origin: String,
     times: Cow<'a, [f64]>,
-    series: Vec<Vec<f64>>,
+    /// Whether it shows one and the same value all the time.
+    dead: bool,
     finite_share: f64,
     rate_hz: f64,
     topic: &'a Topic,
 }
 
 impl Track<'_> {
-    /// Whether it shows one and the same value all the time.
-    fn is_dead(&self) -> bool {
-        self.series.iter().all(|s| s.iter().all(|x| *x == s[0]))
+    /// The values at its times.
+    fn series(&self) -> Vec<Vec<f64>> {
+        let all = self.rule.series(self.topic);
+        all.map(|all| cleaned(&self.topic.time_s, all).1).unwrap_or_default()
     }
 
     fn limit_s(&self) -> f64 {
         if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { GAP_S }
     }
 
-    fn reader(&self) -> Option<Reader<'_>> {
-        Reader::new(&self.rule, &self.times, &self.series, self.limit_s())
+    fn reader<'s>(&'s self, series: &'s [Vec<f64>]) -> Option<Reader<'s>> {
+        Reader::new(&self.rule, &self.times, series, self.limit_s())
     }
 
     /// Whether the channel is sampled much more slowly than rows `period` (s) apart.
@@ -95,14 +98,15 @@ impl Track<'_> {
         }
     }
 
-    fn channel(&self) -> Channel {
+    /// Its channel, with the quality of its values.
+    fn channel(&self, series: &[Vec<f64>]) -> Channel {
         let gap = self.times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let column = self.rule.columns()[0];
-        let mut quality = match &self.series[..] {
+        let mut quality = match series {
             [one] => Quality::of(column, &self.times, one),
             _ => Quality::default(),
         };
-        if let (Some(watch), [one]) = (self.watch(), &self.series[..]) {
+        if let (Some(watch), [one]) = (self.watch(), series) {
             let field = self.rule.factor().and_then(|(field, _)| self.topic.place(field));
             let stays = field.map(|field| watch.stays(field)).unwrap_or_default();
             quality.frozen = quality::frozen_of(column, &self.times, one, stays);
@@ -158,13 +162,15 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
         base.iter().map(|t| Sample { time_s: *t, ..Sample::default() }).collect();
     let period = period_s(&base);
     let mut notes: Vec<String> = Vec::new();
-    let mut sparse = Vec::new();
+    let (mut sparse, mut channels) = (Vec::new(), Vec::new());
     for track in &tracks {
+        let series = track.series();
         if track.is_sparse(period) {
-            sparse.push((track, fill_sparse(&mut rows, track, period)));
+            sparse.push((track, fill_sparse(&mut rows, track, &series, period)));
         } else {
-            fill(&mut rows, track);
+            fill(&mut rows, track, &series);
         }
+        channels.push(track.channel(&series));
     }
     if !sparse.is_empty() {
         let slow = |(t, _): &(&Track<'_>, Vec<bool>)| {
@@ -190,7 +196,7 @@ pub(super) fn build(topics: &Topics, rules: &[Rule], asked: &[Asked]) -> Table {
     }
     Table {
         rows,
-        channels: tracks.iter().map(Track::channel).collect(),
+        channels,
         notes,
         missing,
         whole,
@@ -234,8 +240,7 @@ fn choose<'a>(
                     && track.rate_hz > 5.0 * old.rate_hz
                     && track.finite_share >= GOOD_SHARE;
                 let rests = rule.columns()[0].ends_with("_cmd");
-                let alive =
-                    !rests && old.is_dead() && !track.is_dead() && track.finite_share >= GOOD_SHARE;
+                let alive = !rests && old.dead && !track.dead && track.finite_share >= GOOD_SHARE;
                 if alive {
                     findings.push(Finding::warning(format!(
                         "{}: {} is read, for {} never changes",
@@ -279,7 +284,8 @@ fn track_of<'a>(
     };
     let period = period_s(&times);
     let rate_hz = if period > 0.0 { 1.0 / period } else { 0.0 };
-    Some(Track { rule: rule.clone(), origin, times, series, finite_share, rate_hz, topic })
+    let dead = series.iter().all(|s| s.iter().all(|x| *x == s[0]));
+    Some(Track { rule: rule.clone(), origin, times, dead, finite_share, rate_hz, topic })
 }
 
 /// Times that increase with finite values; the topic's own where they do so already.
@@ -301,19 +307,25 @@ fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>, Vec<Vec<f6
     (Cow::Owned(times), series)
 }
 
-fn fill(rows: &mut [Sample], track: &Track<'_>) {
-    let Some(reader) = track.reader() else { return };
+fn fill(rows: &mut [Sample], track: &Track<'_>, series: &[Vec<f64>]) {
+    let Some(reader) = track.reader(series) else { return };
     rows.iter_mut().for_each(|row| reader.put(row));
 }
 
 /// Fills the rows that follow the samples of `track`, rows `period` (s) apart; `true` for each row
 /// that is filled.
-fn fill_sparse(rows: &mut [Sample], track: &Track<'_>, period: f64) -> Vec<bool> {
+fn fill_sparse(
+    rows: &mut [Sample],
+    track: &Track<'_>,
+    series: &[Vec<f64>],
+    period: f64,
+) -> Vec<bool> {
     let mut fresh = vec![false; rows.len()];
-    let Some(reader) = track.reader() else { return fresh };
+    let Some(reader) = track.reader(series) else { return fresh };
+    let mut next = 0;
     for t in track.times.iter() {
-        // The first row at or after the sample.
-        let next = rows.partition_point(|row| row.time_s < t - SAME_S);
+        // The first row at or after the sample: both are in order.
+        next += rows[next..].iter().take_while(|row| row.time_s < t - SAME_S).count();
         if rows.get(next).is_some_and(|row| row.time_s - t <= period) {
             fresh[next] = true;
         }

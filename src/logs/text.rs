@@ -3,8 +3,8 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use super::columns::{COLUMNS, EITHER};
-use super::csv::{self, CsvError, Raw, Tolerance};
+use super::columns::{BLOCK, COLUMNS, EITHER, Get, Place};
+use super::csv::{self, CsvError, Raw};
 use super::error::LogError;
 use super::finding::Finding;
 use super::load::{Channel, Log, Options, Use, dropped, hint, name};
@@ -13,7 +13,7 @@ use super::phases::Flying;
 use super::quality::Quality;
 use super::stretches::Keep;
 use super::topics::period_s;
-use super::{Flight, Format, Sample, assess, derive, screening};
+use super::{Flight, Format, assess, derive, screening};
 
 /// The flights of a table: one for each recording in it.
 ///
@@ -62,7 +62,7 @@ fn recording(mut raw: Raw, path: &Path, options: &Options, to: Use) -> Result<Lo
     }
     let mut made = std::mem::take(&mut raw.notes);
     let flies = Flying { bridged_s: raw.bridged_s(), ..options.flies };
-    let mut channels = channels(&raw.rows, &options.mapping);
+    let mut channels = channels(&raw, &options.mapping);
     let stretches = raw.stretches(&options.flies);
     if let Some(stretches) = &stretches {
         findings.push(Finding::note(stretches.said()));
@@ -115,12 +115,13 @@ fn settled(
     to: Use,
     findings: &mut Vec<Finding>,
 ) -> Result<csv::Reading, LogError> {
-    let poor = csv::poor(&raw, path, options.tolerance);
-    if let (Some(source), Use::Look) = (&poor, to) {
-        findings.push(Finding::problem(source.to_string()));
+    match (csv::settle(raw, path, options.tolerance), to) {
+        ((_, Some(error)), Use::Compute) => Err(LogError::Csv { error, hint: hint(findings) }),
+        ((reading, poor), _) => {
+            findings.extend(poor.map(|error| Finding::problem(error.to_string())));
+            Ok(reading)
+        }
     }
-    let tolerance = if to == Use::Look { Tolerance::Lenient } else { options.tolerance };
-    csv::settle(raw, path, tolerance).map_err(|error| LogError::Csv { error, hint: hint(findings) })
 }
 
 /// Names of columns that a finding lists.
@@ -150,19 +151,31 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
 }
 
 /// The columns of a CSV that hold anything.
-fn channels(rows: &[Sample], mapping: &Mapping) -> Vec<Channel> {
-    let channel = |(name, get, _): &(&str, fn(&Sample) -> f64, _)| {
-        let seen = rows.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite());
-        let (times, values): (Vec<f64>, Vec<f64>) = seen.unzip();
+fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
+    let mut seen = vec![(Vec::new(), Vec::new()); COLUMNS.len()];
+    for block in raw.rows.chunks(BLOCK) {
+        for ((times, values), (_, get, _)) in seen.iter_mut().zip(COLUMNS).skip(1) {
+            let there = block.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite());
+            for (time, value) in there {
+                times.push(time);
+                values.push(value);
+            }
+        }
+    }
+    let channel = |((times, values), (name, ..)): ((Vec<f64>, Vec<f64>), (&str, Get, Place))| {
         let period = period_s(&times);
+        let mut quality = Quality::at(name, &times, &values, period);
+        if let Some(frozen) = raw.frozen(name, &times, &values) {
+            quality.frozen = frozen;
+        }
         (!times.is_empty()).then(|| Channel {
-            columns: vec![(*name).to_owned()],
+            columns: vec![name.to_owned()],
             origin: mapping.origin(name),
             samples: times.len(),
             rate_hz: if period > 0.0 { 1.0 / period } else { 0.0 },
             largest_gap_s: times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max),
-            quality: Quality::of(name, &times, &values),
+            quality,
         })
     };
-    COLUMNS.iter().skip(1).filter_map(channel).collect()
+    seen.into_iter().zip(COLUMNS).skip(1).filter_map(channel).collect()
 }

@@ -20,7 +20,7 @@ use super::format::MAVLINK_MARKERS;
 use super::stretches::Keep;
 use super::topics::{Naming, Topic, Topics};
 use super::window::Window;
-use greylag_link::framing::{FrameCounts, Frames, MAX_FRAME, frame_len};
+use greylag_link::framing::{Frame, MAX_FRAME, Whole, frame_len, whole};
 use greylag_link::logged::{self, Logged, Own};
 
 /// Bytes of the host's time.
@@ -53,9 +53,19 @@ struct Tick {
     at: usize,
 }
 
+/// The messages of one kind from one sender.
+struct Stream {
+    topic: &'static str,
+    count: usize,
+    entries: Vec<Entry>,
+    /// Their values; `None` of messages that are counted only.
+    values: Option<Topic>,
+}
+
 #[derive(Default)]
 struct Reader {
-    entries: BTreeMap<(&'static str, u16), (Vec<Entry>, Topic)>,
+    /// By the message's number and the sender.
+    streams: BTreeMap<(u32, u16), Stream>,
     /// Clock of each sender, by system × 256 + component.
     clocks: BTreeMap<u16, Vec<Tick>>,
     records: usize,
@@ -70,7 +80,6 @@ pub(super) fn read<'a>(
 ) -> (Vec<Topics>, Window<'a>) {
     let mut window = Window::new(source);
     let mut reader = Reader::default();
-    let mut counts = FrameCounts::default();
     let mut skipped = 0usize;
     let cut = loop {
         let view = window.view(STAMP + MAX_FRAME);
@@ -90,38 +99,43 @@ pub(super) fn read<'a>(
             skipped += 1;
             continue;
         };
-        let before = counts;
-        let found = Frames::new(&frame[..len], &mut counts).next().filter(|f| f.bytes.len() == len);
-        if let Some(found) = found {
-            let stamp = view.first_chunk().map_or(0, |b| u64::from_be_bytes(*b));
-            let source = u16::from_be_bytes([found.source.system, found.source.component]);
-            reader.records += 1;
-            match logged::read(&found) {
-                Some(message) => reader.take(message, stamp as f64 * 1e-6, source, wanted),
-                None => *reader.others.entry(found.id).or_default() += 1,
+        match whole(&frame[..len]) {
+            Whole::Known(found) => {
+                let stamp = view.first_chunk().map_or(0, |b| u64::from_be_bytes(*b));
+                reader.take(&found, stamp as f64 * 1e-6, wanted);
+                window.skip(STAMP + len);
             }
-            window.skip(STAMP + len);
-        } else if counts.unknown > before.unknown {
-            window.skip(STAMP + len);
-        } else {
-            window.skip(1);
-            skipped += 1;
+            Whole::Unknown => window.skip(STAMP + len),
+            Whole::Damaged => {
+                window.skip(1);
+                skipped += 1;
+            }
         }
     };
     (reader.finish(skipped, cut), window)
 }
 
 impl Reader {
-    fn take(&mut self, m: Logged, host_s: f64, source: u16, wanted: &dyn Fn(&str) -> bool) {
-        let values = match m {
-            Logged::Parameter { name, value } => {
+    fn take(&mut self, frame: &Frame<'_>, host_s: f64, wanted: &dyn Fn(&str) -> bool) {
+        self.records += 1;
+        let source = u16::from_be_bytes([frame.source.system, frame.source.component]);
+        let values = match logged::read(frame) {
+            None => {
+                *self.others.entry(frame.id).or_default() += 1;
+                return;
+            }
+            Some(Logged::Parameter { name, value }) => {
                 self.out.parameters.insert(name, value);
                 return;
             }
-            Logged::Values(values) => values,
+            Some(Logged::Values(values)) => values,
         };
-        let key = (values.topic, source);
-        *self.out.counts.entry((values.topic.to_owned(), source)).or_default() += 1;
+        let stream = self.streams.entry((frame.id, source)).or_insert_with(|| {
+            let fields = values.fields.iter().copied();
+            let topic = wanted(values.topic).then(|| Topic::new(fields, Keep::All));
+            Stream { topic: values.topic, count: 0, entries: Vec::new(), values: topic }
+        });
+        stream.count += 1;
         let own_s = match values.own {
             Own::BootMs(ms) => {
                 let clock = self.clocks.entry(source).or_default();
@@ -132,16 +146,9 @@ impl Reader {
             Own::Micros(us) => Some(us as f64 * 1e-6),
             Own::None => None,
         };
-        if !wanted(values.topic) {
-            return;
-        }
-        let (entries, topic) = self.entries.entry(key).or_insert_with(|| {
-            (Vec::new(), Topic::new(values.fields.iter().map(|f| (*f).to_owned()), Keep::All))
-        });
-        entries.push(Entry { at: self.records, host_s, own_s });
-        for (x, column) in values.values.iter().zip(&mut topic.values) {
-            column.push(*x);
-        }
+        let Some(topic) = &mut stream.values else { return };
+        stream.entries.push(Entry { at: self.records, host_s, own_s });
+        topic.values.iter_mut().zip(&values.values).for_each(|(column, x)| column.push(*x));
     }
 
     fn finish(mut self, skipped: usize, cut: usize) -> Vec<Topics> {
@@ -152,6 +159,9 @@ impl Reader {
             if clock.len() > best.len() {
                 *best = clock;
             }
+        }
+        for ((_, source), stream) in &self.streams {
+            *self.out.counts.entry((stream.topic.to_owned(), *source)).or_default() += stream.count;
         }
         for (id, count) in &self.others {
             *self.out.counts.entry((format!("message {id}"), 0)).or_default() += count;
@@ -179,9 +189,9 @@ impl Reader {
     fn only_life(mut self, system: Option<u8>, mut clocks: BTreeMap<u8, Vec<Tick>>) -> Topics {
         let mut out = Topics { system, ..std::mem::take(&mut self.out) };
         clocks.values_mut().for_each(|clock| clock.sort_by(|a, b| a.host_s.total_cmp(&b.host_s)));
-        for ((name, source), (entries, mut topic)) in self.entries {
-            let clock = clocks.get(&source.to_be_bytes()[0]).map_or(&[][..], Vec::as_slice);
-            topic.time_s = entries.iter().map(|entry| time(entry, clock)).collect();
+        for ((_, source), Stream { topic: name, entries, values, .. }) in self.streams {
+            let Some(mut topic) = values else { continue };
+            topic.time_s = times(&entries, clocks.get(&source.to_be_bytes()[0]));
             out.topics.insert((name.to_owned(), source), topic);
         }
         out
@@ -190,10 +200,10 @@ impl Reader {
     /// The boots of the systems that send an attitude: each system with the range of its records.
     fn lives(&self, clocks: &BTreeMap<u8, Vec<Tick>>) -> Vec<(u8, Range<usize>)> {
         let mut attitudes: BTreeMap<u8, usize> = BTreeMap::new();
-        for ((_, source), (entries, _)) in
-            self.entries.iter().filter(|((name, _), _)| name.starts_with("ATTITUDE"))
-        {
-            *attitudes.entry(source.to_be_bytes()[0]).or_default() += entries.len();
+        for ((_, source), stream) in &self.streams {
+            if stream.topic.starts_with("ATTITUDE") && stream.values.is_some() {
+                *attitudes.entry(source.to_be_bytes()[0]).or_default() += stream.count;
+            }
         }
         let most = attitudes.iter().max_by_key(|(_, count)| **count).map(|(system, _)| *system);
         let is_one = |system: u8, count: usize| count >= VEHICLE || Some(system) == most;
@@ -232,15 +242,15 @@ impl Reader {
             own.sort_by(|a, b| a.host_s.total_cmp(&b.host_s));
             ticks.insert(*system, own);
         }
-        for ((name, source), (entries, topic)) in &self.entries {
+        for ((_, source), Stream { topic: name, entries, values, .. }) in &self.streams {
+            let Some(topic) = values else { continue };
             let from = entries.partition_point(|e| e.at < at.start);
             let to = entries.partition_point(|e| e.at < at.end);
             if from == to {
                 continue;
             }
-            let clock = ticks.get(&source.to_be_bytes()[0]).map_or(&[][..], Vec::as_slice);
             let topic = Topic {
-                time_s: entries[from..to].iter().map(|entry| time(entry, clock)).collect(),
+                time_s: times(&entries[from..to], ticks.get(&source.to_be_bytes()[0])),
                 fields: topic.fields.clone(),
                 values: topic.values.iter().map(|v| v[from..to].to_vec()).collect(),
                 ..Topic::default()
@@ -267,19 +277,35 @@ fn unwrapped(own: f64, last: Option<f64>) -> f64 {
     own + ((last - own) / WRAP_MS_S).round() * WRAP_MS_S
 }
 
-/// The time of a message on its system's clock, s; the host's where the system shows none.
-fn time(entry: &Entry, clock: &[Tick]) -> f64 {
-    let Some(own) = interpolate(clock, entry.host_s) else {
-        return entry.own_s.unwrap_or(entry.host_s);
+/// The times of messages on their system's clock, s; the host's where the system shows none.
+fn times(entries: &[Entry], clock: Option<&Vec<Tick>>) -> Vec<f64> {
+    let clock = clock.map_or(&[][..], Vec::as_slice);
+    let mut after = 0;
+    let time = |entry: &Entry| {
+        after = place(clock, entry.host_s, after);
+        match (interpolate(clock, entry.host_s, after), entry.own_s) {
+            (None, own) => own.unwrap_or(entry.host_s),
+            (Some(clock), Some(own)) if (own - clock).abs() < SAME_CLOCK_S => own,
+            (Some(clock), _) => clock,
+        }
     };
-    match entry.own_s {
-        Some(t) if (t - own).abs() < SAME_CLOCK_S => t,
-        _ => own,
-    }
+    entries.iter().map(time).collect()
 }
 
-fn interpolate(clock: &[Tick], host: f64) -> Option<f64> {
-    let after = clock.partition_point(|c| c.host_s < host);
+/// Number of ticks that are tried in turn before a binary search.
+const STEPS: usize = 8;
+
+/// The first tick not before `host`, looked for from `from` on first: messages mostly come in order.
+fn place(clock: &[Tick], host: f64, from: usize) -> usize {
+    let before = |c: &Tick| c.host_s < host;
+    let follows = from == 0 || clock.get(from - 1).is_some_and(before);
+    let ahead = clock.get(from..).unwrap_or_default();
+    let step = ahead.iter().take(STEPS).position(|c| !before(c)).filter(|_| follows);
+    step.map_or_else(|| clock.partition_point(before), |step| from + step)
+}
+
+/// The system's time at the host's time `host`, between the ticks around place `after`.
+fn interpolate(clock: &[Tick], host: f64, after: usize) -> Option<f64> {
     match (after.checked_sub(1).map(|i| clock[i]), clock.get(after)) {
         (Some(a), Some(b)) if b.host_s > a.host_s && b.host_s > host => {
             Some(a.own_s + (b.own_s - a.own_s) * (host - a.host_s) / (b.host_s - a.host_s))

@@ -171,11 +171,15 @@ impl Topics {
         self.topics.is_empty() && has("TIME") && has("STAT") && has("ATT")
     }
 
-    /// Reduces all topics that are kept in stretches to the same stretches.
+    /// Reduces all topics that are kept in stretches to the same stretches, and their memory to what they hold.
     pub fn align(&mut self) {
         let level = self.topics.values().fold(Level::default(), |l, t| l.sparser(t.level));
         let fast = self.topics.values_mut().filter(|t| t.level.thins() && t.level != level);
         fast.for_each(|topic| topic.thin(level));
+        for topic in self.topics.values_mut().filter(|t| t.level.thins()) {
+            topic.time_s.shrink_to_fit();
+            topic.values.iter_mut().for_each(Vec::shrink_to_fit);
+        }
     }
 
     /// The last value of a parameter.

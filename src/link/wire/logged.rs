@@ -1,6 +1,7 @@
 //! Messages of a telemetry log as named numbers, in the units of MAVLink.
 
-use mavlink::dialects::ardupilotmega::MavMessage;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{self as messages, MavMessage};
 
 use super::{Frame, decode};
 
@@ -81,9 +82,35 @@ const SERVOS: [&str; 16] = [
     "servo16_raw",
 ];
 
-/// Decodes a frame; `None` for messages without states, commands or parameters of the flight.
+/// The numbers of the messages that are decoded.
+const READ: [u32; 17] = [
+    messages::PARAM_VALUE_DATA::ID,
+    messages::HEARTBEAT_DATA::ID,
+    messages::EXTENDED_SYS_STATE_DATA::ID,
+    messages::ATTITUDE_QUATERNION_DATA::ID,
+    messages::ATTITUDE_DATA::ID,
+    messages::HIGHRES_IMU_DATA::ID,
+    messages::RAW_IMU_DATA::ID,
+    messages::SCALED_IMU_DATA::ID,
+    messages::SCALED_PRESSURE_DATA::ID,
+    messages::VFR_HUD_DATA::ID,
+    messages::AOA_SSA_DATA::ID,
+    messages::ACTUATOR_OUTPUT_STATUS_DATA::ID,
+    messages::HIL_ACTUATOR_CONTROLS_DATA::ID,
+    messages::SERVO_OUTPUT_RAW_DATA::ID,
+    messages::GLOBAL_POSITION_INT_DATA::ID,
+    messages::LOCAL_POSITION_NED_DATA::ID,
+    messages::WIND_COV_DATA::ID,
+];
+
+/// Decodes a frame; `None` for messages without the flight's states or commands.
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
-    Some(Logged::Values(match decode(frame)? {
+    // Most messages of a real log are others, and decoding costs more than everything else that is done with them.
+    READ.contains(&frame.id).then(|| decode(frame)).flatten().and_then(logged)
+}
+
+fn logged(message: MavMessage) -> Option<Logged> {
+    Some(Logged::Values(match message {
         MavMessage::PARAM_VALUE(m) => {
             let name = m.param_id.to_str().unwrap_or_default().to_owned();
             return Some(Logged::Parameter { name, value: f64::from(m.param_value) });
@@ -250,4 +277,18 @@ fn values(
     let mut wide = [f64::NAN; 16];
     wide.iter_mut().zip(numbers).for_each(|(to, x)| *to = *x);
     Values { topic, own, fields, values: wide }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_messages_that_are_decoded_are_those_that_are_used() {
+        use mavlink::Message as _;
+        for id in 0..70_000 {
+            let used = MavMessage::default_message_from_id(id).and_then(logged).is_some();
+            assert_eq!(used, READ.contains(&id), "{id}");
+        }
+    }
 }

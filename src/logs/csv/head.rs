@@ -20,9 +20,29 @@ enum Share {
     OneOfSeveral,
 }
 
+/// Where one field goes.
+enum To {
+    Nowhere,
+    /// A column, as it is: what most fields are.
+    Column(Place),
+    Targets(Vec<Target>),
+}
+
+impl To {
+    fn of(targets: Vec<Target>) -> To {
+        match targets[..] {
+            [] => To::Nowhere,
+            [(place, scale, offset, Share::Whole)] if (scale, offset) == (1.0, 0.0) => {
+                To::Column(place)
+            }
+            _ => To::Targets(targets),
+        }
+    }
+}
+
 /// Where the fields of a table go.
 pub(super) struct Head {
-    targets: Vec<Vec<Target>>,
+    fields: Vec<To>,
     /// Meaning of names that are not those of the log format.
     pub dialect: Dialect,
     /// Fields of a quaternion.
@@ -54,34 +74,33 @@ impl Head {
         let place = |name: &String| names.iter().position(|n| n == name).unwrap_or(usize::MAX);
         let quaternion = dialect.quaternion.as_ref().map(|q| q.each_ref().map(place));
         let decimal = if delimiter == b',' { Decimal::Point } else { Decimal::PointOrComma };
-        (Head { targets, dialect, quaternion, decimal }, table)
+        let fields = targets.into_iter().map(To::of).collect();
+        (Head { fields, dialect, quaternion, decimal }, table)
     }
 
     /// The sample in a record; `None` if one of its fields is not a number, or the time is missing.
     pub fn sample(&self, record: Fields<'_>) -> Option<Sample> {
         // A row that lacks fields is damaged, and its sample would take many times its size in memory.
-        if record.len() < self.targets.len() {
+        if record.len() < self.fields.len() {
             return None;
         }
         let mut sample = Sample::default();
-        (0..self.targets.len()).try_for_each(|i| self.field(record, i, &mut sample))?;
+        for (to, field) in self.fields.iter().zip(record.iter()) {
+            match to {
+                To::Nowhere => {}
+                To::Column(place) => {
+                    let x = number(field, self.decimal)?;
+                    if !x.is_nan() {
+                        *place(&mut sample) = x;
+                    }
+                }
+                To::Targets(targets) => {
+                    let x = number(field, self.decimal)?;
+                    targets.iter().filter(|_| !x.is_nan()).for_each(|to| put(to, x, &mut sample));
+                }
+            }
+        }
         sample.time_s.is_finite().then_some(sample)
-    }
-
-    /// Writes field `i` into its columns; `None` if it is not a number.
-    fn field(&self, record: Fields<'_>, i: usize, sample: &mut Sample) -> Option<()> {
-        let targets = &self.targets[i];
-        if targets.is_empty() {
-            return Some(());
-        }
-        let x = number(record.get(i)?, self.decimal)?;
-        for (place, scale, offset, share) in targets.iter().filter(|_| !x.is_nan()) {
-            let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
-            let place = place(sample);
-            let sums = *share == Share::OneOfSeveral && !place.is_nan();
-            *place = if sums { *place + value } else { value };
-        }
-        Some(())
     }
 
     /// The parts of the quaternion in a record, if the table has one.
@@ -89,6 +108,14 @@ impl Head {
         let part = |i| record.get(i).and_then(|f| number(f, self.decimal)).unwrap_or(f64::NAN);
         self.quaternion.map(|q| q.map(part))
     }
+}
+
+/// Writes the number of a field into its column.
+fn put((place, scale, offset, share): &Target, x: f64, sample: &mut Sample) {
+    let value = if (*scale, *offset) == (1.0, 0.0) { x } else { x * scale + offset };
+    let place = place(sample);
+    let sums = *share == Share::OneOfSeveral && !place.is_nan();
+    *place = if sums { *place + value } else { value };
 }
 
 /// How decimals may be written.
@@ -130,18 +157,46 @@ fn short(field: &[u8]) -> Option<f64> {
         return None;
     }
     let (mut whole, mut behind, mut point) = (0u64, 0, false);
-    for b in digits {
+    let mut rest = digits;
+    while let [b, after @ ..] = rest {
         match b {
             b'0'..=b'9' => {
                 whole = 10 * whole + u64::from(b - b'0');
                 behind += usize::from(point);
             }
-            b'.' if !point => point = true,
+            b'.' if !point => {
+                point = true;
+                if let Some((digits, after)) = after.split_first_chunk()
+                    && let Some(eight) = eight(*digits)
+                {
+                    whole = 100_000_000 * whole + eight;
+                    behind = 8;
+                    rest = after;
+                    continue;
+                }
+            }
             _ => return None,
         }
+        rest = after;
     }
     let count = digits.len() - usize::from(point);
     (1..TENS.len()).contains(&count).then(|| sign * (whole as f64 / TENS[behind]))
+}
+
+/// The number that eight digits write (Lemire, "Quickly parsing eight digits"); `None` of other letters.
+fn eight(digits: [u8; 8]) -> Option<u64> {
+    const ZEROS: u64 = 0x3030_3030_3030_3030;
+    const ABOVE: u64 = 0x4646_4646_4646_4646;
+    const HIGH: u64 = 0x8080_8080_8080_8080;
+    let letters = u64::from_le_bytes(digits);
+    let values = letters.wrapping_sub(ZEROS);
+    if (letters.wrapping_add(ABOVE) | values) & HIGH != 0 {
+        return None;
+    }
+    // Pairs of digits, then pairs of pairs, then both halves.
+    let pairs = (10 * values + (values >> 8)) & 0x00FF_00FF_00FF_00FF;
+    let fours = (100 * pairs + (pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
+    Some((10_000 * fours + (fours >> 32)) & 0xFFFF_FFFF)
 }
 
 /// Where the file's column `name` goes.
@@ -203,9 +258,28 @@ mod tests {
                 }
             }
         }
-        for text in ["", "-", ".", "1e3", "1.2.3", "+1", " 1", "inf"] {
+        for text in [
+            "",
+            "-",
+            ".",
+            "1e3",
+            "1.2.3",
+            "+1",
+            " 1",
+            "inf",
+            "1.1234567.",
+            "1.1234567/",
+            "1.:2345678",
+        ] {
             assert_eq!(short(text.as_bytes()), None, "{text}");
         }
         assert_eq!([&b"1."[..], b".5", b"-0"].map(short), [Some(1.0), Some(0.5), Some(-0.0)]);
+        for (from, letter) in (0..=255u8).enumerate() {
+            let mut digits = *b"90817263";
+            digits[from % 8] = letter;
+            let right = std::str::from_utf8(&digits).ok().and_then(|d| d.parse::<u64>().ok());
+            let right = right.filter(|_| letter != b'+');
+            assert_eq!(eight(digits), right, "{digits:?}");
+        }
     }
 }

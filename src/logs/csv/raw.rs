@@ -10,7 +10,7 @@ use super::quaternion;
 use super::records::{Fields, Records};
 use super::thin::{STRETCH, Thin, Whole};
 use crate::Channel;
-use crate::columns::{COLUMNS, index};
+use crate::columns::index;
 use crate::mapping::Mapping;
 use crate::phases::Flying;
 use crate::quality::frozen_of;
@@ -46,21 +46,31 @@ const BEGINS: f64 = 0.1;
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// Applies `take` to every row, including those that could not be read.
+    /// Judges every row, those included that could not be read, by `judge`: it gets the row's number, the row and the
+    /// rows that are kept before it. The kept rows stay in place, because a copy of a long table is large.
     pub(super) fn judged(
-        &self,
-        take: impl Fn(&mut rows::Rows, usize, Option<Sample>),
+        &mut self,
+        judge: impl Fn(&mut rows::Rows, usize, Option<Sample>, &[Sample]) -> Option<Sample>,
     ) -> rows::Rows {
         let mut rows = rows::Rows::with_sparse_columns_of(&self.rows);
+        let mut all = std::mem::take(&mut self.rows);
         let mut unreadable = self.unreadable.iter().peekable();
+        let mut kept = 0;
         // The header is row 1.
-        for (sample, place) in self.rows.iter().zip(&self.places) {
+        for (i, place) in self.places.iter().enumerate() {
             while let Some(i) = unreadable.next_if(|i| *i < place) {
-                take(&mut rows, i + 2, None);
+                judge(&mut rows, i + 2, None, &all[..kept]);
             }
-            take(&mut rows, place + 2, Some(*sample));
+            if let Some(row) = judge(&mut rows, place + 2, Some(all[i]), &all[..kept]) {
+                all[kept] = row;
+                kept += 1;
+            }
         }
-        unreadable.for_each(|i| take(&mut rows, i + 2, None));
+        for i in unreadable {
+            judge(&mut rows, i + 2, None, &all[..kept]);
+        }
+        all.truncate(kept);
+        rows.samples = all;
         rows
     }
 
@@ -97,11 +107,12 @@ impl Raw {
         let share = self.rows.len() as f64 / stretches.rows.max(1) as f64;
         channel.samples = (channel.samples as f64 / share).round() as usize;
         channel.largest_gap_s = self.whole.as_ref().map_or(0.0, |whole| whole.watch.largest_gap_s);
-        let column = channel.columns.first().map(String::as_str).unwrap_or_default();
-        let (Some(place), Some(whole)) = (index(column), &self.whole) else { return };
-        let seen = self.rows.iter().map(|s| (s.time_s, COLUMNS[place].1(s)));
-        let (times, values): (Vec<f64>, Vec<f64>) = seen.filter(|(_, x)| x.is_finite()).unzip();
-        channel.quality.frozen = frozen_of(column, &times, &values, whole.watch.stays(place));
+    }
+
+    /// Where a column with these values at `times` (s) is frozen, in the whole table; `None` if all of it is kept.
+    pub fn frozen(&self, column: &str, times: &[f64], values: &[f64]) -> Option<Vec<(f64, f64)>> {
+        let (whole, place) = (self.whole.as_ref()?, index(column)?);
+        Some(frozen_of(column, times, values, whole.watch.stays(place)))
     }
 
     /// The recordings that follow one another in the table: each begins where the time goes back

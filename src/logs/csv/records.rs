@@ -1,6 +1,9 @@
 //! The records of a table, line by line. Most tables have no quotes, so that their fields are read in place.
 
 use std::io::{self, BufRead, Cursor, Read};
+use std::ops::Range;
+
+use memchr::{memchr_iter, memchr2};
 
 /// Whole lines of a source: a last one without its end may miss digits, and is held back.
 pub(super) struct Lines<'a> {
@@ -59,7 +62,6 @@ pub(super) struct Records<'a> {
     pub delimiter: u8,
     begun: bool,
     record: ::csv::ByteRecord,
-    line: Vec<u8>,
     ends: Vec<usize>,
 }
 
@@ -75,6 +77,15 @@ pub(super) struct Fields<'a> {
 impl<'a> Fields<'a> {
     pub fn len(self) -> usize {
         self.ends.len()
+    }
+
+    pub fn iter(self) -> impl Iterator<Item = &'a [u8]> {
+        let mut start = 0;
+        self.ends.iter().map(move |end| {
+            let field = self.bytes.get(start..*end).unwrap_or_default();
+            start = end + self.between;
+            field
+        })
     }
 
     pub fn get(self, i: usize) -> Option<&'a [u8]> {
@@ -106,38 +117,15 @@ impl<'a> Records<'a> {
             delimiter: b',',
             begun: false,
             record: ::csv::ByteRecord::new(),
-            line: Vec::new(),
             ends: Vec::new(),
         }
     }
 
     /// The next record; `None` after the last one.
     pub fn next(&mut self) -> Result<Option<Fields<'_>>, ::csv::Error> {
-        while let Origin::Plain(lines) = &mut self.from {
-            if !lines.next()? {
-                return Ok(None);
-            }
-            let first = !std::mem::replace(&mut self.begun, true);
-            if first {
-                self.delimiter = separator(lines.line.split(|b| *b == b'\n').next().unwrap_or(&[]));
-            }
-            let line = content(&lines.line);
-            if line.contains(&b'"') || line.contains(&b'\r') {
-                self.quoted();
-                break;
-            }
-            let line = if first { line.strip_prefix(MARK).unwrap_or(line) } else { line };
-            if line.is_empty() {
-                continue;
-            }
-            self.line.clear();
-            self.line.extend_from_slice(line);
-            self.ends.clear();
-            let delimiter = self.delimiter;
-            let places = self.line.iter().enumerate().filter(|(_, b)| **b == delimiter);
-            self.ends.extend(places.map(|(i, _)| i));
-            self.ends.push(self.line.len());
-            return Ok(Some(Fields { bytes: &self.line, ends: &self.ends, between: 1 }));
+        if let Some(line) = self.plain()? {
+            let Origin::Plain(lines) = &self.from else { return Ok(None) };
+            return Ok(Some(Fields { bytes: &lines.line[line], ends: &self.ends, between: 1 }));
         }
         let Origin::Quoted(reader) = &mut self.from else { return Ok(None) };
         if !reader.read_byte_record(&mut self.record)? {
@@ -147,6 +135,35 @@ impl<'a> Records<'a> {
         let ends = (0..self.record.len()).filter_map(|i| self.record.range(i)).map(|r| r.end);
         self.ends.extend(ends);
         Ok(Some(Fields { bytes: self.record.as_slice(), ends: &self.ends, between: 0 }))
+    }
+
+    /// Reads the next line that is not empty, without a quote; returns its place in the lines.
+    fn plain(&mut self) -> Result<Option<Range<usize>>, ::csv::Error> {
+        while let Origin::Plain(lines) = &mut self.from {
+            if !lines.next()? {
+                return Ok(None);
+            }
+            let first = !std::mem::replace(&mut self.begun, true);
+            if first {
+                self.delimiter = separator(lines.line.split(|b| *b == b'\n').next().unwrap_or(&[]));
+            }
+            let line = content(&lines.line);
+            if memchr2(b'"', b'\r', line).is_some() {
+                self.quoted();
+                break;
+            }
+            let marked = first && line.starts_with(MARK);
+            let from = if marked { MARK.len() } else { 0 };
+            let (line, to) = (&line[from..], line.len());
+            if line.is_empty() {
+                continue;
+            }
+            self.ends.clear();
+            self.ends.extend(memchr_iter(self.delimiter, line));
+            self.ends.push(line.len());
+            return Ok(Some(from..to));
+        }
+        Ok(None)
     }
 
     /// Passes the present line and the following ones to a reader that handles quotes.

@@ -3,23 +3,43 @@
 use super::ENOUGH;
 use super::relation::values;
 use crate::Sample;
-use crate::columns::{COLUMNS, NEEDED};
+use crate::columns::{BLOCK, COLUMNS, NEEDED};
 use crate::finding::Finding;
 
 /// Columns that show one and the same value, though they should move.
 pub fn check(rows: &[Sample]) -> Vec<Finding> {
-    COLUMNS.iter().filter_map(|(name, get, _)| dead(rows, name, *get)).collect()
+    let mut seen = COLUMNS.map(|_| Seen::default());
+    for block in rows.chunks(BLOCK) {
+        for (seen, (_, get, _)) in seen.iter_mut().zip(COLUMNS).filter(|(seen, _)| !seen.moves) {
+            block.iter().map(get).filter(|x| x.is_finite()).for_each(|x| seen.take(x));
+        }
+    }
+    seen.iter().zip(COLUMNS).filter_map(|(seen, (name, ..))| dead(seen, name)).collect()
 }
 
-fn dead(rows: &[Sample], name: &'static str, get: fn(&Sample) -> f64) -> Option<Finding> {
-    let seen = values(rows, get);
-    let first = *seen.first()?;
-    if seen.len() < 2 * ENOUGH || may_rest(name) || seen.iter().any(|x| *x != first) {
+/// What a column shows.
+#[derive(Default)]
+struct Seen {
+    first: Option<f64>,
+    count: usize,
+    moves: bool,
+}
+
+impl Seen {
+    fn take(&mut self, x: f64) {
+        self.moves |= *self.first.get_or_insert(x) != x;
+        self.count += 1;
+    }
+}
+
+fn dead(seen: &Seen, name: &'static str) -> Option<Finding> {
+    let first = seen.first?;
+    if seen.count < 2 * ENOUGH || may_rest(name) || seen.moves {
         return None;
     }
     let text = format!(
         "{name} is constantly {first} over all {} rows: a sensor that is absent or dead",
-        seen.len()
+        seen.count
     );
     let needed = NEEDED.contains(&name);
     Some(if needed { Finding::problem(text) } else { Finding::warning(text) })

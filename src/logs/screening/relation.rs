@@ -57,7 +57,12 @@ pub fn windows(rows: &[Sample], length_s: f64) -> Vec<&[Sample]> {
 
 /// The integral of `rate` over a window by the trapezoidal rule.
 pub fn integral(window: &[Sample], rate: impl Fn(&Sample) -> f64) -> f64 {
-    let step = |w: &[Sample]| 0.5 * (rate(&w[0]) + rate(&w[1])) * (w[1].time_s - w[0].time_s);
+    let Some(first) = window.first() else { return 0.0 };
+    let mut before = rate(first);
+    let step = |w: &[Sample]| {
+        let now = rate(&w[1]);
+        0.5 * (std::mem::replace(&mut before, now) + now) * (w[1].time_s - w[0].time_s)
+    };
     window.windows(2).map(step).sum()
 }
 

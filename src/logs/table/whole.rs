@@ -36,7 +36,7 @@ impl Whole {
                 let row = |t: &f64| Sample { time_s: *t, ..Sample::default() };
                 air = track.times.iter().map(row).collect();
             }
-            fill(&mut air, track);
+            fill(&mut air, track, &track.series());
         }
         if of("airspeed_mps").is_some_and(|t| t.rule.equivalent) {
             make_true(&mut air);

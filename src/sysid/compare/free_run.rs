@@ -73,28 +73,35 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
         times.iter().map(|t| ((t / flight.dt).round() as usize).max(1)).collect();
     let model = flight.stepping(model);
     let mut runs = Vec::new();
-    let mut trace = Trace::default();
+    let rows = flight.segments.iter().map(|segment| segment.len() + 1).sum();
+    let mut trace: Trace = std::array::from_fn(|_| Vec::with_capacity(rows));
     for segment in &flight.segments {
+        let from = trace[0].len();
         let starts: Vec<usize> = (0..segment.len() - 1).step_by(every).collect();
-        let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
-            .par_iter()
-            .map(|&start| run(&model, flight, segment, start, &looks, every))
-            .collect();
-        let mut drawn: Vec<[f64; 8]> = Vec::with_capacity(segment.len() + 1);
-        for (start, (looks, path)) in starts.iter().zip(flown) {
-            drawn.resize(*start, [f64::NAN; 8]);
-            drawn.extend(path);
-            runs.push(looks);
+        for starts in starts.chunks(RUNS_AT_A_TIME) {
+            let flown: Vec<(Vec<Look>, Vec<[f64; 8]>)> = starts
+                .par_iter()
+                .map(|&start| run(&model, flight, segment, start, &looks, every))
+                .collect();
+            for (start, (looks, path)) in starts.iter().zip(flown) {
+                for (k, list) in trace.iter_mut().enumerate() {
+                    list.resize(from + start, f64::NAN);
+                    list.extend(path.iter().map(|state| state[k]));
+                }
+                runs.push(looks);
+            }
         }
         // the row between segments is NaN, as in the flight's trace
-        drawn.resize(segment.len(), [f64::NAN; 8]);
-        drawn.push([f64::NAN; 8]);
-        for row in drawn {
-            trace.iter_mut().zip(row).for_each(|(list, x)| list.push(x));
+        for list in &mut trace {
+            list.resize(from + segment.len(), f64::NAN);
+            list.push(f64::NAN);
         }
     }
     (runs, trace)
 }
+
+/// Number of runs whose paths are held at once before they enter the trace.
+const RUNS_AT_A_TIME: usize = 256;
 
 /// States of a run that starts at one time of a flight.
 #[derive(Clone, Debug, Default)]

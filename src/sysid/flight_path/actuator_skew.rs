@@ -42,30 +42,31 @@ pub struct Skew {
     pub deviation: f64,
 }
 
-/// Reads a body rate, rad/s.
-type Rate = fn(&Instant) -> f64;
-/// Regressors of the body rate's derivative; the deflection is the last regressor.
-type Terms = fn(&Instant) -> Vec<f64>;
+/// The delays of the recorded deflections by roll and by pitch alone; `None` where one is not seen.
+pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> [Option<Skew>; 2] {
+    [
+        from_axis(segments, step, sampling, |i| i.state.p, roll_terms),
+        from_axis(segments, step, sampling, |i| i.state.q, pitch_terms),
+    ]
+}
 
-/// Delay of the recorded deflections from roll, pitch and the prior, in gusts of the standard deviation `gusts` (m/s).
+/// Delay of the recorded deflections from `own`, the delays by roll and pitch, together with the prior of ±1.5 samples,
+/// in gusts of level `gusts` (m/s).
 ///
-/// Errors in the regressors bias the coefficients. `erring` holds copies of the flight with simulated additional errors of
-/// the same distribution. The additional bias of the copies is subtracted (simulation extrapolation, Cook and Stefanski
-/// 1994, linear).
+/// Errors in the regressors bias the coefficients. `erring` holds the delays in copies of the flight with an additional
+/// error like its own: the additional bias in them is subtracted (simulation extrapolation, Cook and Stefanski 1994,
+/// linear).
 pub fn estimate(
-    segments: &[Segment],
-    erring: &[Vec<Segment>],
+    own: [Option<Skew>; 2],
+    erring: &[[Option<Skew>; 2]],
     step: f64,
-    sampling: Sampling,
     gusts: f64,
 ) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
-    let axes: [(Rate, Terms); 2] = [(|i| i.state.p, roll_terms), (|i| i.state.q, pitch_terms)];
-    for (rate, terms) in axes {
-        let of = |segments: &[Segment]| from_axis(segments, step, sampling, rate, terms);
-        let Some(skew) = of(segments) else { continue };
-        let again: Vec<f64> = erring.iter().filter_map(|s| of(s)).map(|s| s.late).collect();
+    for (axis, skew) in own.into_iter().enumerate() {
+        let Some(skew) = skew else { continue };
+        let again: Vec<f64> = erring.iter().filter_map(|copy| copy[axis]).map(|s| s.late).collect();
         let skew = extrapolated(skew, &again);
         let i = skew.deviation.powi(-2);
         information += i;
@@ -93,27 +94,27 @@ fn extrapolated(skew: Skew, again: &[f64]) -> Skew {
     Skew { late: skew.late - pulled, deviation }
 }
 
-/// Regressors of the roll acceleration; the deflection is last.
-fn roll_terms(i: &Instant) -> Vec<f64> {
+/// Regressors of the roll acceleration, the deflection last.
+fn roll_terms(i: &Instant) -> [f64; 7] {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
-    vec![v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
+    [v2, v2 * s.beta, v * s.p, v * s.r, s.p * s.q, s.q * s.r, v2 * i.controls.aileron]
 }
 
-/// Regressors of the pitch acceleration; the deflection is last.
-fn pitch_terms(i: &Instant) -> Vec<f64> {
+/// Regressors of the pitch acceleration, the deflection last.
+fn pitch_terms(i: &Instant) -> [f64; 6] {
     let (s, v) = (&i.state, i.state.airspeed);
     let v2 = v * v;
     let coupling = s.p * s.p - s.r * s.r;
-    vec![v2, v2 * s.alpha, v * s.q, s.p * s.r, coupling, v2 * i.controls.elevator]
+    [v2, v2 * s.alpha, v * s.q, s.p * s.r, coupling, v2 * i.controls.elevator]
 }
 
-fn from_axis(
+fn from_axis<const T: usize>(
     segments: &[Segment],
     step: f64,
     sampling: Sampling,
     rate: fn(&Instant) -> f64,
-    terms: fn(&Instant) -> Vec<f64>,
+    terms: fn(&Instant) -> [f64; T],
 ) -> Option<Skew> {
     let half = ((KERNEL / step / 2.0).round() as usize).max(3);
     let kernel: Vec<f64> = (0..=2 * half)
@@ -124,12 +125,13 @@ fn from_axis(
         .collect();
     let (mut rows, mut values) = (Vec::new(), Vec::new());
     for segment in segments {
-        let terms: Vec<Vec<f64>> = held(segment.instants.iter().map(terms).collect(), sampling);
-        let rates: Vec<f64> = segment.instants.iter().map(rate).collect();
+        let instants = &segment.instants[..];
+        let terms = |k: usize| held(instants, k, sampling, terms);
         let (mut of_terms, mut of_rates) = (Vec::new(), Vec::new());
         let mut middle = half + 1;
-        while middle + half + 1 < rates.len() {
-            let (row, value) = window(&kernel, &terms, &rates, middle - half, step);
+        while middle + half + 1 < instants.len() {
+            let rate = |k: usize| rate(&instants[k]);
+            let (row, value) = window(&kernel, terms, rate, middle - half, step);
             of_terms.push(row);
             of_rates.push(vec![value]);
             middle += half;
@@ -140,17 +142,20 @@ fn from_axis(
     regress(&rows, &values)
 }
 
-/// Regressors averaged over the interval that starts at each sample: the sample itself if it is held, else the mean with the
-/// next sample.
-fn held(terms: Vec<Vec<f64>>, sampling: Sampling) -> Vec<Vec<f64>> {
+/// Regressors over the interval that starts at sample `k`.
+fn held<const T: usize>(
+    instants: &[Instant],
+    k: usize,
+    sampling: Sampling,
+    terms: fn(&Instant) -> [f64; T],
+) -> [f64; T] {
+    let own = terms(&instants[k]);
     match sampling {
-        Sampling::Held => terms,
-        Sampling::Instants => (0..terms.len())
-            .map(|k| {
-                let after = &terms[(k + 1).min(terms.len() - 1)];
-                terms[k].iter().zip(after).map(|(a, b)| 0.5 * (a + b)).collect()
-            })
-            .collect(),
+        Sampling::Held => own,
+        Sampling::Instants => {
+            let after = terms(&instants[(k + 1).min(instants.len() - 1)]);
+            std::array::from_fn(|i| 0.5 * (own[i] + after[i]))
+        }
     }
 }
 
@@ -165,24 +170,27 @@ fn fast(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     rows.iter().enumerate().map(less_mean).collect()
 }
 
-/// Kernel averages from sample `start`: the regressors, the rate of the last regressor, and the angular acceleration.
-fn window(
+/// Kernel averages from sample `start`: the regressors with the rate of the last one, and the acceleration.
+fn window<const T: usize>(
     kernel: &[f64],
-    terms: &[Vec<f64>],
-    rates: &[f64],
+    terms: impl Fn(usize) -> [f64; T],
+    rate: impl Fn(usize) -> f64,
     start: usize,
     step: f64,
 ) -> (Vec<f64>, f64) {
-    let last = terms[start].len() - 1;
+    let last = T - 1;
     let mut row = vec![0.0; last + 2];
     let mut value = 0.0;
+    let [mut before, mut now] = [terms(start - 1), terms(start)];
     for (j, weight) in kernel.iter().enumerate() {
         let k = start + j;
-        for (x, term) in row.iter_mut().zip(&terms[k]) {
+        let after = terms(k + 1);
+        for (x, term) in row.iter_mut().zip(&now) {
             *x += weight * term;
         }
-        row[last + 1] += weight * (terms[k + 1][last] - terms[k - 1][last]) / (2.0 * step);
-        value += weight * (rates[k + 1] - rates[k]) / step;
+        row[last + 1] += weight * (after[last] - before[last]) / (2.0 * step);
+        value += weight * (rate(k + 1) - rate(k)) / step;
+        (before, now) = (now, after);
     }
     (row, value)
 }

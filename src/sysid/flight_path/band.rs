@@ -57,7 +57,31 @@ impl<const W: usize> Left<W> {
     /// The neutral element of `add`.
     pub const ZERO: Self = Left { corner: [[0.0; W]; W], log_det: 0.0 };
 
-    /// Adds the contribution of another stretch or half of a stretch.
+    /// Subtracts what an instant contributes once it is eliminated, in the rows down to the diagonal: see `mirror`.
+    fn take<const N: usize>(&mut self, done: &Eliminated<N, W>) {
+        // The corner is most of the work, and symmetric: of a row, the columns before its eight are left out.
+        for (i, sums) in self.corner.iter_mut().enumerate() {
+            let from = i / 8 * 8;
+            for row in &done.rest {
+                let by = row[i];
+                for (sum, x) in sums[from..].iter_mut().zip(&row[from..]) {
+                    *sum -= by * x;
+                }
+            }
+        }
+        self.log_det += 2.0 * (0..N).map(|i| done.factor[i][i]).product::<f64>().ln();
+    }
+
+    /// Copies the columns behind the diagonal to the rows below it.
+    fn mirror(&mut self) {
+        for i in 1..W {
+            for j in 0..i {
+                self.corner[i][j] = self.corner[j][i];
+            }
+        }
+    }
+
+    /// Adds the contribution of another part.
     pub fn add(&mut self, other: &Self) {
         add(&mut self.corner, &other.corner);
         self.log_det += other.log_det;
@@ -73,14 +97,45 @@ struct Eliminated<const N: usize, const W: usize> {
     rest: Wide<N, W>,
 }
 
+/// What is kept of an elimination.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// Only the equations of the constants.
+    Constants,
+    /// Every instant after elimination, to solve for it.
+    Instants,
+    /// The equations at every [`PART`]-th instant: the others are eliminated again when they are solved for. An
+    /// instant takes 2.6 kB with all constants, an hour of them a gigabyte.
+    Parts,
+}
+
+/// Number of instants that are eliminated again at a time.
+const PART: usize = 512;
+
+/// A side of a stretch as it was eliminated, from its end towards the middle.
+#[derive(Clone, Debug)]
+struct Side<const N: usize, const W: usize> {
+    done: Vec<Eliminated<N, W>>,
+    /// Contributions to every [`PART`]-th instant from those before it.
+    parts: Vec<Node<N, W>>,
+}
+
 /// A stretch after elimination.
 #[derive(Clone, Debug)]
 pub struct Stretch<const N: usize, const W: usize> {
-    /// Instants before the middle, in order of time.
-    head: Vec<Eliminated<N, W>>,
+    head: Side<N, W>,
     middle: Eliminated<N, W>,
-    /// Instants after the middle, in reverse order of time.
-    tail: Vec<Eliminated<N, W>>,
+    tail: Side<N, W>,
+}
+
+/// Equations of a stretch.
+pub trait Equations<const N: usize, const W: usize>: Sync {
+    /// Number of instants.
+    fn count(&self) -> usize;
+    /// Adds the equations of instant `k` to `node` and, if the constants are asked for, to their `corner`.
+    fn instant(&self, k: usize, node: &mut Node<N, W>, corner: Option<&mut Corner<W>>);
+    /// The equations that couple instant `k` to the next one; the part of the constants goes to `corner`.
+    fn link(&self, k: usize, corner: Option<&mut Corner<W>>) -> Link<N, W>;
 }
 
 /// `into += xᵀ y`.
@@ -152,7 +207,6 @@ fn one<const N: usize, const W: usize>(
     node: &Node<N, W>,
     coupling: &Block<N>,
     neighbour: &mut Node<N, W>,
-    left: &mut Left<W>,
 ) -> Option<Eliminated<N, W>> {
     let factor = cholesky(&node.own)?;
     let (mut next, mut rest) = (*coupling, node.rest);
@@ -160,8 +214,6 @@ fn one<const N: usize, const W: usize>(
     forward(&factor, &mut rest);
     subtract_gram(&mut neighbour.own, &next, &next);
     subtract_gram(&mut neighbour.rest, &next, &rest);
-    subtract_gram(&mut left.corner, &rest, &rest);
-    left.log_det += 2.0 * (0..N).map(|i| factor[i][i]).product::<f64>().ln();
     Some(Eliminated { factor, next, rest })
 }
 
@@ -169,50 +221,132 @@ fn transposed<const N: usize>(a: &Block<N>) -> Block<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
 }
 
-/// Eliminates the instants `0..count` of a stretch; `None` if a block is not positive definite.
-///
-/// `instant(k, node, corner)` adds the equations of instant `k`. `link(k, corner)` returns the equations that couple instants
-/// `k` and `k + 1`.
+/// Direction in which a side is eliminated.
+#[derive(Clone, Copy)]
+enum Towards {
+    Later,
+    Earlier,
+}
+
+impl Towards {
+    /// Eliminates instant `k`; `pending` holds the contributions to it from the one before, then those to the one
+    /// after it.
+    fn eliminate<const N: usize, const W: usize>(
+        self,
+        k: usize,
+        equations: &impl Equations<N, W>,
+        pending: &mut Node<N, W>,
+        mut left: Option<&mut Left<W>>,
+    ) -> Option<Eliminated<N, W>> {
+        let mut node = *pending;
+        equations.instant(k, &mut node, left.as_mut().map(|left| &mut left.corner));
+        let corner = left.as_mut().map(|left| &mut left.corner);
+        let coupling = match self {
+            Towards::Later => {
+                let link = equations.link(k, corner);
+                node.add(&link.first);
+                *pending = link.second;
+                link.coupling
+            }
+            Towards::Earlier => {
+                let link = equations.link(k - 1, corner);
+                node.add(&link.second);
+                *pending = link.first;
+                transposed(&link.coupling)
+            }
+        };
+        let done = one(&node, &coupling, pending)?;
+        if let Some(left) = left {
+            left.take(&done);
+        }
+        Some(done)
+    }
+
+    /// Place of the instant that is eliminated after `before` others, of `count` in all.
+    fn place(self, before: usize, count: usize) -> usize {
+        match self {
+            Towards::Later => before,
+            Towards::Earlier => count - 1 - before,
+        }
+    }
+
+    /// Eliminates the first `length` instants of a side.
+    fn side<const N: usize, const W: usize>(
+        self,
+        length: usize,
+        equations: &impl Equations<N, W>,
+        keep: Keep,
+    ) -> Option<(Side<N, W>, Node<N, W>, Left<W>)> {
+        let (mut left, mut pending) = (Left::ZERO, Node::ZERO);
+        let mut side = Side { done: Vec::new(), parts: Vec::new() };
+        match keep {
+            Keep::Constants => {}
+            Keep::Instants => side.done.reserve_exact(length),
+            Keep::Parts => side.parts.reserve_exact(length.div_ceil(PART)),
+        }
+        for before in 0..length {
+            if keep == Keep::Parts && before.is_multiple_of(PART) {
+                side.parts.push(pending);
+            }
+            let k = self.place(before, equations.count());
+            let done = self.eliminate(k, equations, &mut pending, Some(&mut left))?;
+            if keep == Keep::Instants {
+                side.done.push(done);
+            }
+        }
+        Some((side, pending, left))
+    }
+
+    /// The unknowns of a side of `length` instants, from the one nearest to the `middle` on.
+    fn solve<const N: usize, const W: usize>(
+        self,
+        side: &Side<N, W>,
+        length: usize,
+        equations: &impl Equations<N, W>,
+        by: &[f64; W],
+        middle: [f64; N],
+    ) -> Option<Vec<[f64; N]>> {
+        let (mut after, mut all) = (middle, Vec::with_capacity(length));
+        let mut take = |done: &[Eliminated<N, W>]| {
+            for eliminated in done.iter().rev() {
+                after = eliminated.solve(by, &after);
+                all.push(after);
+            }
+        };
+        take(&side.done);
+        let mut again = Vec::with_capacity(PART.min(length));
+        for (part, pending) in side.parts.iter().enumerate().rev() {
+            let mut pending = *pending;
+            again.clear();
+            for before in part * PART..length.min((part + 1) * PART) {
+                let k = self.place(before, equations.count());
+                again.push(self.eliminate(k, equations, &mut pending, None)?);
+            }
+            take(&again);
+        }
+        Some(all)
+    }
+}
+
+/// Eliminates the instants of a stretch; `None` if a block is not positive definite.
 pub fn eliminate<const N: usize, const W: usize>(
-    count: usize,
-    instant: impl Fn(usize, &mut Node<N, W>, &mut Corner<W>) + Sync,
-    link: impl Fn(usize, &mut Corner<W>) -> Link<N, W> + Sync,
+    equations: &impl Equations<N, W>,
+    keep: Keep,
 ) -> Option<(Stretch<N, W>, Left<W>)> {
+    let count = equations.count();
     let middle = count / 2;
-    let head = || {
-        let (mut left, mut pending) = (Left::ZERO, Node::ZERO);
-        let mut done = Vec::with_capacity(middle);
-        for k in 0..middle {
-            let mut node = pending;
-            instant(k, &mut node, &mut left.corner);
-            let link = link(k, &mut left.corner);
-            node.add(&link.first);
-            pending = link.second;
-            done.push(one(&node, &link.coupling, &mut pending, &mut left)?);
-        }
-        Some((done, pending, left))
-    };
-    let tail = || {
-        let (mut left, mut pending) = (Left::ZERO, Node::ZERO);
-        let mut done = Vec::with_capacity(count - middle);
-        for k in (middle + 1..count).rev() {
-            let mut node = pending;
-            instant(k, &mut node, &mut left.corner);
-            let link = link(k - 1, &mut left.corner);
-            node.add(&link.second);
-            pending = link.first;
-            done.push(one(&node, &transposed(&link.coupling), &mut pending, &mut left)?);
-        }
-        Some((done, pending, left))
-    };
+    let head = || Towards::Later.side(middle, equations, keep);
+    let tail = || Towards::Earlier.side(count - middle - 1, equations, keep);
     let (head, tail) =
         if count < WORTH_A_THREAD { (head(), tail()) } else { rayon::join(head, tail) };
     let ((head, mut node, mut left), (tail, from_tail, left_tail)) = (head?, tail?);
     left.add(&left_tail);
     node.add(&from_tail);
-    instant(middle, &mut node, &mut left.corner);
+    equations.instant(middle, &mut node, Some(&mut left.corner));
     let none = [[0.0; N]; N];
-    let middle = one(&node, &none, &mut { Node::ZERO }, &mut left)?;
+    let middle = one(&node, &none, &mut { Node::ZERO })?;
+    left.take(&middle);
+    left.mirror();
     Some((Stretch { head, middle, tail }, left))
 }
 
@@ -232,98 +366,23 @@ impl<const N: usize, const W: usize> Eliminated<N, W> {
 }
 
 impl<const N: usize, const W: usize> Stretch<N, W> {
-    /// The unknowns in order of time. `by` holds the negated constants, followed by the number 1.
-    pub fn substitute(&self, by: &[f64; W]) -> Vec<[f64; N]> {
-        let middle = self.middle.solve(by, &[0.0; N]);
-        let walk = |side: &[Eliminated<N, W>]| {
-            let mut after = middle;
-            let step = |e: &Eliminated<N, W>| {
-                after = e.solve(by, &after);
-                after
-            };
-            side.iter().rev().map(step).collect::<Vec<_>>()
-        };
-        let (head, tail) = rayon::join(|| walk(&self.head), || walk(&self.tail));
-        head.into_iter().rev().chain([middle]).chain(tail).collect()
+    /// The unknowns in order of time; `by` holds the negated constants, followed by one. `None` if the elimination
+    /// did not succeed, or if nothing was kept of it.
+    pub fn substitute(
+        &self,
+        equations: &impl Equations<N, W>,
+        by: &[f64; W],
+    ) -> Option<Vec<[f64; N]>> {
+        let (count, middle) = (equations.count(), self.middle.solve(by, &[0.0; N]));
+        let (before, after) = (count / 2, count - count / 2 - 1);
+        let (head, tail) = rayon::join(
+            || Towards::Later.solve(&self.head, before, equations, by, middle),
+            || Towards::Earlier.solve(&self.tail, after, equations, by, middle),
+        );
+        let all: Vec<_> = head?.into_iter().rev().chain([middle]).chain(tail?).collect();
+        (all.len() == count).then_some(all)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{DMatrix, DVector};
-
-    /// The band solution equals a dense solution of the same system.
-    #[test]
-    fn band_equals_dense() {
-        const N: usize = 6;
-        const C: usize = 5;
-        const COUNT: usize = 7;
-        let size = COUNT * N + C;
-        // residuals with pseudo-random coefficients; each residual depends on two adjacent instants and the constants
-        let mut seed = 1_u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 33) as f64 / (1_u64 << 31) as f64 - 0.5
-        };
-        let mut dense = DMatrix::<f64>::identity(size, size);
-        let mut right = DVector::<f64>::zeros(size);
-        let mut links = vec![
-            Link {
-                first: Node::<N, { C + 1 }>::ZERO,
-                second: Node::ZERO,
-                coupling: [[0.0; N]; N]
-            };
-            COUNT - 1
-        ];
-        let mut corner = [[0.0; C + 1]; C + 1];
-        (0..C).for_each(|i| corner[i][i] = 1.0);
-        for k in 0..COUNT - 1 {
-            for _ in 0..10 {
-                let mut draw = [[0.0; N]; 1].map(|row| row.map(|_| random()));
-                let first = draw;
-                draw = draw.map(|row| row.map(|_| random()));
-                let second = draw;
-                let rest = [[0.0; C + 1]; 1].map(|row| row.map(|_| random()));
-                let mut j = DVector::<f64>::zeros(size);
-                for i in 0..N {
-                    j[k * N + i] = first[0][i];
-                    j[k * N + N + i] = second[0][i];
-                }
-                (0..C).for_each(|i| j[COUNT * N + i] = rest[0][i]);
-                dense += &j * j.transpose();
-                right += &j * rest[0][C];
-                let link = &mut links[k];
-                add_gram(&mut link.first.own, &first, &first);
-                add_gram(&mut link.second.own, &second, &second);
-                add_gram(&mut link.coupling, &first, &second);
-                add_gram(&mut link.first.rest, &first, &rest);
-                add_gram(&mut link.second.rest, &second, &rest);
-                add_gram(&mut corner, &rest, &rest);
-            }
-        }
-        let instant = |_: usize, node: &mut Node<N, { C + 1 }>, _: &mut Corner<{ C + 1 }>| {
-            (0..N).for_each(|i| node.own[i][i] += 1.0);
-        };
-        let (stretch, mut left) = eliminate(COUNT, instant, |k, _| links[k]).unwrap();
-        add(&mut left.corner, &corner);
-        let matrix = DMatrix::from_fn(C, C, |i, j| left.corner[i][j]);
-        let factor = matrix.cholesky().unwrap();
-        let b = DVector::from_fn(C, |i, _| left.corner[i][C]);
-        let p = factor.solve(&b);
-        let by = std::array::from_fn(|i| if i < C { -p[i] } else { 1.0 });
-        let x = stretch.substitute(&by);
-        let reference = dense.clone().lu().solve(&right).unwrap();
-        for (k, node) in x.iter().enumerate() {
-            for i in 0..N {
-                assert!((node[i] - reference[k * N + i]).abs() < 1e-11);
-            }
-        }
-        assert!((p.clone() - reference.rows(COUNT * N, C)).norm() < 1e-11);
-        // minimum of the sum of squares: Σ r² less its reduction by the dense solution
-        let least = left.corner[C][C] - b.dot(&p);
-        assert!((least - (corner[C][C] - right.dot(&reference))).abs() < 1e-11);
-        let log_det = left.log_det + factor.determinant().ln();
-        assert!((log_det - dense.determinant().ln()).abs() < 1e-10);
-    }
-}
+mod tests;

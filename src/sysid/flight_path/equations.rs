@@ -1,14 +1,17 @@
 //! Normal equations of a fit: linearises all stretches at the present estimate, eliminates the paths, solves for the
 //! constants.
 
+mod along;
 mod erring;
 
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
-use crate::flight_path::band::{self, Left, Link, Node, Stretch, add_gram};
+use along::{Along, PROCESS, step_deviations};
+
+use crate::flight_path::band::{self, Keep, Left, Stretch};
 use crate::flight_path::intake::{Log, Track};
-use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST, Step, gust_kept};
+use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
 use crate::flight_path::levels::Levels;
 use crate::flight_path::measurement::{self, AT, Others, Reading};
 use crate::flight_path::nuisance::{self, COUNT, INERTIAL, Values, WIND};
@@ -63,10 +66,6 @@ pub struct Solved<const N: usize> {
     /// Measurements predicted before the change.
     pub readings: Vec<Vec<Reading>>,
 }
-
-/// Ratio between the bounds beyond which residuals of kinematic steps and of measurements are down-weighted. At a launch, an
-/// impact or an alignment of the estimator, the logged path changes by more than gyros and accelerometers measure.
-const PROCESS: f64 = 1.5;
 
 impl Problem<'_> {
     /// Solves for the path's motion and the constants, with gusts held.
@@ -150,7 +149,7 @@ impl Problem<'_> {
 
     /// −2 ln L of the noise levels with the constants held, up to terms that do not depend on the gusts' level.
     pub fn misfit(&self, found: &Found, bound: f64) -> Option<f64> {
-        let (_, _, left) = self.eliminate::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
+        let left = self.constants::<MOTION_AND_GUST, 1, 1, 1>(found, bound, None)?;
         let components = 3.0 * found.paths.iter().map(Path::len).sum::<usize>() as f64;
         let misfit = left.corner[0][0] + left.log_det;
         Some(misfit + 2.0 * components * found.levels.gusts.ln())
@@ -170,7 +169,7 @@ impl Problem<'_> {
     /// Estimate and standard deviation of each of the constants `places` without the prior of that constant. NaN if the data have
     /// no information on the constant.
     pub fn unbound(&self, found: &Found, bound: f64, places: &[usize]) -> Option<Vec<[f64; 2]>> {
-        let (_, _, left) = self.eliminate::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
+        let left = self.constants::<MOTION, WIDTH, AT, BETWEEN>(found, bound, None)?;
         let bound = self.information(&left)?;
         let pull = self.pull(found, &left);
         let of = |place: &usize| {
@@ -200,7 +199,9 @@ impl Problem<'_> {
         found: &Found,
         bound: f64,
     ) -> Option<Solved<N>> {
-        let (stretches, readings, left) = self.eliminate::<N, W, M, D>(found, bound, None)?;
+        let instants = found.paths.iter().map(Path::len).sum::<usize>();
+        let keep = if instants > HELD { Keep::Parts } else { Keep::Instants };
+        let (stretches, left) = self.eliminate::<N, W, M, D>(found, bound, None, keep)?;
         let (mut constants, mut deviations) = ([0.0; COUNT], [0.0; COUNT]);
         let mut by = [0.0; W];
         by[W - 1] = 1.0;
@@ -212,137 +213,53 @@ impl Problem<'_> {
             deviations = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
             by.iter_mut().zip(&constants).for_each(|(by, step)| *by = -step);
         }
-        let moves = stretches.par_iter().map(|s| s.substitute(&by)).collect();
+        let solved = stretches.par_iter().map(|(along, stretch)| stretch.substitute(along, &by));
+        let moves = solved.collect::<Option<_>>()?;
+        let readings = stretches.into_iter().map(|(along, _)| along.readings).collect();
         Some(Solved { moves, constants, deviations, readings })
     }
 
-    fn eliminate<const N: usize, const W: usize, const M: usize, const D: usize>(
+    /// Equations of the constants alone.
+    fn constants<const N: usize, const W: usize, const M: usize, const D: usize>(
         &self,
         found: &Found,
         bound: f64,
         others: Option<&[Vec<[Others; 3]>]>,
-    ) -> Option<(Vec<Stretch<N, W>>, Vec<Vec<Reading>>, Left<W>)> {
-        let pairs = self.log.tracks.par_iter().zip(&found.paths).enumerate();
-        let done: Vec<_> = pairs
-            .map(|(i, (track, path))| {
-                let others = others.and_then(|o| o.get(i)).map(Vec::as_slice);
-                self.stretch::<N, W, M, D>(track, path, found, bound, others)
-            })
-            .collect::<Option<_>>()?;
-        let (mut stretches, mut readings, mut left) = (Vec::new(), Vec::new(), Left::ZERO);
-        for (stretch, reading, share) in done {
-            stretches.push(stretch);
-            readings.push(reading);
-            left.add(&share);
-        }
-        Some((stretches, readings, left))
+    ) -> Option<Left<W>> {
+        Some(self.eliminate::<N, W, M, D>(found, bound, others, Keep::Constants)?.1)
     }
 
-    fn stretch<const N: usize, const W: usize, const M: usize, const D: usize>(
-        &self,
-        track: &Track,
-        path: &Path,
-        found: &Found,
+    fn eliminate<'a, const N: usize, const W: usize, const M: usize, const D: usize>(
+        &'a self,
+        found: &'a Found,
         bound: f64,
-        others: Option<&[[Others; 3]]>,
-    ) -> Option<(Stretch<N, W>, Vec<Reading>, Left<W>)> {
-        let (step, gravity) = (self.log.step, self.options.gravity);
-        let (values, l) = (&found.values, &found.levels);
-        let readings =
-            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
-        let drive = Drive::new(track, values, step, self.sampling, gravity);
-        let spread = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
-        let sd = step_deviations::<N>(l, step);
-        let instant = |k: usize, node: &mut Node<N, W>, corner: &mut band::Corner<W>| {
-            if k == 0 {
-                start::<N, W>(&path.gust[0], l.gusts, node, corner);
-            }
-            measurement::add::<N, W, M>(
-                path,
-                values,
-                k,
-                &readings[k],
-                &spread,
-                bound,
-                others.map(|o| &o[k]),
-                node,
-                corner,
-            );
+        others: Option<&'a [Vec<[Others; 3]>]>,
+        keep: Keep,
+    ) -> Option<(Vec<(Along<'a, N, M, D>, Stretch<N, W>)>, Left<W>)> {
+        let pairs = self.log.tracks.par_iter().zip(&found.paths).enumerate();
+        let one = |(i, (track, path)): (usize, (&'a Track, &'a Path))| {
+            let others = others.and_then(|o| o.get(i)).map(Vec::as_slice);
+            let along = Along::<N, M, D>::new(self, track, path, found, bound, others);
+            let (stretch, left) = band::eliminate::<N, W>(&along, keep)?;
+            // Of equations that are not solved for, nothing but the constants is needed.
+            Some((Some((along, stretch)).filter(|_| keep != Keep::Constants), left))
         };
-        let link = |k: usize, corner: &mut band::Corner<W>| {
-            let step = drive.step::<N, D>(path, values, k, step, gravity);
-            weigh(step, &sd, PROCESS * bound, corner)
-        };
-        let (stretch, left) = band::eliminate(path.len(), instant, link)?;
-        Some((stretch, readings, left))
+        let done: Vec<_> = pairs.map(one).collect::<Option<_>>()?;
+        let (mut stretches, mut left) = (Vec::new(), Left::ZERO);
+        for (stretch, share) in done {
+            stretches.extend(stretch);
+            left.add(&share);
+        }
+        Some((stretches, left))
     }
 }
+
+/// Number of instants of a flight beyond which their equations are made again rather than held.
+const HELD: usize = 100_000;
 
 /// Huber's loss of a residual in standard deviations: quadratic up to `bound`, then linear.
 fn huber(size: f64, bound: f64) -> f64 {
     if size <= bound { size * size } else { bound * (2.0 * size - bound) }
-}
-
-/// Standard deviations of the changes between samples `step` (s) apart: attitude (rad), velocity (m/s), gust (m/s).
-fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
-    let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
-    std::array::from_fn(|i| match i {
-        0..3 => levels.gyro[i] * step,
-        3..MOTION => levels.force[i - 3] * step,
-        _ => gust,
-    })
-}
-
-/// Adds the prior of a stretch's first instant: standard deviations of 10 rad, 100 m/s and the gusts' `level` (m/s).
-fn start<const N: usize, const W: usize>(
-    gust: &Vector3<f64>,
-    level: f64,
-    node: &mut Node<N, W>,
-    corner: &mut band::Corner<W>,
-) {
-    for i in 0..N {
-        let information = [0.01, 1e-4, level.powi(-2)][i / 3];
-        node.own[i][i] += information;
-        if i >= MOTION {
-            let gust = gust[i - MOTION];
-            node.rest[i][W - 1] -= gust * information;
-            corner[W - 1][W - 1] += gust * gust * information;
-        }
-    }
-}
-
-/// Normal equations of a step whose rows have the standard deviations `sd`. Residuals beyond `bound` standard deviations are
-/// down-weighted.
-fn weigh<const N: usize, const W: usize, const D: usize>(
-    mut step: Step<N, D>,
-    sd: &[f64; N],
-    bound: f64,
-    corner: &mut band::Corner<W>,
-) -> Link<N, W> {
-    for (i, sd) in sd.iter().enumerate() {
-        let size = (step.rest[i][D - 1] / sd).abs();
-        let weight = (bound / size).min(1.0).sqrt() / sd;
-        step.first[i].iter_mut().for_each(|x| *x *= weight);
-        step.second[i].iter_mut().for_each(|x| *x *= weight);
-        step.rest[i].iter_mut().for_each(|x| *x *= weight);
-    }
-    let mut link = Link { first: Node::ZERO, second: Node::ZERO, coupling: [[0.0; N]; N] };
-    add_gram(&mut link.first.own, &step.first, &step.first);
-    add_gram(&mut link.second.own, &step.second, &step.second);
-    add_gram(&mut link.coupling, &step.first, &step.second);
-    for (node, by) in [(&mut link.first, &step.first), (&mut link.second, &step.second)] {
-        let mut rest = [[0.0; D]; N];
-        add_gram(&mut rest, by, &step.rest);
-        for (row, rest) in node.rest.iter_mut().zip(&rest) {
-            row[W - D..].copy_from_slice(rest);
-        }
-    }
-    let mut own = [[0.0; D]; D];
-    add_gram(&mut own, &step.rest, &step.rest);
-    for (row, own) in corner[W - D..].iter_mut().zip(&own) {
-        row[W - D..].iter_mut().zip(own).for_each(|(x, y)| *x += y);
-    }
-    link
 }
 
 impl<const N: usize> Solved<N> {

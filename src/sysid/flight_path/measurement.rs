@@ -180,7 +180,7 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
     bound: f64,
     others: Option<&[Others; 3]>,
     node: &mut Node<N, W>,
-    corner: &mut Corner<W>,
+    corner: Option<&mut Corner<W>>,
 ) {
     if reading.residual.iter().all(|x| x.is_nan()) {
         return;
@@ -206,6 +206,7 @@ pub fn add<const N: usize, const W: usize, const M: usize>(
     for (row, coupling) in node.rest.iter_mut().zip(&coupling) {
         spill(row, coupling);
     }
+    let Some(corner) = corner else { return };
     let mut own = [[0.0; M]; M];
     add_gram(&mut own, &rests, &rests);
     for (i, own) in own.iter().enumerate() {

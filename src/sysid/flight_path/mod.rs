@@ -28,6 +28,8 @@ mod smoother;
 
 pub use manoeuvres::{Manoeuvre, ManoeuvreKind, manoeuvres};
 
+use std::borrow::Borrow;
+
 use equations::Problem;
 use sampling::Chosen;
 
@@ -167,15 +169,20 @@ pub enum ReconstructError {
     },
 }
 
-/// Reconstructs `flight`: resamples each segment to uniform time steps, then estimates and removes sensor errors and wind.
+/// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors and wind.
+/// A flight that is given away, not lent, is dropped as soon as it is resampled: a long one is large.
 ///
 /// # Errors
-/// A required channel is missing, the log contains no flight, no stretch of the flight is long enough, or no path fits the
-/// sensors.
-pub fn reconstruct(flight: &Flight, options: &Options) -> Result<Reconstruction, ReconstructError> {
-    let log = intake::take_in(flight, options)?;
+/// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors
+/// contradict one another.
+pub fn reconstruct(
+    flight: impl Borrow<Flight>,
+    options: &Options,
+) -> Result<Reconstruction, ReconstructError> {
+    let log = intake::take_in(flight.borrow(), options)?;
+    let declared = options.sampling.or_else(|| flight.borrow().declared_sampling());
+    drop(flight);
     let (means, widths) = (nuisance::prior_means(&log), nuisance::prior_widths(&log));
-    let declared = options.sampling.or_else(|| flight.declared_sampling());
     let problem = Problem { log: &log, options, sampling: Sampling::Instants, means, widths };
     let Chosen { sampling, found, note } = sampling::choose(&problem, declared)?;
     let widths = found.widths;

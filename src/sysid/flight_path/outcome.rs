@@ -65,11 +65,10 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
                 .into(),
         });
     }
-    let erring = draws(problem, found)?;
-    let left = left(&segments, &erring, &found.levels.gyro);
+    let (left, erring) = draws(problem, found, &segments)?;
     nuisances.extend(unmeasured_angles(problem, found, &segments, &left));
-    let gusts = found.levels.gusts;
-    let skew = actuator_skew::estimate(&segments, &erring, log.step, problem.sampling, gusts);
+    let own = actuator_skew::by_axis(&segments, log.step, problem.sampling);
+    let skew = actuator_skew::estimate(own, &erring, log.step, found.levels.gusts);
     let late = late_beyond_doubt(&skew, log.step);
     if late && options.actuators_clock == ActuatorClock::AsRecorded {
         notes.push(format!(
@@ -108,23 +107,22 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     })
 }
 
-/// Copies of the flight, each with a random additional error of the same distribution as the error of the path.
-fn draws(problem: &Problem, found: &Found) -> Result<Vec<Vec<Segment>>, ReconstructError> {
+/// What copies of the flight show, each with an additional error like those of the path: the root mean square of
+/// their errors in each state, the gyros' noise for the rates, and the delays of the actuators in each copy.
+fn draws(
+    problem: &Problem,
+    found: &Found,
+    segments: &[Segment],
+) -> Result<([f64; 8], Vec<[Option<Skew>; 2]>), ReconstructError> {
+    let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut random = stream(0, &[]);
-    let draw = |_| {
-        let erring = problem.erring(found, &mut random)?;
-        Some(path_as_segments(problem, found, &erring.paths, Some(&erring.gyro)))
-    };
-    let all: Option<Vec<_>> = (0..DRAWS).map(draw).collect();
-    all.ok_or_else(|| no_path(&problem.options.name, "the equations became singular"))
-}
-
-/// Root mean square of the drawn errors of each state, in the unit of the state. For the body rates, the noise `gyro`
-/// (rad/s).
-fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64; 8] {
-    let (mut squares, mut count) = ([0.0; 8], 0.0_f64);
-    for draw in erring {
-        let pairs = segments.iter().zip(draw);
+    let (mut squares, mut count, mut delays) = ([0.0; 8], 0.0_f64, Vec::new());
+    for _ in 0..DRAWS {
+        // A copy is as large as the flight: there is one at a time.
+        let erring = problem.erring(found, &mut random).ok_or_else(singular)?;
+        let copy = path_as_segments(problem, found, &erring.paths, Some(&erring.gyro));
+        drop(erring);
+        let pairs = segments.iter().zip(&copy);
         for (a, b) in pairs.flat_map(|(a, b)| a.instants.iter().zip(&b.instants)) {
             let (a, b) = (a.state.to_array(), b.state.to_array());
             for (i, sum) in squares.iter_mut().enumerate() {
@@ -133,10 +131,11 @@ fn left(segments: &[Segment], erring: &[Vec<Segment>], gyro: &[f64; 3]) -> [f64;
             }
             count += 1.0;
         }
+        delays.push(actuator_skew::by_axis(&copy, problem.log.step, problem.sampling));
     }
     let mut left = squares.map(|sum| (sum / count).sqrt());
-    left[3..6].copy_from_slice(gyro);
-    left
+    left[3..6].copy_from_slice(&found.levels.gyro);
+    Ok((left, delays))
 }
 
 /// Segments with the states of `paths`. The noise `gyro` (rad/s), if given, is added to the body rates.

@@ -3,14 +3,15 @@
 use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{BETWEEN, Found, Problem, WIDTH, start, step_deviations, weigh};
-use crate::flight_path::band::{self, Node};
+use super::along::{Along, weigh};
+use super::{BETWEEN, Found, HELD, Problem, WIDTH};
+use crate::flight_path::band::{self, Corner, Keep, Link, Node};
 use crate::flight_path::intake::Track;
-use crate::flight_path::kinematics::{Drive, MOTION, MOTION_AND_GUST};
+use crate::flight_path::kinematics::{MOTION, MOTION_AND_GUST};
 use crate::flight_path::levels::CALM;
-use crate::flight_path::measurement::{self, AT, OTHERS, Others, Reading};
+use crate::flight_path::measurement::{AT, OTHERS, Others};
 use crate::flight_path::nuisance::{self, COUNT, Values};
-use crate::flight_path::path::{CHANNELS, Path};
+use crate::flight_path::path::Path;
 use greylag_logs::Sampling;
 use greylag_num::stream::Stream;
 
@@ -34,8 +35,7 @@ impl Problem<'_> {
     ) -> Option<[Values; OTHERS]> {
         const W: usize = WIDTH + OTHERS;
         const M: usize = AT + OTHERS;
-        let eliminated = self.eliminate::<MOTION, W, M, BETWEEN>(found, bound, Some(others));
-        let (_, _, left) = eliminated?;
+        let left = self.constants::<MOTION, W, M, BETWEEN>(found, bound, Some(others))?;
         let factor = self.information(&left)?.cholesky()?;
         Some(std::array::from_fn(|r| {
             let seen = |i: usize| !nuisance::unseeable(i, &self.log.has);
@@ -69,54 +69,52 @@ impl Problem<'_> {
         found: &Found,
         random: &mut Stream,
     ) -> Option<Vec<[f64; 3]>> {
-        let (step, gravity) = (self.log.step, self.options.gravity);
-        let (values, l) = (&found.values, &found.levels);
+        let l = &found.levels;
         let mut unit = || -> f64 { StandardNormal.sample(random) };
         let noise: Vec<[f64; N]> =
             (0..path.len()).map(|_| std::array::from_fn(|_| unit())).collect();
-        let measured =
-            measurement::readings(track, path, values, step, self.log.sensors.vanes_at());
+        let mut along = Along::<N, 1, 1>::new(self, track, path, found, f64::INFINITY, None);
+        along.first = Vector3::zeros();
         // as in the fit: coloured noise counts as white noise with a larger standard deviation
-        let spread: [f64; CHANNELS] = std::array::from_fn(|i| l.measured[i] * l.colour[i]);
-        let readings: Vec<Reading> = measured
-            .into_iter()
-            .map(|r| r.with(std::array::from_fn(|i| spread[i] * unit())))
-            .collect();
-        let drive = Drive::new(track, values, step, self.sampling, gravity);
-        let sd = step_deviations::<N>(l, step);
-        let along: &Path = path;
-        let instant = |k: usize, node: &mut Node<N, 1>, corner: &mut band::Corner<1>| {
-            if k == 0 {
-                start::<N, 1>(&Vector3::zeros(), l.gusts, node, corner);
-            }
-            let reading = &readings[k];
-            measurement::add::<N, 1, 1>(
-                along,
-                values,
-                k,
-                reading,
-                &spread,
-                f64::INFINITY,
-                None,
-                node,
-                corner,
-            );
-        };
-        let link = |k: usize, corner: &mut band::Corner<1>| {
-            let mut step = drive.step::<N, 1>(along, values, k, step, gravity);
-            for i in 0..N {
-                let unit = match (i, self.sampling) {
-                    (0..3, Sampling::Instants) => 0.5 * (noise[k][i] + noise[k + 1][i]),
-                    _ => noise[k][i],
-                };
-                step.rest[i][0] = sd[i] * unit;
-            }
-            weigh(step, &sd, f64::INFINITY, corner)
-        };
-        let (stretch, _) = band::eliminate(along.len(), instant, link)?;
-        for (k, x) in stretch.substitute(&[1.0]).iter().enumerate() {
-            path.shift(k, x);
+        let spread = along.spread;
+        for reading in &mut along.readings {
+            *reading = reading.with(std::array::from_fn(|i| spread[i] * unit()));
         }
+        let drawn = Drawn { along, noise, sampling: self.sampling };
+        let keep = if path.len() > HELD { Keep::Parts } else { Keep::Instants };
+        let moves = band::eliminate(&drawn, keep)?.0.substitute(&drawn, &[1.0])?;
+        let noise = drawn.noise;
+        moves.iter().enumerate().for_each(|(k, x)| path.shift(k, x));
         Some(noise.iter().map(|unit| std::array::from_fn(|i| l.gyro[i] * unit[i])).collect())
+    }
+}
+
+/// Equations of a path's error in one draw of the noise of every sensor.
+struct Drawn<'a, const N: usize> {
+    along: Along<'a, N, 1, 1>,
+    /// Standard normal numbers of the steps.
+    noise: Vec<[f64; N]>,
+    sampling: Sampling,
+}
+
+impl<const N: usize> band::Equations<N, 1> for Drawn<'_, N> {
+    fn count(&self) -> usize {
+        band::Equations::<N, 1>::count(&self.along)
+    }
+
+    fn instant(&self, k: usize, node: &mut Node<N, 1>, corner: Option<&mut Corner<1>>) {
+        self.along.instant(k, node, corner);
+    }
+
+    fn link(&self, k: usize, corner: Option<&mut Corner<1>>) -> Link<N, 1> {
+        let (mut step, sd, noise) = (self.along.step(k), &self.along.sd, &self.noise);
+        for i in 0..N {
+            let unit = match (i, self.sampling) {
+                (0..3, Sampling::Instants) => 0.5 * (noise[k][i] + noise[k + 1][i]),
+                _ => noise[k][i],
+            };
+            step.rest[i][0] = sd[i] * unit;
+        }
+        weigh(step, sd, f64::INFINITY, corner)
     }
 }

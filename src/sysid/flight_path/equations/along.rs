@@ -1,0 +1,165 @@
+//! Equations of a stretch along the present path: its measurements and its kinematic steps.
+
+use nalgebra::Vector3;
+
+use super::{Found, Problem};
+use crate::flight_path::band::{self, Link, Node, add_gram};
+use crate::flight_path::intake::Track;
+use crate::flight_path::kinematics::{Drive, MOTION, Step, gust_kept};
+use crate::flight_path::levels::Levels;
+use crate::flight_path::measurement::{self, Others, Reading};
+use crate::flight_path::nuisance::Values;
+use crate::flight_path::path::{CHANNELS, Path};
+
+/// Ratio of the bound beyond which a kinematic step is down-weighted to that of the measurements. With a launcher, an impact
+/// or an estimator that aligns itself, the logged path moves by more than gyros and accelerometers measure.
+pub const PROCESS: f64 = 1.5;
+
+/// Equations of a stretch along the present path, with `N` unknowns for each instant, `M` columns of constants that act
+/// at instants, and `D` of those that act between them.
+pub struct Along<'a, const N: usize, const M: usize, const D: usize> {
+    problem: &'a Problem<'a>,
+    path: &'a Path,
+    values: &'a Values,
+    /// Measurements less their predictions.
+    pub readings: Vec<Reading>,
+    drive: Drive,
+    /// First gust of the path, and the level of the gusts, m/s.
+    pub first: Vector3<f64>,
+    gusts: f64,
+    /// Standard deviations of the channels and of the steps.
+    pub spread: [f64; CHANNELS],
+    pub sd: [f64; N],
+    bound: f64,
+    others: Option<&'a [[Others; 3]]>,
+}
+
+impl<'a, const N: usize, const M: usize, const D: usize> Along<'a, N, M, D> {
+    /// Equations of `track` along `path`, with the constants and levels of `found`.
+    pub fn new(
+        problem: &'a Problem<'a>,
+        track: &Track,
+        path: &'a Path,
+        found: &'a Found,
+        bound: f64,
+        others: Option<&'a [[Others; 3]]>,
+    ) -> Self {
+        let (step, gravity) = (problem.log.step, problem.options.gravity);
+        let (values, l) = (&found.values, &found.levels);
+        let vanes_at = problem.log.sensors.vanes_at();
+        Along {
+            readings: measurement::readings(track, path, values, step, vanes_at),
+            drive: Drive::new(track, values, step, problem.sampling, gravity),
+            first: path.gust[0],
+            gusts: l.gusts,
+            spread: std::array::from_fn(|i| l.measured[i] * l.colour[i]),
+            sd: step_deviations::<N>(l, step),
+            problem,
+            path,
+            values,
+            bound,
+            others,
+        }
+    }
+
+    /// The step from sample `k` to the next one.
+    pub fn step(&self, k: usize) -> Step<N, D> {
+        let (step, gravity) = (self.problem.log.step, self.problem.options.gravity);
+        self.drive.step::<N, D>(self.path, self.values, k, step, gravity)
+    }
+}
+
+impl<const N: usize, const W: usize, const M: usize, const D: usize> band::Equations<N, W>
+    for Along<'_, N, M, D>
+{
+    fn count(&self) -> usize {
+        self.path.len()
+    }
+
+    fn instant(&self, k: usize, node: &mut Node<N, W>, mut corner: Option<&mut band::Corner<W>>) {
+        if k == 0 {
+            start::<N, W>(&self.first, self.gusts, node, corner.as_deref_mut());
+        }
+        measurement::add::<N, W, M>(
+            self.path,
+            self.values,
+            k,
+            &self.readings[k],
+            &self.spread,
+            self.bound,
+            self.others.map(|o| &o[k]),
+            node,
+            corner,
+        );
+    }
+
+    fn link(&self, k: usize, corner: Option<&mut band::Corner<W>>) -> Link<N, W> {
+        weigh(self.step(k), &self.sd, PROCESS * self.bound, corner)
+    }
+}
+
+/// Standard deviations of the differences between samples `step` (s) apart.
+pub fn step_deviations<const N: usize>(levels: &Levels, step: f64) -> [f64; N] {
+    let gust = levels.gusts * (1.0 - gust_kept(step).powi(2)).sqrt();
+    std::array::from_fn(|i| match i {
+        0..3 => levels.gyro[i] * step,
+        3..MOTION => levels.force[i - 3] * step,
+        _ => gust,
+    })
+}
+
+/// Prior of an initial instant: standard deviations of 10 rad and 100 m/s, which hardly constrain the motion, and the level
+/// of the gusts.
+fn start<const N: usize, const W: usize>(
+    gust: &Vector3<f64>,
+    level: f64,
+    node: &mut Node<N, W>,
+    mut corner: Option<&mut band::Corner<W>>,
+) {
+    for i in 0..N {
+        let information = [0.01, 1e-4, level.powi(-2)][i / 3];
+        node.own[i][i] += information;
+        if i >= MOTION {
+            let gust = gust[i - MOTION];
+            node.rest[i][W - 1] -= gust * information;
+            if let Some(corner) = &mut corner {
+                corner[W - 1][W - 1] += gust * gust * information;
+            }
+        }
+    }
+}
+
+/// Equations of a step whose rows have the standard deviations `sd`; a residual beyond `bound` of them is
+/// down-weighted.
+pub fn weigh<const N: usize, const W: usize, const D: usize>(
+    mut step: Step<N, D>,
+    sd: &[f64; N],
+    bound: f64,
+    corner: Option<&mut band::Corner<W>>,
+) -> Link<N, W> {
+    for (i, sd) in sd.iter().enumerate() {
+        let size = (step.rest[i][D - 1] / sd).abs();
+        let weight = (bound / size).min(1.0).sqrt() / sd;
+        step.first[i].iter_mut().for_each(|x| *x *= weight);
+        step.second[i].iter_mut().for_each(|x| *x *= weight);
+        step.rest[i].iter_mut().for_each(|x| *x *= weight);
+    }
+    let mut link = Link { first: Node::ZERO, second: Node::ZERO, coupling: [[0.0; N]; N] };
+    add_gram(&mut link.first.own, &step.first, &step.first);
+    add_gram(&mut link.second.own, &step.second, &step.second);
+    add_gram(&mut link.coupling, &step.first, &step.second);
+    for (node, by) in [(&mut link.first, &step.first), (&mut link.second, &step.second)] {
+        let mut rest = [[0.0; D]; N];
+        add_gram(&mut rest, by, &step.rest);
+        for (row, rest) in node.rest.iter_mut().zip(&rest) {
+            row[W - D..].copy_from_slice(rest);
+        }
+    }
+    let Some(corner) = corner else { return link };
+    let mut own = [[0.0; D]; D];
+    add_gram(&mut own, &step.rest, &step.rest);
+    for (row, own) in corner[W - D..].iter_mut().zip(&own) {
+        row[W - D..].iter_mut().zip(own).for_each(|(x, y)| *x += y);
+    }
+    link
+}
