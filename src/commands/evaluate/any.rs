@@ -108,22 +108,7 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         beside.par_iter().map(|model| of_model(kinds, model, seed)).collect();
     let others: Vec<Flight> = others.into_iter().flatten().collect();
     if !files::is_stdout(arguments.json.as_deref()) {
-        println!("{}", summary(kinds, &drawn));
-        println!(
-            "lost: beyond recovery within 60 s of 12 random attitudes; settled and integral: of those kept, the integral relative to that of"
-        );
-        println!(
-            "the first controller designed from the aircraft's own model, aircraft by aircraft; medians, then the 90th percentile"
-        );
-        if !changed.is_empty() {
-            println!("{}", after_changes(kinds, &drawn, &changed));
-            println!(
-                "kept: after a change at 30 s, of the aircraft that the controller keeps without it; settled: over the whole minute"
-            );
-        }
-        if !others.is_empty() {
-            println!("{}", one_by_one(&others));
-        }
+        print(kinds, &drawn, &changed, &others);
     }
     let flights: Vec<Flight> = drawn.into_iter().chain(changed).chain(others).collect();
     if let Some(path) = &arguments.json {
@@ -139,6 +124,26 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         files::write(path, &text, arguments.force.into())?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Prints the tables of the drawn aircraft, of those after a change, and of the aircraft of given models.
+fn print(kinds: &[ControllerKind], drawn: &[Flight], changed: &[Flight], others: &[Flight]) {
+    println!("{}", summary(kinds, drawn));
+    println!(
+        "lost: beyond recovery within 60 s of 12 random attitudes; settled and integral: of those kept, the integral relative to that of"
+    );
+    println!(
+        "the first controller designed from the aircraft's own model, aircraft by aircraft; medians, then the 90th percentile"
+    );
+    if !changed.is_empty() {
+        println!("{}", after_changes(kinds, drawn, changed));
+        println!(
+            "kept: after a change at 30 s, of the aircraft that the controller keeps without it; settled: over the whole minute"
+        );
+    }
+    if !others.is_empty() {
+        println!("{}", one_by_one(others));
+    }
 }
 
 /// Information from which a controller of this kind may be designed.

@@ -1,3 +1,5 @@
+//! Elimination and solution of given equations, against dense matrices.
+
 use super::*;
 use nalgebra::{DMatrix, DVector};
 
