@@ -3,7 +3,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use super::columns::{BLOCK, COLUMNS, EITHER, Get, Place};
+use super::columns::{BLOCK, COLUMNS, EITHER};
 use super::csv::{self, CsvError, Raw};
 use super::error::LogError;
 use super::finding::Finding;
@@ -152,9 +152,9 @@ fn lacks(path: &Path, missing: &[CsvError], unknown: &[String]) -> Finding {
 
 /// The columns of a CSV that hold anything.
 fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
-    let mut seen = vec![(Vec::new(), Vec::new()); COLUMNS.len()];
+    let mut seen = vec![[Vec::new(), Vec::new()]; COLUMNS.len()];
     for block in raw.rows.chunks(BLOCK) {
-        for ((times, values), (_, get, _)) in seen.iter_mut().zip(COLUMNS).skip(1) {
+        for ([times, values], (_, get, _)) in seen.iter_mut().zip(COLUMNS).skip(1) {
             let there = block.iter().map(|s| (s.time_s, get(s))).filter(|(_, x)| x.is_finite());
             for (time, value) in there {
                 times.push(time);
@@ -162,7 +162,7 @@ fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
             }
         }
     }
-    let channel = |((times, values), (name, ..)): ((Vec<f64>, Vec<f64>), (&str, Get, Place))| {
+    let channel = |name: &str, [times, values]: [Vec<f64>; 2]| {
         let period = period_s(&times);
         let mut quality = Quality::at(name, &times, &values, period);
         if let Some(frozen) = raw.frozen(name, &times, &values) {
@@ -177,5 +177,6 @@ fn channels(raw: &Raw, mapping: &Mapping) -> Vec<Channel> {
             quality,
         })
     };
-    seen.into_iter().zip(COLUMNS).skip(1).filter_map(channel).collect()
+    let all = seen.into_iter().zip(COLUMNS).skip(1);
+    all.filter_map(|(seen, (name, ..))| channel(name, seen)).collect()
 }

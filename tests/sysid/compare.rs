@@ -359,7 +359,7 @@ fn reconstructed(noise: Noise) -> Vec<Reconstruction> {
             gravity: aircraft.atmosphere.gravity,
             ..flight_path::Options::new(format!("{seed}.csv"), aircraft.airframe.actuators)
         };
-        reconstruct(&fly(seed, 60.0, noise), &options).unwrap()
+        reconstruct(fly(seed, 60.0, noise), &options).unwrap()
     };
     (1..=3).map(one_flight).collect()
 }

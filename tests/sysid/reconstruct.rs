@@ -196,7 +196,7 @@ fn actuators_that_come_late_are_put_right() {
     let flown = fly(60.0, air([0.0; 3], None), 3);
     let mut errors = Errors { noise: Errors::NOISE, ..Errors::NONE };
     errors.skew[6] = 0.007;
-    let found = reconstruct(&spoil(&flown, &errors, 3), &options()).unwrap();
+    let found = reconstruct(spoil(&flown, &errors, 3), &options()).unwrap();
     let skew = found.nuisances.iter().find(|n| n.name == "skew_actuators").unwrap();
     println!("{skew:?}");
     assert!((skew.value - 0.007).abs() < 3.0 * skew.sd && skew.sd < 0.002);
@@ -259,7 +259,7 @@ fn gaps_split_and_short_stretches_are_named() {
 #[test]
 fn manoeuvres_are_told_apart() {
     let flown = fly(20.0, air([0.0; 3], None), 5);
-    let mut found = reconstruct(&spoil(&flown, &Errors::NONE, 5), &options()).unwrap();
+    let mut found = reconstruct(spoil(&flown, &Errors::NONE, 5), &options()).unwrap();
     // straight flight with an elevator doublet of the test's own
     for (k, i) in found.segments[0].instants.iter_mut().enumerate() {
         (i.state.roll, i.state.p, i.state.q, i.state.r) = (0.0, 0.0, 0.0, 0.0);
@@ -385,7 +385,7 @@ fn scores(campaign: &Campaign, seed: u64) -> Vec<Vec<(&'static str, f64, f64)>> 
     let errors = Errors { noise: campaign.noise, ..errors };
     let flown = fly(campaign.seconds, air(wind, campaign.severity), seed);
     let draw = |draw: u64| {
-        let found = reconstruct(&spoil(&flown, &errors, seed + 1_000_000 * draw), &options());
+        let found = reconstruct(spoil(&flown, &errors, seed + 1_000_000 * draw), &options());
         let found = found.unwrap();
         let score = |(name, value): &(&'static str, f64)| {
             let n = found.nuisances.iter().find(|n| n.name == *name).unwrap();
@@ -477,7 +477,7 @@ fn planted_errors_beside_a_clean_velocity_over_ground() {
 fn what_noise_is_left_is_stated() {
     let flown = fly(30.0, air([0.0; 3], None), 7);
     let errors = Errors { noise: Errors::NOISE, ..Errors::NONE };
-    let found = reconstruct(&spoil(&flown, &errors, 7), &options()).unwrap();
+    let found = reconstruct(spoil(&flown, &errors, 7), &options()).unwrap();
     let of = |name: &str| found.nuisances.iter().find(|n| n.name == name).unwrap().sd;
     let rms = state_errors(&flown, &found).map(|e| e[1]);
     println!("{:?}\n{rms:?}", found.left);

@@ -42,8 +42,11 @@ pub struct Skew {
     pub deviation: f64,
 }
 
-/// The delays of the recorded deflections by roll and by pitch alone; `None` where one is not seen.
-pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> [Option<Skew>; 2] {
+/// Delays by roll and by pitch alone; `None` where the axis does not show one.
+pub type ByAxis = [Option<Skew>; 2];
+
+/// The delays of the recorded deflections by roll and by pitch alone.
+pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> ByAxis {
     [
         from_axis(segments, step, sampling, |i| i.state.p, roll_terms),
         from_axis(segments, step, sampling, |i| i.state.q, pitch_terms),
@@ -56,12 +59,7 @@ pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> [Option<S
 /// Errors in the regressors bias the coefficients. `erring` holds the delays in copies of the flight with an additional
 /// error like its own: the additional bias in them is subtracted (simulation extrapolation, Cook and Stefanski 1994,
 /// linear).
-pub fn estimate(
-    own: [Option<Skew>; 2],
-    erring: &[[Option<Skew>; 2]],
-    step: f64,
-    gusts: f64,
-) -> Skew {
+pub fn estimate(own: ByAxis, erring: &[ByAxis], step: f64, gusts: f64) -> Skew {
     let prior = (SKEW_SAMPLES * step).powi(-2);
     let (mut information, mut weighted) = (prior, 0.0);
     for (axis, skew) in own.into_iter().enumerate() {

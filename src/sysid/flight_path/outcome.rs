@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::flight_path::actuator_skew::{self, Skew};
+use crate::flight_path::actuator_skew::{self, ByAxis, Skew};
 use crate::flight_path::channel::wrap;
 use crate::flight_path::equations::{Found, Problem, no_path};
 use crate::flight_path::intake::{Log, Track};
@@ -113,7 +113,7 @@ fn draws(
     problem: &Problem,
     found: &Found,
     segments: &[Segment],
-) -> Result<([f64; 8], Vec<[Option<Skew>; 2]>), ReconstructError> {
+) -> Result<([f64; 8], Vec<ByAxis>), ReconstructError> {
     let singular = || no_path(&problem.options.name, "the equations became singular");
     let mut random = stream(0, &[]);
     let (mut squares, mut count, mut delays) = ([0.0; 8], 0.0_f64, Vec::new());
