@@ -236,16 +236,13 @@ fn purposes(log: &Log) -> Vec<Purpose> {
     if by_path {
         forces.clear();
     }
-    let path: Vec<String> = by_path
-        .then(|| "specific force of the reconstructed path".to_owned())
-        .into_iter()
-        .collect();
+    let named = |by: bool, text: &str| Vec::from_iter(by.then(|| text.to_owned()));
+    let path = named(by_path, "specific force of the reconstructed path");
     let density = density(has);
-    let rebuilt = if incidence.is_empty() || !velocity.is_empty() {
-        Vec::new()
-    } else {
-        vec!["alpha and beta from wind-corrected velocity, at a loss of power".to_owned()]
-    };
+    let rebuilt = named(
+        !incidence.is_empty() && velocity.is_empty(),
+        "alpha and beta from wind-corrected velocity, at a loss of power",
+    );
     let no_incidence = if incidence.is_empty() {
         Vec::new()
     } else if velocity.is_empty() {
