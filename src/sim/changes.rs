@@ -39,7 +39,8 @@ impl Change {
         }
     }
 
-    /// The aircraft of `model` after the change. A stuck surface changes the commands, not the model.
+    /// The aircraft of `model`, whose aerodynamics are linear, after the change. A stuck surface changes the commands, not
+    /// the model.
     pub fn of(self, model: &GreyBox) -> GreyBox {
         let mut changed = model.clone();
         match self {
@@ -115,7 +116,7 @@ mod tests {
     use std::path::Path;
 
     fn x8() -> GreyBox {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
         GreyBox::load(&path).unwrap()
     }
 
