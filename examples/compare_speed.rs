@@ -1,4 +1,5 @@
 //! How long comparison or diagnosis of a ten-minute log takes, with the memory: `cargo run --release --example compare_speed`.
+//! `-- write FILE MINUTES` writes the log of such a flight only.
 
 #[path = "../tests/support/compare.rs"]
 mod compare_support;
@@ -16,6 +17,15 @@ use greylag::sysid::flight_path::{self, ActuatorClock, reconstruct};
 use greylag::sysid::progress::Stage;
 
 fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if let [command, path, minutes] = &words[..]
+        && command == "write"
+    {
+        let minutes: f64 = minutes.parse().expect("minutes");
+        let file = std::fs::File::create(path).expect("a file that can be written");
+        let flight = fly(1, 60.0 * minutes, REALISTIC);
+        return csv::write(&flight, std::io::BufWriter::new(file)).expect("space on the disk");
+    }
     let mut text = Vec::new();
     csv::write(&fly(1, 600.0, REALISTIC), &mut text).expect("memory");
     println!("ten minutes at 100 Hz; {} MB resident before", status_mb("VmRSS:"));

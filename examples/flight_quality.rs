@@ -35,6 +35,7 @@ use greylag::control::policy::Agent;
 use greylag::control::quality::{Limits, Moment, Quality, Track, attitude_error_deg};
 use greylag::control::{Controller, ControllerKind, Observation, Source, Target, build};
 use greylag::model::GreyBox;
+use greylag::num::statistics;
 use greylag::num::stream::stream;
 use greylag::physics::{ActuatorState, Airframe, Command, State, Time};
 use greylag::sim::episode::settled_error_deg;
@@ -489,9 +490,7 @@ fn merge(all: &mut Vec<Flown>, more: Vec<Flown>) {
 
 /// Mean integral of the error, ° s.
 fn mean<'a>(flights: impl Iterator<Item = &'a Measured>) -> f64 {
-    let (sum, count) = flights
-        .fold((0.0, 0.0), |(sum, count), m| (sum + m.quality.error_integral_deg_s, count + 1.0));
-    sum / count
+    statistics::mean(&flights.map(|m| m.quality.error_integral_deg_s).collect::<Vec<_>>())
 }
 
 /// The controller of a word: `NAME`, or `hybrid-ilqr:KEY=VALUE,…` with other settings; `+free` leaves the envelope limiter out.
@@ -520,6 +519,7 @@ fn settings(changes: &str) -> Result<Settings> {
         let number = || value.parse::<f64>().with_context(|| format!("{value} is no number"));
         match (key, s.envelope.as_mut()) {
             ("far", _) => s.far = if value == "none" { None } else { Some(number()?) },
+            ("missed", _) => s.missed = if value == "none" { None } else { Some(number()?) },
             ("attitude", _) => s.attitude = number()?,
             ("rate", _) => s.rate = number()?,
             ("sideslip", _) => s.sideslip = number()?,

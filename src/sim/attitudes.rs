@@ -3,7 +3,7 @@
 use rand::RngExt;
 use serde::Serialize;
 
-use crate::changes::{CHANGE_S, Change, Elevons};
+use crate::changes::{CHANGE_S, Changed};
 use crate::environment::{Environment, Imagined};
 use crate::episode::{attitude_error_deg, settled_error_deg};
 use greylag_control::{Controller, Observation, Target};
@@ -56,12 +56,12 @@ pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] 
 }
 
 /// Flies `controller` for a minute in `model`, towards the [`attitudes`] of flight `number` of `seed`. The aircraft
-/// changes by `change` after [`CHANGE_S`].
+/// becomes `changed` after [`CHANGE_S`].
 pub fn fly(
     model: &GreyBox,
     controller: &mut dyn Controller,
     [seed, number]: [u64; 2],
-    change: Option<(Change, Elevons)>,
+    changed: Option<&Changed>,
 ) -> Minute {
     let mut world = Imagined::cruising(model.clone());
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
@@ -78,12 +78,12 @@ pub fn fly(
             let tick = leg * LEG + step;
             let now = tick as f64 * STEP;
             let mut command = controller.command(&seen, target);
-            if let Some((change, elevons)) = change.filter(|_| tick >= changes_at) {
+            if let Some(changed) = changed.filter(|_| tick >= changes_at) {
                 if at_change.is_none() {
-                    world.change(change.of(model));
+                    world.change(changed.model().clone());
                 }
                 let before = *at_change.get_or_insert(seen.previous[0]);
-                command = change.command(command, before, elevons);
+                command = changed.command(command, before);
             }
             match world.step(command) {
                 Ok(next) if is_flown(&next, cruise) => seen = next,

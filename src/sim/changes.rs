@@ -1,6 +1,6 @@
 //! Sudden changes of the aircraft in flight.
 
-use greylag_model::GreyBox;
+use greylag_model::{GreyBox, JoinError};
 use greylag_physics::Command;
 use greylag_physics::rigid_body::RigidBody;
 
@@ -38,12 +38,24 @@ impl Change {
             Change::StuckSurface => "one surface stuck",
         }
     }
+}
 
-    /// The aircraft of `model`, whose aerodynamics are linear, after the change. A stuck surface changes the commands, not
-    /// the model.
-    pub fn of(self, model: &GreyBox) -> GreyBox {
+/// An aircraft that changes in flight.
+#[derive(Clone, Debug)]
+pub struct Changed {
+    change: Change,
+    model: GreyBox,
+    elevons: Elevons,
+}
+
+impl Changed {
+    /// The aircraft of `model` after `change`. A stuck surface changes the commands, not the model.
+    ///
+    /// # Errors
+    /// If the model already has an effect that moves its centre of gravity.
+    pub fn new(change: Change, model: &GreyBox, elevons: Elevons) -> Result<Changed, JoinError> {
         let mut changed = model.clone();
-        match self {
+        match change {
             Change::HalfAileron => {
                 for name in ["roll_linear.Clda", "yaw_linear.Cnda", "side_force_linear.CYda"] {
                     let half = value(model, name) / 2.0;
@@ -55,21 +67,33 @@ impl Change {
                 let [mass, jx, jy, jz, jxz] = [mass, jx, jy, jz, jxz].map(|x| MASS * x);
                 changed.set_body(RigidBody { mass, jx, jy, jz, jxz });
             }
-            Change::CentreOfGravity => moved_aft(model, &mut changed),
+            Change::CentreOfGravity => {
+                changed.join("cg_shift", &[AFT * model.airframe.geometry.chord])?;
+            }
             Change::StuckSurface => {}
         }
-        changed
+        Ok(Changed { change, model: changed, elevons })
+    }
+
+    /// What changes.
+    pub fn change(&self) -> Change {
+        self.change
+    }
+
+    /// The model after the change.
+    pub fn model(&self) -> &GreyBox {
+        &self.model
     }
 
     /// The command that the surfaces follow when `stuck` (aileron and elevator, fractions of full deflection) was the
     /// command at the change.
-    pub fn command(self, command: Command, stuck: Command, elevons: Elevons) -> Command {
-        if self != Change::StuckSurface {
+    pub fn command(&self, command: Command, stuck: Command) -> Command {
+        if self.change != Change::StuckSurface {
             return command;
         }
-        // the left surface by the mixer, right = elevator + aileron and left = elevator − aileron
-        match elevons {
+        match self.elevons {
             Elevons::Yes => {
+                // the left elevon by the mixer: right = elevator + aileron, left = elevator − aileron
                 let left = stuck.elevator - stuck.aileron;
                 let right = command.elevator + command.aileron;
                 let (elevator, aileron) = (0.5 * (right + left), 0.5 * (right - left));
@@ -93,57 +117,46 @@ fn value(model: &GreyBox, name: &str) -> f64 {
     model.coefficients().iter().find(|c| c.name == name).map_or(0.0, |c| c.value)
 }
 
-/// Moments of lift and side force about a centre of gravity further aft: Cm += (x/c) CL, Cn += (x/b) CY. The damping by
-/// the pitch rate changes in the second order and is kept.
-fn moved_aft(model: &GreyBox, changed: &mut GreyBox) {
-    let geometry = &model.airframe.geometry;
-    for of in ["0", "alpha", "de"] {
-        let name = format!("pitch_linear.Cm{of}");
-        let lift = value(model, &format!("lift_linear.CL{of}"));
-        changed.set_coefficient(&name, value(model, &name) + AFT * lift);
-    }
-    let arm = AFT * geometry.chord / geometry.span;
-    for of in ["0", "beta", "da"] {
-        let name = format!("yaw_linear.Cn{of}");
-        let side = value(model, &format!("side_force_linear.CY{of}"));
-        changed.set_coefficient(&name, value(model, &name) + arm * side);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::path::Path;
 
     fn x8() -> GreyBox {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/prior.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
         GreyBox::load(&path).unwrap()
     }
 
     #[test]
     fn each_change_is_what_its_name_says() {
         let model = x8();
-        let half = Change::HalfAileron.of(&model);
+        let changed =
+            |change| Changed::new(change, &model, Elevons::Yes).map(|c| c.model().clone());
+        let half = changed(Change::HalfAileron).unwrap();
         let clda = "roll_linear.Clda";
         assert_eq!(value(&half, clda), value(&model, clda) / 2.0);
-        let heavy = Change::Mass.of(&model);
+        let heavy = changed(Change::Mass).unwrap();
         assert!((heavy.body.mass / model.body.mass - 1.3).abs() < 1e-12);
-        let aft = Change::CentreOfGravity.of(&model);
-        let [before, after] = [&model, &aft].map(|m| value(m, "pitch_linear.Cmalpha"));
-        // the static margin −Cmα/CLα falls by the move
-        let moved = (after - before) / value(&model, "lift_linear.CLalpha");
-        assert!((moved - 0.05).abs() < 1e-12, "{moved}");
+        let aft = changed(Change::CentreOfGravity).unwrap();
+        let chord = model.airframe.geometry.chord;
+        assert!((value(&aft, "cg_shift.x_m") - 0.05 * chord).abs() < 1e-12);
+        assert!(
+            Changed::new(Change::CentreOfGravity, &aft, Elevons::Yes).is_err(),
+            "moved already"
+        );
     }
 
     #[test]
     fn a_stuck_surface_leaves_the_other_one() {
         let stuck = Command { aileron: 0.1, elevator: 0.2, ..Command::IDLE };
         let wanted = Command { aileron: 0.4, elevator: 0.0, ..Command::IDLE };
-        let flown = Change::StuckSurface.command(wanted, stuck, Elevons::Yes);
+        let of =
+            |change, elevons| Changed::new(change, &x8(), elevons).unwrap().command(wanted, stuck);
+        let flown = of(Change::StuckSurface, Elevons::Yes);
         assert!((flown.elevator - flown.aileron - 0.1).abs() < 1e-12, "left stays");
         assert!((flown.elevator + flown.aileron - 0.4).abs() < 1e-12, "right follows");
-        let flown = Change::StuckSurface.command(wanted, stuck, Elevons::No);
+        let flown = of(Change::StuckSurface, Elevons::No);
         assert_eq!([flown.aileron, flown.elevator], [0.25, 0.0]);
-        assert_eq!(Change::Mass.command(wanted, stuck, Elevons::Yes), wanted);
+        assert_eq!(of(Change::Mass, Elevons::Yes), wanted);
     }
 }

@@ -107,12 +107,19 @@ fn the_commands_draw_write_and_evaluate() {
     GreyBox::load(&out.join("29/model.toml")).unwrap();
     let json = folder.path().join("any.json");
     let json = json.to_str().unwrap();
-    let words = ["evaluate", "--any", "2", "--controller", "adaptive", "lqi", "--json", json];
+    let words =
+        ["evaluate", "--any", "2", "--controller", "adaptive", "lqi", "--change", "--json", json];
     let table = run(&words);
+    assert!(table.contains("centre of gravity") && table.contains("kept %"), "{table}");
     assert!(table.contains("own model") && table.contains("textbook"), "{table}");
     let text = std::fs::read_to_string(json).unwrap();
     let document: serde_json::Value = serde_json::from_str(&text).unwrap();
-    // adaptive once, lqi from the own model and from the textbook
-    assert_eq!(document["flights"].as_array().unwrap().len(), 2 * 3);
+    // adaptive once, lqi from the own model and from the textbook; each without a change and after four
+    let flights = document["flights"].as_array().unwrap();
+    assert_eq!(flights.len(), 2 * 3 * 5);
+    let after: Vec<_> = flights.iter().filter(|f| f["change"] == "mass +30 %").collect();
+    assert_eq!(after.len(), 2 * 3);
+    let before = flights.iter().find(|f| f["change"].is_null()).unwrap();
+    assert_ne!(before["minute"], after[0]["minute"], "the change acts");
     assert_eq!(document["schema"], "greylag.any-aircraft/1");
 }

@@ -15,7 +15,7 @@ use crate::model::GreyBox;
 use crate::model::population::{Drawn, Layout, Population};
 use crate::num::statistics::quantile;
 use crate::sim::attitudes::{self, Minute};
-use crate::sim::changes::{Change, Elevons};
+use crate::sim::changes::{Change, Changed, Elevons};
 
 /// Options of `--any`.
 #[derive(clap::Args)]
@@ -97,8 +97,7 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
         .map(|number| {
             let drawn = population.draw(seed, number)?;
             bar.inc(1);
-            let flights = of_drawn(kinds, &drawn, seed, &changes);
-            Ok(flights)
+            of_drawn(kinds, &drawn, seed, &changes)
         })
         .collect();
     let (drawn, changed): (Vec<Flight>, Vec<Flight>) =
@@ -159,19 +158,22 @@ fn of_drawn(
     drawn: &Drawn,
     seed: u64,
     changes: &[Option<Change>],
-) -> Vec<Flight> {
+) -> Result<Vec<Flight>> {
     let elevons = match drawn.layout {
         Layout::Elevons => Elevons::Yes,
         _ => Elevons::No,
     };
-    let changes: Vec<_> = changes.iter().map(|c| c.map(|change| (change, elevons))).collect();
+    let changed = |change: &Option<Change>| {
+        change.map(|change| Changed::new(change, &drawn.exact, elevons)).transpose()
+    };
+    let changes = changes.iter().map(changed).collect::<Result<Vec<_>, _>>()?;
     let all =
         kinds.iter().flat_map(|kind| knowledge(*kind).iter().map(move |knows| (*kind, *knows)));
-    all.flat_map(|(kind, knows)| {
+    let flights = all.flat_map(|(kind, knows)| {
         let from = if knows == Knowledge::Textbook { &drawn.textbook } else { &drawn.exact };
         of_controller((kind, knows), [from, &drawn.exact], [seed, drawn.number], &changes)
-    })
-    .collect()
+    });
+    Ok(flights.collect())
 }
 
 fn of_model(kinds: &[ControllerKind], model: &GreyBox, seed: u64) -> Vec<Flight> {
@@ -186,16 +188,18 @@ fn of_controller(
     (kind, knows): (ControllerKind, Knowledge),
     [from, exact]: [&GreyBox; 2],
     flight: [u64; 2],
-    changes: &[Option<(Change, Elevons)>],
+    changes: &[Option<Changed>],
 ) -> Vec<Flight> {
     // the design of an LQI takes longer than its flight
     let mut controller = build(kind, from).ok();
-    let mut fly = |change: &Option<(Change, Elevons)>| Flight {
+    let mut fly = |changed: &Option<Changed>| Flight {
         aircraft: exact.airframe.name.clone(),
         controller: kind.name(),
         knows,
-        change: change.map(|(c, _)| c.name()),
-        minute: controller.as_mut().map(|c| attitudes::fly(exact, c.as_mut(), flight, *change)),
+        change: changed.as_ref().map(|c| c.change().name()),
+        minute: controller
+            .as_mut()
+            .map(|c| attitudes::fly(exact, c.as_mut(), flight, changed.as_ref())),
     };
     changes.iter().map(&mut fly).collect()
 }

@@ -1,7 +1,7 @@
-//! Comparison of the attitude that a plan predicted with the attitude that was reached.
+//! Comparison of the attitude that a plan predicted with the attitude that is reached.
 //!
-//! One-step predictions cannot show an error of the closed loop: a wrong model whose accelerations are nearly right may still make
-//! plans under which the aircraft oscillates. The attitude at the end of a quarter of a second shows it.
+//! One-step predictions do not show an error of the closed loop: a model whose accelerations are nearly right may still make
+//! plans under which the aircraft oscillates. The attitude a quarter of a second later shows it.
 
 use crate::Target;
 use greylag_physics::State;
@@ -11,40 +11,50 @@ use super::course::wrapped;
 /// Ticks between a prediction and its comparison.
 pub(super) const SPAN: usize = 25;
 
-/// Predicted attitudes of the last ticks.
+/// Attitude that a plan predicted, and the target that it was made for: roll and pitch, rad.
+#[derive(Clone, Copy, Debug)]
+struct Prediction {
+    attitude: [f64; 2],
+    target: [f64; 2],
+}
+
+/// Predictions of the last ticks.
 #[derive(Clone, Debug)]
 pub(super) struct Forecast {
-    /// Roll and pitch (rad) that are expected at the tick of this index, modulo the span.
-    expected: [Option<[f64; 2]>; SPAN],
+    /// The prediction for a tick, at the tick's number modulo the span.
+    expected: [Option<Prediction>; SPAN],
     now: usize,
-    target: Option<Target>,
 }
 
 impl Forecast {
     pub fn new() -> Forecast {
-        Forecast { expected: [None; SPAN], now: 0, target: None }
+        Forecast { expected: [None; SPAN], now: 0 }
     }
 
-    /// Drops all predictions, where the plans were not flown.
+    /// Drops all predictions, because their plans are not flown.
     pub fn forget(&mut self) {
         self.expected = [None; SPAN];
     }
 
-    /// The error of the prediction for this tick, rad: the larger one of roll and pitch. `None` without a prediction
-    /// towards this target.
+    /// Goes on to the next tick. Returns the error of the prediction for it, rad, without what the target has moved
+    /// since: the larger one of roll and pitch. `None` without a prediction.
     pub fn error(&mut self, seen: &State, target: &Target) -> Option<f64> {
-        if self.target != Some(*target) {
-            self.forget();
-            self.target = Some(*target);
-        }
         self.now = (self.now + 1) % SPAN;
-        let [roll, pitch] = self.expected[self.now].take()?;
-        Some(wrapped(seen.roll - roll).abs().max((seen.pitch - pitch).abs()))
+        let then = self.expected[self.now].take()?;
+        let (now, target) = ([seen.roll, seen.pitch], [target.roll, target.pitch]);
+        let of = |axis: usize| {
+            let moved = wrapped(target[axis] - then.target[axis]).abs();
+            wrapped(now[axis] - then.attitude[axis]).abs() - moved
+        };
+        Some(of(0).max(of(1)))
     }
 
     /// Notes the state that the plan of this tick predicts after [`SPAN`] ticks.
-    pub fn note(&mut self, after: &State) {
-        self.expected[self.now] = Some([after.roll, after.pitch]);
+    pub fn note(&mut self, after: &State, target: &Target) {
+        self.expected[self.now] = Some(Prediction {
+            attitude: [after.roll, after.pitch],
+            target: [target.roll, target.pitch],
+        });
     }
 }
 
@@ -52,34 +62,38 @@ impl Forecast {
 mod tests {
     use super::*;
 
+    const TARGET: Target = Target { roll: 1.0, pitch: 0.0, airspeed: 20.0 };
+
     fn at(roll: f64) -> State {
         State { roll, ..State::NEUTRAL }
     }
 
     #[test]
     fn a_prediction_is_compared_when_its_time_has_come() {
-        let target = Target { roll: 1.0, pitch: 0.0, airspeed: 20.0 };
         let mut forecast = Forecast::new();
         for tick in 0..SPAN {
-            assert_eq!(forecast.error(&at(0.0), &target), None, "{tick}");
-            forecast.note(&at(0.01 * tick as f64));
+            assert_eq!(forecast.error(&at(0.0), &TARGET), None, "{tick}");
+            forecast.note(&at(0.01 * tick as f64), &TARGET);
         }
         for tick in 0..SPAN {
-            let error = forecast.error(&at(0.5), &target).unwrap();
+            let error = forecast.error(&at(0.5), &TARGET).unwrap();
             assert!((error - (0.5 - 0.01 * tick as f64)).abs() < 1e-12, "{tick}: {error}");
         }
-        assert_eq!(forecast.error(&at(0.5), &target), None, "no plan was flown since");
+        assert_eq!(forecast.error(&at(0.5), &TARGET), None, "no plan was flown since");
     }
 
     #[test]
-    fn predictions_towards_another_target_are_dropped() {
-        let target = Target { roll: 1.0, pitch: 0.0, airspeed: 20.0 };
+    fn what_the_target_has_moved_is_no_error() {
         let mut forecast = Forecast::new();
         for _ in 0..SPAN {
-            forecast.error(&at(0.0), &target);
-            forecast.note(&at(1.0));
+            forecast.error(&at(0.0), &TARGET);
+            forecast.note(&at(0.0), &TARGET);
         }
-        let other = Target { roll: -1.0, ..target };
-        assert_eq!(forecast.error(&at(0.0), &other), None);
+        // a client that moves its setpoint at every tick does not switch the comparison off
+        let moved = Target { roll: 1.1, ..TARGET };
+        let error = forecast.error(&at(0.4), &moved).unwrap();
+        assert!((error - 0.3).abs() < 1e-12, "{error}");
+        let jumped = Target { roll: -1.0, ..TARGET };
+        assert!(forecast.error(&at(-0.4), &jumped).unwrap() < 0.0);
     }
 }

@@ -38,11 +38,6 @@ const STEPS: usize = 50;
 /// that an intermittently wrong model is not used in between.
 const WAIT: usize = 500;
 
-/// Error of the attitude predicted a quarter of a second before, rad, beyond which the LQI flies. With the learned model
-/// it stays below in still air, with 60 ms of delay it passes 0.15 in 3 of 15,000 ticks, in moderate turbulence in 38 of 20,000;
-/// with models that make the aircraft oscillate it reaches 0.4 to 1.3.
-const MISSED: f64 = 0.15;
-
 /// Ticks between trials of the LQI's flight as a starting point. Without these trials, steps with 40 ms of delay
 /// overshoot more often (18 instead of 10 %). At every tick, the trial takes one sixth of the controller's computing time.
 const EVERY: usize = 5;
@@ -242,7 +237,8 @@ impl Controller for Ilqr {
         let alone = self.lqi.command(seen, target);
         // a model whose predictions are wrong must not be planned with
         let missed = self.forecast.error(&seen.state, target);
-        if self.disturbance.is_wrong(TRUST) || missed.is_some_and(|error| error > MISSED) {
+        let too_far = self.settings.missed.zip(missed).is_some_and(|(most, error)| error > most);
+        if self.disturbance.is_wrong(TRUST) || too_far {
             self.waiting = WAIT;
         }
         if self.waiting > 0 {
@@ -283,7 +279,7 @@ impl Controller for Ilqr {
         match self.desk.plan {
             Some(plan) => {
                 if let Some(after) = self.desk.flown.states().nth(forecast::SPAN) {
-                    self.forecast.note(after);
+                    self.forecast.note(after, target);
                 }
                 self.lqi.hand_over(&before, seen);
                 let [aileron, elevator] = plan[0];

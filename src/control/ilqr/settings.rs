@@ -19,6 +19,9 @@ pub struct Settings {
     pub envelope: Option<Barrier>,
     /// Reference that the plan follows.
     pub towards: Towards,
+    /// Largest error of the attitude predicted a quarter of a second before, rad. Beyond it the LQI flies for 5 s. `None`
+    /// does not compare.
+    pub missed: Option<f64>,
     /// Number of iterations per tick.
     pub iterations: usize,
     /// Starting points in addition to the last plan and the LQI's commands.
@@ -68,6 +71,7 @@ impl Settings {
         last: 20.0,
         envelope: None,
         towards: Towards::Target,
+        missed: None,
         iterations: 1,
         start: Start::Own,
     };
@@ -77,6 +81,8 @@ impl Settings {
         far: Some(0.15),
         envelope: Some(Barrier { part: 0.94, load: 0.05, alpha: 0.01, sideslip: 0.05 }),
         towards: Towards::Path,
+        // 0.12 to 0.3 rad fly alike on models drawn with widths of 15 % (docs/validation/acados.md)
+        missed: Some(0.15),
         start: Start::Policy,
         ..Settings::PLAIN
     };

@@ -1,55 +1,18 @@
-//! Checksum of MAVLink frames: CRC-16/MCRF4XX, eight bytes at a time.
+//! Checksum of MAVLink frames: CRC-16/MCRF4XX.
 //!
-//! A log of an hour has a million frames, and most of the time to cut them is that of their checksums. Table k holds
-//! the effect of a byte with k bytes behind it, so that eight look-ups do not wait for each other ("slicing by 8";
-//! Kounavis and Berry 2008).
+//! A log of an hour has a million frames, and most of the time to separate them is that of their checksums: the tables of
+//! the crate `crc` take sixteen bytes at a time.
 
-/// The polynomial x¹⁶ + x¹² + x⁵ + 1 with its bits reversed.
-const POLYNOMIAL: u16 = 0x8408;
-const START: u16 = 0xFFFF;
-/// Bytes that are taken at a time.
-const SLICE: usize = 8;
+use crc::{CRC_16_MCRF4XX, Crc, Table};
 
-const TABLES: [[u16; 256]; SLICE] = tables();
-
-const fn tables() -> [[u16; 256]; SLICE] {
-    let mut tables = [[0; 256]; SLICE];
-    let mut i = 0;
-    while i < 256 {
-        let mut sum = i as u16;
-        let mut bit = 0;
-        while bit < 8 {
-            sum = if sum & 1 == 0 { sum >> 1 } else { sum >> 1 ^ POLYNOMIAL };
-            bit += 1;
-        }
-        tables[0][i] = sum;
-        i += 1;
-    }
-    let mut k = 1;
-    while k < SLICE {
-        i = 0;
-        while i < 256 {
-            let before = tables[k - 1][i];
-            tables[k][i] = before >> 8 ^ tables[0][before as usize & 0xFF];
-            i += 1;
-        }
-        k += 1;
-    }
-    tables
-}
+static CHECKSUM: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
 
 /// The checksum of a frame: `bytes` from behind the start marker to the end of the payload, then CRC_EXTRA.
 pub(crate) fn checksum(bytes: &[u8], extra: u8) -> u16 {
-    let (slices, rest) = bytes.as_chunks::<SLICE>();
-    let sum = slices.iter().fold(START, |sum, slice| {
-        let [low, high] = sum.to_le_bytes();
-        let first =
-            TABLES[7][usize::from(slice[0] ^ low)] ^ TABLES[6][usize::from(slice[1] ^ high)];
-        let others = slice[2..].iter().zip(TABLES[..6].iter().rev());
-        others.fold(first, |sum, (byte, table)| sum ^ table[usize::from(*byte)])
-    });
-    let one = |sum: u16, byte: u8| sum >> 8 ^ TABLES[0][usize::from(sum as u8 ^ byte)];
-    one(rest.iter().fold(sum, |sum, byte| one(sum, *byte)), extra)
+    let mut digest = CHECKSUM.digest();
+    digest.update(bytes);
+    digest.update(&[extra]);
+    digest.finalize()
 }
 
 #[cfg(test)]
@@ -58,7 +21,7 @@ mod tests {
 
     #[test]
     fn the_checksum_is_that_of_the_protocols_own_library() {
-        // The check value of CRC-16/MCRF4XX is that of the digits 1 to 9.
+        // the check value of CRC-16/MCRF4XX is that of the digits 1 to 9
         assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
         let mut seed = 1u32;
         let mut byte = || {
