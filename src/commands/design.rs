@@ -37,13 +37,14 @@ pub struct Arguments {
     json: JsonArgument,
 }
 
-/// Separation of the effects by each manoeuvre, as JSON. A value is null if the aircraft would leave its bounds.
+/// Separation of the effects by each manoeuvre, as JSON. `separation` is null if the simulated flight leaves the roll
+/// or pitch bounds of a schedule; `needed_s` is null also if no finite time suffices.
 #[derive(Serialize)]
 struct Document<'a> {
     between: [&'a str; 2],
     manoeuvres: Vec<Manoeuvre<'a>>,
     chosen: Option<&'a str>,
-    /// Flight time with the chosen manoeuvre that suffices, s.
+    /// Flight time of the chosen manoeuvre after which the effects count as distinguished, s.
     chosen_s: Option<f64>,
 }
 
@@ -102,13 +103,17 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     arguments.json.write("greylag.design/1", &found, overwrite)?;
     let Some(Plan { manoeuvre, seconds, times, schedule }) = plan else {
         bail!(
-            "no manoeuvre of the menu distinguishes {} from {} within {LONGEST_S} s; name larger --values, or take both as one",
+            "no built-in manoeuvre distinguishes {} from {} within {LONGEST_S} s of flight; \
+             give larger effects with --values, or treat {} and {} as indistinguishable",
+            a.id,
+            b.id,
             a.id,
             b.id
         );
     };
     let words = format!(
-        "{}: {}\n{seconds:.1} s of it distinguish {} from {} (evidence {ENOUGH}); one pass takes {:.0} s",
+        "{}: {}\n{seconds:.1} s of this manoeuvre separate {} from {} (required separation {ENOUGH}); \
+         one repetition takes {:.0} s",
         manoeuvre.name,
         manoeuvre.description,
         a.id,
@@ -121,7 +126,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.out {
         files::write(path, &schedule.to_toml(), overwrite)?;
         eprintln!(
-            "written to {} ({times} times, on opposite headings); fly it with `greylag demo --schedule {}`",
+            "schedule with {times} repetitions of the manoeuvre, on alternating opposite headings, written to {}; \
+             fly it with `greylag fly --schedule {}`, or simulated with `greylag demo --schedule {}`",
+            path.display(),
             path.display(),
             path.display()
         );

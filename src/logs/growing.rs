@@ -15,8 +15,7 @@ pub struct Growing {
 }
 
 impl Growing {
-    /// Adds `bytes` and returns the rows that are complete now and have a time, in the units of the format.
-    /// `path` appears in errors.
+    /// Adds `bytes`. Returns the newly completed rows that have a time stamp, in SI units. `path` appears in errors.
     ///
     /// # Errors
     /// The text is not a table.

@@ -32,8 +32,8 @@ impl Size {
         Size { mass: (body.mass / mass).max(1.0), length, lift: 1.0 }
     }
 
-    /// The size with the lift coefficient that the aircraft needs at its smallest `airspeed` (m/s). It is the lift coefficient
-    /// of level flight at sea level times `PULL`, and at least 1.
+    /// Sets the factor for the bounds of `CL0`: `PULL` times the lift coefficient of level flight at sea level at the smallest
+    /// `airspeed` (m/s), and at least 1.
     pub fn lifted_at(self, airspeed: f64, body: &RigidBody, geometry: &Geometry) -> Size {
         let pressure = 0.5 * SEA_LEVEL * airspeed * airspeed;
         let level = body.mass * GRAVITY / (pressure * geometry.area);

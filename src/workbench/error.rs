@@ -148,8 +148,9 @@ pub enum WorkbenchError {
     /// The effect is accepted and therefore cannot be removed.
     #[error("{0} is accepted; take it back first")]
     Accepted(String),
-    /// No manoeuvre in the list distinguishes the two effects.
-    #[error("no manoeuvre of the menu distinguishes {} from {} within ten minutes; take both as one, or give `greylag design` larger --values", .0[0], .0[1])]
+    /// No built-in manoeuvre distinguishes the two effects.
+    #[error("no built-in manoeuvre distinguishes {} from {} within 600 s of flight; \
+             treat both as indistinguishable, or give `greylag design` larger effects with --values", .0[0], .0[1])]
     NotApart([String; 2]),
     /// A flight is in progress.
     #[error("a flight is on; stop it, or wait for its end")]

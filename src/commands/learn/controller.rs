@@ -12,12 +12,12 @@ use crate::model::GreyBox;
 use crate::model::residual::hash;
 use crate::sysid::amend::document::effect_file;
 
-/// Name of the controller's folder below that of a learning.
+/// Name of the controller's folder inside the output folder of `greylag learn`.
 pub const CONTROLLER: &str = "controller";
 /// File name of the record of origin.
 pub const ORIGIN: &str = "learned.toml";
 
-/// The controller's files: folder below that of the learning, and name.
+/// The controller's files: subfolder of the output folder, and file name.
 const FILES: [(&str, &str); 6] = [
     (MODEL, "airframe.toml"),
     (MODEL, "residual.safetensors"),
@@ -48,8 +48,8 @@ struct Content {
     sha256: String,
 }
 
-/// Copies the model and the policy of the learning in `out` into one folder. The model file is written last of these
-/// files. A folder with a model file is therefore complete.
+/// Copies model and policy from the output folder `out` into its subfolder `controller`. The model file is copied last. A
+/// folder with a model file is therefore complete.
 ///
 /// # Errors
 /// If a file cannot be read or written.
@@ -86,8 +86,7 @@ pub fn assemble(
         files,
         imagined,
     };
-    let text = "# Where the files of this folder come from; `greylag learn` writes it.\n"
-        .to_owned()
+    let text = "# Origin of the files in this folder. Written by `greylag learn`.\n".to_owned()
         + &toml::to_string(&origin)?;
     write(&folder.join(ORIGIN), text.as_bytes())
 }

@@ -113,7 +113,7 @@ impl Solver {
     }
 }
 
-/// Curvature of the value with the commands at their answer K δx: Q_xx + Kᵀ Q_uu K + Kᵀ Q_ux + Q_uxᵀ K.
+/// Hessian of the value function under the feedback δu = K δx: Q_xx + Kᵀ Q_uu K + Kᵀ Q_ux + Q_uxᵀ K.
 fn reduced(q_xx: Square, q_uu: &Matrix2<f64>, q_ux: &Gain, gain: &Gain) -> Square {
     // column by column, without 16 × 16 temporaries
     let mut value = q_xx;

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! planned command ─► fallback controller ─► command held 50 ms ─► wings level at trim constants
-//!    late, or not finite         no usable state         still none
+//!    late, or not finite         no usable state    no usable state for over 50 ms
 //! ```
 
 mod command;
@@ -60,7 +60,8 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 /// - tick: [`Pilot::observe`] with a state frame, then [`Pilot::decide`] with the plan for the request that `observe`
 ///   returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
 /// - requests of clients: the trait [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
-/// - vehicle: [`Pilot::engaged`] when a real controller has given control authority.
+/// - vehicle: [`Pilot::engaged`] when a flight controller (not the simulator's shim) has given control
+///   authority.
 ///
 /// All times are vehicle time and must not decrease. A clock that jumps back by more than 1 s counts as a restart of
 /// the vehicle; the pilot then drops all earlier states.
@@ -91,7 +92,7 @@ pub struct Pilot {
     cut: Option<[f64; 2]>,
     /// The last command, after slew limits.
     in_force: Command,
-    /// The command before the last command. Repeated states are not counted.
+    /// The command of the previous tick. Ticks with a repeated state are skipped.
     before: Command,
     /// The command in force when the state last changed.
     last_moved: Command,
@@ -109,7 +110,7 @@ pub struct Pilot {
     oscillation: Oscillation,
     /// Whether a flight controller can take control back.
     hands_back: bool,
-    /// Whether a flight controller is commanded attitudes. Surface commands then have no effect.
+    /// Whether the companion sends attitude setpoints to a flight controller instead of surface commands.
     by_attitude: bool,
     /// Time of the last oscillation. The gain is reduced for a while after an oscillation.
     oscillated: Option<Time>,
@@ -201,8 +202,8 @@ impl Pilot {
         self.programme = Some(Programme::new(schedule));
     }
 
-    /// Configures the pilot for `vehicle`. If surface commands pass through a controller's channels, their signs are
-    /// checked. If attitudes are commanded, sign checks and the oscillation guard are off.
+    /// Configures the pilot for `vehicle`. If surface commands pass through a flight controller, their signs are
+    /// checked. If attitude setpoints are sent, sign checks and the oscillation guard are off.
     pub fn take_on(&mut self, vehicle: &Vehicle) {
         self.by_attitude = !vehicle.flies_surfaces();
         if vehicle.has_channels() {

@@ -5,7 +5,7 @@ use greylag_model::residual::{INPUTS, OUTPUTS};
 use greylag_num::dense::{Layer, rectify};
 use greylag_num::{Dense, Real};
 
-/// Number of inputs and of outputs of a tile of a weight matrix whose gradient is summed in registers.
+/// Side of a square tile of a weight matrix. The gradient of a tile is summed in registers.
 const TILE: usize = 4;
 
 /// A network prepared for both passes.
@@ -49,13 +49,13 @@ impl Passes {
         }
     }
 
-    /// Length of a point's trace of the forward pass: all units but the last layer's.
+    /// Number of activations that the forward pass stores for each sample: those of all layers except the last.
     pub fn trace(&self) -> usize {
         let sizes = self.network.sizes();
         sizes[..sizes.len() - 1].iter().sum()
     }
 
-    /// Length of a point's slopes of the backward pass: all units but the first layer's.
+    /// Number of gradients that the backward pass stores for each sample: those of all layers except the input.
     pub fn slopes(&self) -> usize {
         self.network.sizes()[1..].iter().sum()
     }
@@ -81,8 +81,8 @@ impl Passes {
         output
     }
 
-    /// Slopes over the inputs, from the slopes `output` over the outputs. `slopes` receives the slopes over all units
-    /// before rectification.
+    /// The gradient with respect to the inputs, from the gradient `output` with respect to the outputs. `slopes` receives the
+    /// gradients with respect to all pre-activations.
     #[inline(always)]
     pub fn backward<R: Real>(
         &self,
@@ -114,7 +114,7 @@ impl Passes {
         input
     }
 
-    /// Adds the contributions of several points to `gradient`. `traces` and `slopes` hold the data of one point after
+    /// Adds the contributions of several samples to `gradient`. `traces` and `slopes` hold the data of one sample after
     /// another.
     #[inline(always)]
     pub fn gather<R: Packet>(&self, traces: &[R], slopes: &[R], gradient: &mut [f64]) {
@@ -140,7 +140,7 @@ impl Passes {
     }
 }
 
-/// Gradient of a layer: Σ over points of unit · slope.
+/// Gradient of a layer's weights: Σ over samples of input activation · gradient of the pre-activation.
 struct Sides<'a, R> {
     traces: &'a [R],
     slopes: &'a [R],

@@ -11,7 +11,7 @@ impl Effect for DragBeta2 {
     const ID: &'static str = "drag_beta2";
     const DESCRIPTION: &'static str = "Drag due to sideslip, by its magnitude and its square.";
     const FORMULA: &'static str = "D = Q (CDβ |β| + CDβ² β²)";
-    const SOURCE: &'static str = "Gryte18; JSBSim reading in params/x8/FACTS.md";
+    const SOURCE: &'static str = "Gryte18; JSBSim's X8, see params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] = &[
         coefficient("CDbeta", "drag due to the magnitude of sideslip", "1/rad", (-0.5, 0.5)),
         // may be negative if the side force acts along body y instead of across the airflow, because the drag then contains

@@ -11,7 +11,7 @@ impl Effect for LiftTable {
     const ID: &'static str = "lift_table";
     const DESCRIPTION: &'static str = "Lift as a table over angle of attack, stall included.";
     const FORMULA: &'static str = "L = Q k CL(α)";
-    const SOURCE: &'static str = "JSBSim table reading in params/x8/FACTS.md";
+    const SOURCE: &'static str = "tables of JSBSim's X8, see params/x8/FACTS.md";
     const COEFFICIENTS: &'static [Coefficient] =
         &[coefficient("k", "factor on the whole table", "", (0.0, 10.0))];
     const TABLE: Option<&'static str> = Some("CL");

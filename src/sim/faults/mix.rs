@@ -4,7 +4,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Earliest start of a fault, s. By then the companion has found a real flight controller and has taken control.
+/// Earliest start of a fault, s. By then the companion has detected the flight controller and has taken control.
 pub const FIRST_S: f64 = 12.0;
 /// Time at which all faults have ended, s.
 pub const LAST_S: f64 = 42.0;
@@ -52,8 +52,8 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
-    /// The kinds that campaigns and searches draw. A killed companion is excluded, because it would change the flight
-    /// of every seed.
+    /// The kinds that campaigns and searches draw by their index in this list. [`Killed`](FaultKind::Killed) is excluded,
+    /// because a longer list would change the faults of every seed.
     pub const DRAWN: [FaultKind; 17] = [
         FaultKind::Loss,
         FaultKind::Duplication,
@@ -131,8 +131,8 @@ impl Fault {
     }
 }
 
-/// The one to three faults of flight `seed`, at random times. Faults may overlap. Consecutive seeds cycle through
-/// [`FaultKind::DRAWN`] with the kind of the first fault.
+/// One to three faults for flight `seed`, at random times. Faults may overlap. The first fault has the kind
+/// `DRAWN[seed mod N]`, where N is the length of [`DRAWN`](FaultKind::DRAWN).
 pub fn draw(seed: u64) -> Vec<Fault> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let count = random.random_range(1..=3);

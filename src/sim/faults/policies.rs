@@ -15,9 +15,9 @@ const UNIT_M: f64 = 100.0;
 const UNIT_S: f64 = 5.0;
 /// Altitude loss that is accepted in a flight of turns, climbs and descents, m.
 const ALTITUDE_LOSS_M: f64 = 400.0;
-/// Time after which an exposure no longer explains a violation, s.
+/// Time for which violations are still excused after the aircraft was exposed ([`Sample::exposed`]), s.
 const MEMORY_S: f64 = 3.0;
-/// RMS of the high-pass filtered deflection of a surface that counts as an oscillation, −1..1 being the travel.
+/// RMS of a surface's high-pass filtered deflection above which the surface oscillates; 1 is the maximum deflection.
 const SWING: f64 = 0.5;
 /// Longest time for which a command may be held, s: 50 ms, and half a step (5 ms) for the arrival times of states.
 const HELD_S: f64 = 0.055;
@@ -40,11 +40,11 @@ pub struct Sample {
     pub decision: Option<Decision>,
     /// Age of that decision, s.
     pub age_s: f64,
-    /// Time for which the command has been held over a gap of states, vehicle clock, s.
+    /// Time for which the command has been held without a usable state, on the vehicle's clock, s.
     pub held_s: f64,
     /// Largest change of a surface command since the last sample, −1..1 being the travel; 0 without a new decision.
     pub moved: f64,
-    /// Whether the flight controller executes the companion's commands. Always true for the shim.
+    /// Whether the flight controller executes the companion's commands. Always true for the simulator's shim.
     pub steered: bool,
     /// Whether the companion intends to control.
     pub engaged: bool,
@@ -159,8 +159,8 @@ fn ends(state: impl Fn(&Sample) -> bool + Copy + Send + Sync + 'static, seconds:
     is(state).implies(is(move |s| !state(s) || s.age_s > STALE_S).eventually(seconds))
 }
 
-/// The angle `of` a target is between the limits `ends` of the envelope, degrees. The rule holds while no attitude is
-/// commanded.
+/// The commanded angle (`of` the target, rad) is between the limits `ends` of the envelope, degrees. The rule holds while
+/// no attitude is commanded.
 fn target_inside(of: fn(&Target) -> f64, ends: fn(&Envelope) -> [f64; 2]) -> Rule {
     Formula::atom(move |s: &Sample| {
         let [least, most] = ends(&s.envelope);
@@ -216,17 +216,17 @@ fn of_commands() -> Vec<Policy> {
         ),
         policy(
             "bank-target",
-            "the bank that is flown to lies inside the envelope",
+            "the commanded bank angle is inside the envelope",
             target_inside(|t| t.roll, |e| [-e.bank_max_deg, e.bank_max_deg]),
         ),
         policy(
             "pitch-target",
-            "the pitch that is flown to lies inside the envelope",
+            "the commanded pitch angle is inside the envelope",
             target_inside(|t| t.pitch, |e| [e.pitch_min_deg, e.pitch_max_deg]),
         ),
         policy(
             "held",
-            "a command is held over a gap of states for at most 0.055 s",
+            "without a usable state, a command is held for at most 0.055 s",
             Formula::atom(|s: &Sample| (HELD_S - s.held_s) / HELD_S),
         ),
     ]
@@ -281,17 +281,17 @@ fn of_the_loop() -> Vec<Policy> {
     vec![
         policy(
             "reached",
-            "in calm air and without faults an attitude is reached to 5 degrees within 5 s",
+            "in calm air and without faults, the commanded attitude is reached within 5 degrees in 5 s",
             steady_for_less(REACHED_S).or(near(5.0).once(REACHED_S)),
         ),
         policy(
             "kept",
-            "after 8 s of these it is kept to 5 degrees",
+            "in calm air and without faults, after 8 s the commanded attitude is held within 5 degrees",
             steady_for_less(8.0).or(near(5.0)),
         ),
         policy(
             "no-oscillation",
-            "no surface moves fast by more than half its travel (rms over a second) for 2.5 s",
+            "no surface oscillates for 2.5 s with an RMS above half its maximum deflection",
             unless_exposed(
                 is(|s| s.swing > SWING).implies(is(|s| s.swing <= SWING).eventually(SWING_S)),
             ),
@@ -307,27 +307,29 @@ fn of_handing_over() -> Vec<Policy> {
     vec![
         of_controllers(
             "dead-link",
-            "when nothing has come for 0.3 s, the aircraft is handed back within 0.3 s",
+            "when no data has arrived from the vehicle for 0.3 s, control returns to the flight \
+             controller within 0.3 s",
             is(|s| ours(s) && s.silent_s >= 0.3).implies(is(|s| !ours(s)).eventually(0.3)),
         ),
         of_controllers(
             "refusal",
-            "what the checks refuse is handed back within 5 s",
+            "after a fault found by the sign check or oscillation guard, control returns to the \
+             flight controller within 5 s",
             ends(|s| ours(s) && s.decided(|d| d.refused.is_some()), 5.0),
         ),
         of_controllers(
             "no-state",
-            "without a state to fly on the aircraft is handed back within 5 s",
+            "without a usable state, control returns to the flight controller within 5 s",
             ends(|s| ours(s) && s.decided(|d| d.source == Source::Level), 5.0),
         ),
         of_controllers(
             "unasked",
-            "nobody's mode is changed to the companion's unless a client asked for it",
+            "the companion takes control only at a client's request",
             is(|s| s.steered).rises().implies(is(|s| s.asked)),
         ),
         of_controllers(
             "after-disarm",
-            "disarmed, the companion lets go of the controller within 3 s",
+            "after disarming, control returns to the flight controller within 3 s",
             ends(|s| ours(s) && s.decided(|d| !d.armed), 3.0),
         ),
         policy(
@@ -349,7 +351,7 @@ fn of_reports() -> Vec<Policy> {
     vec![
         policy(
             "refusal-reported",
-            "what the checks refuse is reported within 1 s",
+            "a fault found by the sign check or oscillation guard is reported within 1 s",
             reported(decided(|d| d.refused.is_some())),
         ),
         policy(
@@ -359,7 +361,7 @@ fn of_reports() -> Vec<Policy> {
         ),
         policy(
             "level-reported",
-            "flying without a state is reported within 1 s",
+            "flight without a usable state is reported within 1 s",
             reported(decided(|d| d.armed && d.source == Source::Level)),
         ),
         policy(
@@ -371,7 +373,8 @@ fn of_reports() -> Vec<Policy> {
             of_controllers: true,
             ..policy(
                 "hand-back-reported",
-                "the end of steering is reported within 1 s, unless a fault keeps it from the companion",
+                "the loss of control authority is reported within 1 s, unless a fault conceals it \
+                 from the companion",
                 // the companion notices the change only through its link
                 is(|s| s.disturbed).once(1.0).or(reported(is(|s| !s.steered))),
             )

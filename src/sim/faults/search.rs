@@ -1,5 +1,5 @@
-//! Search for flights that violate a flight rule. A new flight varies one of those closest to a violation (PGFuzz, Kim
-//! et al., NDSS 2021) or is drawn at random. Violating flights are reduced.
+//! Search for flights that violate a flight rule. A new flight is a variation of one that came close to a violation (PGFuzz,
+//! Kim et al., NDSS 2021), or is drawn at random. A flight with a violation is reduced to what the violation requires.
 
 use std::ops::ControlFlow;
 
@@ -45,8 +45,8 @@ pub struct Nearest {
     pub scenario: Option<Scenario>,
 }
 
-/// Flies `scenario` and returns the smallest robustness and its time, s, for each rule. `None` marks a rule that does
-/// not apply to the counterpart. A panic violates all applicable rules.
+/// Flies `scenario`. Returns for each rule the smallest robustness and the time at which it occurred, s; `None` if the rule
+/// does not apply to the counterpart. A panic violates all applicable rules.
 ///
 /// # Errors
 ///
@@ -60,8 +60,7 @@ pub fn distances(
     Ok(judged(rules, scenario.counterpart, &samples, &found))
 }
 
-/// Smallest robustness and its time, s, for each rule, from the samples and findings of a flight with `counterpart`.
-/// `None` marks a rule that does not apply to the counterpart.
+/// As [`distances`], from the samples and findings of a flight with `counterpart`.
 pub fn judged(
     rules: &[Policy],
     counterpart: Counterpart,

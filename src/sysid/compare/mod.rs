@@ -1,7 +1,6 @@
 //! Comparison of models with flights: free-run errors, and the channels and regimes in which a model fails.
 //!
-//! The method is described in `docs/explanation/comparison.md`. Models are compared as given, without tuning. The
-//! diagnosis of missing effects regresses on [`columns`](crate::weak_form::windows::columns).
+//! The method is described in `docs/explanation/comparison.md`. Models are compared as given, without tuning.
 
 pub mod answer;
 mod bins;

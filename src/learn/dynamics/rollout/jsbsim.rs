@@ -51,7 +51,7 @@ impl<R: Packet, S: InstructionSet<Number = R>> Pass<'_, S> {
         for step in (0..=self.steps()).rev() {
             let mut norms = [nothing(); 2];
             if step == 0 {
-                // The start state is recorded. Only the memory depends on the step before the start.
+                // The start state is recorded, so its gradient is dropped. Step 0 determines only the memory.
                 slope = nothing();
             } else {
                 let [error, prior, learned] = self.direct(step, trace, of);

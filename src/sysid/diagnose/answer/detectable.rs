@@ -1,9 +1,9 @@
 //! The smallest detectable amount of an effect.
 //!
 //! For an effect that is linear in its coefficients, this amount follows from the standard deviations of the coefficients.
-//! An effect on the deflections is not linear near zero: a small lag is confounded with a clock error, and a small dead zone
-//! has no effect. Such an effect is evaluated at several amounts on the deflections of the flights. All nuisances are
-//! projected out at each amount.
+//! The contribution of an effect on the inputs is not proportional to its amount near zero: a small lag is confounded with a
+//! clock error, and a small dead zone has no effect. Its contribution is therefore computed from the inputs of the flights at
+//! several amounts. All nuisance parameters are projected out at each amount.
 
 use std::collections::BTreeMap;
 
@@ -49,7 +49,7 @@ fn linear(round: &Round, trial: &Trial, threshold: f64) -> Option<f64> {
 struct Shown {
     /// Standard deviation of the amount due to noise alone.
     alone: f64,
-    /// Ratio of the standard deviation from the scatter of blocks to that from noise, at least 1.
+    /// Ratio of the amount's standard deviation, derived from the scatter between blocks of the flights, to `alone`; at least 1.
     scatter: f64,
     /// Penalty on the evidence: ln n for each free coefficient, with n independent samples.
     penalty: f64,
@@ -63,8 +63,8 @@ impl Shown {
         Some(Shown { alone, scatter: (robust / alone).max(1.0), penalty })
     }
 
-    /// The amount, in standard deviations, at which gain and Wald statistic both exceed `threshold` even if noise reduces the
-    /// estimate by one standard deviation.
+    /// The amount, in units of `alone`, at which the gain and the Wald statistic both exceed `threshold` even if noise reduces
+    /// the estimate by one standard deviation.
     fn needed(&self, threshold: f64) -> f64 {
         let threshold = threshold.max(0.0);
         let by_gain = (threshold + self.penalty).sqrt();
@@ -108,7 +108,8 @@ impl<'a> Sought<'a> {
         Some(sought)
     }
 
-    /// Converts a size to an amount and back. For a limit, the size is the reciprocal: a lower limit is a larger effect.
+    /// Converts an amount to a size, or a size to an amount. The size grows with the strength of the effect: it equals the
+    /// amount, except for a limit (on a rate, for example), for which it is 1/amount.
     fn turned(&self, x: f64) -> f64 {
         let starts = self.entry.about.entry.map_or(&[][..], |e| e.starts);
         let falls = starts.first().map(|s| s[0]) > starts.last().map(|s| s[0]);

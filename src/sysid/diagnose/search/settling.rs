@@ -18,14 +18,14 @@ pub struct Ranked {
     pub round: Round,
     /// Indices and scores of the candidates, in descending order of rank.
     pub scores: Vec<(usize, Score)>,
-    /// Best evidence in each null flight.
+    /// Best evidence in each simulated flight without a missing effect (null flight).
     pub nulls: Vec<f64>,
     /// Evidence that a candidate must exceed.
     pub threshold: f64,
 }
 
-/// Ranks the candidates of `round`. If the model's accelerations are too inaccurate for candidates of mass and inertia, the
-/// accelerations of a better model are used.
+/// Ranks the candidates of `round`. The regressors of mass and inertia contain accelerations predicted by the model. If these
+/// are too inaccurate, a better model predicts them.
 pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     let rank = |mut round: Round| {
         let scores = round.rank();
@@ -40,10 +40,12 @@ pub fn ranked(problem: &Problem, round: Round, options: &Options) -> Ranked {
     }
 }
 
-/// The round with accelerations of another model: the model after the best change of mass or inertia was added and tuned.
+/// The round whose regressors of mass and inertia contain the accelerations of a better model: the round's model with the
+/// best-ranked change of mass or inertia, added and tuned.
 ///
-/// `None` if this is not necessary. A large error of the inertia causes wrong accelerations of the model, and wrong
-/// regressors. The estimates then differ between flights and are all too small.
+/// A large inertia error of the model makes these regressors wrong. The estimates then differ between flights and are all too
+/// small. `None` if no change of mass or inertia exceeds the threshold, if tuning changes its first coefficient by at most
+/// `ASTRAY`, or if a model cannot be linearised.
 fn accelerated(problem: &Problem, ranked: &Ranked) -> Option<Round> {
     let Ranked { round, scores, threshold, .. } = ranked;
     let of_body = |trial: usize, score: &Score| {

@@ -28,15 +28,14 @@ use run_off::run_off;
 
 /// Share of the work done once all candidates have been ranked.
 const RANKED: f64 = 0.3;
-/// Largest number of asserted effects.
+/// Largest number of effects added to the model.
 const MOST: usize = 6;
-/// Largest number of tuning passes after an effect has joined. A product of two coefficients, such as a saturation
-/// and the effectiveness that saturates, needs more of them than [`SETTLING`], since each is tuned with the other
-/// held.
+/// Largest number of tuning passes after an effect has been added. If two coefficients multiply each other (a saturation
+/// limit and an effectiveness), the linearised tuning converges slowly and needs more passes than [`SETTLING`].
 const MOST_SETTLING: usize = 12;
 /// Convergence tolerance of tuning: largest change of a coefficient in its standard deviations.
 const STEP_TOLERANCE: f64 = 0.2;
-/// Number of refused candidates, in addition to the added effects, after which the search ends.
+/// Largest number of refused candidates that are set aside; the next refusal ends the search.
 const MOST_ASIDE: usize = 4;
 
 /// Searches for the effects that `model` lacks.
@@ -111,12 +110,13 @@ fn select(
         let Some(winner) = examine(found, options) else { break };
         let passed = winner.refused.is_empty() || winner.trace.is_some();
         let outcome = match (&winner.trace, passed) {
-            (Some(_), _) => "is a trace",
-            (None, true) => "joins",
-            (None, false) => "is refused",
+            (Some(_), _) => "significant but immaterial, added",
+            (None, true) => "added",
+            (None, false) => "refused",
         };
         report(progress, &format!("{}: {outcome}", winner.id), found.fraction())?;
-        // several effects may be missing, so a refused candidate does not end the search
+        // While no effect has been added, the first refusal ends the search. Later, up to MOST_ASIDE refused candidates are
+        // set aside, because further effects may be missing.
         if !passed && found.last.is_some() && aside.len() < MOST_ASIDE {
             found.scores.remove(0);
             aside.push(winner);
@@ -141,7 +141,7 @@ fn first_look(round: &Round, scores: &[(usize, Score)], threshold: f64) -> Vec<F
     scores.iter().map(of).collect()
 }
 
-/// `current` without the effect `id`, which `given` does not contain either.
+/// `current` with the effect `id` removed. `given` must not contain `id`.
 fn without(given: &GreyBox, current: &GreyBox, id: &str) -> GreyBox {
     let mut model = given.clone();
     let joined: Vec<&'static str> =
@@ -202,8 +202,8 @@ impl Found {
         Ok(true)
     }
 
-    /// `model`, with the effect selected last, tuned to convergence; an earlier effect that becomes insignificant is
-    /// removed and ends the tuning. `None` if the model cannot be linearised.
+    /// Tunes `model`, which contains the effect selected last, until convergence or for `MOST_SETTLING` passes. An earlier
+    /// effect that becomes insignificant is removed, and tuning stops. `None` if the model cannot be linearised.
     fn settle(
         &mut self,
         problem: &Problem,

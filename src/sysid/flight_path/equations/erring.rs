@@ -1,4 +1,5 @@
-//! Simulated errors of the path from random sensor noise, and changes of the constants for given air-data residuals.
+//! Simulated errors of the estimated path due to random sensor noise, and changes of the constants due to given residuals of
+//! the air-data sensors.
 
 use nalgebra::{SVector, Vector3};
 use rand_distr::{Distribution, StandardNormal};
@@ -25,7 +26,7 @@ pub struct Erring {
 }
 
 impl Problem<'_> {
-    /// Changes of the constants of [`calm`](Self::calm) if the air-data sensors had the residuals `others`, indexed by stretch
+    /// Changes of the constants of [`calm`](Self::calm) if the air-data sensors had the residuals `others`, indexed by track
     /// and instant. `None` if the equations are singular.
     pub fn moved_by(
         &self,
