@@ -81,7 +81,7 @@ impl Settings {
         far: Some(0.15),
         envelope: Some(Barrier { part: 0.94, load: 0.05, alpha: 0.01, sideslip: 0.05 }),
         towards: Towards::Path,
-        // 0.12 to 0.3 rad fly alike on models drawn with widths of 15 % (docs/validation/acados.md)
+        // 0.12 to 0.3 rad lose no step on models drawn with widths of 15 % (results/flight-quality.txt)
         missed: Some(0.15),
         start: Start::Policy,
         ..Settings::PLAIN
