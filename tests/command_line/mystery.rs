@@ -167,6 +167,6 @@ fn a_design_names_its_manoeuvre_and_writes_it() {
     );
     let small = "propwash=0.0000001";
     let hopeless = [&between[..], &["--values", small]].concat();
-    refuses(&hopeless, &["no manoeuvre"]);
+    refuses(&hopeless, &["no built-in manoeuvre", "--values"]);
     refuses(&["demo", "--schedule", "none.toml"], &["none.toml"]);
 }

@@ -94,6 +94,6 @@ mod tests {
         let error = forecast.error(&at(0.4), &moved).unwrap();
         assert!((error - 0.3).abs() < 1e-12, "{error}");
         let jumped = Target { roll: -1.0, ..TARGET };
-        assert!(forecast.error(&at(-0.4), &jumped).unwrap() < 0.0);
+        assert_eq!(forecast.error(&at(-0.4), &jumped), Some(0.0), "pitch was predicted exactly");
     }
 }
