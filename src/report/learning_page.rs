@@ -26,6 +26,8 @@ pub struct LearningReport<'a> {
     pub subtitle: String,
     /// The trainings on the page.
     pub trainings: &'a [Training],
+    /// The next command for the user to run.
+    pub next: String,
     /// Inputs such as commands and files, as pairs of name and value.
     pub provenance: Vec<(String, String)>,
 }
@@ -117,7 +119,7 @@ impl LearningReport<'_> {
             false => Section::new(
                 "",
                 "",
-                vec![Figure::Findings(Findings { lead, rest, ..Findings::default() })],
+                vec![Figure::Findings(Findings { lead, rest, next: self.next.clone() })],
             ),
         }
     }
@@ -231,6 +233,7 @@ mod tests {
             title: "Curves".into(),
             subtitle: String::new(),
             trainings: &trainings,
+            next: "greylag evaluate --controller policy --policy two/seed-1".into(),
             provenance: Vec::new(),
         };
         let figures = report.figures("Minutes", |p| p.seconds / 60.0);
@@ -245,6 +248,7 @@ mod tests {
         let table = report.table();
         assert_eq!(table.rows.len(), 3);
         assert_eq!(table.rows[1].cells[4..6], ["2", "2.00"]);
-        assert!(report.page().render().contains("Learning curves"));
+        let page = report.page().render();
+        assert!(page.contains("Learning curves") && page.contains("--policy two/seed-1"));
     }
 }

@@ -9,12 +9,13 @@ use greylag::commands::fly::companion_with;
 use greylag::control::envelope::Guarded;
 use greylag::control::policy::Agent;
 use greylag::control::quality::{Limits, Quality};
-use greylag::control::{Controller, ControllerKind, Source, Target, build};
+use greylag::control::{Controller, ControllerKind, Observation, Source, Target, build};
 use greylag::flight::desk::Desk;
 use greylag::flight::runtime::Companion;
 use greylag::link::autopilot::{AttitudeSetpoint, Autopilot, Mode, Verdict};
 use greylag::link::vehicle::{Sitl, Vehicle};
 use greylag::model::GreyBox;
+use greylag::physics::Command;
 use greylag::sim::evaluation::{Evaluation, Scored, evaluate_courses};
 use greylag::sim::steps::steps;
 use greylag::sim::{Environment, Simulator};
@@ -76,6 +77,63 @@ fn the_load_factor_is_kept() {
             assert!(load[1] > 1.5 * most, "the limiter has nothing to do: {load:?}");
         }
     }
+}
+
+/// A controller of the user's that knows no sideslip: an LQI whose rudder goes from stop to stop every two seconds.
+struct Kicks {
+    lqi: Box<dyn Controller>,
+    tick: usize,
+}
+
+impl Controller for Kicks {
+    fn name(&self) -> &'static str {
+        "kicks"
+    }
+
+    fn reset(&mut self, seed: u64) {
+        self.lqi.reset(seed);
+    }
+
+    fn command(&mut self, seen: &Observation, target: &Target) -> Command {
+        self.tick += 1;
+        let rudder = if self.tick % 400 < 200 { 1.0 } else { -1.0 };
+        Command { rudder, ..self.lqi.command(seen, target) }
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Controller> {
+        Box::new(Kicks { lqi: self.lqi.boxed_clone(), ..*self })
+    }
+}
+
+/// With a rudder the limiter keeps JSBSim's sideslip too, whoever flies.
+#[test]
+fn sideslip_is_kept_by_the_rudder() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut model = GreyBox::load(&root.join("params/aerosonde/jsbsim.toml")).unwrap();
+    let most = 2.0;
+    model.airframe.envelope.sideslip_max_deg = Some(most);
+    let source = Source { model: &model, agent: None, changes: &[] };
+    let kicks = Kicks { lqi: build(ControllerKind::Lqi, source).unwrap(), tick: 0 };
+    let airspeed_mps = model.airframe.envelope.airspeed_cruise_mps;
+    let reached = |mut controller: Box<dyn Controller>| {
+        let start = Start { airspeed_mps, ..Start::NEUTRAL };
+        let options =
+            PlantOptions { aircraft: "aerosonde".into(), start, ..PlantOptions::default() };
+        let mut world = Simulator::new(&options).unwrap();
+        let mut seen = world.reset().unwrap();
+        controller.reset(1);
+        let target = Target { roll: 0.0, pitch: 0.05, airspeed: airspeed_mps };
+        let mut beta = 0.0_f64;
+        for _ in 0..1200 {
+            seen = world.step(controller.command(&seen, &target)).unwrap();
+            beta = beta.max(world.truth().beta_rad.to_degrees().abs());
+        }
+        beta
+    };
+    let kept = reached(Box::new(Guarded::new(kicks.boxed_clone(), &model)));
+    assert!(kept < 1.05 * most && kept > 0.8 * most, "{kept}");
+    let free = reached(kicks.boxed_clone());
+    assert!(free > 1.2 * most, "the limiter has nothing to do: {free}");
 }
 
 /// The steep attitudes of `cargo demo` with the companion in the loop over its link, 8 s each: least and largest load factor,

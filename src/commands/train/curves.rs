@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail};
 use comfy_table::Table;
 
 use crate::commands::files::{self, Overwrite};
-use crate::learn::policy::learning_curve::{self, CURVE};
+use crate::learn::policy::learning_curve::{self, CURVE, CurvePoint, best};
+use crate::logs::quoted;
 use crate::report::{LearningReport, Training};
 
 /// Prefix of the folder of one seed in a training of several seeds.
@@ -35,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let trainings =
         arguments.folders.iter().map(|f| training(f)).collect::<Result<Vec<Training>>>()?;
-    let report = report("Learning curves", &trainings);
+    let report = report("Learning curves", &arguments.folders, &trainings);
     let table = report.table();
     let mut printed = Table::new();
     printed.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
@@ -52,21 +53,36 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Draws the curves of the training in `folder` into `page`.
 pub fn draw(folder: &Path, page: &Path) -> Result<()> {
     let trainings = [training(folder)?];
-    let report = report("Training of a policy", &trainings);
+    let report = report("Training of a policy", &[folder.to_owned()], &trainings);
     files::write(page, &report.page().render(), Overwrite::Force)
 }
 
-fn report<'a>(title: &str, trainings: &'a [Training]) -> LearningReport<'a> {
+/// The page of `trainings`, which lie in `folders`, in the same order.
+fn report<'a>(title: &str, folders: &[PathBuf], trainings: &'a [Training]) -> LearningReport<'a> {
     let seeds = trainings.iter().map(|t| t.seeds.len()).sum::<usize>();
     LearningReport {
         title: title.into(),
         subtitle: format!("Trainings: {}; policies: {seeds}.", trainings.len()),
         trainings,
+        next: next(folders, trainings),
         provenance: vec![
             ("Program".into(), concat!("greylag ", env!("CARGO_PKG_VERSION")).into()),
             ("Command".into(), files::command_line()),
         ],
     }
+}
+
+/// The command that scores the policy with the smallest error of all seeds.
+fn next(folders: &[PathBuf], trainings: &[Training]) -> String {
+    let least = |points: &[CurvePoint]| best(points).map_or(f64::INFINITY, |k| points[k].badness());
+    let seeds = folders.iter().zip(trainings).flat_map(|(folder, training)| {
+        training.seeds.iter().map(move |(seed, points)| (folder, seed, least(points)))
+    });
+    seeds.min_by(|a, b| a.2.total_cmp(&b.2)).map_or_else(String::new, |(folder, seed, _)| {
+        let own = folder.join(format!("{SEED}{seed}"));
+        let policy = if own.is_dir() { &own } else { folder };
+        format!("greylag evaluate --controller policy lqi --policy {}", quoted(policy))
+    })
 }
 
 /// The curves in `folder`, or in the folders of its seeds.

@@ -1,5 +1,5 @@
 //! The envelope limiter between a controller and the surfaces. The elevator limits load factor and angle of attack, the
-//! aileron limits bank.
+//! aileron limits bank, the rudder limits sideslip.
 //!
 //! Each limit gives a control law for the surface. The command is clamped between the laws of both sides (min/max
 //! selection, as in fly-by-wire: Stevens, Lewis and Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.6).
@@ -29,6 +29,8 @@ const PART: f64 = 0.96;
 const PITCH_POLE: f64 = 10.0;
 /// Pole ω of the law for bank, rad/s.
 const BANK_POLE: f64 = 10.0;
+/// Pole ω of the law for sideslip, rad/s.
+const SIDESLIP_POLE: f64 = 10.0;
 /// Number of steps until a command acts: one to the next tick, the others for the lag of a surface's actuator.
 const AHEAD: usize = 3;
 /// Deflection for the finite difference of a surface's effect, as a fraction of its travel.
@@ -49,6 +51,8 @@ pub enum Limit {
     Incidence,
     /// The bank limit.
     Bank,
+    /// The sideslip limit.
+    Sideslip,
     /// No limit. The limiter is inactive because the model's predictions were wrong.
     Distrust,
 }
@@ -84,6 +88,7 @@ pub struct EnvelopeLimiter {
 enum Surface {
     Elevator,
     Aileron,
+    Rudder,
 }
 
 /// Value of a limit in its unit, and the rate of this value per second.
@@ -147,6 +152,7 @@ impl EnvelopeLimiter {
         let mut out = Limited { command: wanted.clamped(), by: None };
         let at = self.when_it_acts(seen);
         self.keep_bank(&at, &mut out);
+        self.keep_sideslip(&at, &mut out);
         self.keep_load(&at, &mut out);
         out
     }
@@ -170,25 +176,41 @@ impl EnvelopeLimiter {
     }
 
     fn keep_bank(&self, at: &Moment, out: &mut Limited) {
-        let motion = at.motion(Surface::Aileron, |s| s.roll);
+        let travel = self.model.airframe.actuators.aileron.travel;
+        let motion = at.motion(Surface::Aileron, travel, |s| s.roll);
         let most = self.bounds.bank;
         let law = |value| motion.law(At { limit: Limit::Bank, value, rate: 0.0 }, BANK_POLE);
-        let travel = self.model.airframe.actuators.aileron.travel;
         // the law holds only if positive aileron rolls right
         if motion.effect > 0.0 {
             clamp(&mut out.command.aileron, &mut out.by, travel, [law(-most), law(most)]);
         }
     }
 
+    /// Limits the sideslip of an aircraft with a rudder. Without one no surface controls it: at full travel the X8's aileron changes
+    /// β̈ by less than a twentieth of what the law asks.
+    fn keep_sideslip(&self, at: &Moment, out: &mut Limited) {
+        let Some(rudder) = &self.model.airframe.actuators.rudder else {
+            return;
+        };
+        let motion = at.motion(Surface::Rudder, rudder.travel, |s| s.beta);
+        let most = self.bounds.within(PART).sideslip;
+        let law =
+            |value| motion.law(At { limit: Limit::Sideslip, value, rate: 0.0 }, SIDESLIP_POLE);
+        // the law holds only if positive rudder yaws left, towards positive sideslip
+        if motion.effect > 0.0 {
+            clamp(&mut out.command.rudder, &mut out.by, rudder.travel, [law(-most), law(most)]);
+        }
+    }
+
     /// Limits load factor and angle of attack. Both are limits of the angle of attack.
     fn keep_load(&self, at: &Moment, out: &mut Limited) {
-        let motion = at.motion(Surface::Elevator, |s| s.alpha);
+        let travel = self.model.airframe.actuators.elevator.travel;
+        let motion = at.motion(Surface::Elevator, travel, |s| s.alpha);
         // the law holds only if positive elevator pitches down
         if motion.effect >= 0.0 {
             return;
         }
         let bounds = self.bounds.within(PART);
-        let travel = self.model.airframe.actuators.elevator.travel;
         // the load factor is computed for the elevator that holds the angle of attack, because a moving elevator adds its own
         // lift
         let held = (motion.deflection - motion.acceleration / motion.effect)
@@ -226,13 +248,7 @@ impl Surface {
         match self {
             Surface::Elevator => &mut controls.elevator,
             Surface::Aileron => &mut controls.aileron,
-        }
-    }
-
-    fn travel(self, model: &GreyBox) -> Travel {
-        match self {
-            Surface::Elevator => model.airframe.actuators.elevator.travel,
-            Surface::Aileron => model.airframe.actuators.aileron.travel,
+            Surface::Rudder => &mut controls.rudder,
         }
     }
 }
@@ -242,8 +258,8 @@ impl Moment<'_> {
         self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
     }
 
-    /// Value and derivatives of the quantity `of`, and their response to `surface`.
-    fn motion(&self, surface: Surface, of: impl Fn(&State) -> f64) -> Motion {
+    /// Value and derivatives of the quantity `of`, and their response to `surface`, which has this `travel`.
+    fn motion(&self, surface: Surface, travel: Travel, of: impl Fn(&State) -> f64) -> Motion {
         let mut controls = self.controls;
         // the acceleration is the change of the rate along the predicted motion
         let follow = |controls: &Controls| {
@@ -253,7 +269,6 @@ impl Moment<'_> {
         };
         let (rate, acceleration) = follow(&controls);
         let deflection = *surface.of(&mut controls);
-        let travel = surface.travel(self.model);
         let probe = if deflection > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         *surface.of(&mut controls) += probe;
         let (_, probed) = follow(&controls);
@@ -271,7 +286,7 @@ impl Moment<'_> {
     /// The elevator deflections (rad) at which the elevator's lift alone reaches the largest and the smallest load factor.
     fn lift_limits(&self, bounds: &Bounds, elevator: f64) -> [f64; 2] {
         let load = self.load(self.state.alpha, elevator);
-        let travel = Surface::Elevator.travel(self.model);
+        let travel = self.model.airframe.actuators.elevator.travel;
         let probe = if elevator > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         let slope = (self.load(self.state.alpha, elevator + probe) - load) / probe;
         // the lift of a canard has the other sign, as does its moment

@@ -20,7 +20,13 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let answer = c.answer.clone();
     let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
-    let words = Figure::Findings(findings(c));
+    let mut found = findings(c);
+    if c.models.len() == 1 {
+        // the box above says where the model fails
+        let lead = std::mem::take(&mut found.lead);
+        found.rest.splice(0..0, lead);
+    }
+    let words = Figure::Findings(found);
     // the page of a single model begins with its failures, that of several models with their differences
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
