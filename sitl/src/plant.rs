@@ -8,6 +8,7 @@ mod mixing;
 mod nodes;
 mod options;
 mod settling;
+mod spin_up;
 mod state;
 mod steering;
 mod travel;
@@ -198,7 +199,7 @@ impl Plant {
     fn start_engines(&mut self) -> Result<(), PlantError> {
         let started = self.nodes.start_engines(&mut self.fdm, self.options.step_s);
         match started.map_err(jsbsim("starting the engines"))? {
-            None => Ok(()),
+            None => self.spin_up(),
             Some(engine) => {
                 Err(PlantError::Engine { aircraft: self.options.aircraft.clone(), engine })
             }

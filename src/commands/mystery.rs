@@ -9,6 +9,7 @@ use comfy_table::{CellAlignment, Table};
 use greylag_sitl::plant::PlantOptions;
 use serde::{Deserialize, Serialize};
 
+use crate::commands::choices;
 use crate::commands::files::shipped;
 use crate::control::{ControllerKind, build};
 use crate::logs::csv;
@@ -60,6 +61,10 @@ pub struct Arguments {
     /// Fly in MIL-spec turbulence: 3 light, 4 moderate.
     #[arg(long, value_name = "1..7", value_parser = clap::value_parser!(u8).range(1..=7))]
     turbulence_severity: Option<u8>,
+    /// Controller of the flights. `any` and `adaptive` know of the aircraft its cruise airspeed and whether it has a rudder: they
+    /// explore an aircraft without a model.
+    #[arg(long, value_name = "NAME", default_value = "lqi", value_parser = choices::controller())]
+    controller: ControllerKind,
     /// Reveal the answer of a folder, beside the result in its diagnosis.json.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "out", "what", "turbulence_severity"])]
     open: Option<PathBuf>,
@@ -128,7 +133,7 @@ fn make(arguments: &Arguments, seed: u64, out: &Path) -> Result<ExitCode> {
     let model = starting_model(&text, &format!("mystery-{seed}"), seed, &trial.missing);
     put(&folder, "model.toml", &model.map_err(|why| anyhow!("making the model: {why}"))?)?;
     GreyBox::load(&folder.join("model.toml"))?;
-    let logs = trial.fly(build(ControllerKind::Lqi, &reference)?.as_ref())?;
+    let logs = trial.fly(build(arguments.controller, &reference)?.as_ref())?;
     for flight in logs.training.iter().chain(&logs.testing) {
         csv::save(flight, &folder.join(&flight.name))?;
     }

@@ -67,11 +67,6 @@ impl Linked {
         }
         Ok(if self.0.len() == 1 { sum } else { sum / self.0.len() as f64 })
     }
-
-    /// Whether `self` and `other` have a property in common.
-    pub fn shares(&self, other: &Linked) -> bool {
-        self.0.iter().any(|(node, _)| other.0.iter().any(|(theirs, _)| node == theirs))
-    }
 }
 
 #[cfg(test)]

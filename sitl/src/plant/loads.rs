@@ -106,6 +106,14 @@ impl Plant {
         work: impl FnOnce(&mut Plant) -> Result<T, PlantError>,
     ) -> Result<T, PlantError> {
         self.reset(start)?;
+        self.held(work)
+    }
+
+    /// Result of `work` while the integrators of the state are off: only systems and engines run.
+    pub(super) fn held<T>(
+        &mut self,
+        work: impl FnOnce(&mut Plant) -> Result<T, PlantError>,
+    ) -> Result<T, PlantError> {
         let mut schemes = [0.0; 4];
         for (scheme, name) in schemes.iter_mut().zip(INTEGRATORS) {
             *scheme = self.property(name)?;

@@ -88,11 +88,6 @@ impl Nodes {
         self.steering.is_glider()
     }
 
-    /// Whether two controls may share a property.
-    pub(super) fn is_shared(&self) -> bool {
-        self.steering.is_shared()
-    }
-
     /// Starts every engine that can be off. Returns the index of the first that does not run after the start.
     /// JSBSim starts engines at full power; they then follow the throttle.
     pub(super) fn start_engines(&self, fdm: &mut Fdm, step_s: f64) -> Result<Option<usize>, Error> {

@@ -131,19 +131,6 @@ impl Steering {
         }
     }
 
-    /// Whether two controls share a property; only one control at a time can then reach its full command.
-    pub(super) fn is_shared(&self) -> bool {
-        match self {
-            Steering::Usual(usual) => {
-                let [aileron, elevator] = &usual.surfaces;
-                let rudder = usual.rudder.as_ref().map(|[command, _]| command);
-                aileron.shares(elevator)
-                    || rudder.is_some_and(|r| r.shares(aileron) || r.shares(elevator))
-            }
-            Steering::Mixed(_) => true,
-        }
-    }
-
     /// Whether the aircraft has no throttle.
     pub(super) fn is_glider(&self) -> bool {
         match self {

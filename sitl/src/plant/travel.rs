@@ -107,18 +107,14 @@ impl Plant {
         })
     }
 
-    /// Deflections of aileron, elevator and rudder at rest at `command`, rad. If controls share a surface, each control is
-    /// commanded alone: together they would reach its stop too early.
+    /// Deflections of aileron, elevator and rudder at rest at `command`, rad, each control alone: on a V-tail or on elevons they would
+    /// move one surface together, or reach its stop too early.
     fn stops(&mut self, command: f64) -> Result<[f64; 3], PlantError> {
-        let [aileron, elevator, rudder] = [command; 3];
-        if !self.nodes.is_shared() {
-            return self.rest(&Inputs { aileron, elevator, throttle: 0.0, rudder });
-        }
         let none = Inputs::default();
         Ok([
-            self.rest(&Inputs { aileron, ..none })?[0],
-            self.rest(&Inputs { elevator, ..none })?[1],
-            self.rest(&Inputs { rudder, ..none })?[2],
+            self.rest(&Inputs { aileron: command, ..none })?[0],
+            self.rest(&Inputs { elevator: command, ..none })?[1],
+            self.rest(&Inputs { rudder: command, ..none })?[2],
         ])
     }
 

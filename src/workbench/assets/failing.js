@@ -80,6 +80,9 @@ function build() {
 
 // ---- which model ----
 
+/** Error of a model's free runs over so many seconds; undefined where the flights are too short. */
+const error_over = (seconds, model) => model?.free_run.find((h) => h.horizon_s === seconds)?.rmse_scaled;
+
 /** The model that is shown before the effects: tuned as soon as that is known, as given if the reader asks for it. */
 const way = (ways) => (ways.includes("tuned") && pick.base !== "given" ? "tuned" : "given");
 /** Of a list with one entry a model: that model's, and the amended one's if there is one. */
@@ -94,7 +97,9 @@ function switcher() {
   const press = (to) => { pick.base = to; pick.by_hand = false; switcher(); pressed_cell(); };
   const why = { tuned: "its own coefficients fitted: what is left is for a missing effect to explain", given: ways.includes("tuned") ? "what tuning takes away was wrong coefficients, no missing effect" : "as its file has it; Diagnose tunes it first" };
   const button = (to) => el("button", { type: "button", "data-base": to, "aria-pressed": to === now ? "true" : "false", disabled: !ways.includes(to), onclick: () => press(to) }, WORD[to]);
-  parts.base.replaceChildren(el("b", {}, "Model"), button("tuned"), button("given"), el("span", { class: "muted" }, why[now]));
+  const error = error_over(RUN_S, bench.failing.models[ways.indexOf(now)]);
+  const off = error == null ? [] : [el("b", { class: "off", title: "root mean square over the eight states of free runs, each state over its characteristic value (NRMSE)" }, `error over ${RUN_S} s: ${show(error, 3)}`)];
+  parts.base.replaceChildren(el("b", {}, "Model"), button("tuned"), button("given"), ...off, el("span", { class: "muted" }, why[now]));
   if (inside) parts.base.querySelector("[aria-pressed=true]").focus();
 }
 
