@@ -36,7 +36,7 @@ def widths(amended):
 
 def error(greylag, model, logs, out):
     """Error of `model` over 5 s, all states over their characteristic values."""
-    run([greylag, "compare", "--model", model, "--log", *logs, "--json", out])
+    run([greylag, "compare", "--model", model, "--log", *logs, "--json", out, "--force"])
     scores = json.loads(out.read_text())["models"][0]["free_run"]
     return next(s["rmse_scaled"] for s in scores if s["horizon_s"] == 5.0)
 

@@ -3,6 +3,7 @@
 mod air;
 mod aircraft;
 mod discovery;
+mod electric;
 mod facts;
 mod flights;
 mod hidden_channels;

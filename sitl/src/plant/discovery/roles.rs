@@ -20,6 +20,8 @@ pub(super) struct Tried {
 
 /// Deflection assumed at full command if the aircraft has only a normalised position, rad: 20°.
 const SHARE_RAD: f64 = 0.349;
+/// Largest difference of the movements of two positions that count as equal, as a fraction.
+const ALIKE: f64 = 0.01;
 /// Smallest moment of a candidate, as a fraction of the largest about the same axis.
 const LEAST: f64 = 0.05;
 /// Smallest moment about an axis, as a fraction of the largest about any axis; a smaller one is attributed to rounding.
@@ -132,7 +134,7 @@ fn score(parts: &[(&Tried, f64)], role: &Role, largest: f64) -> f64 {
     };
     let words = if name(&role.words) { 4.0 } else { 1.0 };
     let others = if name(&OTHERS) { 0.1 } else { 1.0 };
-    let moves = if parts.iter().all(|(t, _)| position(t).is_some()) { 1.0 } else { 0.3 };
+    let moves = if parts.iter().all(|(t, _)| !positions(t).is_empty()) { 1.0 } else { 0.3 };
     (own / (own + beside)).powi(2) * (own / largest).min(2.0).sqrt() * words * others * moves
 }
 
@@ -146,8 +148,9 @@ fn are_sides(a: &str, b: &str) -> bool {
     swapped || (a.len() == b.len() && differ.len() == 1 && letters)
 }
 
-/// The position that a command moves most, in rad; if there is none in rad, a normalised position.
-fn position(tried: &Tried) -> Option<&(String, [f64; 2])> {
+/// The positions that a command moves most, all by the same amount, in rad; if there are none in rad, the normalised ones. A command
+/// may move two surfaces, of a V-tail for instance, of which another command moves one the other way: their mean is its own.
+fn positions(tried: &Tried) -> Vec<&(String, [f64; 2])> {
     let kind = |name: &str| match name {
         _ if name.contains("deg") => 0,
         _ if name.contains("norm") => 1,
@@ -155,7 +158,14 @@ fn position(tried: &Tried) -> Option<&(String, [f64; 2])> {
     };
     let size = |m: &[f64; 2]| m[0].abs().max(m[1].abs());
     let usable = tried.moved.iter().filter(|(name, m)| kind(name) > 0 && size(m) < 3.0);
-    usable.max_by(|a, b| kind(&a.0).cmp(&kind(&b.0)).then(size(&a.1).total_cmp(&size(&b.1))))
+    let most = usable
+        .clone()
+        .max_by(|a, b| kind(&a.0).cmp(&kind(&b.0)).then(size(&a.1).total_cmp(&size(&b.1))));
+    let Some((first, m)) = most else { return Vec::new() };
+    let alike = |other: &&(String, [f64; 2])| {
+        kind(&other.0) == kind(first) && (size(&other.1) - size(m)).abs() < ALIKE * size(m)
+    };
+    usable.filter(alike).collect()
 }
 
 /// Command and position of the choice, written as `--property` takes them.
@@ -166,11 +176,11 @@ fn named(
 ) -> (Option<String>, Option<String>) {
     let moment: f64 = choice.parts.iter().map(|(t, sign)| sign * t.moments[role.axis]).sum();
     let turn = if moment * role.sense < 0.0 { -1.0 } else { 1.0 };
-    let (mut commands, mut positions) = (Vec::new(), Vec::new());
+    let (mut commands, mut places) = (Vec::new(), Vec::new());
     for (tried, sign) in &choice.parts {
         let sign = sign * turn;
         commands.push(linked(&tried.command, sign, tried.full_at));
-        if let Some((name, [back, ahead])) = position(tried) {
+        for (name, [back, ahead]) in positions(tried) {
             let rises = if ahead - back >= 0.0 { sign } else { -sign };
             let is_share = name.contains("norm");
             if is_share {
@@ -179,11 +189,11 @@ fn named(
                      {}'s effect at full command is known", role.name
                 ));
             }
-            positions.push(linked(name, rises, if is_share { SHARE_RAD } else { 1.0 }));
+            places.push(linked(name, rises, if is_share { SHARE_RAD } else { 1.0 }));
         }
     }
     let text = |parts: Vec<String>| (!parts.is_empty()).then(|| parts.join(","));
-    (text(commands), text(positions))
+    (text(commands), text(places))
 }
 
 fn linked(name: &str, sign: f64, scale: f64) -> String {
