@@ -17,6 +17,8 @@ mod cdr;
 mod chunk;
 mod definition;
 mod streams;
+#[cfg(test)]
+mod tests;
 
 use std::io::{self, Read};
 
@@ -121,8 +123,9 @@ impl Reader<'_> {
         // A record that the file's end cuts is judged by what there is of it.
         let agrees = match code {
             op::CHUNK => chunk::agrees(body, length),
-            op::MESSAGE_INDEX => bytes(body, 2)
-                .is_none_or(|size| u64::from(u32::from_le_bytes(size)) + 6 == length),
+            op::MESSAGE_INDEX => {
+                bytes(body, 2).is_none_or(|size| u64::from(u32::from_le_bytes(size)) + 6 == length)
+            }
             op::MESSAGE => {
                 let channel = bytes(body, 0).map(u16::from_le_bytes);
                 length >= MESSAGE as u64 && channel.is_none_or(|c| self.streams.knows(c))

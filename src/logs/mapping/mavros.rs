@@ -65,9 +65,11 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
         out.push(Rule::linear(force, "imu/data", &forces, gain));
         out.push(Rule::linear(force, "imu/data_raw", &forces, gain));
     }
-    out.push(Rule::linear("airspeed_mps", "vfr_hud", "airspeed", 1.0).equivalent().noting(
-        "airspeed is vfr_hud's equivalent airspeed, made true by the air's density",
-    ));
+    out.push(
+        Rule::linear("airspeed_mps", "vfr_hud", "airspeed", 1.0)
+            .equivalent()
+            .noting("airspeed is vfr_hud's equivalent airspeed, made true by the air's density"),
+    );
     for (column, field, gain) in [
         ("vn_mps", "twist.linear.y", 1.0),
         ("ve_mps", "twist.linear.x", 1.0),
@@ -78,7 +80,8 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
     out.push(Rule::linear("altitude_m", "altitude", "amsl", 1.0));
     out.push(Rule::linear("altitude_m", "vfr_hud", "altitude", 1.0));
     for topic in ["setpoint_raw/target_attitude", "setpoint_raw/attitude"] {
-        for (column, angle) in [("roll_target_rad", Tilt::Roll), ("pitch_target_rad", Tilt::Pitch)] {
+        for (column, angle) in [("roll_target_rad", Tilt::Roll), ("pitch_target_rad", Tilt::Pitch)]
+        {
             out.push(Rule::tilt(column, topic, angle, ORIENTATION).in_axes(Axes::EnuFlu));
         }
     }
@@ -90,8 +93,7 @@ pub fn rules(topics: &Topics, mixer: Option<&Mixer>) -> Vec<Rule> {
         ("rudder_cmd", 2, -1.0),
         ("throttle_cmd", 3, 1.0),
     ] {
-        let rule =
-            Rule::linear(column, "target_actuator_control", &format!("controls[{i}]"), gain);
+        let rule = Rule::linear(column, "target_actuator_control", &format!("controls[{i}]"), gain);
         out.push(rule.noting("commands are target_actuator_control's, before the mixer"));
     }
     out

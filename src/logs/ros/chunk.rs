@@ -89,8 +89,7 @@ impl Reader<'_> {
             "" => Box::new(packed),
             "lz4" => Box::new(FrameDecoder::new(packed)),
             "zstd" => {
-                let frame =
-                    StreamingDecoder::new_with_max_window_size(&mut packed, ZSTD_WINDOW);
+                let frame = StreamingDecoder::new_with_max_window_size(&mut packed, ZSTD_WINDOW);
                 Box::new(frame.map_err(io::Error::other)?)
             }
             other => return Err(io::Error::other(format!("compression `{other}` is unknown"))),

@@ -336,7 +336,10 @@ mod tests {
             let of = |name: &str| {
                 values[STAMPS.len() + plan.fields.iter().position(|f| f == name).unwrap()]
             };
-            assert_eq!([of("x[0]"), of("x[2]"), of("pulses[1]"), of("last")], [1.5, 3.5, 1600.0, 1.0]);
+            assert_eq!(
+                [of("x[0]"), of("x[2]"), of("pulses[1]"), of("last")],
+                [1.5, 3.5, 1600.0, 1.0]
+            );
             assert!(of("pulses[2]").is_nan());
         }
         // Cut anywhere, it does not fit.
@@ -349,10 +352,15 @@ mod tests {
         let wanted = |_: &str| true;
         assert!(Plan::of("own/msg/A", "A a\n", &wanted).is_none());
         assert!(Plan::of("own/msg/A", "B b\n", &wanted).is_none());
-        let wide: String = (0..5).map(|i| format!("MSG: own/T{i}\n{}", format!("T{} a\n", i + 1).repeat(20))).collect();
-        assert!(Plan::of("own/msg/A", &format!("T0 a\n{wide}MSG: own/T5\nint8 x\n"), &wanted).is_none());
+        let wide: String = (0..5)
+            .map(|i| format!("MSG: own/T{i}\n{}", format!("T{} a\n", i + 1).repeat(20)))
+            .collect();
+        assert!(
+            Plan::of("own/msg/A", &format!("T0 a\n{wide}MSG: own/T5\nint8 x\n"), &wanted).is_none()
+        );
         // Four thousand million empty messages are no work.
-        let plan = Plan::of("own/msg/A", "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n", &wanted).unwrap();
+        let plan =
+            Plan::of("own/msg/A", "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n", &wanted).unwrap();
         let mut values = Vec::new();
         assert!(plan.decode(&[0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 9], &mut values));
         assert_eq!(values[STAMPS.len()], 9.0);

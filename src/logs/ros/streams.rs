@@ -221,7 +221,10 @@ impl<'w> Streams<'w> {
                 ));
             }
             if let Some(why) = stream.unread.as_ref().filter(|_| stream.count > 0) {
-                said.push(format!("{} messages of {} were left out: {why}", stream.count, stream.name));
+                said.push(format!(
+                    "{} messages of {} were left out: {why}",
+                    stream.count, stream.name
+                ));
             }
         }
         let jumps: usize = self.clocks.iter().map(|clock| clock.jumps).sum();
@@ -260,7 +263,8 @@ fn named(topic: &str, kind: &str) -> (String, String) {
     let topic = topic.trim_start_matches('/');
     if kind.starts_with("px4_msgs/") {
         let (before, last) = topic.rsplit_once('/').unwrap_or(("", topic));
-        let versioned = last.rsplit_once("_v").filter(|(_, v)| v.bytes().all(|b| b.is_ascii_digit()));
+        let versioned =
+            last.rsplit_once("_v").filter(|(_, v)| v.bytes().all(|b| b.is_ascii_digit()));
         let name = versioned.map_or(last, |(name, _)| name);
         let vehicle = before.strip_suffix("fmu/out").or(before.strip_suffix("fmu/in"));
         let vehicle = vehicle.unwrap_or(before).trim_end_matches('/');
@@ -302,8 +306,14 @@ mod tests {
             let (vehicle, name) = named(topic, kind);
             format!("{vehicle}|{name}")
         };
-        assert_eq!(named("/fmu/out/vehicle_status_v1", "px4_msgs/msg/VehicleStatus"), "|vehicle_status");
-        assert_eq!(named("/px4_2/fmu/in/vehicle_attitude_setpoint", "px4_msgs/msg/X"), "px4_2|vehicle_attitude_setpoint");
+        assert_eq!(
+            named("/fmu/out/vehicle_status_v1", "px4_msgs/msg/VehicleStatus"),
+            "|vehicle_status"
+        );
+        assert_eq!(
+            named("/px4_2/fmu/in/vehicle_attitude_setpoint", "px4_msgs/msg/X"),
+            "px4_2|vehicle_attitude_setpoint"
+        );
         assert_eq!(named("/mavros/imu/data", "sensor_msgs/msg/Imu"), "|imu/data");
         assert_eq!(named("/uav1/mavros/vfr_hud", "mavros_msgs/msg/VfrHud"), "uav1|vfr_hud");
         assert_eq!(named("/probe/alpha", "std_msgs/msg/Float64"), "|probe/alpha");
