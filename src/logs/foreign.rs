@@ -14,11 +14,11 @@ const KNOWN: [(&[u8], &str); 10] = [
     ),
     (
         b"MATLAB 5.0 MAT-file",
-        "it is a MATLAB file: greylag.mat_to_csv of the Python package makes a CSV of it (pip install ./python), in MATLAB writetimetable",
+        "it is a MATLAB file: greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"\x89HDF\r\n",
-        "it is an HDF5 file (MATLAB 7.3 writes such): greylag.mat_to_csv of the Python package makes a CSV of it (pip install ./python), in MATLAB writetimetable",
+        "it is an HDF5 file (MATLAB 7.3 writes such): greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"H Product:Blackbox",

@@ -13,8 +13,10 @@ use super::cdr::{Cdr, Number};
 
 /// Nesting of message types; those of MAVROS and PX4 have five levels at most.
 const DEPTH: usize = 8;
-/// Steps of one message; `nav_msgs/Odometry` has thirty.
-const STEPS: usize = 4096;
+/// Steps and elements of all messages of a bag that are read; `nav_msgs/Odometry` has a hundred.
+pub(super) const STEPS: usize = 1 << 16;
+/// Fields of a message that are read.
+const FIELDS: usize = 256;
 /// Elements of an array that can be fields.
 const ELEMENTS: usize = 32;
 /// Fields of which the time of a message is made. They are the first values of a message.
@@ -66,10 +68,15 @@ pub(super) struct Plan {
 
 impl Plan {
     /// The plan for the type `name` (`package/msg/Type`) by the definitions in `text`, for the fields that `wanted`
-    /// names; `None` if the definition cannot be followed.
-    pub fn of(name: &str, text: &str, wanted: &dyn Fn(&str) -> bool) -> Option<Plan> {
+    /// names; `None` if the definition cannot be followed, or takes more than the `budget` of steps that is left.
+    pub fn of(
+        name: &str,
+        text: &str,
+        wanted: &dyn Fn(&str) -> bool,
+        budget: &mut usize,
+    ) -> Option<Plan> {
         let types = types(name, text);
-        let mut maker = Maker { types: &types, wanted, fields: Vec::new(), budget: STEPS };
+        let mut maker = Maker { types: &types, wanted, fields: Vec::new(), budget };
         let mut steps = Vec::new();
         maker.message(&short(name), Some(""), DEPTH, &mut steps)?;
         let read = steps.iter().rposition(Step::reads).map_or(0, |last| last + 1);
@@ -135,17 +142,24 @@ struct Maker<'m> {
     wanted: &'m dyn Fn(&str) -> bool,
     fields: Vec<String>,
     /// Steps that may still be made.
-    budget: usize,
+    budget: &'m mut usize,
 }
 
 impl Maker<'_> {
+    /// Takes `steps` off the budget; `None` if it does not hold as many.
+    fn spend(&mut self, steps: usize) -> Option<()> {
+        *self.budget = self.budget.checked_sub(steps)?;
+        Some(())
+    }
+
     /// The place of the value of a field, if it is asked for.
     fn place(&mut self, name: &str) -> Option<usize> {
         if let Some(stamp) = STAMPS.iter().position(|stamp| *stamp == name) {
             // The stamp itself may be asked for as well; it is one field in either case.
             return Some(stamp);
         }
-        (self.wanted)(name).then(|| {
+        let fits = self.fields.len() < FIELDS && (self.wanted)(name);
+        (fits && !self.fields.iter().any(|field| field == name)).then(|| {
             self.fields.push(name.to_owned());
             STAMPS.len() + self.fields.len() - 1
         })
@@ -170,7 +184,7 @@ impl Maker<'_> {
         };
         let package = name.split('/').next().unwrap_or_default();
         for (kind, field) in fields {
-            self.budget = self.budget.checked_sub(1)?;
+            self.spend(1)?;
             let path = prefix.map(|prefix| format!("{prefix}{field}"));
             self.field(kind, package, path.as_deref(), depth, out)?;
         }
@@ -199,6 +213,7 @@ impl Maker<'_> {
             }
             (Some(number), Some(count)) => {
                 let most = if let Count::Fixed(n) = count { n.min(ELEMENTS) } else { ELEMENTS };
+                self.spend(most)?;
                 let mut place = |i: usize| path.and_then(|p| self.place(&format!("{p}[{i}]")));
                 let places = (0..most).map(&mut place).collect();
                 out.push(Step::Numbers(number, count, places));
@@ -325,9 +340,12 @@ mod tests {
 
     #[test]
     fn fields_are_read_in_both_byte_orders() {
-        let plan = Plan::of("own/msg/Outer", TEXT, &|f| {
-            f.starts_with("x[") || f.starts_with("pulses[") || f == "last"
-        });
+        let plan = Plan::of(
+            "own/msg/Outer",
+            TEXT,
+            &|f| f.starts_with("x[") || f.starts_with("pulses[") || f == "last",
+            &mut 1000,
+        );
         let plan = plan.unwrap();
         let mut values = Vec::new();
         for little in [true, false] {
@@ -350,17 +368,28 @@ mod tests {
     #[test]
     fn definitions_that_have_no_end_are_not_followed() {
         let wanted = |_: &str| true;
-        assert!(Plan::of("own/msg/A", "A a\n", &wanted).is_none());
-        assert!(Plan::of("own/msg/A", "B b\n", &wanted).is_none());
+        assert!(Plan::of("own/msg/A", "A a\n", &wanted, &mut STEPS.clone()).is_none());
+        assert!(Plan::of("own/msg/A", "B b\n", &wanted, &mut STEPS.clone()).is_none());
         let wide: String = (0..5)
             .map(|i| format!("MSG: own/T{i}\n{}", format!("T{} a\n", i + 1).repeat(20)))
             .collect();
         assert!(
-            Plan::of("own/msg/A", &format!("T0 a\n{wide}MSG: own/T5\nint8 x\n"), &wanted).is_none()
+            Plan::of(
+                "own/msg/A",
+                &format!("T0 a\n{wide}MSG: own/T5\nint8 x\n"),
+                &wanted,
+                &mut STEPS.clone()
+            )
+            .is_none()
         );
         // Four thousand million empty messages are no work.
-        let plan =
-            Plan::of("own/msg/A", "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n", &wanted).unwrap();
+        let plan = Plan::of(
+            "own/msg/A",
+            "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n",
+            &wanted,
+            &mut STEPS.clone(),
+        )
+        .unwrap();
         let mut values = Vec::new();
         assert!(plan.decode(&[0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 9], &mut values));
         assert_eq!(values[STAMPS.len()], 9.0);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mcap::records::{Channel, SchemaHeader};
 
 use super::JUMP_S;
-use super::definition::{Plan, STAMPS};
+use super::definition::{Plan, STAMPS, STEPS};
 use crate::finding::Finding;
 use crate::stretches::Keep;
 use crate::topics::{Topic, Topics};
@@ -84,6 +84,8 @@ pub(super) struct Streams<'w> {
     /// Second of the first message by the recorder, from which its times are counted.
     log_epoch_s: Option<u64>,
     values: Vec<f64>,
+    /// Steps that plans may still take: what a file declares must not take more memory than it has bytes.
+    budget: usize,
     /// Messages on channels that the file does not declare.
     orphans: usize,
     /// Definitions and declarations that cannot be read.
@@ -104,6 +106,7 @@ impl<'w> Streams<'w> {
             epoch_s: None,
             log_epoch_s: None,
             values: Vec::new(),
+            budget: STEPS,
             orphans: 0,
             unreadable: 0,
         }
@@ -124,11 +127,14 @@ impl<'w> Streams<'w> {
         let schema = self.schemas.get(&channel.schema_id);
         let (vehicle, name) = named(&channel.topic, schema.map_or("", |s| &s.name));
         let wanted = |field: &str| (self.wanted)(&name, field);
-        let (plan, unread) = match planned(schema, &channel.message_encoding, &wanted) {
-            Ok(plan) => (plan.filter(|plan| !plan.fields.is_empty()), None),
-            // Only of a topic whose fields could be asked for.
-            Err(why) => (None, (self.wanted)(&name, ANY).then_some(why)),
-        };
+        let encoding = &channel.message_encoding;
+        // Only a topic of which a field may be asked for is worth a plan.
+        let (plan, unread) =
+            match wanted(ANY).then(|| planned(schema, encoding, &wanted, &mut self.budget)) {
+                None => (None, None),
+                Some(Ok(plan)) => (plan.filter(|plan| !plan.fields.is_empty()), None),
+                Some(Err(why)) => (None, Some(why)),
+            };
         let topic = plan.as_ref().map(|plan| Topic::new(plan.fields.iter().cloned(), self.keep));
         let stream = Stream { vehicle, name, count: 0, plan, topic, unfit: 0, unread };
         self.by_topic.insert(channel.topic.clone(), self.streams.len());
@@ -245,6 +251,7 @@ fn planned(
     schema: Option<&Schema>,
     encoding: &str,
     wanted: &dyn Fn(&str) -> bool,
+    budget: &mut usize,
 ) -> Result<Option<Plan>, String> {
     let Some(schema) = schema else { return Ok(None) };
     if encoding != "cdr" || schema.encoding != "ros2msg" {
@@ -254,7 +261,7 @@ fn planned(
         ));
     }
     let text = String::from_utf8_lossy(&schema.text);
-    let plan = Plan::of(&schema.name, &text, wanted);
+    let plan = Plan::of(&schema.name, &text, wanted, budget);
     plan.map(Some).ok_or_else(|| format!("the definition of {} is not whole", schema.name))
 }
 
