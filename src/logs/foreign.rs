@@ -3,7 +3,7 @@
 use super::format::MAVLINK_MARKERS;
 
 /// First bytes of common files that are not logs, with their kind and the file to give instead.
-const KNOWN: [(&[u8], &str); 10] = [
+const KNOWN: [(&[u8], &str); 11] = [
     (
         b"#ROSBAG V",
         "it is a ROS 1 bag, which is not read: make a ROS 2 bag of it by `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags) and give the .mcap in FOLDER",
@@ -13,12 +13,16 @@ const KNOWN: [(&[u8], &str); 10] = [
         "it is an SQLite database, such as a ROS 2 bag (.db3), which is not read: make an .mcap of it by `ros2 bag convert -i BAG -o to.yaml`, where to.yaml holds `output_bags: [{uri: NEW, storage_id: mcap, all: true}]`, in the ROS workspace that recorded it",
     ),
     (
+        b"MATLAB 7.3 MAT-file",
+        "it is a MATLAB file (7.3): greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
+    ),
+    (
         b"MATLAB 5.0 MAT-file",
         "it is a MATLAB file: greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"\x89HDF\r\n",
-        "it is an HDF5 file (MATLAB 7.3 writes such): greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
+        "it is an HDF5 file: greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"H Product:Blackbox",

@@ -67,7 +67,8 @@ fn files_of_other_kinds_are_named_with_what_to_give_instead() {
         (b"#ROSBAG V2.0\n\x45\x00".to_vec(), ["ROS 1 bag", "rosbags-convert"]),
         (b"SQLite format 3\0".to_vec(), ["ROS 2 bag", "ros2 bag convert"]),
         (b"MATLAB 5.0 MAT-file, Platform: GLNXA64".to_vec(), ["MATLAB", "mat_to_csv"]),
-        (b"\x89HDF\r\n\x1a\n".to_vec(), ["MATLAB 7.3", "mat_to_csv"]),
+        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec(), ["7.3", "mat_to_csv"]),
+        (b"\x89HDF\r\n\x1a\n".to_vec(), ["HDF5", "mat_to_csv"]),
         (b"{\"t\": 0, \"p\": 1}\n".to_vec(), ["JSON", "CSV"]),
         (b"<!-- logged with, paparazzi -->\n<conf>\n".to_vec(), ["Paparazzi", ".data"]),
     ] {
