@@ -10,7 +10,7 @@ const KNOWN: [(&[u8], &str); 11] = [
     ),
     (
         b"SQLite format 3\0",
-        "it is an SQLite database, such as a ROS 2 bag (.db3), which is not read: make an .mcap of it by `ros2 bag convert -i BAG -o to.yaml`, where to.yaml holds `output_bags: [{uri: NEW, storage_id: mcap, all: true}]`, in the ROS workspace that recorded it",
+        "it is an SQLite database, such as a ROS 2 bag (.db3), which is not read: make an .mcap of it by `rosbags-convert --src FOLDER --dst NEW --dst-storage mcap` (pip install rosbags), or by `ros2 bag convert -i FOLDER -o to.yaml` with `output_bags: [{uri: NEW, storage_id: mcap, all: true}]` in to.yaml",
     ),
     (
         b"MATLAB 7.3 MAT-file",

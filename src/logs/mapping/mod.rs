@@ -13,7 +13,7 @@
 //! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion of
 //! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states which part is first.
 //!
-//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
+//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash, ROS bag)
 //! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, from a
 //! parabola fitted to the rows of so many seconds. `[derive] body_rates_over_s` computes p, q, r from roll, pitch and yaw
 //! in the same way. `[board]` rotates the axes of a log (see [`Board`]). `[flight]` sets the criteria for flight:

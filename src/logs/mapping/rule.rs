@@ -301,10 +301,10 @@ impl Rule {
             Fill::Quaternion { fields, axes } => {
                 let [w, x, y, z] = fields.each_ref().map(|f| topic.field(f));
                 let (w, x, y, z) = (w?, x?, y?, z?);
-                let mut out = vec![Vec::with_capacity(w.len()); 4];
+                let mut out = vec![vec![0.0; w.len()]; 4];
                 for i in 0..w.len() {
                     let q = axes.ned_frd([w[i], x[i], y[i], z[i]]);
-                    out.iter_mut().zip(q).for_each(|(column, c)| column.push(c));
+                    out.iter_mut().zip(q).for_each(|(column, c)| column[i] = c);
                 }
                 Some(out)
             }
