@@ -1,8 +1,6 @@
 //! ROS 2 bags in MCAP read into topics: those of MAVROS, of `px4_msgs`, and any other that a mapping names.
 //!
-//! The crate `mcap` knows the layout of the records. Its readers hold a whole chunk or its largest record in memory, a
-//! camera's image for example, and end at the first damage; here a chunk is unpacked as it is read, only messages that
-//! are asked for are kept, and reading goes on behind damage.
+//! A chunk is unpacked as it is read, only messages that are asked for are kept, and reading goes on behind damage.
 //!
 //! The time of a message is its stamp: `timestamp_sample` or `timestamp` of `px4_msgs`, `header.stamp` of others. A
 //! message without one has the recorder's time, moved to the clock of the stamps. Where the stamps jump against the
@@ -16,19 +14,20 @@
 mod cdr;
 mod chunk;
 mod definition;
+mod records;
 mod streams;
 #[cfg(test)]
 mod tests;
 
 use std::io::{self, Read};
 
-use mcap::records::{Record, op};
-
 use super::finding::Finding;
+use super::format::MCAP_MAGIC;
 use super::stretches::Keep;
 use super::topics::Topics;
 use super::window::Window;
 use chunk::Body;
+use records::{bytes, op};
 use streams::Streams;
 
 /// Code and length of a record.
@@ -87,12 +86,12 @@ pub(super) fn read<'a>(
         lacking: 0,
         ended: false,
     };
-    window.view(mcap::MAGIC.len());
-    window.skip(mcap::MAGIC.len());
+    window.view(MCAP_MAGIC.len());
+    window.skip(MCAP_MAGIC.len());
     loop {
         let view = window.view(LOOK);
-        if view.starts_with(mcap::MAGIC) {
-            window.skip(mcap::MAGIC.len());
+        if view.starts_with(&MCAP_MAGIC) {
+            window.skip(MCAP_MAGIC.len());
             continue;
         }
         if view.len() < HEAD {
@@ -105,11 +104,6 @@ pub(super) fn read<'a>(
         }
     }
     (reader.finish(), window)
-}
-
-/// The first `N` bytes of `view` from `at` on.
-fn bytes<const N: usize>(view: &[u8], at: usize) -> Option<[u8; N]> {
-    view.get(at..)?.first_chunk().copied()
 }
 
 impl Reader<'_> {
@@ -132,7 +126,7 @@ impl Reader<'_> {
             }
             op::DATA_END => length == 4,
             op::FOOTER => length == 20,
-            _ => (1..=op::DATA_END).contains(&code) || code >= 0x80,
+            _ => (1..=op::DATA_END).contains(&code) || code >= op::PRIVATE,
         };
         let sure = self.in_step || matches!(code, op::CHUNK | op::MESSAGE);
         (agrees && sure && length < 1 << 48).then_some((code, length))
@@ -188,13 +182,14 @@ impl Reader<'_> {
     fn record(&mut self, code: u8, length: u64, from: &mut dyn Read) -> io::Result<()> {
         self.buffer.clear();
         match code {
-            op::SCHEMA | op::CHANNEL if length <= LONGEST => {
+            op::SCHEMA if length <= LONGEST => {
                 self.fill(length, from)?;
-                match mcap::parse_record(code, &self.buffer) {
-                    Ok(Record::Schema { header, data }) => self.streams.define(header, &data),
-                    Ok(Record::Channel(channel)) => self.streams.declare(&channel),
-                    _ => self.streams.unreadable += 1,
-                }
+                self.streams.define(records::schema(&self.buffer));
+                Ok(())
+            }
+            op::CHANNEL if length <= LONGEST => {
+                self.fill(length, from)?;
+                self.streams.declare(records::channel(&self.buffer));
                 Ok(())
             }
             op::MESSAGE if length >= MESSAGE as u64 => {

@@ -34,7 +34,6 @@ const HOMES: &[(&str, &[&str])] = &[
     ("clap_complete", &["commands"]),
     ("anyhow", &["commands"]),
     ("indicatif", &["commands"]),
-    ("mcap", &["logs/ros"]),
     ("ruzstd", &["logs/ros"]),
     ("lz4_flex", &["logs/ros"]),
     ("comfy_table", &["commands"]),

@@ -3,10 +3,10 @@
 use std::io::{self, Read};
 
 use lz4_flex::frame::FrameDecoder;
-use mcap::records::ChunkHeader;
 use ruzstd::decoding::StreamingDecoder;
 
-use super::{LOOK, Reader, bytes};
+use super::records::bytes;
+use super::{LOOK, Reader};
 use crate::window::Window;
 
 /// Times, sizes and checksum before the name of the compression.
@@ -106,16 +106,23 @@ impl Reader<'_> {
     }
 }
 
+/// What the header of a chunk says of its content.
+struct Header {
+    uncompressed_size: u64,
+    /// Zero if there is none.
+    uncompressed_crc: u32,
+    compression: String,
+    compressed_size: u64,
+}
+
 /// The header of a chunk, of whose compression's name no more than [`NAME`] bytes are read.
-fn header(body: &mut Body<'_, '_>) -> io::Result<ChunkHeader> {
+fn header(body: &mut Body<'_, '_>) -> io::Result<Header> {
     let view = body.window.view(LOOK);
     let name = bytes(view, TO_NAME).map_or(0, |b| u32::from_le_bytes(b) as usize).min(NAME);
     let mut head = vec![0; TO_NAME + 4 + name + 8];
     body.read_exact(&mut head)?;
     let word = |at: usize| bytes(&head, at).map_or(0, u64::from_le_bytes);
-    Ok(ChunkHeader {
-        message_start_time: word(0),
-        message_end_time: word(8),
+    Ok(Header {
         uncompressed_size: word(16),
         uncompressed_crc: bytes(&head, 24).map_or(0, u32::from_le_bytes),
         compression: String::from_utf8_lossy(&head[TO_NAME + 4..][..name]).into_owned(),

@@ -1,26 +1,20 @@
 //! The topics of a bag, each with the plan by which its messages are read, and the vehicles that they belong to.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use mcap::records::{Channel, SchemaHeader};
+use std::collections::BTreeMap;
 
 use super::JUMP_S;
 use super::definition::{Plan, STAMPS, STEPS};
+use super::records::{Channel, Schema};
 use crate::finding::Finding;
 use crate::stretches::Keep;
 use crate::topics::{Topic, Topics};
 
 /// Stamps later than this, s, count from 1970; earlier ones from the boot of the vehicle or the start of a simulation.
 const SINCE_1970_S: f64 = 1e8;
+/// Attitudes from which on a further namespace counts as another vehicle.
+const VEHICLE: usize = 10;
 /// Topics with which a vehicle is counted as one.
 const ATTITUDES: [&str; 2] = ["vehicle_attitude", "imu/data"];
-
-/// A definition of a message type.
-struct Schema {
-    name: String,
-    encoding: String,
-    text: Vec<u8>,
-}
 
 /// A topic of the bag.
 struct Stream {
@@ -89,7 +83,7 @@ pub(super) struct Streams<'w> {
     /// Messages on channels that the file does not declare.
     orphans: usize,
     /// Definitions and declarations that cannot be read.
-    pub unreadable: usize,
+    unreadable: usize,
 }
 
 impl<'w> Streams<'w> {
@@ -113,21 +107,27 @@ impl<'w> Streams<'w> {
     }
 
     /// Takes the definition of a message type.
-    pub fn define(&mut self, header: SchemaHeader, text: &[u8]) {
-        let SchemaHeader { id, name, encoding } = header;
-        self.schemas.insert(id, Schema { name, encoding, text: text.to_vec() });
+    pub fn define(&mut self, schema: Option<Schema>) {
+        match schema {
+            Some(schema) => drop(self.schemas.insert(schema.id, schema)),
+            None => self.unreadable += 1,
+        }
     }
 
     /// Takes the declaration of a channel. One that repeats a topic joins its stream.
-    pub fn declare(&mut self, channel: &Channel) {
+    pub fn declare(&mut self, channel: Option<Channel>) {
+        let Some(channel) = channel else {
+            self.unreadable += 1;
+            return;
+        };
         if let Some(stream) = self.by_topic.get(&channel.topic) {
             self.channels.insert(channel.id, *stream);
             return;
         }
-        let schema = self.schemas.get(&channel.schema_id);
+        let schema = self.schemas.get(&channel.schema);
         let (vehicle, name) = named(&channel.topic, schema.map_or("", |s| &s.name));
         let wanted = |field: &str| (self.wanted)(&name, field);
-        let encoding = &channel.message_encoding;
+        let encoding = &channel.encoding;
         // Only a topic of which a field may be asked for is worth a plan.
         let (plan, unread) =
             match wanted(ANY).then(|| planned(schema, encoding, &wanted, &mut self.budget)) {
@@ -194,23 +194,24 @@ impl<'w> Streams<'w> {
     }
 
     /// The flights of the bag: one for each vehicle with an attitude, or one for all topics.
-    pub fn finish(mut self, mut findings: Vec<Finding>) -> Vec<Topics> {
+    pub fn finish(self, mut findings: Vec<Finding>) -> Vec<Topics> {
         findings.extend(self.said().into_iter().map(Finding::warning));
-        let attitude = |s: &&Stream| ATTITUDES.contains(&s.name.as_str()) && s.count > 0;
-        let vehicles: BTreeSet<String> =
-            self.streams.iter().filter(attitude).map(|s| s.vehicle.clone()).collect();
-        self.streams.sort_by(|a, b| a.vehicle.cmp(&b.vehicle));
-        if vehicles.len() < 2 {
-            return vec![topics(self.streams.iter_mut().collect(), findings, None)];
+        let mut vehicles: BTreeMap<String, Vec<Stream>> = BTreeMap::new();
+        for stream in self.streams {
+            vehicles.entry(stream.vehicle.clone()).or_default().push(stream);
         }
-        let one = |vehicle: &String| {
-            let mine = self.streams.iter_mut().filter(|s| s.vehicle == *vehicle).collect();
-            topics(mine, findings.clone(), Some(format!("vehicle {vehicle}")))
+        let several = vehicles.values().filter(|streams| attitudes(streams) >= VEHICLE).count() > 1;
+        if !several {
+            return vec![topics(vehicles.into_values().flatten().collect(), findings, None)];
+        }
+        vehicles.retain(|_, streams| attitudes(streams) >= VEHICLE);
+        let one = |(vehicle, streams): (String, Vec<Stream>)| {
+            topics(streams, findings.clone(), Some(format!("vehicle {vehicle}")))
         };
-        vehicles.iter().map(one).collect()
+        vehicles.into_iter().map(one).collect()
     }
 
-    /// What was left out, and what is odd about the times.
+    /// What was left out of the bag, and what is odd about the times.
     fn said(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.orphans + self.unreadable > 0 {
@@ -219,20 +220,6 @@ impl<'w> Streams<'w> {
                 self.orphans + self.unreadable
             ));
         }
-        for stream in &self.streams {
-            if stream.unfit > 0 {
-                said.push(format!(
-                    "{} of {} messages of {} do not fit their definition and were left out",
-                    stream.unfit, stream.count, stream.name
-                ));
-            }
-            if let Some(why) = stream.unread.as_ref().filter(|_| stream.count > 0) {
-                said.push(format!(
-                    "{} messages of {} were left out: {why}",
-                    stream.count, stream.name
-                ));
-            }
-        }
         let jumps: usize = self.clocks.iter().map(|clock| clock.jumps).sum();
         if jumps > 0 {
             said.push(format!(
@@ -240,6 +227,28 @@ impl<'w> Streams<'w> {
             ));
         }
         said
+    }
+}
+
+/// Number of messages with the attitude of a vehicle.
+fn attitudes(streams: &[Stream]) -> usize {
+    let attitude = |s: &&Stream| ATTITUDES.contains(&s.name.as_str());
+    streams.iter().filter(attitude).map(|s| s.count).sum()
+}
+
+impl Stream {
+    /// What was left out of the topic.
+    fn said(&self) -> Option<String> {
+        let (count, name) = (self.count, &self.name);
+        match &self.unread {
+            Some(why) if count > 0 => Some(format!("{count} messages of {name} were left out: {why}")),
+            _ => (self.unfit > 0).then(|| {
+                format!(
+                    "{} of {count} messages of {name} do not fit their definition and were left out",
+                    self.unfit
+                )
+            }),
+        }
     }
 }
 
@@ -260,8 +269,7 @@ fn planned(
             schema.encoding
         ));
     }
-    let text = String::from_utf8_lossy(&schema.text);
-    let plan = Plan::of(&schema.name, &text, wanted, budget);
+    let plan = Plan::of(&schema.name, &schema.text, wanted, budget);
     plan.map(Some).ok_or_else(|| format!("the definition of {} is not whole", schema.name))
 }
 
@@ -288,15 +296,16 @@ fn named(topic: &str, kind: &str) -> (String, String) {
 }
 
 /// The topics of a flight. Topics of one name are instances of it, in the order of the file.
-fn topics(streams: Vec<&mut Stream>, findings: Vec<Finding>, life: Option<String>) -> Topics {
+fn topics(streams: Vec<Stream>, findings: Vec<Finding>, life: Option<String>) -> Topics {
     let mut out = Topics { life, findings, ..Topics::default() };
-    let mut instances: BTreeMap<&str, u16> = BTreeMap::new();
+    out.findings.extend(streams.iter().filter_map(Stream::said).map(Finding::warning));
+    let mut instances: BTreeMap<String, u16> = BTreeMap::new();
     for stream in streams {
-        let next = instances.entry(&stream.name).or_default();
-        let key = (stream.name.clone(), *next);
+        let next = instances.entry(stream.name.clone()).or_default();
+        let key = (stream.name, *next);
         *next = next.saturating_add(1);
         out.counts.insert(key.clone(), stream.count);
-        if let Some(topic) = stream.topic.take().filter(|t| t.last_s().is_some()) {
+        if let Some(topic) = stream.topic.filter(|t| t.last_s().is_some()) {
             out.topics.insert(key, topic);
         }
     }
