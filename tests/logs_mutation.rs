@@ -73,7 +73,11 @@ fn mutate(inputs: usize, rows: usize, seed: u64) -> (usize, f64) {
     let truth = samples(rows);
     let binary = dataflash(&truth);
     let text = in_text(&binary, "ArduPlane V4.6.0").into_bytes();
-    let whole = [csv(&truth), ulog(&truth), binary, tlog(&truth), text];
+    feed(&[csv(&truth), ulog(&truth), binary, tlog(&truth), text], inputs, seed, BESIDES)
+}
+
+/// Mutates the files `whole` in turn; as [`mutate`], with `besides` bytes beside the multiple of a file's size.
+fn feed(whole: &[Vec<u8>], inputs: usize, seed: u64, besides: usize) -> (usize, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut read, mut most) = (0, 0.0f64);
     for i in 0..inputs {
@@ -100,9 +104,9 @@ fn mutate(inputs: usize, rows: usize, seed: u64) -> (usize, f64) {
             }
         }
         let (log, peak) = measured(&bytes);
-        most = most.max(peak.saturating_sub(BESIDES) as f64 / bytes.len() as f64);
+        most = most.max(peak.saturating_sub(besides) as f64 / bytes.len() as f64);
         assert!(
-            peak <= MULTIPLE * bytes.len() + BESIDES,
+            peak <= MULTIPLE * bytes.len() + besides,
             "input {i} of seed {seed}: {peak} bytes for {}",
             bytes.len()
         );
@@ -120,6 +124,90 @@ fn mutated_logs_cause_no_panic() {
     let (read, _) = mutate(100_000, 4, 1);
     // Most mutations leave a readable log: the readers are really reached.
     assert!(read > 30_000, "{read}");
+}
+
+/// The window of a zstd frame, beside what other formats take.
+#[cfg(feature = "study")]
+const BESIDES_A_BAG: usize = BESIDES + (9 << 20);
+
+/// A sample bag.
+#[cfg(feature = "study")]
+fn bag(name: &str) -> Vec<u8> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ros");
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+#[test]
+#[cfg(feature = "study")]
+fn mutated_bags_cause_no_panic() {
+    let names = ["mavros_big_endian.zstd.mcap", "px4_no_chunks.mcap", "mavros.lz4.mcap"];
+    let whole = names.map(bag);
+    // Half of the inputs have their damage among the declarations, at the beginning.
+    let heads = whole.each_ref().map(|bytes| bytes[..bytes.len().min(5000)].to_vec());
+    let (read, most) = feed(&whole, 5000, 5, BESIDES_A_BAG);
+    println!("{read} of 5000 read as logs; at most {most:.1} times the file's size");
+    assert!(read > 3500, "{read}");
+    feed(&heads, 15_000, 6, BESIDES_A_BAG);
+}
+
+/// A record of MCAP.
+#[cfg(feature = "study")]
+fn mcap_record(out: &mut Vec<u8>, code: u8, body: &[u8]) {
+    out.push(code);
+    out.extend((body.len() as u64).to_le_bytes());
+    out.extend(body);
+}
+
+/// Bags made to take much memory for few bytes.
+#[cfg(feature = "study")]
+fn bag_bombs() -> Vec<(&'static str, Vec<u8>)> {
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+    let schema = |definition: &str| {
+        let mut out = b"\x89MCAP0\r\n".to_vec();
+        let all = [
+            1u16.to_le_bytes().to_vec(),
+            text("px4_msgs/msg/VehicleAttitude"),
+            text("ros2msg"),
+            text(definition),
+        ];
+        mcap_record(&mut out, 3, &all.concat());
+        out
+    };
+    let channel = |out: &mut Vec<u8>, id: u16, topic: &str| {
+        let ids = [id.to_le_bytes(), 1u16.to_le_bytes()].concat();
+        mcap_record(out, 4, &[ids, text(topic), text("cdr"), vec![0; 4]].concat());
+    };
+    let message = |out: &mut Vec<u8>, id: u16, body: &[u8]| {
+        let head = [&id.to_le_bytes()[..], &[0; 20], body].concat();
+        mcap_record(out, 5, &head);
+    };
+    // One wide type under every number, each with a message.
+    let mut wide = schema(&(0..400).map(|i| format!("float32[32] q{i}\n")).collect::<String>());
+    let mut many = schema("uint64 timestamp\nfloat32[32] q\n");
+    for id in 0..20_000u16 {
+        channel(&mut wide, id, &format!("/v{id}/fmu/out/vehicle_attitude"));
+        channel(&mut many, id, &format!("/v{id}/fmu/out/vehicle_attitude"));
+        message(&mut many, id, &[&[0, 1, 0, 0][..], &[1; 136]].concat());
+    }
+    // Lengths beyond the file: of a record, a chunk, a sequence, an array.
+    let mut long = schema("uint8[] a\nfloat64[4000000000] b\nfloat32[4] q\n");
+    channel(&mut long, 1, "/fmu/out/vehicle_attitude");
+    message(&mut long, 1, &[0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0]);
+    let sizes = [&[0; 16][..], &u64::MAX.to_le_bytes(), &[0; 8], &[0xFF; 7]].concat();
+    mcap_record(&mut long, 6, &sizes);
+    long.extend([5, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0]);
+    vec![("wide types", wide), ("channels", many), ("lengths", long)]
+}
+
+#[test]
+#[cfg(feature = "study")]
+fn bags_made_to_take_memory_do_not_get_it() {
+    for (name, bytes) in bag_bombs() {
+        let (log, peak) = measured(&bytes);
+        let multiple = peak as f64 / bytes.len() as f64;
+        println!("{name}: {} kB, {multiple:.1} times, read: {}", bytes.len() / 1000, log.is_ok());
+        assert!(peak <= MULTIPLE * bytes.len() + BESIDES_A_BAG, "{name}: {multiple}");
+    }
 }
 
 #[test]

@@ -6,23 +6,23 @@ use super::format::MAVLINK_MARKERS;
 const KNOWN: [(&[u8], &str); 11] = [
     (
         b"#ROSBAG V",
-        "it is a ROS 1 bag, of which no topic is read: write its topics to one CSV, a row for each time",
-    ),
-    (
-        b"\x89MCAP0\r\n",
-        "it is a ROS 2 bag (MCAP), of which no topic is read: write its topics to one CSV, a row for each time",
+        "it is a ROS 1 bag, which is not read: make a ROS 2 bag of it by `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags) and give the .mcap in FOLDER",
     ),
     (
         b"SQLite format 3\0",
-        "it is an SQLite database, such as a ROS 2 bag (.db3), of which no topic is read: write its topics to one CSV, a row for each time",
+        "it is an SQLite database, such as a ROS 2 bag (.db3), which is not read: make an .mcap of it by `rosbags-convert --src FOLDER --dst NEW --dst-storage mcap` (pip install rosbags), or by `ros2 bag convert -i FOLDER -o to.yaml` with `output_bags: [{uri: NEW, storage_id: mcap, all: true}]` in to.yaml",
+    ),
+    (
+        b"MATLAB 7.3 MAT-file",
+        "it is a MATLAB file (7.3): greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"MATLAB 5.0 MAT-file",
-        "it is a MATLAB file: write its signals to one CSV, a row for each time (writetimetable)",
+        "it is a MATLAB file: greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"\x89HDF\r\n",
-        "it is an HDF5 file (MATLAB 7.3 writes such): write its signals to one CSV, a row for each time",
+        "it is an HDF5 file: greylag.logs.mat_to_csv of the Python package (pip install ./python) makes a CSV of it",
     ),
     (
         b"H Product:Blackbox",
@@ -37,6 +37,10 @@ const KNOWN: [(&[u8], &str); 11] = [
     ),
     (b"%PDF", "it is a PDF document"),
 ];
+
+/// What is said of a ROS 2 bag by a program without their reader.
+#[cfg(not(feature = "ros"))]
+pub(super) const BAG_WITHOUT_READER: &str = "it is a ROS 2 bag (MCAP), which this program was built without a reader for: build it with --features study, as `cargo greylag` and the installed program are";
 
 /// Number of zero bytes with which no log begins.
 const EMPTY: usize = 256;
@@ -89,7 +93,7 @@ mod tests {
     #[test]
     fn what_people_bring_is_named() {
         let ros = kind(b"#ROSBAG V2.0\n").unwrap();
-        assert!(ros.contains("ROS 1 bag") && ros.contains("CSV"), "{ros}");
+        assert!(ros.contains("ROS 1 bag") && ros.contains("rosbags-convert"), "{ros}");
         assert!(kind(b"\n{\"time\": 0}\n").unwrap().contains("JSON"));
         assert_eq!(kind(b"\x89PNG\r\n"), None);
         assert!(kind(&[0; 4096]).unwrap().contains("zeros"));

@@ -1,4 +1,4 @@
-//! The four log formats, distinguished by how they begin.
+//! The five log formats, distinguished by how they begin.
 
 use serde::Serialize;
 
@@ -16,20 +16,27 @@ pub enum Format {
     Dataflash,
     /// Telemetry log of MAVLink frames (`.tlog`).
     Tlog,
+    /// Bag of ROS 2 in MCAP (`.mcap`).
+    Ros,
 }
 
 /// First bytes of a ULog file.
 pub(super) const ULOG_MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35];
+/// First bytes of an MCAP file.
+pub(super) const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// First bytes of every DataFlash record.
 pub(super) const DATAFLASH_MAGIC: [u8; 2] = [0xA3, 0x95];
 /// Start markers of MAVLink 1 and 2, behind the eight bytes of the time.
 pub(super) const MAVLINK_MARKERS: [u8; 2] = [0xFE, 0xFD];
 
 impl Format {
-    /// The format of a file by its content; `None` if it is none of the four.
+    /// The format of a file by its content; `None` if it is none of the five.
     pub fn of(bytes: &[u8]) -> Option<Format> {
         if bytes.starts_with(&ULOG_MAGIC) {
             return Some(Format::Ulog);
+        }
+        if bytes.starts_with(&MCAP_MAGIC) {
+            return Some(Format::Ros);
         }
         if bytes.starts_with(&DATAFLASH_MAGIC) {
             return Some(Format::Dataflash);
@@ -59,6 +66,7 @@ impl Format {
             Format::Ulog => "PX4 ULog",
             Format::Dataflash => "ArduPilot DataFlash",
             Format::Tlog => "MAVLink telemetry log",
+            Format::Ros => "ROS 2 bag",
         }
     }
 }

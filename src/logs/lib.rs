@@ -1,6 +1,6 @@
 //! A flight in memory, with the formats it is read from or written to.
 //!
-//! [`load`] reads any of the four formats, distinguished by their first bytes, onto one table.
+//! [`load`] reads any of the five formats, distinguished by their first bytes, onto one table.
 
 mod assess;
 mod binary;
@@ -26,6 +26,8 @@ pub mod quality;
 pub mod phases;
 pub mod rudder;
 mod resample;
+#[cfg(feature = "ros")]
+mod ros;
 mod rows;
 mod screening;
 mod shell;

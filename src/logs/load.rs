@@ -223,7 +223,7 @@ fn open(path: &Path, options: &Options, to: Use) -> Result<Lives, LogError> {
 const BUFFER: usize = 64 * 1024;
 
 /// Message for a file of unknown format.
-const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, or a MAVLink .tlog";
+const NONE_OF_THEM: &str = "it begins neither like a CSV table nor a PX4 ULog, an ArduPilot DataFlash .bin or .log, a MAVLink .tlog, or a ROS 2 bag (.mcap)";
 
 /// Reads the flights of the log `source`, which begins with `start`.
 fn read(
@@ -251,10 +251,10 @@ fn read(
         return table(start, source, path, options, to, keep);
     }
     let wanted = |topic: &str| options.mapping.wants(format, topic);
+    let fields = |topic: &str, field: &str| options.mapping.wants_field(format, topic, field);
     let mut text_log;
     let (lives, window): (Vec<Topics>, _) = match format {
         Format::Ulog => {
-            let fields = |topic: &str, field: &str| options.mapping.wants_of_px4(topic, field);
             let (topics, window) = ulog::read(&mut source, &fields, keep);
             (vec![topics], window)
         }
@@ -263,6 +263,13 @@ fn read(
             dataflash::read(&mut text_log, &wanted, keep)
         }
         Format::Dataflash => dataflash::read(&mut source, &wanted, keep),
+        #[cfg(feature = "ros")]
+        Format::Ros => super::ros::read(&mut source, &fields, keep),
+        #[cfg(not(feature = "ros"))]
+        Format::Ros => {
+            let (path, what) = (path.to_owned(), foreign::BAG_WITHOUT_READER);
+            return Err(LogError::Foreign { path, what });
+        }
         _ => tlog::read(&mut source, &wanted),
     };
     if let Some(error) = window.failure() {

@@ -38,7 +38,7 @@ impl<'a> Reader<'a> {
     ) -> Option<Reader<'a>> {
         let mut series = Cow::Borrowed(series);
         let to = match &rule.fill {
-            Fill::Quaternion(_) => {
+            Fill::Quaternion { .. } => {
                 one_sided(series.to_mut());
                 Target::Attitude
             }

@@ -66,6 +66,7 @@ pub(super) fn vehicle(format: Format, topics: &Topics) -> Option<Vehicle> {
         Format::Ulog => px4(topics),
         Format::Dataflash => ardupilot(topics),
         Format::Tlog => telemetry(topics),
+        Format::Ros => px4(topics).or_else(|| mavros(topics)),
     }
 }
 
@@ -108,6 +109,13 @@ fn px4(topics: &Topics) -> Option<Vehicle> {
         (Some(2.0), _) | (None, Some(0.0)) => found(Kind::FixedWing, "vehicle_status"),
         _ => None,
     }
+}
+
+/// MAVROS publishes no type, but a VTOL has a state other than zero.
+fn mavros(topics: &Topics) -> Option<Vehicle> {
+    let (_, states) = topics.series("extended_state", "vtol_state")?;
+    let vtol = states.iter().any(|state| (1.0..=4.0).contains(state));
+    vtol.then(|| Vehicle { kind: Kind::Vtol, by: "extended_state.vtol_state".into() })
 }
 
 fn ardupilot(topics: &Topics) -> Option<Vehicle> {
@@ -180,7 +188,7 @@ pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
     let mut spans = Vec::new();
     match format {
         Format::Csv => {}
-        Format::Ulog => {
+        Format::Ulog | Format::Ros => {
             let status = "vtol_vehicle_status";
             let state = held(topics.series(status, "vehicle_vtol_state"), |x| x != 4.0);
             let rotor = held(topics.series(status, "vtol_in_rw_mode"), |x| x != 0.0);
@@ -193,6 +201,8 @@ pub(super) fn hovers(format: Format, topics: &Topics) -> Vec<(f64, f64)> {
                     x != 0.0
                 }));
             }
+            let state = topics.series("extended_state", "vtol_state");
+            spans.extend(held(state, |x| (1.0..=3.0).contains(&x)));
         }
         Format::Dataflash => {
             spans = held(topics.series("MODE", "ModeNum"), |x| HOVER_MODES.contains(&x));

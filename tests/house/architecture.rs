@@ -34,6 +34,8 @@ const HOMES: &[(&str, &[&str])] = &[
     ("clap_complete", &["commands"]),
     ("anyhow", &["commands"]),
     ("indicatif", &["commands"]),
+    ("ruzstd", &["logs/ros"]),
+    ("lz4_flex", &["logs/ros"]),
     ("comfy_table", &["commands"]),
     ("greylag_sitl", &["sim", "commands"]),
     ("nalgebra", &["num", "physics", "model", "control", "logs", "flight", "sysid", "learn"]),

@@ -64,9 +64,11 @@ fn files_of_other_kinds_are_named_with_what_to_give_instead() {
     }
     for (bytes, words) in [
         (stream, ["without their times", ".tlog"]),
-        (b"#ROSBAG V2.0\n\x45\x00".to_vec(), ["ROS 1 bag", "CSV"]),
-        (b"\x89MCAP0\r\n\x01\x20".to_vec(), ["ROS 2 bag", "CSV"]),
-        (b"SQLite format 3\0".to_vec(), ["ROS 2 bag", "CSV"]),
+        (b"#ROSBAG V2.0\n\x45\x00".to_vec(), ["ROS 1 bag", "rosbags-convert"]),
+        (b"SQLite format 3\0".to_vec(), ["ROS 2 bag", "ros2 bag convert"]),
+        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64".to_vec(), ["MATLAB", "mat_to_csv"]),
+        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec(), ["7.3", "mat_to_csv"]),
+        (b"\x89HDF\r\n\x1a\n".to_vec(), ["HDF5", "mat_to_csv"]),
         (b"{\"t\": 0, \"p\": 1}\n".to_vec(), ["JSON", "CSV"]),
         (b"<!-- logged with, paparazzi -->\n<conf>\n".to_vec(), ["Paparazzi", ".data"]),
     ] {
@@ -174,4 +176,12 @@ fn roll_and_p_of_a_flight_that_stands_on_its_tail_are_of_one_scale() {
     let flight: Flight = rows.into();
     let log = looked("tail.csv", &csv(&flight.samples));
     assert!(!said(&log).contains("times as much as p"), "{}", said(&log));
+}
+
+/// The companion's image has no reader of bags.
+#[test]
+#[cfg(not(feature = "study"))]
+fn a_bag_is_named_by_a_program_without_their_reader() {
+    let error = refused(b"\x89MCAP0\r\n\x01\x20");
+    assert!(error.contains("ROS 2 bag") && error.contains("--features study"), "{error}");
 }

@@ -13,7 +13,7 @@
 //! `[attitude] quaternion = ["csv.qx", "csv.qy", "csv.qz", "csv.qw"]` derives roll, pitch and yaw from a quaternion of
 //! earth axes NED to body axes FRD; `order = "wxyz"` or `"xyzw"` states which part is first.
 //!
-//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash)
+//! A column's value is scale × field + offset. `instance` is the topic's number (ULog, DataFlash, ROS bag)
 //! or system/component (telemetry log). With `rate_over_s` the column is the rate of change of the field, from a
 //! parabola fitted to the rows of so many seconds. `[derive] body_rates_over_s` computes p, q, r from roll, pitch and yaw
 //! in the same way. `[board]` rotates the axes of a log (see [`Board`]). `[flight]` sets the criteria for flight:
@@ -21,6 +21,7 @@
 
 mod ardupilot;
 mod board;
+mod mavros;
 mod telemetry;
 mod px4;
 pub(super) mod rule;
@@ -254,6 +255,9 @@ impl Mapping {
         let others = match format {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
+            // The stamps of one are not of the clock of the other.
+            Format::Ros if topics.first("vehicle_attitude").is_some() => px4::rules(topics),
+            Format::Ros => mavros::rules(topics, self.mixer()),
             Format::Dataflash => ardupilot::rules(topics, self.mixer()),
             Format::Tlog => telemetry::rules(topics, self.mixer()),
         };
@@ -270,14 +274,19 @@ impl Mapping {
         own.chain(turn.clone()).chain(free).collect()
     }
 
-    /// Whether a field of a topic of PX4 is needed for any rule.
-    pub(super) fn wants_of_px4(&self, topic: &str, field: &str) -> bool {
+    /// Whether a field of a topic of a ULog or of a ROS bag is needed for any rule. An empty name stands for any field.
+    pub(super) fn wants_field(&self, format: Format, topic: &str, field: &str) -> bool {
+        if field.is_empty() {
+            return self.wants(format, topic);
+        }
         let entry = || self.entries.values().any(|e| e.topic == topic && e.field == field);
         let turn = || {
             let of_topic = self.quaternion.as_ref().filter(|q| q.topic == topic);
             of_topic.is_some_and(|q| q.fields.iter().any(|f| f == field))
         };
-        px4::TOPICS.contains(&topic) && px4::uses(field) || entry() || turn()
+        let own = px4::TOPICS.contains(&topic) && px4::uses(field);
+        let ros = || mavros::TOPICS.contains(&topic) && mavros::uses(field);
+        own || format == Format::Ros && ros() || entry() || turn()
     }
 
     /// Whether a topic of a format is needed for any rule.
@@ -285,6 +294,8 @@ impl Mapping {
         let own: &[&str] = match format {
             Format::Csv => &[],
             Format::Ulog => &px4::TOPICS,
+            Format::Ros if mavros::TOPICS.contains(&topic) => &mavros::TOPICS,
+            Format::Ros => &px4::TOPICS,
             Format::Dataflash => &ardupilot::TOPICS,
             Format::Tlog => &telemetry::TOPICS,
         };

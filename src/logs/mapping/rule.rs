@@ -1,5 +1,7 @@
 //! One way to fill columns from a topic.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use crate::topics::Topic;
 
 /// How a field's value is shaped before it is summed.
@@ -59,6 +61,26 @@ pub struct Term {
     pub shape: Shape,
 }
 
+/// Axes between which a quaternion turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axes {
+    /// From body axes forward-right-down to earth axes north-east-down.
+    NedFrd,
+    /// From body axes forward-left-up to earth axes east-north-up, as in ROS.
+    EnuFlu,
+}
+
+impl Axes {
+    /// The quaternion (w first) from body axes forward-right-down to earth axes north-east-down.
+    fn ned_frd(self, [w, x, y, z]: [f64; 4]) -> [f64; 4] {
+        match self {
+            Axes::NedFrd => [w, x, y, z],
+            // (0, 1, 1, 0)/√2 from the left turns ENU into NED, (0, 1, 0, 0) from the right FRD into FLU; the sign is changed.
+            Axes::EnuFlu => [w + z, x + y, x - y, w - z].map(|c| c * FRAC_1_SQRT_2),
+        }
+    }
+}
+
 /// An angle of a quaternion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tilt {
@@ -95,9 +117,14 @@ pub enum Fill {
         /// Constant that is added.
         offset: f64,
     },
-    /// Roll, pitch and yaw from a quaternion NED→FRD, w first.
-    Quaternion([String; 4]),
-    /// One column: the roll or the pitch of a quaternion NED→FRD, w first.
+    /// Roll, pitch and yaw from a quaternion, w first.
+    Quaternion {
+        /// Fields of the quaternion, w first.
+        fields: [String; 4],
+        /// Axes between which it turns.
+        axes: Axes,
+    },
+    /// One column: the roll or the pitch of a quaternion, w first.
     Tilt {
         /// Name of the column.
         column: &'static str,
@@ -105,6 +132,8 @@ pub enum Fill {
         angle: Tilt,
         /// Fields of the quaternion, w first.
         fields: [&'static str; 4],
+        /// Axes between which it turns.
+        axes: Axes,
     },
     /// Air density from static pressure (times the factor in Pa) and temperature (factor, in °C).
     Density {
@@ -160,12 +189,21 @@ impl Rule {
 
     /// Roll, pitch and yaw from the four fields of a quaternion NED→FRD.
     pub fn quaternion(topic: &str, fields: [&str; 4]) -> Rule {
-        Rule::new(topic, Fill::Quaternion(fields.map(str::to_owned)))
+        let fields = fields.map(str::to_owned);
+        Rule::new(topic, Fill::Quaternion { fields, axes: Axes::NedFrd })
     }
 
     /// The roll or the pitch of a quaternion's fields.
     pub fn tilt(column: &'static str, topic: &str, angle: Tilt, fields: [&'static str; 4]) -> Rule {
-        Rule::new(topic, Fill::Tilt { column, angle, fields })
+        Rule::new(topic, Fill::Tilt { column, angle, fields, axes: Axes::NedFrd })
+    }
+
+    /// The rule with its quaternion taken between other axes.
+    pub fn in_axes(mut self, other: Axes) -> Rule {
+        if let Fill::Quaternion { axes, .. } | Fill::Tilt { axes, .. } = &mut self.fill {
+            *axes = other;
+        }
+        self
     }
 
     /// Air density from a pressure and a temperature by the gas law.
@@ -210,7 +248,7 @@ impl Rule {
         match &self.fill {
             Fill::Sum { column, .. } => vec![column],
             Fill::Tilt { column, .. } => vec![column],
-            Fill::Quaternion(_) => vec!["roll_rad", "pitch_rad", "yaw_rad"],
+            Fill::Quaternion { .. } => vec!["roll_rad", "pitch_rad", "yaw_rad"],
             Fill::Density { .. } => vec!["air_density_kgpm3"],
         }
     }
@@ -225,7 +263,7 @@ impl Rule {
     pub fn fields(&self) -> Vec<&str> {
         match &self.fill {
             Fill::Sum { terms, .. } => terms.iter().map(|t| t.field.as_str()).collect(),
-            Fill::Quaternion(fields) => fields.iter().map(String::as_str).collect(),
+            Fill::Quaternion { fields, .. } => fields.iter().map(String::as_str).collect(),
             Fill::Tilt { fields, .. } => fields.to_vec(),
             Fill::Density { pressure, temperature } => vec![pressure.0, temperature.0],
         }
@@ -260,13 +298,20 @@ impl Rule {
                 }
                 Some(vec![out])
             }
-            Fill::Quaternion(fields) => {
-                fields.iter().map(|f| topic.field(f).map(<[f64]>::to_vec)).collect()
+            Fill::Quaternion { fields, axes } => {
+                let [w, x, y, z] = fields.each_ref().map(|f| topic.field(f));
+                let (w, x, y, z) = (w?, x?, y?, z?);
+                let mut out = vec![vec![0.0; w.len()]; 4];
+                for i in 0..w.len() {
+                    let q = axes.ned_frd([w[i], x[i], y[i], z[i]]);
+                    out.iter_mut().zip(q).for_each(|(column, c)| column[i] = c);
+                }
+                Some(out)
             }
-            Fill::Tilt { angle, fields, .. } => {
+            Fill::Tilt { angle, fields, axes, .. } => {
                 let [w, x, y, z] = fields.map(|f| topic.field(f));
                 let (w, x, y, z) = (w?, x?, y?, z?);
-                let at = |i: usize| angle.of([w[i], x[i], y[i], z[i]]);
+                let at = |i: usize| angle.of(axes.ned_frd([w[i], x[i], y[i], z[i]]));
                 Some(vec![(0..topic.time_s.len()).map(at).collect()])
             }
             Fill::Density { pressure, temperature } => {

@@ -1,0 +1,273 @@
+//! ROS 2 bags in MCAP read into topics: those of MAVROS, of `px4_msgs`, and any other that a mapping names.
+//!
+//! A chunk is unpacked as it is read, only messages that are asked for are kept, and reading goes on behind damage.
+//!
+//! The time of a message is its stamp: `timestamp_sample` or `timestamp` of `px4_msgs`, `header.stamp` of others. A
+//! message without one has the recorder's time, moved to the clock of the stamps. Where the stamps jump against the
+//! recorder's time by more than [`JUMP_S`], as PX4's do when they are synchronised, the recorder's time bridges it.
+//!
+//! Topics of `px4_msgs` have the names and fields of ULog (`/fmu/out/vehicle_status_v1` is `vehicle_status`), those of
+//! MAVROS begin behind `/mavros/`, others have their own name without the first slash.
+//!
+//! Not read: definitions in `ros2idl`, messages in other encodings than CDR, bags of several files at once.
+
+mod cdr;
+mod chunk;
+mod definition;
+mod records;
+mod streams;
+#[cfg(test)]
+mod tests;
+
+use std::io::{self, Read};
+
+use super::finding::Finding;
+use super::format::MCAP_MAGIC;
+use super::stretches::Keep;
+use super::topics::Topics;
+use super::window::Window;
+use chunk::Body;
+use records::{bytes, op};
+use streams::Streams;
+
+/// Code and length of a record.
+const HEAD: usize = 9;
+/// Number, sequence and two times of a message.
+const MESSAGE: usize = 22;
+/// The longest message or definition that is read, bytes; longer ones are counted only.
+const LONGEST: u64 = 1 << 20;
+/// Bytes that are looked at to tell a record from damage.
+const LOOK: usize = 4096;
+/// Jump of the stamps against the recorder's time that is bridged, s.
+const JUMP_S: f64 = 5.0;
+
+struct Reader<'w> {
+    streams: Streams<'w>,
+    /// The bytes of a record.
+    buffer: Vec<u8>,
+    /// Whether the last bytes were a record.
+    in_step: bool,
+    /// Bytes that belong to no record.
+    skipped: usize,
+    /// Seconds lost at each damaged place; NaN until the next message.
+    holes: Vec<f64>,
+    /// The recorder's time of the last message, ns since 1970.
+    last_ns: Option<u64>,
+    chunks: usize,
+    /// Chunks that could not be read to their end, and the reason of the first.
+    broken: usize,
+    reason: String,
+    /// Chunks whose content does not have its checksum.
+    unequal: usize,
+    /// Bytes that the last record lacks.
+    lacking: u64,
+    /// Whether the file's end was seen.
+    ended: bool,
+}
+
+/// Reads the topics with their fields that `wanted` names; everything else is counted.
+pub(super) fn read<'a>(
+    source: &'a mut dyn Read,
+    wanted: &dyn Fn(&str, &str) -> bool,
+    keep: Keep,
+) -> (Vec<Topics>, Window<'a>) {
+    let mut window = Window::new(source);
+    let mut reader = Reader {
+        streams: Streams::new(wanted, keep),
+        buffer: Vec::new(),
+        in_step: true,
+        skipped: 0,
+        holes: Vec::new(),
+        last_ns: None,
+        chunks: 0,
+        broken: 0,
+        reason: String::new(),
+        unequal: 0,
+        lacking: 0,
+        ended: false,
+    };
+    window.view(MCAP_MAGIC.len());
+    window.skip(MCAP_MAGIC.len());
+    loop {
+        let view = window.view(LOOK);
+        if view.starts_with(&MCAP_MAGIC) {
+            window.skip(MCAP_MAGIC.len());
+            continue;
+        }
+        if view.len() < HEAD {
+            reader.lacking += (HEAD - view.len()) as u64 * u64::from(!view.is_empty());
+            break;
+        }
+        match reader.head(view) {
+            Some((code, length)) => reader.place(&mut window, code, length),
+            None => reader.damaged(&mut window),
+        }
+    }
+    (reader.finish(), window)
+}
+
+impl Reader<'_> {
+    /// Code and length of the record at the beginning of `view`; `None` if it cannot be one.
+    ///
+    /// Chunks and their indices state their length twice, which must agree. Where the file is damaged, only a chunk or
+    /// a message on a known channel shows that it is readable again.
+    fn head(&self, view: &[u8]) -> Option<(u8, u64)> {
+        let (code, length) = (*view.first()?, u64::from_le_bytes(bytes(view, 1)?));
+        let body = &view[HEAD..];
+        // A record that the file's end cuts is judged by what there is of it.
+        let agrees = match code {
+            op::CHUNK => chunk::agrees(body, length),
+            op::MESSAGE_INDEX => {
+                bytes(body, 2).is_none_or(|size| u64::from(u32::from_le_bytes(size)) + 6 == length)
+            }
+            op::MESSAGE => {
+                let channel = bytes(body, 0).map(u16::from_le_bytes);
+                length >= MESSAGE as u64 && channel.is_none_or(|c| self.streams.knows(c))
+            }
+            op::DATA_END => length == 4,
+            op::FOOTER => length == 20,
+            _ => (1..=op::DATA_END).contains(&code) || code >= op::PRIVATE,
+        };
+        let sure = self.in_step || matches!(code, op::CHUNK | op::MESSAGE);
+        (agrees && sure && length < 1 << 48).then_some((code, length))
+    }
+
+    /// Reads the record at the beginning of the window.
+    fn place(&mut self, window: &mut Window<'_>, code: u8, length: u64) {
+        self.in_step = true;
+        self.ended |= matches!(code, op::DATA_END | op::FOOTER);
+        window.skip(HEAD);
+        let mut body = Body { window, left: length };
+        if code == op::CHUNK {
+            self.chunk(&mut body);
+        } else {
+            // Too few bytes are counted below.
+            let _ = self.record(code, length, &mut body);
+        }
+        self.lacking += body.finish();
+    }
+
+    /// Counts a byte that belongs to no record.
+    fn damaged(&mut self, window: &mut Window<'_>) {
+        self.hole();
+        self.in_step = false;
+        self.skipped += 1;
+        window.skip(1);
+    }
+
+    /// Notes that messages are lost before the next one.
+    fn hole(&mut self) {
+        if self.in_step {
+            self.holes.push(f64::NAN);
+        }
+    }
+
+    /// Reads the records that `from` holds, to its end.
+    fn records(&mut self, from: &mut dyn Read) -> io::Result<()> {
+        loop {
+            let mut head = [0; HEAD];
+            match from.read(&mut head[..1])? {
+                0 => return Ok(()),
+                _ => from.read_exact(&mut head[1..])?,
+            }
+            let length = u64::from_le_bytes(bytes(&head, 1).unwrap_or_default());
+            self.record(head[0], length, from)?;
+        }
+    }
+
+    /// Reads a record of `length` bytes from `from`.
+    ///
+    /// # Errors
+    /// `from` ends before it, or cannot be read.
+    fn record(&mut self, code: u8, length: u64, from: &mut dyn Read) -> io::Result<()> {
+        self.buffer.clear();
+        match code {
+            op::SCHEMA if length <= LONGEST => {
+                self.fill(length, from)?;
+                self.streams.define(records::schema(&self.buffer));
+                Ok(())
+            }
+            op::CHANNEL if length <= LONGEST => {
+                self.fill(length, from)?;
+                self.streams.declare(records::channel(&self.buffer));
+                Ok(())
+            }
+            op::MESSAGE if length >= MESSAGE as u64 => {
+                self.fill(MESSAGE as u64, from)?;
+                let channel = bytes(&self.buffer, 0).map_or(0, u16::from_le_bytes);
+                let log_ns = bytes(&self.buffer, 6).map_or(0, u64::from_le_bytes);
+                self.passed(log_ns);
+                let rest = length - MESSAGE as u64;
+                if !self.streams.counts(channel, length <= LONGEST) {
+                    return pass(rest, from);
+                }
+                self.fill(rest, from)?;
+                self.streams.take(channel, log_ns, &self.buffer[MESSAGE..]);
+                Ok(())
+            }
+            _ => pass(length, from),
+        }
+    }
+
+    /// Reads `length` bytes more into the buffer, which grows with what there is.
+    fn fill(&mut self, length: u64, from: &mut dyn Read) -> io::Result<()> {
+        let read = from.take(length).read_to_end(&mut self.buffer)?;
+        if read as u64 == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+    }
+
+    /// Notes the recorder's time of a message, by which lost ones are measured.
+    fn passed(&mut self, log_ns: u64) {
+        if let Some(hole) = self.holes.last_mut().filter(|hole| hole.is_nan()) {
+            let last = self.last_ns.unwrap_or(log_ns);
+            *hole = log_ns.saturating_sub(last) as f64 * 1e-9;
+        }
+        self.last_ns = Some(log_ns);
+    }
+
+    fn finish(self) -> Vec<Topics> {
+        let mut said = Vec::new();
+        let lost: f64 = self.holes.iter().filter(|s| s.is_finite()).sum();
+        if self.lacking > 0 {
+            said.push(format!(
+                "the file ends in the middle of a record, {} bytes of which are missing",
+                self.lacking
+            ));
+        } else if !self.ended {
+            said.push(
+                "the file has no end record: the recorder did not close it, or the copy is cut; it is read up to there"
+                    .to_owned(),
+            );
+        }
+        if self.skipped > 0 {
+            said.push(format!(
+                "{} bytes of the file belong to no record and were skipped: it is damaged there",
+                self.skipped
+            ));
+        }
+        if self.broken > 0 {
+            let (broken, chunks, why) = (self.broken, self.chunks, &self.reason);
+            said.push(format!(
+                "{broken} of {chunks} chunks could not be read to their end (the first: {why})"
+            ));
+        }
+        if self.unequal > 0 {
+            said.push(format!(
+                "{} of {} chunks do not have their checksum: some of their messages may be wrong",
+                self.unequal, self.chunks
+            ));
+        }
+        if !self.holes.is_empty() {
+            said.push(format!(
+                "damage took {lost:.2} s of messages, at {} places",
+                self.holes.len()
+            ));
+        }
+        self.streams.finish(said.into_iter().map(Finding::warning).collect())
+    }
+}
+
+/// Passes over `length` bytes.
+fn pass(length: u64, from: &mut dyn Read) -> io::Result<()> {
+    let passed = io::copy(&mut from.take(length), &mut io::sink())?;
+    if passed == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+}

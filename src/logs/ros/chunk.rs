@@ -1,0 +1,131 @@
+//! Chunks of an MCAP file: unpacked while they are read, their checksum compared at their end.
+
+use std::io::{self, Read};
+
+use lz4_flex::frame::FrameDecoder;
+use ruzstd::decoding::StreamingDecoder;
+
+use super::records::bytes;
+use super::{LOOK, Reader};
+use crate::window::Window;
+
+/// Times, sizes and checksum before the name of the compression.
+const TO_NAME: usize = 28;
+/// The longest name of a compression.
+const NAME: usize = 16;
+/// The largest window of a zstd frame, bytes: the most that a compressor takes below its level 20.
+const ZSTD_WINDOW: u64 = 8 << 20;
+
+/// The bytes of a record's body that are still to come.
+pub(super) struct Body<'b, 'w> {
+    pub window: &'b mut Window<'w>,
+    pub left: u64,
+}
+
+impl Body<'_, '_> {
+    /// Passes over what is left; returns the number of bytes that the file lacks of it.
+    pub fn finish(mut self) -> u64 {
+        let _ = io::copy(&mut self, &mut io::sink());
+        self.left
+    }
+}
+
+impl Read for Body<'_, '_> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 || to.is_empty() {
+            return Ok(0);
+        }
+        let view = self.window.view(1);
+        let most = usize::try_from(self.left).unwrap_or(usize::MAX);
+        let count = view.len().min(to.len()).min(most);
+        to[..count].copy_from_slice(&view[..count]);
+        self.window.skip(count);
+        self.left -= count as u64;
+        Ok(count)
+    }
+}
+
+/// Whether the header of a chunk of `length` bytes agrees with that length, as far as `body` holds it.
+pub(super) fn agrees(body: &[u8], length: u64) -> bool {
+    let Some(name) = bytes(body, TO_NAME).map(|b| u32::from_le_bytes(b) as usize) else {
+        return length > (TO_NAME + 12) as u64;
+    };
+    let size = bytes(body, TO_NAME + 4 + name).map(u64::from_le_bytes);
+    let head = (TO_NAME + 4 + name + 8) as u64;
+    name <= NAME && size.is_none_or(|size| size.checked_add(head) == Some(length))
+}
+
+/// A source with the checksum of what was read of it.
+struct Summed<R> {
+    source: R,
+    sum: crc32fast::Hasher,
+}
+
+impl<R: Read> Read for Summed<R> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(to)?;
+        self.sum.update(&to[..count]);
+        Ok(count)
+    }
+}
+
+impl Reader<'_> {
+    /// Reads the messages of a chunk.
+    pub(super) fn chunk(&mut self, body: &mut Body<'_, '_>) {
+        self.chunks += 1;
+        if let Err(error) = self.unpacked(body) {
+            self.broken += 1;
+            if self.reason.is_empty() {
+                self.reason = error.to_string();
+            }
+            self.hole();
+        }
+    }
+
+    fn unpacked(&mut self, body: &mut Body<'_, '_>) -> io::Result<()> {
+        let header = header(body)?;
+        let mut packed = body.take(header.compressed_size);
+        let plain: Box<dyn Read + '_> = match header.compression.as_str() {
+            "" => Box::new(packed),
+            "lz4" => Box::new(FrameDecoder::new(packed)),
+            "zstd" => {
+                let frame = StreamingDecoder::new_with_max_window_size(&mut packed, ZSTD_WINDOW);
+                Box::new(frame.map_err(io::Error::other)?)
+            }
+            other => return Err(io::Error::other(format!("compression `{other}` is unknown"))),
+        };
+        let plain = plain.take(header.uncompressed_size);
+        let mut summed = Summed { source: plain, sum: crc32fast::Hasher::new() };
+        self.records(&mut summed)?;
+        if summed.source.limit() > 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        let sum = summed.sum.finalize();
+        self.unequal += usize::from(header.uncompressed_crc != 0 && header.uncompressed_crc != sum);
+        Ok(())
+    }
+}
+
+/// What the header of a chunk says of its content.
+struct Header {
+    uncompressed_size: u64,
+    /// Zero if there is none.
+    uncompressed_crc: u32,
+    compression: String,
+    compressed_size: u64,
+}
+
+/// The header of a chunk, of whose compression's name no more than [`NAME`] bytes are read.
+fn header(body: &mut Body<'_, '_>) -> io::Result<Header> {
+    let view = body.window.view(LOOK);
+    let name = bytes(view, TO_NAME).map_or(0, |b| u32::from_le_bytes(b) as usize).min(NAME);
+    let mut head = vec![0; TO_NAME + 4 + name + 8];
+    body.read_exact(&mut head)?;
+    let word = |at: usize| bytes(&head, at).map_or(0, u64::from_le_bytes);
+    Ok(Header {
+        uncompressed_size: word(16),
+        uncompressed_crc: bytes(&head, 24).map_or(0, u32::from_le_bytes),
+        compression: String::from_utf8_lossy(&head[TO_NAME + 4..][..name]).into_owned(),
+        compressed_size: word(TO_NAME + 4 + name),
+    })
+}

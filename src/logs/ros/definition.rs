@@ -1,0 +1,397 @@
+//! Fields of a ROS 2 message by its definition, and their values in a message serialised as CDR.
+//!
+//! Written here because the crate looked at falls short (`re_ros_msg` 0.36.3): it refuses a whole definition for one
+//! constant whose name is not in capitals, follows a type that holds itself until the stack ends, and makes a map of
+//! all fields for each message. Here only the fields that are asked for are read; what follows the last of them is not
+//! looked at.
+//!
+//! Not read: strings, `wstring` and what follows one, elements of sequences of messages.
+
+use std::collections::BTreeMap;
+
+use super::cdr::{Cdr, Number};
+
+/// Nesting of message types; those of MAVROS and PX4 have five levels at most.
+const DEPTH: usize = 8;
+/// Steps and elements of all messages of a bag that are read; `nav_msgs/Odometry` has a hundred.
+pub(super) const STEPS: usize = 1 << 16;
+/// Fields of a message that are read.
+const FIELDS: usize = 256;
+/// Elements of an array that can be fields.
+const ELEMENTS: usize = 32;
+/// Fields of which the time of a message is made. They are the first values of a message.
+pub(super) const STAMPS: [&str; 4] =
+    ["header.stamp.sec", "header.stamp.nanosec", "timestamp", "timestamp_sample"];
+
+/// The number of elements of an array.
+#[derive(Clone, Copy, Debug)]
+enum Count {
+    Fixed(usize),
+    /// As many as the message says.
+    Sequence,
+}
+
+/// One step of reading a message.
+#[derive(Debug)]
+enum Step {
+    /// A number, with the place of its value.
+    Number(Number, Option<usize>),
+    /// A string, which is passed over.
+    Text,
+    /// An array of numbers, with the places of the values of its first elements.
+    Numbers(Number, Count, Vec<Option<usize>>),
+    /// An array of strings or messages, which is passed over.
+    Each(Count, Vec<Step>),
+}
+
+impl Step {
+    /// Whether the step reads a value.
+    fn reads(&self) -> bool {
+        match self {
+            Step::Number(_, place) => place.is_some(),
+            Step::Numbers(_, _, places) => places.iter().any(Option::is_some),
+            Step::Text | Step::Each(..) => false,
+        }
+    }
+}
+
+/// The fields of a type: type and name of each.
+type Fields<'t> = Vec<(&'t str, &'t str)>;
+
+/// How the fields of a message that are asked for are read.
+#[derive(Debug)]
+pub(super) struct Plan {
+    steps: Vec<Step>,
+    /// Names of the fields, nested ones as `outer.inner`, elements as `field[0]`.
+    pub fields: Vec<String>,
+}
+
+impl Plan {
+    /// The plan for the type `name` (`package/msg/Type`) by the definitions in `text`, for the fields that `wanted`
+    /// names; `None` if the definition cannot be followed, or takes more than the `budget` of steps that is left.
+    pub fn of(
+        name: &str,
+        text: &str,
+        wanted: &dyn Fn(&str) -> bool,
+        budget: &mut usize,
+    ) -> Option<Plan> {
+        let types = types(name, text);
+        let mut maker = Maker { types: &types, wanted, fields: Vec::new(), budget };
+        let mut steps = Vec::new();
+        maker.message(&short(name), Some(""), DEPTH, &mut steps)?;
+        let read = steps.iter().rposition(Step::reads).map_or(0, |last| last + 1);
+        steps.truncate(read);
+        Some(Plan { steps, fields: maker.fields })
+    }
+
+    /// Reads a message into `values`: [`STAMPS`], then the fields, NaN where there is none. `false` if it does not fit
+    /// the definition.
+    pub fn decode(&self, message: &[u8], values: &mut Vec<f64>) -> bool {
+        values.clear();
+        values.resize(STAMPS.len() + self.fields.len(), f64::NAN);
+        let Some(mut cdr) = Cdr::of(message) else { return false };
+        run(&self.steps, &mut cdr, values).is_some()
+    }
+}
+
+fn run(steps: &[Step], cdr: &mut Cdr<'_>, values: &mut [f64]) -> Option<()> {
+    for step in steps {
+        match step {
+            Step::Number(kind, place) => {
+                let value = cdr.number(*kind)?;
+                if let Some(place) = place {
+                    values[*place] = value;
+                }
+            }
+            Step::Text => cdr.pass_text()?,
+            Step::Numbers(kind, count, places) => {
+                let count = counted(*count, cdr)?;
+                for place in places.iter().take(count) {
+                    let value = cdr.number(*kind)?;
+                    if let Some(place) = place {
+                        values[*place] = value;
+                    }
+                }
+                cdr.pass(*kind, count.saturating_sub(places.len()))?;
+            }
+            Step::Each(count, steps) => {
+                for _ in 0..counted(*count, cdr)? {
+                    let before = cdr.left();
+                    run(steps, cdr, values)?;
+                    // A message of empty arrays takes no bytes, however many there are.
+                    if cdr.left() == before {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    Some(())
+}
+
+fn counted(count: Count, cdr: &mut Cdr<'_>) -> Option<usize> {
+    match count {
+        Count::Fixed(count) => Some(count),
+        Count::Sequence => cdr.length(),
+    }
+}
+
+/// Makes the steps of a message.
+struct Maker<'m> {
+    types: &'m BTreeMap<String, Fields<'m>>,
+    wanted: &'m dyn Fn(&str) -> bool,
+    fields: Vec<String>,
+    /// Steps that may still be made.
+    budget: &'m mut usize,
+}
+
+impl Maker<'_> {
+    /// Takes `steps` off the budget; `None` if it does not hold as many.
+    fn spend(&mut self, steps: usize) -> Option<()> {
+        *self.budget = self.budget.checked_sub(steps)?;
+        Some(())
+    }
+
+    /// The place of the value of a field, if it is asked for.
+    fn place(&mut self, name: &str) -> Option<usize> {
+        if let Some(stamp) = STAMPS.iter().position(|stamp| *stamp == name) {
+            // The stamp itself may be asked for as well; it is one field in either case.
+            return Some(stamp);
+        }
+        let fits = self.fields.len() < FIELDS && (self.wanted)(name);
+        (fits && !self.fields.iter().any(|field| field == name)).then(|| {
+            self.fields.push(name.to_owned());
+            STAMPS.len() + self.fields.len() - 1
+        })
+    }
+
+    /// The steps of a message of type `name`. Its fields are called `prefix` and their name; without a prefix they are
+    /// passed over.
+    fn message(
+        &mut self,
+        name: &str,
+        prefix: Option<&str>,
+        depth: usize,
+        out: &mut Vec<Step>,
+    ) -> Option<()> {
+        let depth = depth.checked_sub(1)?;
+        let types = self.types;
+        let fields = match types.get(name) {
+            Some(fields) => &fields[..],
+            None if name == "builtin_interfaces/Time" => &TIME[..],
+            None if name == "builtin_interfaces/Duration" => &TIME[..],
+            None => return None,
+        };
+        let package = name.split('/').next().unwrap_or_default();
+        for (kind, field) in fields {
+            self.spend(1)?;
+            let path = prefix.map(|prefix| format!("{prefix}{field}"));
+            self.field(kind, package, path.as_deref(), depth, out)?;
+        }
+        if fields.is_empty() {
+            // A message without fields is serialised as one byte.
+            out.push(Step::Number(Number::U8, None));
+        }
+        Some(())
+    }
+
+    /// The step of a field of the type `kind`, as it is written in a message of `package`.
+    fn field(
+        &mut self,
+        kind: &str,
+        package: &str,
+        path: Option<&str>,
+        depth: usize,
+        out: &mut Vec<Step>,
+    ) -> Option<()> {
+        let (element, count) = array(kind)?;
+        let number = Number::named(element);
+        match (number, count) {
+            (Some(number), None) => {
+                let place = path.and_then(|path| self.place(path));
+                out.push(Step::Number(number, place));
+            }
+            (Some(number), Some(count)) => {
+                let most = if let Count::Fixed(n) = count { n.min(ELEMENTS) } else { ELEMENTS };
+                self.spend(most)?;
+                let mut place = |i: usize| path.and_then(|p| self.place(&format!("{p}[{i}]")));
+                let places = (0..most).map(&mut place).collect();
+                out.push(Step::Numbers(number, count, places));
+            }
+            (None, None) if is_text(element) => out.push(Step::Text),
+            (None, Some(count)) if is_text(element) => {
+                out.push(Step::Each(count, vec![Step::Text]));
+            }
+            (None, None) => {
+                let prefix = path.map(|path| format!("{path}."));
+                self.message(&full(element, package), prefix.as_deref(), depth, out)?;
+            }
+            (None, Some(count)) => {
+                let mut steps = Vec::new();
+                self.message(&full(element, package), None, depth, &mut steps)?;
+                out.push(Step::Each(count, steps));
+            }
+        }
+        Some(())
+    }
+}
+
+/// The fields of `builtin_interfaces/Time` and `Duration`, which some writers leave out.
+const TIME: [(&str, &str); 2] = [("int32", "sec"), ("uint32", "nanosec")];
+
+/// Type of the elements and their number, of an array; the type itself of what is none.
+fn array(kind: &str) -> Option<(&str, Option<Count>)> {
+    let Some((element, count)) = kind.split_once('[') else { return Some((kind, None)) };
+    let count = count.strip_suffix(']')?;
+    let bound = count.is_empty() || count.starts_with("<=");
+    let count = if bound { Count::Sequence } else { Count::Fixed(count.parse().ok()?) };
+    Some((element, Some(count)))
+}
+
+/// Whether a type is a string, with or without a bound.
+fn is_text(kind: &str) -> bool {
+    kind.split("<=").next() == Some("string")
+}
+
+/// `package/Type` of a type as it is written in a message of `package`.
+fn full(kind: &str, package: &str) -> String {
+    match kind {
+        "Header" => "std_msgs/Header".to_owned(),
+        _ if kind.contains('/') => short(kind),
+        _ => format!("{package}/{kind}"),
+    }
+}
+
+/// `package/Type` of `package/msg/Type`.
+fn short(name: &str) -> String {
+    match (name.split('/').next(), name.rsplit_once('/')) {
+        (Some(package), Some((_, kind))) => format!("{package}/{kind}"),
+        _ => name.to_owned(),
+    }
+}
+
+/// The types that a definition holds: `name`, then those behind lines of `=` and `MSG: package/Type`.
+fn types<'t>(name: &str, text: &'t str) -> BTreeMap<String, Fields<'t>> {
+    let mut types: BTreeMap<String, Fields<'t>> = BTreeMap::new();
+    let mut current = short(name);
+    types.entry(current.clone()).or_default();
+    for line in text.lines() {
+        if let Some(next) = line.trim().strip_prefix("MSG:") {
+            current = short(next.trim());
+            types.entry(current.clone()).or_default();
+        } else if let (Some(field), Some(fields)) = (field(line), types.get_mut(&current)) {
+            fields.push(field);
+        }
+    }
+    types
+}
+
+/// Type and name of the field that a line declares; `None` of a constant, a comment or a separator.
+fn field(line: &str) -> Option<(&str, &str)> {
+    let line = line.split('#').next()?.trim();
+    let (kind, rest) = line.split_once(char::is_whitespace)?;
+    let rest = rest.trim_start();
+    let end = rest.find(|c: char| c.is_whitespace() || c == '=').unwrap_or(rest.len());
+    let (name, after) = rest.split_at(end);
+    (!after.trim_start().starts_with('=') && !name.is_empty()).then_some((kind, name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "# a comment\nuint8 small_constant=3\nHeader header\nInner[] inner\nfloat64[3] x # the axes\n\
+        uint16[<=4] pulses\nstring<=8 name \"a # b\"\nbool last 1\n================\nMSG: std_msgs/Header\n\
+        builtin_interfaces/Time stamp\nstring frame_id\n================\nMSG: own/Inner\nint8 a\nfloat32 b\n";
+
+    /// A message of `TEXT`, written by hand: little-endian, then big-endian.
+    fn message(little: bool) -> Vec<u8> {
+        let mut out = vec![0, u8::from(little), 0, 0];
+        let order = |bytes: &[u8]| -> Vec<u8> {
+            if little { bytes.to_vec() } else { bytes.iter().rev().copied().collect() }
+        };
+        let pad = |out: &mut Vec<u8>, to: usize| {
+            while !(out.len() - 4).is_multiple_of(to) {
+                out.push(0xEE);
+            }
+        };
+        out.extend(order(&7i32.to_le_bytes()));
+        out.extend(order(&500_000_000u32.to_le_bytes()));
+        out.extend(order(&4u32.to_le_bytes()));
+        out.extend(b"map\0");
+        out.extend(order(&2u32.to_le_bytes()));
+        for (a, b) in [(1u8, 2f32), (3, 4.0)] {
+            out.push(a);
+            pad(&mut out, 4);
+            out.extend(order(&b.to_le_bytes()));
+        }
+        pad(&mut out, 8);
+        for x in [1.5f64, -2.5, 3.5] {
+            out.extend(order(&x.to_le_bytes()));
+        }
+        out.extend(order(&2u32.to_le_bytes()));
+        for x in [1500u16, 1600] {
+            out.extend(order(&x.to_le_bytes()));
+        }
+        out.extend(order(&2u32.to_le_bytes()));
+        out.extend(b"n\0\x01");
+        out
+    }
+
+    #[test]
+    fn fields_are_read_in_both_byte_orders() {
+        let plan = Plan::of(
+            "own/msg/Outer",
+            TEXT,
+            &|f| f.starts_with("x[") || f.starts_with("pulses[") || f == "last",
+            &mut 1000,
+        );
+        let plan = plan.unwrap();
+        let mut values = Vec::new();
+        for little in [true, false] {
+            assert!(plan.decode(&message(little), &mut values));
+            assert_eq!(values[..2], [7.0, 5e8]);
+            let of = |name: &str| {
+                values[STAMPS.len() + plan.fields.iter().position(|f| f == name).unwrap()]
+            };
+            assert_eq!(
+                [of("x[0]"), of("x[2]"), of("pulses[1]"), of("last")],
+                [1.5, 3.5, 1600.0, 1.0]
+            );
+            assert!(of("pulses[2]").is_nan());
+        }
+        // Cut anywhere, it does not fit.
+        let whole = message(true);
+        assert!((0..whole.len()).all(|end| !plan.decode(&whole[..end], &mut values)));
+    }
+
+    #[test]
+    fn definitions_that_have_no_end_are_not_followed() {
+        let wanted = |_: &str| true;
+        assert!(Plan::of("own/msg/A", "A a\n", &wanted, &mut STEPS.clone()).is_none());
+        assert!(Plan::of("own/msg/A", "B b\n", &wanted, &mut STEPS.clone()).is_none());
+        let wide: String = (0..5)
+            .map(|i| format!("MSG: own/T{i}\n{}", format!("T{} a\n", i + 1).repeat(20)))
+            .collect();
+        assert!(
+            Plan::of(
+                "own/msg/A",
+                &format!("T0 a\n{wide}MSG: own/T5\nint8 x\n"),
+                &wanted,
+                &mut STEPS.clone()
+            )
+            .is_none()
+        );
+        // Four thousand million empty messages are no work.
+        let plan = Plan::of(
+            "own/msg/A",
+            "E[] e\nint8 x\n===\nMSG: own/E\nint8[0] n\n",
+            &wanted,
+            &mut STEPS.clone(),
+        )
+        .unwrap();
+        let mut values = Vec::new();
+        assert!(plan.decode(&[0, 1, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 9], &mut values));
+        assert_eq!(values[STAMPS.len()], 9.0);
+    }
+}

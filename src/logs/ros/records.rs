@@ -1,0 +1,70 @@
+//! Records of an MCAP file that a bag's topics are declared by, and the codes of all.
+//!
+//! Not by the crate `mcap` (0.26.0): its readers hold the largest record in memory, a camera's image for example, and end at
+//! the first damage.
+
+/// Codes of the records, by <https://mcap.dev/spec>.
+pub(super) mod op {
+    pub const FOOTER: u8 = 0x02;
+    pub const SCHEMA: u8 = 0x03;
+    pub const CHANNEL: u8 = 0x04;
+    pub const MESSAGE: u8 = 0x05;
+    pub const CHUNK: u8 = 0x06;
+    pub const MESSAGE_INDEX: u8 = 0x07;
+    pub const DATA_END: u8 = 0x0F;
+    /// The first code of records that programs define themselves.
+    pub const PRIVATE: u8 = 0x80;
+}
+
+/// The definition of a message type.
+pub(super) struct Schema {
+    pub id: u16,
+    /// Name of the type, `package/msg/Type`.
+    pub name: String,
+    /// Language of the definition.
+    pub encoding: String,
+    pub text: String,
+}
+
+/// The declaration of a channel, on which messages of a topic stand.
+pub(super) struct Channel {
+    pub id: u16,
+    pub schema: u16,
+    pub topic: String,
+    /// Encoding of the messages.
+    pub encoding: String,
+}
+
+/// The first `N` bytes of `view` from `at` on.
+pub(super) fn bytes<const N: usize>(view: &[u8], at: usize) -> Option<[u8; N]> {
+    view.get(at..)?.first_chunk().copied()
+}
+
+/// Takes a number off the beginning of `body`.
+fn number(body: &mut &[u8]) -> Option<u16> {
+    let (number, rest) = body.split_first_chunk()?;
+    *body = rest;
+    Some(u16::from_le_bytes(*number))
+}
+
+/// Takes a text, which follows its length, off the beginning of `body`.
+fn text(body: &mut &[u8]) -> Option<String> {
+    let (length, rest) = body.split_first_chunk()?;
+    let (text, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+    *body = rest;
+    Some(String::from_utf8_lossy(text).into_owned())
+}
+
+/// The definition of a message type in the body of a record.
+pub(super) fn schema(mut body: &[u8]) -> Option<Schema> {
+    let body = &mut body;
+    let (id, name) = (number(body)?, text(body)?);
+    Some(Schema { id, name, encoding: text(body)?, text: text(body)? })
+}
+
+/// The declaration of a channel in the body of a record.
+pub(super) fn channel(mut body: &[u8]) -> Option<Channel> {
+    let body = &mut body;
+    let (id, schema) = (number(body)?, number(body)?);
+    Some(Channel { id, schema, topic: text(body)?, encoding: text(body)? })
+}
