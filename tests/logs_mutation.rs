@@ -146,7 +146,8 @@ fn mutated_bags_cause_no_panic() {
     let heads = whole.each_ref().map(|bytes| bytes[..bytes.len().min(5000)].to_vec());
     let (read, most) = feed(&whole, 5000, 5, BESIDES_A_BAG);
     println!("{read} of 5000 read as logs; at most {most:.1} times the file's size");
-    assert!(read > 3500, "{read}");
+    // As many in a hundred as of the other formats, at least.
+    assert!(read > 1500, "{read}");
     feed(&heads, 15_000, 6, BESIDES_A_BAG);
 }
 

@@ -16,12 +16,17 @@ const VEHICLE: usize = 10;
 /// Topics with which a vehicle is counted as one.
 const ATTITUDES: [&str; 2] = ["vehicle_attitude", "imu/data"];
 
+/// Package of the messages of PX4.
+const PX4: &str = "px4_msgs/";
+
 /// A topic of the bag.
 struct Stream {
     /// Namespace of the vehicle; empty for the only one.
     vehicle: String,
     /// Name in the table of topics.
     name: String,
+    /// Whether its messages are of `px4_msgs`, whose `timestamp` is in microseconds.
+    px4: bool,
     count: usize,
     /// How its messages are read; `None` of a topic that is not asked for.
     plan: Option<Plan>,
@@ -35,6 +40,8 @@ struct Stream {
 /// The clock of the stamps beside that of the recorder.
 #[derive(Default)]
 struct Clock {
+    /// The second from which its times are counted; zero for a clock that begins at a boot.
+    epoch_s: Option<f64>,
     /// Recorder's time less the message's, s.
     offset_s: Option<f64>,
     /// What is added to the stamps, s.
@@ -73,8 +80,6 @@ pub(super) struct Streams<'w> {
     streams: Vec<Stream>,
     /// Of `header.stamp` and of `timestamp`.
     clocks: [Clock; 2],
-    /// The second from which times are counted: none for clocks that begin at a boot.
-    epoch_s: Option<f64>,
     /// Second of the first message by the recorder, from which its times are counted.
     log_epoch_s: Option<u64>,
     values: Vec<f64>,
@@ -97,7 +102,6 @@ impl<'w> Streams<'w> {
             by_topic: BTreeMap::new(),
             streams: Vec::new(),
             clocks: Default::default(),
-            epoch_s: None,
             log_epoch_s: None,
             values: Vec::new(),
             budget: STEPS,
@@ -125,7 +129,8 @@ impl<'w> Streams<'w> {
             return;
         }
         let schema = self.schemas.get(&channel.schema);
-        let (vehicle, name) = named(&channel.topic, schema.map_or("", |s| &s.name));
+        let kind = schema.map_or("", |s| &s.name);
+        let (px4, (vehicle, name)) = (kind.starts_with(PX4), named(&channel.topic, kind));
         let wanted = |field: &str| (self.wanted)(&name, field);
         let encoding = &channel.encoding;
         // Only a topic of which a field may be asked for is worth a plan.
@@ -136,7 +141,7 @@ impl<'w> Streams<'w> {
                 Some(Err(why)) => (None, Some(why)),
             };
         let topic = plan.as_ref().map(|plan| Topic::new(plan.fields.iter().cloned(), self.keep));
-        let stream = Stream { vehicle, name, count: 0, plan, topic, unfit: 0, unread };
+        let stream = Stream { vehicle, name, px4, count: 0, plan, topic, unfit: 0, unread };
         self.by_topic.insert(channel.topic.clone(), self.streams.len());
         self.channels.insert(channel.id, self.streams.len());
         self.streams.push(stream);
@@ -172,7 +177,7 @@ impl<'w> Streams<'w> {
         let base = *self.log_epoch_s.get_or_insert(log_ns / 1_000_000_000);
         let log_s = (i128::from(log_ns) - i128::from(base) * 1_000_000_000) as f64 * 1e-9;
         let [sec, nanosec, timestamp, sampled] = [0, 1, 2, 3].map(|i| self.values[i]);
-        let (clock, whole_s, rest_s) = if timestamp > 0.0 {
+        let (clock, whole_s, rest_s) = if stream.px4 && timestamp > 0.0 {
             let micros = if sampled > 0.0 { sampled } else { timestamp };
             (1, (micros / 1e6).floor(), micros % 1e6 * 1e-6)
         } else {
@@ -180,7 +185,7 @@ impl<'w> Streams<'w> {
         };
         let own = &mut self.clocks[clock];
         let time_s = if whole_s + rest_s > 0.0 {
-            let epoch = *self.epoch_s.get_or_insert(match whole_s > SINCE_1970_S {
+            let epoch = *own.epoch_s.get_or_insert(match whole_s > SINCE_1970_S {
                 // The first message may not be the earliest one.
                 true => whole_s - 1.0,
                 false => 0.0,
@@ -276,7 +281,7 @@ fn planned(
 /// Namespace of the vehicle, and name in the table of topics, of a topic of the message type `kind`.
 fn named(topic: &str, kind: &str) -> (String, String) {
     let topic = topic.trim_start_matches('/');
-    if kind.starts_with("px4_msgs/") {
+    if kind.starts_with(PX4) {
         let (before, last) = topic.rsplit_once('/').unwrap_or(("", topic));
         let versioned =
             last.rsplit_once("_v").filter(|(_, v)| v.bytes().all(|b| b.is_ascii_digit()));
