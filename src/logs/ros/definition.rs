@@ -1,9 +1,8 @@
 //! Fields of a ROS 2 message by its definition, and their values in a message serialised as CDR.
 //!
-//! Written here because the crate looked at falls short (`re_ros_msg` 0.36.3): it refuses a whole definition for one
-//! constant whose name is not in capitals, follows a type that holds itself until the stack ends, and makes a map of
-//! all fields for each message. Here only the fields that are asked for are read; what follows the last of them is not
-//! looked at.
+//! Written here because the crate looked at (`re_ros_msg` 0.36.3) refuses a whole definition for one constant whose name is
+//! not in capitals, and makes a map of all fields for each message. Here only the fields that are asked for are read; what
+//! follows the last of them is not looked at.
 //!
 //! Not read: strings, `wstring` and what follows one, elements of sequences of messages.
 
