@@ -221,7 +221,8 @@ fn a_flood_of_a_client_costs_nobody_the_flight() {
 #[ignore = "half an hour"]
 fn fifty_of_each_trouble() {
     let _alone = alone();
-    let troubles: [(&str, &(dyn Fn(&Process, u64) + Sync)); 3] = [
+    type Trouble<'t> = (&'t str, &'t (dyn Fn(&Process, u64) + Sync));
+    let troubles: [Trouble<'_>; 3] = [
         ("stopped for 0.1 to 5 s", &|process, k| {
             process.stop(Duration::from_millis([100, 300, 600, 1200, 2500, 5000][k as usize % 6]));
         }),
