@@ -521,7 +521,7 @@ def main():
     print("ticks without a plan of acados:", failures)
     if arguments.out:
         record = {
-            "command": " ".join(["tests/acados_beside_planners.py", *sys.argv[1:]]),
+            "command": " ".join(["tests/acados_beside_planners.py", *(Path(w).name if Path(w).is_absolute() else w for w in sys.argv[1:])]),
             "processor": next((l.split(":")[1].strip() for l in open("/proc/cpuinfo") if "model name" in l), ""),
             "casadi_against_rust": differences,
             "settings": {"blocks": arguments.blocks, "margin": arguments.margin},

@@ -16,8 +16,8 @@ import tempfile
 from pathlib import Path
 
 FLOWN = ("any", "lqi")
-MEASURES = {"x8": ["--mass-kg", "3.364", "--span-m", "2.1", "--area-m2", "0.75"]}
-"""What a user knows of an aircraft without a model."""
+MEASURES = ("--mass-kg", "3.364", "--span-m", "2.1", "--area-m2", "0.75")
+"""What a user knows of the X8 without a model."""
 
 
 def run(command, allowed=(0, 3)):
@@ -54,7 +54,7 @@ def explored(greylag, seed, folder):
     tests = sorted((folder / "lqi").glob("test-*.csv"))
     models = {"as given": folder / "lqi" / "model.toml", **{c: folder / f"fit-{c}" / "model.toml" for c in FLOWN}}
     own = folder / "own"
-    run([greylag, "aircraft", "from-log", own, *MEASURES["x8"], "--log", *sorted((folder / "any").glob("train-*.csv"))])
+    run([greylag, "aircraft", "from-log", own, *MEASURES, "--log", *sorted((folder / "any").glob("train-*.csv"))])
     models |= {"estimated from size": own / "prior" / "model.toml", "from-log": own / "model.toml"}
     for name, model in models.items():
         errors[name] = error(greylag, model, tests, folder / "compared.json")

@@ -36,7 +36,7 @@ pub fn log(path: &Path) -> Result<()> {
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if named && path.is_file() {
         bail!(
-            "{} is a .toml file, where a flight log is wanted (CSV, .ulg, .bin, .tlog): are --model and --log swapped?",
+            "{} is a .toml file, where a flight log is wanted (CSV, .ulg, .bin, .tlog, .mcap): are --model and --log swapped?",
             path.display()
         );
     }

@@ -20,7 +20,7 @@ use crate::workbench;
 /// Logs and options for reading them.
 #[derive(Clone, clap::Args)]
 pub struct LogArguments {
-    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
     #[arg(long = "log", num_args = 1.., required = true)]
     pub paths: Vec<PathBuf>,
     #[command(flatten)]

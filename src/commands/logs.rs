@@ -33,7 +33,7 @@ enum Verb {
     /// Show what logs hold, at which rates, with which gaps, and what each is missing for which
     /// purpose. Exit status 3 when something makes the numbers of one wrong.
     Info {
-        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
+        /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// As JSON: an object, of several logs a list of them.
@@ -52,7 +52,7 @@ enum Verb {
     },
     /// Write a log of any format as a CSV table.
     Convert {
-        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
+        /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         input: PathBuf,
         /// The CSV table to write.
         output: PathBuf,
@@ -69,7 +69,7 @@ enum Verb {
     /// Reconstruct the flight path of a log: write the states without sensor errors as a CSV table and
     /// print the sensor errors, the wind and the clocks with their standard deviations.
     Reconstruct {
-        /// CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
+        /// CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
         input: PathBuf,
         /// The table, in the columns of the log format.
         output: PathBuf,

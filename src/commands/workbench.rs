@@ -22,7 +22,7 @@ use crate::workbench::session::FILE;
     after_help = "The page is served on this machine only, to whoever has the token of the printed address. Everything is kept in the session's folder as it happens; Ctrl-C ends the workbench, and the same command goes on from there."
 )]
 pub struct Arguments {
-    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog; more can be dropped on the page.
+    /// Flight logs to begin with: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap); more can be dropped on the page.
     logs: Vec<PathBuf>,
     /// The model file. An existing session knows its own; a new one takes that of the environment variable
     /// GREYLAG_MODEL where this is left out.

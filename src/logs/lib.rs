@@ -22,6 +22,7 @@ mod load;
 pub mod mapping;
 mod mixed;
 mod names;
+mod number;
 pub mod quality;
 pub mod phases;
 pub mod rudder;

@@ -18,10 +18,11 @@ use std::rc::Rc;
 
 use super::finding::Finding;
 use super::format::ULOG_MAGIC;
+use super::number::Number;
 use super::stretches::Keep;
 use super::topics::{Topic, Topics};
 use super::window::Window;
-use layout::{Kind, Layout};
+use layout::Layout;
 use subscriptions::{Subscription, Subscriptions};
 
 /// Magic, version and start time.
@@ -232,7 +233,7 @@ impl Reader {
             b'P' => self.parameter(body),
             b'O' => {
                 self.dropouts += 1;
-                self.dropout_ms += Kind::U16.at(body, 0).max(0.0) as u64;
+                self.dropout_ms += Number::U16.at(body, 0).max(0.0) as u64;
             }
             _ => {}
         }
@@ -250,7 +251,7 @@ impl Reader {
         let Some((key, value)) = rest.split_at_checked(usize::from(len)) else { return };
         let key = String::from_utf8_lossy(key);
         if let Some((kind, name)) = key.split_once(' ')
-            && let Some(kind) = Kind::named(kind)
+            && let Some(kind) = Number::named(kind)
         {
             let value = kind.at(value, 0);
             if value.is_finite() {

@@ -2,8 +2,8 @@
 //!
 //! JSBSim's electric engine is a source of constant power: its torque is the power over the speed of the propeller, at least 1 rad/s.
 //! The first frame of a propeller at rest adds P·dt/J to its speed, 130,000 rpm for a model aircraft in steps of 10 ms, and the
-//! state is no number a tenth of a second later. In steps of a hundredth the propeller speeds up as it should, and it windmills
-//! from then on.
+//! state is no number a tenth of a second later (`findings/jsbsim-electric-standstill.sh`). In steps of a hundredth the propeller
+//! speeds up as it should. Once it windmills, the usual step is stable at full throttle (tested).
 
 use jsbsim::NodeId;
 

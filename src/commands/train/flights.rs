@@ -24,7 +24,7 @@ const MOST_COPIES: f64 = 50.0;
 /// Where flights come from.
 #[derive(clap::Args)]
 pub struct FlightArguments {
-    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin or MAVLink .tlog, distinguished by content.
+    /// Flight logs: CSV, PX4 ULog, ArduPilot .bin, MAVLink .tlog or ROS 2 bag (.mcap), distinguished by content.
     #[arg(long = "log", num_args = 1..)]
     logs: Vec<PathBuf>,
     #[command(flatten)]

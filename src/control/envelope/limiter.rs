@@ -45,13 +45,13 @@ const NEWTON: usize = 2;
 /// The limit that changed a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// The load-factor limit.
+    /// The largest or the smallest load factor.
     Load,
-    /// The angle-of-attack limit.
+    /// The angle of attack before the stall, positive or negative.
     Incidence,
-    /// The bank limit.
+    /// The largest bank to either side.
     Bank,
-    /// The sideslip limit.
+    /// The largest sideslip to either side.
     Sideslip,
     /// No limit. The limiter is inactive because the model's predictions were wrong.
     Distrust,
@@ -99,13 +99,22 @@ struct At {
     rate: f64,
 }
 
+/// The model with the recent prediction error, at one altitude.
+struct Dynamics<'a> {
+    model: &'a GreyBox,
+    /// Rates that the model did not predict, per second.
+    unexplained: State,
+    /// Altitude above mean sea level, m.
+    altitude: f64,
+}
+
 /// The predicted state at the time at which a command acts.
 struct Moment<'a> {
-    model: &'a GreyBox,
-    unexplained: State,
-    altitude: f64,
+    dynamics: Dynamics<'a>,
     state: State,
     controls: Controls,
+    /// Rates of the state, and rates after [`SPAN_S`] of the predicted motion, per second.
+    rates: [State; 2],
 }
 
 /// Value, first and second derivative of a limited quantity, and the effect of a surface on the second derivative.
@@ -172,7 +181,9 @@ impl EnvelopeLimiter {
             actuators.step(&seen.previous[0], figures);
             controls = self.model.act(&actuators.controls(), &mut inputs);
         }
-        Moment { model: &self.model, unexplained, altitude: seen.altitude, state, controls }
+        let dynamics = Dynamics { model: &self.model, unexplained, altitude: seen.altitude };
+        let rates = dynamics.rates(&state, &controls);
+        Moment { dynamics, state, controls, rates }
     }
 
     fn keep_bank(&self, at: &Moment, out: &mut Limited) {
@@ -253,40 +264,46 @@ impl Surface {
     }
 }
 
-impl Moment<'_> {
+impl Dynamics<'_> {
+    /// Rates of `state` under `controls`, per second.
     fn rate(&self, state: &State, controls: &Controls) -> State {
         self.model.rate(state, controls, self.altitude).advance(&self.unexplained, 1.0)
     }
 
+    /// Rates of `state` under `controls`, and those after [`SPAN_S`] of this motion, per second.
+    fn rates(&self, state: &State, controls: &Controls) -> [State; 2] {
+        let rate = self.rate(state, controls);
+        [rate, self.rate(&state.advance(&rate, SPAN_S), controls)]
+    }
+}
+
+impl Moment<'_> {
     /// Value and derivatives of the quantity `of`, and their response to `surface`, which has this `travel`.
     fn motion(&self, surface: Surface, travel: Travel, of: impl Fn(&State) -> f64) -> Motion {
         let mut controls = self.controls;
         // the acceleration is the change of the rate along the predicted motion
-        let follow = |controls: &Controls| {
-            let rate = self.rate(&self.state, controls);
-            let later = self.rate(&self.state.advance(&rate, SPAN_S), controls);
-            (of(&rate), (of(&later) - of(&rate)) / SPAN_S)
-        };
-        let (rate, acceleration) = follow(&controls);
+        let along = |[rate, later]: &[State; 2]| (of(later) - of(rate)) / SPAN_S;
+        let acceleration = along(&self.rates);
         let deflection = *surface.of(&mut controls);
         let probe = if deflection > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         *surface.of(&mut controls) += probe;
-        let (_, probed) = follow(&controls);
+        let probed = along(&self.dynamics.rates(&self.state, &controls));
         let effect = (probed - acceleration) / probe;
-        Motion { value: of(&self.state), rate, acceleration, effect, deflection }
+        let (value, rate) = (of(&self.state), of(&self.rates[0]));
+        Motion { value, rate, acceleration, effect, deflection }
     }
 
     /// The load factor at an angle of attack and an elevator deflection (rad).
     fn load(&self, alpha: f64, elevator: f64) -> f64 {
         let state = State { alpha, ..self.state };
         let controls = Controls { elevator, ..self.controls };
-        load_factor_under(&state, &self.rate(&state, &controls))
+        load_factor_under(&state, &self.dynamics.rate(&state, &controls))
     }
 
     /// The elevator deflections (rad) at which the elevator's lift alone reaches the largest and the smallest load factor.
     fn lift_limits(&self, bounds: &Bounds, elevator: f64) -> [f64; 2] {
         let load = self.load(self.state.alpha, elevator);
-        let travel = self.model.airframe.actuators.elevator.travel;
+        let travel = self.dynamics.model.airframe.actuators.elevator.travel;
         let probe = if elevator > 0.0 { PROBE * travel.least } else { PROBE * travel.most };
         let slope = (self.load(self.state.alpha, elevator + probe) - load) / probe;
         // the lift of a canard has the other sign, as does its moment
@@ -317,7 +334,7 @@ impl Moment<'_> {
             return stall;
         }
         // the angle of attack for a load factor is proportional to 1/V²
-        let rate = self.rate(&self.state, &self.controls).airspeed;
+        let rate = self.rates[0].airspeed;
         let rate = -2.0 * rate / self.state.airspeed * bounds.load[side] / slope;
         At { limit: Limit::Load, value: alpha, rate }
     }

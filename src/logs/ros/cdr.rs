@@ -3,48 +3,7 @@
 //! A message begins with four bytes that name its encoding. A number stands at a multiple of its size behind them, in
 //! the second version of the encoding at a multiple of four at most.
 
-/// A number of a message.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Number {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Number {
-    /// The number of a type as a definition writes it.
-    pub fn named(name: &str) -> Option<Number> {
-        Some(match name {
-            "int8" => Number::I8,
-            "uint8" | "bool" | "byte" | "char" => Number::U8,
-            "int16" => Number::I16,
-            "uint16" => Number::U16,
-            "int32" => Number::I32,
-            "uint32" => Number::U32,
-            "int64" => Number::I64,
-            "uint64" => Number::U64,
-            "float32" => Number::F32,
-            "float64" => Number::F64,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Number::I8 | Number::U8 => 1,
-            Number::I16 | Number::U16 => 2,
-            Number::I32 | Number::U32 | Number::F32 => 4,
-            Number::I64 | Number::U64 | Number::F64 => 8,
-        }
-    }
-}
+use crate::number::Number;
 
 /// A message that is read from its beginning.
 pub(super) struct Cdr<'b> {
@@ -83,35 +42,22 @@ impl<'b> Cdr<'b> {
         Some(bytes)
     }
 
-    /// The bytes of one number, least significant first.
-    fn bytes<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let little = self.little;
-        let mut bytes: [u8; N] = *self.take(N, 1)?.first_chunk()?;
-        if !little {
-            bytes.reverse();
-        }
-        Some(bytes)
-    }
-
     /// The next number.
     pub fn number(&mut self, kind: Number) -> Option<f64> {
-        Some(match kind {
-            Number::I8 => f64::from(i8::from_le_bytes(self.bytes()?)),
-            Number::U8 => f64::from(u8::from_le_bytes(self.bytes()?)),
-            Number::I16 => f64::from(i16::from_le_bytes(self.bytes()?)),
-            Number::U16 => f64::from(u16::from_le_bytes(self.bytes()?)),
-            Number::I32 => f64::from(i32::from_le_bytes(self.bytes()?)),
-            Number::U32 => f64::from(u32::from_le_bytes(self.bytes()?)),
-            Number::I64 => i64::from_le_bytes(self.bytes()?) as f64,
-            Number::U64 => u64::from_le_bytes(self.bytes()?) as f64,
-            Number::F32 => f64::from(f32::from_le_bytes(self.bytes()?)),
-            Number::F64 => f64::from_le_bytes(self.bytes()?),
-        })
+        let bytes = self.take(kind.size(), 1)?;
+        if self.little {
+            return Some(kind.at(bytes, 0));
+        }
+        let mut turned = [0; 8];
+        let turned = &mut turned[..bytes.len()];
+        turned.copy_from_slice(bytes);
+        turned.reverse();
+        Some(kind.at(turned, 0))
     }
 
     /// The number of elements of a sequence.
     pub fn length(&mut self) -> Option<usize> {
-        usize::try_from(u32::from_le_bytes(self.bytes()?)).ok()
+        self.number(Number::U32).map(|length| length as usize)
     }
 
     /// Passes over `count` numbers.

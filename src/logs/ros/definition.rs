@@ -8,7 +8,8 @@
 
 use std::collections::BTreeMap;
 
-use super::cdr::{Cdr, Number};
+use super::cdr::Cdr;
+use crate::number::Number;
 
 /// Nesting of message types; those of MAVROS and PX4 have five levels at most.
 const DEPTH: usize = 8;

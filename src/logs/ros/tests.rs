@@ -150,7 +150,7 @@ fn a_bag_cut_anywhere_is_read_up_to_there_and_says_so() {
 #[test]
 fn damage_costs_a_chunk_and_is_counted() {
     let truth = truth();
-    let told = |text: &str| {
+    let warned = |text: &str| {
         let words =
             ["chunks could not be read", "do not have their checksum", "belong to no record"];
         words.iter().any(|word| text.contains(word)) && text.contains("s of messages")
@@ -170,11 +170,11 @@ fn damage_costs_a_chunk_and_is_counted() {
             for bytes in [spoiled, lacking] {
                 let log = damaged(&bytes);
                 let text = said(&log);
-                noticed += usize::from(told(&text));
+                noticed += usize::from(warned(&text));
                 // The index of a chunk is not needed.
                 let same =
                     log.flight.samples.len() == 200 && table(&log, 200) == table(&sound, 200);
-                assert!(told(&text) || same, "{name} at {at}: {text}");
+                assert!(warned(&text) || same, "{name} at {at}: {text}");
                 assert!(log.flight.samples.len() > 100, "{name} at {at}: {text}");
             }
         }

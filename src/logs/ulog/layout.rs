@@ -2,78 +2,18 @@
 
 use std::collections::BTreeMap;
 
+use crate::number::Number;
+
 /// Nesting of message types; PX4 has three levels at most.
 const DEPTH: usize = 8;
 /// Numeric fields of one topic; PX4's largest has a few hundred.
 const FIELDS: usize = 2048;
 
-/// A type of a field with its size in bytes.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Kind {
-    pub(super) fn named(name: &str) -> Option<Kind> {
-        Some(match name {
-            "int8_t" => Kind::I8,
-            "uint8_t" | "bool" | "char" => Kind::U8,
-            "int16_t" => Kind::I16,
-            "uint16_t" => Kind::U16,
-            "int32_t" => Kind::I32,
-            "uint32_t" => Kind::U32,
-            "int64_t" => Kind::I64,
-            "uint64_t" => Kind::U64,
-            "float" => Kind::F32,
-            "double" => Kind::F64,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Kind::I8 | Kind::U8 => 1,
-            Kind::I16 | Kind::U16 => 2,
-            Kind::I32 | Kind::U32 | Kind::F32 => 4,
-            Kind::I64 | Kind::U64 | Kind::F64 => 8,
-        }
-    }
-
-    /// The value at `offset`; NaN beyond the end, where PX4 has cut the padding.
-    pub(super) fn at(self, bytes: &[u8], offset: usize) -> f64 {
-        fn take<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
-            bytes.get(offset..)?.first_chunk().copied()
-        }
-        let value = match self {
-            Kind::I8 => take(bytes, offset).map(|b| f64::from(i8::from_le_bytes(b))),
-            Kind::U8 => take(bytes, offset).map(|b| f64::from(u8::from_le_bytes(b))),
-            Kind::I16 => take(bytes, offset).map(|b| f64::from(i16::from_le_bytes(b))),
-            Kind::U16 => take(bytes, offset).map(|b| f64::from(u16::from_le_bytes(b))),
-            Kind::I32 => take(bytes, offset).map(|b| f64::from(i32::from_le_bytes(b))),
-            Kind::U32 => take(bytes, offset).map(|b| f64::from(u32::from_le_bytes(b))),
-            Kind::I64 => take(bytes, offset).map(|b| i64::from_le_bytes(b) as f64),
-            Kind::U64 => take(bytes, offset).map(|b| u64::from_le_bytes(b) as f64),
-            Kind::F32 => take(bytes, offset).map(|b| f64::from(f32::from_le_bytes(b))),
-            Kind::F64 => take(bytes, offset).map(f64::from_le_bytes),
-        };
-        value.unwrap_or(f64::NAN)
-    }
-}
-
 /// A field of a subscribed topic, flattened.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub name: String,
-    pub kind: Kind,
+    pub kind: Number,
     pub offset: usize,
 }
 
@@ -82,8 +22,8 @@ pub(super) struct Layout {
     /// The fields that are read.
     pub fields: Vec<Field>,
     /// Types and positions of `timestamp` and `timestamp_sample`.
-    pub stamp: Option<(Kind, usize)>,
-    pub sampled: Option<(Kind, usize)>,
+    pub stamp: Option<(Number, usize)>,
+    pub sampled: Option<(Number, usize)>,
     /// Bytes of a whole record, without the padding at its end, which PX4 does not write.
     pub size: usize,
     /// Bytes of a whole record with that padding.
@@ -130,7 +70,7 @@ fn flatten(
             }
             let index = if count.is_some() { format!("[{i}]") } else { String::new() };
             let path = format!("{prefix}{field}{index}");
-            match Kind::named(kind) {
+            match Number::named(kind) {
                 Some(kind) => {
                     out.push(Field { name: path, kind, offset: *offset });
                     *offset += kind.size();

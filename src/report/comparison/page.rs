@@ -20,13 +20,9 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
     let answer = c.answer.clone();
     let boxed = AnswerBox { answer, place: place::of_models(&c.models), first: First::Error };
     let answer = Figure::Answer(Box::new(boxed));
-    let mut found = findings(c);
-    if c.models.len() == 1 {
-        // the box above says where the model fails
-        let lead = std::mem::take(&mut found.lead);
-        found.rest.splice(0..0, lead);
-    }
-    let words = Figure::Findings(found);
+    // of one model the box above says where it fails
+    let leading = if c.models.len() == 1 { 0 } else { LEADING };
+    let words = Figure::Findings(findings(c, leading));
     // the page of a single model begins with its failures, that of several models with their differences
     let (first, later) = match c.models.len() {
         0 | 1 => (vec![answer, words], Section::default()),
@@ -50,7 +46,7 @@ pub fn comparison_page(report: &ComparisonReport) -> Page {
 
 /// The short section of a flight report: the errors of the model of that flight.
 pub(crate) fn short_section(c: &Comparison) -> Section {
-    let mut found = findings(c);
+    let mut found = findings(c, LEADING);
     // The links point to figures that only the page of the comparison contains.
     for finding in found.lead.iter_mut().chain(&mut found.rest) {
         finding.link = None;
@@ -92,14 +88,15 @@ pub(crate) fn channel_name(id: ChannelId) -> String {
     format!("{} {}", id.symbol(), id.name())
 }
 
-fn findings(c: &Comparison) -> Findings {
+/// The sentences on all models, of which the first `leading` on the first model are prominent.
+fn findings(c: &Comparison, leading: usize) -> Findings {
     let mut lead = Vec::new();
     let mut rest = Vec::new();
     for (k, model) in c.models.iter().enumerate() {
         let own = if k == 0 { usize::MAX } else { OF_OTHERS };
         for (i, sentence) in model.sentences.iter().take(own).enumerate() {
             let finding = Finding { sentence: sentence.clone(), link: link(model, sentence) };
-            match (k, i < LEADING) {
+            match (k, i < leading) {
                 (0, true) => lead.push(finding),
                 (0, false) => rest.push(finding),
                 _ => rest.push(Finding {
@@ -109,7 +106,7 @@ fn findings(c: &Comparison) -> Findings {
             }
         }
     }
-    if lead.is_empty() {
+    if lead.is_empty() && rest.is_empty() {
         let sentence = "No channel could be compared: the notes say why.".into();
         lead.push(Finding { sentence, link: None });
     }

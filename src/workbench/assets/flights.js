@@ -10,7 +10,7 @@ export function flights(bench) {
   const kept = new Set([...body.querySelectorAll("details[open]")].map((d) => d.dataset.key));
   const input = el("input", { type: "file", multiple: true, onchange: () => bench.upload([...input.files]) });
   const drop = el("label", { class: "drop" }, "Drop flight logs here, or choose files", input,
-    el("br"), el("span", { class: "note" }, "CSV, ULog, DataFlash .bin, .tlog"));
+    el("br"), el("span", { class: "note" }, "CSV, ULog, DataFlash .bin, .tlog, .mcap"));
   const left = bench.reading > 0 && el("p", { class: "note", role: "status" }, `${bench.reading} more ${bench.reading === 1 ? "is" : "are"} being read …`);
   const list = bench.state.flights.map((flight, place) => one(bench, flight, place, kept));
   body.replaceChildren(drop, ...list, ...[left].filter(Boolean), ...[command(bench.state.commands.flights)].filter(Boolean));
