@@ -70,6 +70,23 @@ fn a_fit_that_is_worse_on_flights_held_out_is_not_written() {
     assert!(out.join("model.toml").exists());
 }
 
+/// Sensors with noise, and a model without error: what the fit gains is chance.
+#[test]
+fn a_fit_that_is_better_by_chance_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b, c] = [(1, "a.csv"), (2, "b.csv"), (3, "c.csv")]
+        .map(|(k, name)| log(folder.path(), name, "", 130 + k));
+    let out = folder.path().join("out");
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("params/x8/jsbsim.toml");
+    let model = model.to_str().unwrap();
+    let line = ["amend", "--model", model, "--log", &a, &b, "--hold-out", &c, "--tune-only"];
+    let said = greylag(&[&line[..], &["--out", out.to_str().unwrap()]].concat());
+    let text = String::from_utf8_lossy(&said.stdout);
+    assert_eq!(said.status.code(), Some(3), "{text}");
+    assert!(text.contains("The model as given is kept"), "{text}");
+    assert!(!out.join("model.toml").exists());
+}
+
 #[test]
 fn bounds_are_the_users_and_free_runs_are_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,11 +1,15 @@
 """`greylag amend --tune-only` beside a plain output error in numpy, on flights of official JSBSim.
 
-    python tests/truth/make_cases.py --truth official --seed 53001 --nulls 10 --effects '' --duration 40 --out cases/real
-    python tests/truth/make_cases.py --truth official --seed 53001 --nulls 10 --effects '' --duration 40 --noise 0 --skew 0 --out cases/clean
-    python tests/truth/beside_output_error.py --greylag target/release/greylag --cases cases/real --clean cases/clean --out fits
+    python tests/truth/make_cases.py --truth official --seed 91132 --nulls 10 --effects '' --duration 40 --out cases/real
+    python tests/truth/make_cases.py --truth official --seed 91132 --nulls 10 --effects '' --duration 40 --noise 0 --skew 0 --out cases/clean
+    python tests/truth/make_cases.py --truth official --seed 91131 --nulls 20 --effects '' --duration 40 --wrong 0 --out cases/true
+    python tests/truth/make_cases.py --truth official --seed 91131 --nulls 20 --effects '' --duration 40 --wrong 0 --noise 0 --skew 0 --out cases/true-clean
+    python tests/truth/beside_output_error.py --greylag target/release/greylag --cases cases/clean --clean cases/clean --out fits/clean
+    python tests/truth/beside_output_error.py --greylag target/release/greylag --cases cases/real --clean cases/clean --out fits/real
+    python tests/truth/beside_output_error.py --greylag target/release/greylag --cases cases/true --clean cases/true-clean --out fits/true
 
 Both fit the three training flights of each case; both models are judged by free runs of 5 s over the test flights without
-sensors' errors (`output_error.judge`, RK4 of its own). `amend` holds out the test flights of `--cases`. With `--wrong 0` in make_cases the given model is the truth.
+sensors' errors (`output_error.judge`, RK4 of its own). `amend` holds out the test flights of `--cases`. With `--wrong 0` the given model is the true one.
 """
 
 import argparse

@@ -38,7 +38,7 @@ use crate::sysid::progress::{Progress, Stage, part};
 #[derive(clap::Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true),
-    after_help = "Exit status: 0 done, 1 nothing was written, 3 not written, for the fit flies the flights held out worse than the model as given, or written, but an effect was refused, a coefficient ended at a bound, a log was left out or flights contradict one another."
+    after_help = "Exit status: 0 done, 1 nothing was written, 3 not written, for the fit predicts the flights held out worse than the model as given or not better with 95 % confidence, or written, but an effect was refused, a coefficient ended at a bound, a log was left out or flights contradict one another."
 )]
 pub struct Arguments {
     /// Model file to start from; it stays as it is.
@@ -78,7 +78,7 @@ pub struct Arguments {
     /// size, such as lift_linear.CL0=-2..2; the amended model's file records it.
     #[arg(long = "bound", value_name = "NAME=LEAST..MOST", num_args = 1.., value_parser = bounds::bound)]
     bounds: Vec<bounds::Bound>,
-    /// Write effects into the model that the data refuse, and a model that flies the flights held out worse.
+    /// Write effects into the model that the data refuse, and a fit that predicts the flights held out no better.
     #[arg(long)]
     accept_anyway: bool,
     /// Fit to all logs: nothing is held out, so that the errors are those of the flights that were fitted.
@@ -133,11 +133,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     story.notes.splice(0..0, notes);
     in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
-    let worse = story.worse().filter(|_| !arguments.accept_anyway);
+    let kept = story.keeps_given().filter(|_| !arguments.accept_anyway);
     // the page is drawn before anything is written; Ctrl-C then leaves no file behind
     let draw = || page(arguments, &model, &amended, &tests, &places, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
-        Some(path) if !all_refused && worse.is_none() => Some((path, draw()?)),
+        Some(path) if !all_refused && kept.is_none() => Some((path, draw()?)),
         _ => None,
     };
     bar.go_on()?;
@@ -150,7 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
              --accept-anyway writes a refused effect"
         );
     }
-    if let Some(why) = worse {
+    if let Some(why) = kept {
         println!("{why} Nothing was written; --accept-anyway writes the fit.");
         return Ok(ExitCode::from(IN_DOUBT));
     }

@@ -3,6 +3,7 @@
 use super::amendment::{Added, Refused};
 use super::error::AmendError;
 use super::flight::Flight;
+use super::leave_one_out::mean_with_error;
 use super::output_error::Fit;
 use super::parameters;
 use super::result::{AddedEffect, Parameter};
@@ -16,8 +17,8 @@ pub(super) const IMPROVED: f64 = 0.01;
 /// An effect that reduces the held-out error below this share of the previous error is accepted although the search has not
 /// converged with it. Convergence may need further effects.
 pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
-/// At least one coefficient of an effect must differ from zero by this number of standard deviations.
-const CLEAR: f64 = 1.96;
+/// Standard deviations in half of a 95 % interval. At least one coefficient of an effect must differ from zero by as many.
+pub(super) const CLEAR: f64 = 1.96;
 /// The same number for effects of more than three coefficients: with many coefficients, one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
 /// Flights disagree if the estimate of one flight differs from the common estimate by more than this number of standard
@@ -57,6 +58,21 @@ impl Judge<'_> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
         let (runs, _) = free_run::fly(model, &flights, self.horizons_s);
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
+    }
+
+    /// Mean decrease of the squared scaled error from `before` to `after`, paired over the free runs of the held-out flights at the
+    /// horizon of [`judged`], and its standard error. Runs that are longer than the time between their starts overlap, and count
+    /// accordingly less.
+    ///
+    /// `None` if fewer than two runs reach a horizon.
+    pub fn decrease(&self, before: &GreyBox, after: &GreyBox) -> Option<[f64; 2]> {
+        let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
+        let at = judged_at(&self.scores(before))?;
+        let errors = |model| free_run::fly(model, &flights, &[at]).0.squared_errors(at);
+        let pairs = errors(before).into_iter().zip(errors(after));
+        let less: Vec<f64> = pairs.map(|(before, after)| before - after).collect();
+        let overlap = (at / free_run::START_EVERY_S).max(1.0);
+        (less.len() > 1).then(|| mean_with_error(&less)).map(|[mean, e]| [mean, e * overlap.sqrt()])
     }
 
     /// Decides on the effect `added` from its fit and the held-out scores `before`. Returns the effect's record, and the fit with

@@ -215,7 +215,7 @@ fn scored(structure: &Structure, free: usize, errors: Vec<f64>) -> Scored {
 }
 
 /// Mean and standard error of the mean.
-fn mean_with_error(x: &[f64]) -> [f64; 2] {
+pub(super) fn mean_with_error(x: &[f64]) -> [f64; 2] {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
     let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);

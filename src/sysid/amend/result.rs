@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::conventions::Tried;
 use super::flight::SENSORS;
-use super::judge::{judged, judged_at};
+use super::judge::{CLEAR, judged, judged_at};
 use crate::compare::{Answer, HorizonScore};
 use crate::per_flight::{Constant, PerFlight};
 
@@ -171,6 +171,9 @@ pub struct Amendment {
     pub before: Vec<HorizonScore>,
     /// Held-out free-run errors with the effects added.
     pub after: Vec<HorizonScore>,
+    /// Mean decrease of the squared scaled free-run error from the model as given to the fit, paired over the runs of the held-out
+    /// flights, and its standard error; `None` if fewer than two runs reach a horizon.
+    pub decrease: Option<[f64; 2]>,
     /// Further notes for the reader.
     pub notes: Vec<String>,
     /// Settings of the amendment.
@@ -178,16 +181,32 @@ pub struct Amendment {
 }
 
 impl Amendment {
-    /// Why the model as given is to be kept, in a sentence: the fit predicts held-out flights worse.
-    pub fn worse(&self) -> Option<String> {
+    /// Why the model as given is to be kept, in a sentence. `None` if the fit is to be used.
+    ///
+    /// It is kept if the fit predicts held-out flights worse. If only its coefficients were tuned, it is also kept if the 95 %
+    /// interval of the decrease of the squared error includes zero.
+    pub fn keeps_given(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
-        (after > (1.0 + WORSE) * given || after.is_nan()).then(|| {
-            format!(
-                "The model as given is kept, for the fit flies the flights that it did not see worse: {given:.5} became \
-                 {after:.5} of the reference scale in free runs of {} s.",
-                judged_at(&self.given).unwrap_or_default()
-            )
-        })
+        let why = if after > (1.0 + WORSE) * given || after.is_nan() {
+            "the fit predicts the flights that it did not see worse"
+        } else if self.only_tuned()
+            && self.decrease.is_some_and(|[mean, error]| mean < CLEAR * error)
+        {
+            "on the flights that the fit did not see the 95 % interval of the decrease of the error includes zero"
+        } else {
+            return None;
+        };
+        Some(format!(
+            "The model as given is kept, for {why}: {given:.5} became {after:.5} of the reference scale in free runs of {} s.",
+            judged_at(&self.given).unwrap_or_default()
+        ))
+    }
+
+    /// Whether the fit differs from the model as given in its coefficients only.
+    fn only_tuned(&self) -> bool {
+        !self.effects.iter().any(|e| e.joined)
+            && !self.conventions.iter().any(|c| c.kept)
+            && self.settings.per_flight == PerFlight::default()
     }
 
     /// Whether effects were requested and none of them joined.

@@ -215,6 +215,12 @@ impl Runs {
         looks.iter().map(one).collect()
     }
 
+    /// Squared scaled error of each run at `horizon_s` (s), one of the sampled times. The scaled error of a diverged run is
+    /// [`DIVERGENCE_BOUND`].
+    pub fn squared_errors(&self, horizon_s: f64) -> Vec<f64> {
+        self.errors(&self.at(horizon_s)).iter().map(|e| e * e).collect()
+    }
+
     /// The errors at `horizon_s` (s), one of the sampled times.
     pub fn score(&self, horizon_s: f64) -> HorizonScore {
         let looks = self.at(horizon_s);
