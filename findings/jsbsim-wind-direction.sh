@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# JSBSim 1.3.3: wind directions are those to which the wind blows, not those from which it comes, as in every weather report: with `ic/vw-dir-deg` = 90 an aircraft on the heading 90 has a tailwind.
+# `atmosphere/psiw-rad`, the wind's direction, follows the wind except where its north component is exactly zero: a wind that is set to blow to the east, or to the west, keeps the direction of the wind before.
+set -euo pipefail
+folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
+python3 -m venv "$folder/v" && "$folder/v/bin/pip" -q install jsbsim==1.3.3
+"$folder/v/bin/python" - <<'PYTHON' 2>/dev/null | sed "/^ *$/d; /Flight Dynamics Model/d; /JSBSim-ML/d; /startup/d"
+import math
+import jsbsim
+
+f = jsbsim.FGFDMExec(None)
+f.set_debug_level(0)
+f.load_model("c172p")
+f["ic/h-sl-ft"], f["ic/vc-kts"], f["ic/psi-true-deg"] = 4000, 100, 90
+f["ic/vw-mag-fps"], f["ic/vw-dir-deg"] = 20, 90
+f.run_ic()
+print("JSBSim", f.get_version())
+east, along = f["atmosphere/wind-east-fps"], f["velocities/vg-fps"] - f["velocities/vt-fps"]
+print(f"ic/vw-dir-deg 90, heading 90: wind to the east {east:.1f} ft/s, ground speed less airspeed {along:.1f} ft/s")
+assert abs(east - 20) < 1e-9 and abs(along - 20) < 0.1
+read = {}
+for north, east in ((-20.0, 0.0), (0.0, 20.0), (1e-9, 20.0), (0.0, -20.0)):
+    f["atmosphere/wind-north-fps"], f["atmosphere/wind-east-fps"] = north, east
+    f.run()
+    read[north, east] = math.degrees(f["atmosphere/psiw-rad"])
+    print(f"wind ({north:g}, {east:g}) ft/s north, east: psiw {read[north, east]:.0f} deg, atan2 {math.degrees(math.atan2(east, north)) % 360:.0f} deg")
+assert [round(x) for x in read.values()] == [180, 180, 90, 90]
+PYTHON
