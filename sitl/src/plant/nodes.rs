@@ -188,6 +188,11 @@ impl Nodes {
         }
         fdm.set_property("atmosphere/randomseed", scattered(options.seed))?;
         if let Some(turbulence) = options.air.turbulence {
+            let [north, east, _] = wind;
+            if north == 0.0 && east != 0.0 {
+                // JSBSim keeps the previous direction then, along which turbulence is larger (findings/jsbsim-wind-direction.sh).
+                fdm.set_property("atmosphere/psiw-rad", east.atan2(north))?;
+            }
             let path = "atmosphere/turbulence/milspec/";
             let w20 = turbulence.wind_20ft_mps / FT;
             fdm.set_property(&format!("{path}windspeed_at_20ft_AGL-fps"), w20)?;

@@ -58,6 +58,23 @@ fn gust_blows_when_and_as_told() {
     assert!((flight[80].wind_ned_mps[1] - 2.0).abs() < 1e-6);
 }
 
+/// JSBSim keeps the wind's previous direction where its north component is zero.
+#[test]
+fn turbulence_goes_with_a_wind_from_due_west() {
+    let turbulence = Some(Turbulence { wind_20ft_mps: 15.0, severity: 5 });
+    let east = |north: f64| {
+        let air = Air { wind_ned_mps: [north, 5.0, 0.0], turbulence, ..Air::default() };
+        fly(&mut plant_in(air), 0, 300)
+    };
+    let (exact, nearly) = (east(0.0), east(1e-9));
+    assert!(exact.iter().any(|t| t.wind_ned_mps[0].abs() > 0.2));
+    for (a, b) in exact.iter().zip(&nearly) {
+        for (a, b) in a.wind_ned_mps.iter().zip(b.wind_ned_mps) {
+            assert!((a - b).abs() < 1e-3, "{a} {b}");
+        }
+    }
+}
+
 #[test]
 fn air_that_cannot_blow_is_refused() {
     let gust = Gust {
