@@ -21,6 +21,8 @@ pub const ACCEPTED_UNCONVERGED: f64 = 0.5;
 pub(super) const CLEAR: f64 = 1.96;
 /// The same number for effects of more than three coefficients: with many coefficients, one exceeds `CLEAR` by chance.
 const CLEAR_OF_MANY: f64 = 3.0;
+/// Smallest scaled error of a free run of which a logarithm is taken.
+const LEAST_ERROR: f64 = 1e-12;
 /// Flights disagree if the estimate of one flight differs from the common estimate by more than this number of standard
 /// deviations, and by more than [`DISAGREE_SHARE`].
 const DISAGREE: f64 = 4.0;
@@ -60,17 +62,19 @@ impl Judge<'_> {
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
-    /// Mean decrease of the squared scaled error from `before` to `after`, paired over the free runs of the held-out flights at the
-    /// horizon of [`judged`], and its standard error. Runs that are longer than the time between their starts overlap, and count
-    /// accordingly less.
+    /// Mean of ln(scaled error of `before` / scaled error of `after`), paired over the free runs of the held-out flights at the
+    /// horizon of [`judged`], and its standard error. A logarithm, so that one run that diverges does not outweigh all others.
+    /// Runs that are longer than the time between their starts overlap, and count accordingly less.
     ///
     /// `None` if fewer than two runs reach a horizon.
     pub fn decrease(&self, before: &GreyBox, after: &GreyBox) -> Option<[f64; 2]> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
         let at = judged_at(&self.scores(before))?;
-        let errors = |model| free_run::fly(model, &flights, &[at]).0.squared_errors(at);
+        let errors = |model| free_run::fly(model, &flights, &[at]).0.scaled_errors(at);
         let pairs = errors(before).into_iter().zip(errors(after));
-        let less: Vec<f64> = pairs.map(|(before, after)| before - after).collect();
+        let less: Vec<f64> = pairs
+            .map(|(before, after)| (before.max(LEAST_ERROR) / after.max(LEAST_ERROR)).ln())
+            .collect();
         let overlap = (at / free_run::START_EVERY_S).max(1.0);
         (less.len() > 1).then(|| mean_with_error(&less)).map(|[mean, e]| [mean, e * overlap.sqrt()])
     }

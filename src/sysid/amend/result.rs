@@ -171,8 +171,8 @@ pub struct Amendment {
     pub before: Vec<HorizonScore>,
     /// Held-out free-run errors with the effects added.
     pub after: Vec<HorizonScore>,
-    /// Mean decrease of the squared scaled free-run error from the model as given to the fit, paired over the runs of the held-out
-    /// flights, and its standard error; `None` if fewer than two runs reach a horizon.
+    /// Mean of ln(scaled error of the model as given / scaled error of the fit), paired over the free runs of the held-out flights,
+    /// and its standard error; `None` if fewer than two runs reach a horizon.
     pub decrease: Option<[f64; 2]>,
     /// Further notes for the reader.
     pub notes: Vec<String>,
@@ -184,7 +184,7 @@ impl Amendment {
     /// Why the model as given is to be kept, in a sentence. `None` if the fit is to be used.
     ///
     /// It is kept if the fit predicts held-out flights worse. If only its coefficients were tuned, it is also kept if the 95 %
-    /// interval of the decrease of the squared error includes zero.
+    /// interval of `decrease` includes zero.
     pub fn keeps_given(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
         let why = if after > (1.0 + WORSE) * given || after.is_nan() {

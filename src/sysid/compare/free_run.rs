@@ -215,10 +215,10 @@ impl Runs {
         looks.iter().map(one).collect()
     }
 
-    /// Squared scaled error of each run at `horizon_s` (s), one of the sampled times. The scaled error of a diverged run is
+    /// Scaled error of each run at `horizon_s` (s), one of the sampled times. The error of a diverged run is
     /// [`DIVERGENCE_BOUND`].
-    pub fn squared_errors(&self, horizon_s: f64) -> Vec<f64> {
-        self.errors(&self.at(horizon_s)).iter().map(|e| e * e).collect()
+    pub fn scaled_errors(&self, horizon_s: f64) -> Vec<f64> {
+        self.errors(&self.at(horizon_s))
     }
 
     /// The errors at `horizon_s` (s), one of the sampled times.
