@@ -180,19 +180,17 @@ impl Nodes {
         for (name, speed) in ["north", "east", "down"].into_iter().zip(wind) {
             fdm.set_property(&format!("atmosphere/wind-{name}-fps"), speed / FT)?;
         }
-        if wind == [0.0; 3] {
-            // The initial condition leaves a rounding error in the wind, which gives a spurious wind direction.
-            fdm.set_property("atmosphere/psiw-rad", 0.0)?;
-        } else {
+        let [north, east, _] = wind;
+        if north == 0.0 {
+            // JSBSim keeps the previous direction then (findings/jsbsim-wind-direction.sh), here that of the rounding error which
+            // the initial condition leaves in the wind. Turbulence goes by it.
+            fdm.set_property("atmosphere/psiw-rad", east.atan2(0.0))?;
+        }
+        if wind != [0.0; 3] {
             settle(fdm, options.step_s)?;
         }
         fdm.set_property("atmosphere/randomseed", scattered(options.seed))?;
         if let Some(turbulence) = options.air.turbulence {
-            let [north, east, _] = wind;
-            if north == 0.0 && east != 0.0 {
-                // JSBSim keeps the previous direction then, along which turbulence is larger (findings/jsbsim-wind-direction.sh).
-                fdm.set_property("atmosphere/psiw-rad", east.atan2(north))?;
-            }
             let path = "atmosphere/turbulence/milspec/";
             let w20 = turbulence.wind_20ft_mps / FT;
             fdm.set_property(&format!("{path}windspeed_at_20ft_AGL-fps"), w20)?;

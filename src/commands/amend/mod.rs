@@ -133,7 +133,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     story.notes.splice(0..0, notes);
     in_doubt |= doubtful(story);
     let all_refused = story.all_refused();
-    let kept = story.keeps_given().filter(|_| !arguments.accept_anyway);
+    let kept = given_is_kept(arguments, story).filter(|_| !all_refused);
     // the page is drawn before anything is written; Ctrl-C then leaves no file behind
     let draw = || page(arguments, &model, &amended, &tests, &places, &part(&on_stage, drawing));
     let drawn = match &arguments.report {
@@ -143,6 +143,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     bar.go_on()?;
     drop(bar);
     let answer = amended.amendment.answer.clone().then(next(arguments, &places));
+    if let Some(why) = &kept {
+        println!("{why} Nothing was written; --accept-anyway writes the fit.\n");
+    }
     print(&amended.amendment, &answer);
     if all_refused {
         bail!(
@@ -150,8 +153,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
              --accept-anyway writes a refused effect"
         );
     }
-    if let Some(why) = kept {
-        println!("{why} Nothing was written; --accept-anyway writes the fit.");
+    if kept.is_some() {
         return Ok(ExitCode::from(IN_DOUBT));
     }
     places.write(&model, &amended, [&logs, &hold_out], overwrite)?;
@@ -160,6 +162,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     print_summary(&answer);
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
+}
+
+/// Why the fit is not written, in a sentence. With `--fit-all` no flight can show what is chance.
+fn given_is_kept(arguments: &Arguments, story: &Amendment) -> Option<String> {
+    let by_chance = || story.by_chance().filter(|_| !arguments.fit_all);
+    story.worse().or_else(by_chance).filter(|_| !arguments.accept_anyway)
 }
 
 /// The next step for the user: a diagnosis of what the amended model still lacks.

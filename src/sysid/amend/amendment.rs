@@ -168,7 +168,8 @@ fn of_right(
     let (train, test) = (ready(flights)?, ready(held_out)?);
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
     let ask = Ask { options, train: &train, judge: &judge, progress, begun: AtomicUsize::new(0) };
-    let given = (judge.scores(model), model);
+    let given = judge.scores(model);
+    let as_given = model;
     let scratch = (options.prior == Prior::Bounds).then(|| parameters::from_scratch(model));
     let model = scratch.as_ref().unwrap_or(model);
     let best = ask.selected(model)?;
@@ -196,8 +197,8 @@ fn of_right(
         tuned: tuned.parameters.clone(),
         flights: fit.flights.clone(),
         held_out: held_out.iter().map(|f| f.name.clone()).collect(),
-        decrease: judge.decrease(given.1, &fit.model),
-        given: given.0,
+        decrease: judge::judged_at(&given).and_then(|s| judge.decrease(s, as_given, &fit.model)),
+        given,
         before,
         after,
         notes,

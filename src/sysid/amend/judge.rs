@@ -62,20 +62,19 @@ impl Judge<'_> {
         self.horizons_s.iter().map(|h| runs.score(*h)).collect()
     }
 
-    /// Mean of ln(scaled error of `before` / scaled error of `after`), paired over the free runs of the held-out flights at the
-    /// horizon of [`judged`], and its standard error. A logarithm, so that one run that diverges does not outweigh all others.
-    /// Runs that are longer than the time between their starts overlap, and count accordingly less.
+    /// Mean of ln(scaled error of `before` / scaled error of `after`), paired over the free runs of `horizon_s` (s) over the held-out
+    /// flights, and its standard error. A logarithm, so that one run that diverges does not outweigh all others. Runs that are
+    /// longer than the time between their starts overlap, and count accordingly less.
     ///
-    /// `None` if fewer than two runs reach a horizon.
-    pub fn decrease(&self, before: &GreyBox, after: &GreyBox) -> Option<[f64; 2]> {
+    /// `None` if fewer than two runs reach the horizon.
+    pub fn decrease(&self, horizon_s: f64, before: &GreyBox, after: &GreyBox) -> Option<[f64; 2]> {
         let flights: Vec<_> = self.test.iter().map(|f| f.prepared.clone()).collect();
-        let at = judged_at(&self.scores(before))?;
-        let errors = |model| free_run::fly(model, &flights, &[at]).0.scaled_errors(at);
+        let errors =
+            |model| free_run::fly(model, &flights, &[horizon_s]).0.scaled_errors(horizon_s);
+        let log = |error: f64| error.max(LEAST_ERROR).ln();
         let pairs = errors(before).into_iter().zip(errors(after));
-        let less: Vec<f64> = pairs
-            .map(|(before, after)| (before.max(LEAST_ERROR) / after.max(LEAST_ERROR)).ln())
-            .collect();
-        let overlap = (at / free_run::START_EVERY_S).max(1.0);
+        let less: Vec<f64> = pairs.map(|(before, after)| log(before) - log(after)).collect();
+        let overlap = (horizon_s / free_run::START_EVERY_S).max(1.0);
         (less.len() > 1).then(|| mean_with_error(&less)).map(|[mean, e]| [mean, e * overlap.sqrt()])
     }
 

@@ -181,25 +181,38 @@ pub struct Amendment {
 }
 
 impl Amendment {
-    /// Why the model as given is to be kept, in a sentence. `None` if the fit is to be used.
-    ///
-    /// It is kept if the fit predicts held-out flights worse. If only its coefficients were tuned, it is also kept if the 95 %
-    /// interval of `decrease` includes zero.
-    pub fn keeps_given(&self) -> Option<String> {
+    /// That the model as given is kept, in a sentence, if the fit predicts the flights for validation worse.
+    pub fn worse(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
-        let why = if after > (1.0 + WORSE) * given || after.is_nan() {
-            "the fit predicts the flights that it did not see worse"
-        } else if self.only_tuned()
-            && self.decrease.is_some_and(|[mean, error]| mean < CLEAR * error)
-        {
-            "on the flights that the fit did not see the 95 % interval of the decrease of the error includes zero"
-        } else {
-            return None;
-        };
-        Some(format!(
-            "The model as given is kept, for {why}: {given:.5} became {after:.5} of the reference scale in free runs of {} s.",
+        (after > (1.0 + WORSE) * given || after.is_nan())
+            .then(|| self.kept("the fit predicts the flights for validation worse"))
+    }
+
+    /// That the model as given is kept, in a sentence, if only its coefficients were tuned and the 95 % interval of `decrease`
+    /// includes zero.
+    pub fn by_chance(&self) -> Option<String> {
+        let [mean, error] = self.decrease?;
+        // plus zero: no −0
+        let percent = |sd: f64| (100.0 * (1.0 - (-(mean + sd * error)).exp())).round() + 0.0;
+        (self.only_tuned() && mean < CLEAR * error).then(|| {
+            self.kept(&format!(
+                "on the flights for validation the fit may be better by chance (95 % interval of the decrease of the error: \
+                 {} to {} %)",
+                percent(-CLEAR),
+                percent(CLEAR)
+            ))
+        })
+    }
+
+    /// That the model as given is kept, with the reason `why` and the errors.
+    fn kept(&self, why: &str) -> String {
+        let error = |scores| judged(scores).unwrap_or(f64::NAN);
+        format!(
+            "The model as given is kept: {why}. {:.5} became {:.5} of the reference scale in free runs of {} s.",
+            error(&self.given),
+            error(&self.after),
             judged_at(&self.given).unwrap_or_default()
-        ))
+        )
     }
 
     /// Whether the fit differs from the model as given in its coefficients only.
