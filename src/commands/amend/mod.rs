@@ -116,10 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
-    let (paths, held) = match arguments.fit_all {
-        true => (arguments.logs.paths.clone(), arguments.logs.paths.clone()),
-        false => divided(&arguments.logs.paths, &arguments.hold_out),
-    };
+    let (paths, held) = divided(arguments);
     let (logs, hold_out) = (hashed(&paths)?, hashed(&held)?);
     let mut taken = arguments.logs.of(paths).take_in(&model, ActuatorClock::AsRecorded)?;
     let tests = tests(arguments, held, &model, &mut taken)?;
@@ -289,9 +286,14 @@ fn page(
 }
 
 /// Logs for the fit and logs for validation. If none is held out, the last log is for validation. A single log stays
-/// whole.
-fn divided(logs: &[PathBuf], hold_out: &[PathBuf]) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    match (logs, hold_out) {
+/// whole. With `--fit-all` all logs are for both.
+fn divided(arguments: &Arguments) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    let logs = &arguments.logs.paths;
+    if arguments.fit_all {
+        return (logs.clone(), logs.clone());
+    }
+    let hold_out = &arguments.hold_out;
+    match (logs.as_slice(), hold_out.as_slice()) {
         ([first @ .., last], []) if !first.is_empty() => (first.to_vec(), vec![last.clone()]),
         _ => (logs.to_vec(), hold_out.to_vec()),
     }
