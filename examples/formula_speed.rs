@@ -1,6 +1,6 @@
 //! What an evaluation of a formula costs beside the same in Rust: in lanes, in double precision, with derivatives.
 //!
-//! `cargo run --release --ignore-rust-version --no-default-features --example formula_speed`
+//! `cargo run --release --ignore-rust-version --no-default-features --features speed --example formula_speed`
 
 use std::hint::black_box;
 use std::time::Instant;

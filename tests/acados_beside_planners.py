@@ -1,7 +1,7 @@
 """acados beside the planners: the learned model, ilqr's horizon and weights, constrained, real-time iteration.
 
     python3 -m venv target/acados-venv && target/acados-venv/bin/pip install -q comma-deps-acados jsbsim numpy
-    cargo build --release --ignore-rust-version --no-default-features --features sitl --bin greylag --example model_rates
+    cargo build --release --ignore-rust-version --no-default-features --features sitl,speed --bin greylag --example model_rates
     target/acados-venv/bin/python tests/acados_beside_planners.py --every 7 --steps 50 --out results/acados-beside-planners.json
 
 Needs a C compiler. The grey box is written anew in CasADi from `params/x8/learned`, and its rates and their derivatives

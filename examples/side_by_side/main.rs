@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! examples/side_by_side/setup target/torch-venv       # PyTorch from PyPI: 3 GB, once; not needed
-//! cargo run --release --ignore-rust-version --features sitl,learn --example side_by_side -- \
+//! cargo run --release --ignore-rust-version --features sitl,learn,speed --example side_by_side -- \
 //!     [--python target/torch-venv/bin/python] [--rounds 9]
 //! ```
 //!

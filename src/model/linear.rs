@@ -94,32 +94,3 @@ pub(super) fn matrices(
 ) -> (SMatrix<f64, STATES, STATES>, SMatrix<f64, STATES, 4>) {
     (SMatrix::from_fn(|i, j| rows[i][j]), SMatrix::from_fn(|i, j| rows[i][STATES + j]))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    #[test]
-    fn all_inputs_at_once_give_the_bits_of_four_at_a_time() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params");
-        for file in ["x8/learned/model.toml", "x8/prior.toml", "aerosonde/prior.toml"] {
-            let model = GreyBox::load(&folder.join(file)).unwrap();
-            let trim = Trim::straight(&model, model.airframe.reference.airspeed, 100.0).unwrap();
-            let mut state = trim.state;
-            for turn in 0..8 {
-                let x = inputs(&state, &trim.controls);
-                let (_, rows) = jacobian(&x, |x| {
-                    let (state, controls) = split(x);
-                    model.step(&state, &controls, 100.0, &mut Memory::default()).to_array()
-                });
-                let linear = linearise_step(&model, &state, &trim.controls, 100.0);
-                // on a processor without AVX2 both are the same code
-                assert_eq!((linear.a, linear.b), matrices(rows), "{file}");
-                state.roll += 0.2;
-                state.alpha += 0.03 * f64::from(turn);
-                state.q -= 0.3;
-            }
-        }
-    }
-}

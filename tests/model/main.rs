@@ -9,6 +9,7 @@ mod effects_lqi;
 mod facts;
 mod files;
 mod join;
+mod linear;
 #[cfg(feature = "sitl")]
 mod validate_effects;
 #[cfg(feature = "sitl")]

@@ -114,6 +114,7 @@ impl fmt::Display for Change {
             Change::Trust(x) => write!(f, "trust={}", unless_none(x)),
             Change::Known(x) => write!(f, "known={}", unless_none(x)),
             Change::Instructions(Instructions::Widest) => write!(f, "instructions=widest"),
+            Change::Instructions(Instructions::Avx2) => write!(f, "instructions=avx2"),
             Change::Instructions(Instructions::Portable) => write!(f, "instructions=portable"),
             Change::Cores(n) => write!(f, "cores={n}"),
         }
@@ -127,7 +128,7 @@ impl fmt::Display for Change {
      temperature, iterations, start (neutral, policy, last), spread, persistence, kept, proposals, noise, \
      alpha (or none), value (critics, fitted), steps, chunk, delay (yes, no), margin, \
      ilqr (yes, no), disturbance (s, or none), trust (or none), known (or none), \
-     instructions (widest, portable), cores (1, 2)"
+     instructions (widest, avx2, portable), cores (1, 2)"
 )]
 pub struct ChangeError {
     text: String,
@@ -192,6 +193,7 @@ fn parse(text: &str) -> Result<Change, String> {
         "cores" => Change::Cores(count([1, 2])?),
         "instructions" => Change::Instructions(match value {
             "widest" => Instructions::Widest,
+            "avx2" => Instructions::Avx2,
             "portable" => Instructions::Portable,
             _ => return Err(format!("there are no instructions {value:?}")),
         }),
@@ -229,6 +231,7 @@ mod tests {
             "disturbance=0.3",
             "trust=none",
             "known=1.5",
+            "instructions=avx2",
             "instructions=portable",
             "cores=2",
         ] {

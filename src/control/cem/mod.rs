@@ -129,10 +129,7 @@ impl Cem {
         );
         let count = settings.population.div_ceil(WIDTH);
         let steps = settings.steps.max(HORIZON);
-        let machine = match settings.instructions {
-            Instructions::Widest => Machine::detect(),
-            Instructions::Portable => Machine::baseline(),
-        };
+        let machine = Machine::new(settings.instructions);
         Cem {
             name,
             model: model.clone(),

@@ -1,5 +1,6 @@
 //! Rollouts of many candidates at once, with the widest vector instructions of the processor.
 
+use super::settings::Instructions;
 use super::surrogate::Surrogate;
 use crate::lqi::Ahead;
 use crate::policy::{ACTIONS, Agent, OBSERVATIONS, command, observe};
@@ -98,21 +99,19 @@ pub(super) enum Machine {
 type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 
 impl Machine {
-    /// The widest instruction set of this processor.
-    pub fn detect() -> Machine {
+    /// The instruction set that is asked for, or the widest below it that this processor supports.
+    pub fn new(wanted: Instructions) -> Machine {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx512f") {
+        if wanted == Instructions::Widest && is_x86_feature_detected!("avx512f") {
             // SAFETY: the processor has the feature
             return Machine::Avx512(unsafe { room_avx512() });
-        } else if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        } else if wanted != Instructions::Portable
+            && is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+        {
             // SAFETY: the processor has the features
             return Machine::Avx2(unsafe { room_avx2() });
         }
-        Machine::baseline()
-    }
-
-    /// The baseline instruction set of the compilation target.
-    pub fn baseline() -> Machine {
         Machine::Baseline(Units::new(Base::zero()))
     }
 
@@ -125,7 +124,7 @@ impl Machine {
         out: &mut [Worth],
     ) {
         match self {
-            // SAFETY: `detect` has checked the processor's features
+            // SAFETY: `new` has checked the processor's features
             #[cfg(target_arch = "x86_64")]
             Machine::Avx512(units) => unsafe { fly_avx512(scene, actions, blocks, out, units) },
             // SAFETY: as above

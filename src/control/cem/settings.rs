@@ -40,6 +40,8 @@ pub enum Value {
 pub enum Instructions {
     /// The widest instruction set that the processor supports.
     Widest,
+    /// AVX2, if the processor supports it, even where it supports AVX-512.
+    Avx2,
     /// The baseline of the compilation target. Its multiply-adds may round differently from those of the widest set. A
     /// flight is therefore bit-identical only when it is repeated with the same choice.
     Portable,
