@@ -223,38 +223,3 @@ fn findings(model: &GreyBox, check: &AircraftCheck, speeds: usize) -> Vec<String
     }
     out
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    fn model(path: &str) -> GreyBox {
-        GreyBox::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)).unwrap()
-    }
-
-    #[test]
-    fn the_shipped_aircraft_can_be_flown() {
-        for path in ["params/x8/jsbsim.toml", "params/aerosonde/jsbsim.toml"] {
-            let found = check(&model(path)).unwrap();
-            assert!(
-                found.loops.iter().all(|l| l.delay > 0.02 && l.gain[1] > 1.5),
-                "{:?}",
-                found.loops
-            );
-            assert!(found.authority.roll_rate > SLOW_ROLL);
-            // their only findings concern the delay margin of the LQI
-            assert!(found.findings.iter().all(|f| f.contains("of delay")), "{:?}", found.findings);
-            assert_eq!(found.modes.iter().filter(|m| m.name == "short period").count(), 1);
-        }
-    }
-
-    #[test]
-    fn a_reversed_surface_and_a_weak_motor_are_said() {
-        let mut wrong = model("params/aerosonde/jsbsim.toml");
-        assert!(wrong.set_coefficient("roll_linear.Clda", -0.17));
-        assert!(wrong.set_coefficient("thrust_table.k", 0.25));
-        let said = check(&wrong).unwrap().findings.join("\n");
-        assert!(said.contains("Clda") && said.contains("throttle"), "{said}");
-    }
-}

@@ -58,23 +58,3 @@ fn flown(model: &GreyBox, from: State, controls: Controls, altitude: f64) -> Sti
     }
     response
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    #[test]
-    fn the_stick_rolls_right_and_pitches_up() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/aerosonde/prior.toml");
-        let model = GreyBox::load(&path).unwrap();
-        let [roll, pitch] = stick_responses(&model).unwrap();
-        let at = |r: &StickResponse, t: f64| r.states[(t / STEP_S) as usize];
-        assert!(at(&roll, 0.5).p > 0.1 && at(&roll, 0.5).roll > 0.02);
-        assert!(at(&pitch, 0.2).q > 0.01 && at(&pitch, 0.5).alpha > at(&pitch, 0.0).alpha);
-        // sideslip and the dihedral effect reduce the roll rate below that of the aileron alone
-        let full = crate::aircraft_check::check(&model).unwrap().authority.roll_rate;
-        let share = at(&roll, 0.4).p / (STEPPED * full);
-        assert!((0.4..1.1).contains(&share), "{share}");
-    }
-}

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "sitl")]
 mod any_aircraft;
+mod check;
 #[cfg(feature = "sitl")]
 mod envelope;
 mod hybrid;

@@ -35,7 +35,7 @@ fn all_inputs_at_once_give_the_bits_of_four_at_a_time() {
             let linear = linearise_step(&model, &state, &controls, 100.0);
             // on a processor without AVX2 both are the same code
             for row in 0..8 {
-                for column in 0..12 {
+                for column in 0..12_usize {
                     let found = match column.checked_sub(8) {
                         Some(control) => linear.b[(row, control)],
                         None => linear.a[(row, column)],

@@ -168,8 +168,7 @@ fn of_right(
     let (train, test) = (ready(flights)?, ready(held_out)?);
     let judge = Judge { test: &test, horizons_s: &options.horizons_s };
     let ask = Ask { options, train: &train, judge: &judge, progress, begun: AtomicUsize::new(0) };
-    let given = judge.scores(model);
-    let as_given = model;
+    let (as_given, given) = (model, judge.scores(model));
     let scratch = (options.prior == Prior::Bounds).then(|| parameters::from_scratch(model));
     let model = scratch.as_ref().unwrap_or(model);
     let best = ask.selected(model)?;

@@ -1,0 +1,47 @@
+//! The check of an aircraft, and its responses to the stick.
+
+use std::path::Path;
+
+use greylag::control::aircraft_check::check;
+use greylag::control::stick_response::{STEPPED, StickResponse, stick_responses};
+use greylag::model::GreyBox;
+
+fn model(path: &str) -> GreyBox {
+    GreyBox::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+#[test]
+fn the_shipped_aircraft_can_be_flown() {
+    for path in ["params/x8/jsbsim.toml", "params/aerosonde/jsbsim.toml"] {
+        let found = check(&model(path)).unwrap();
+        let kept = found.loops.iter().all(|l| l.delay > 0.02 && l.gain[1] > 1.5);
+        assert!(kept, "{:?}", found.loops);
+        // 20 degrees a second
+        assert!(found.authority.roll_rate > 0.35);
+        // their only findings concern the delay margin of the LQI
+        assert!(found.findings.iter().all(|f| f.contains("of delay")), "{:?}", found.findings);
+        assert_eq!(found.modes.iter().filter(|m| m.name == "short period").count(), 1);
+    }
+}
+
+#[test]
+fn a_reversed_surface_and_a_weak_motor_are_said() {
+    let mut wrong = model("params/aerosonde/jsbsim.toml");
+    assert!(wrong.set_coefficient("roll_linear.Clda", -0.17));
+    assert!(wrong.set_coefficient("thrust_table.k", 0.25));
+    let said = check(&wrong).unwrap().findings.join("\n");
+    assert!(said.contains("Clda") && said.contains("throttle"), "{said}");
+}
+
+#[test]
+fn the_stick_rolls_right_and_pitches_up() {
+    let model = model("params/aerosonde/prior.toml");
+    let [roll, pitch] = stick_responses(&model).unwrap();
+    let at = |r: &StickResponse, t: f64| r.states[r.time_s.iter().filter(|x| **x < t).count()];
+    assert!(at(&roll, 0.5).p > 0.1 && at(&roll, 0.5).roll > 0.02);
+    assert!(at(&pitch, 0.2).q > 0.01 && at(&pitch, 0.5).alpha > at(&pitch, 0.0).alpha);
+    // sideslip and the dihedral effect reduce the roll rate below that of the aileron alone
+    let full = check(&model).unwrap().authority.roll_rate;
+    let share = at(&roll, 0.4).p / (STEPPED * full);
+    assert!((0.4..1.1).contains(&share), "{share}");
+}
