@@ -5,6 +5,7 @@ use std::path::Path;
 use greylag::model::{GreyBox, Memory, Trim, linearise_step};
 use greylag::num::{Dual, Real};
 use greylag::physics::{Controls, State};
+use nalgebra::SMatrix;
 
 /// The derivatives of a step with respect to input `first` (of eight states and four controls) and the three after it, as
 /// rows of the next state.
@@ -33,16 +34,10 @@ fn all_inputs_at_once_give_the_bits_of_four_at_a_time() {
             x[8..11].copy_from_slice(&[controls.aileron, controls.elevator, controls.throttle]);
             let parts = [0, 4, 8].map(|first| four(&model, &x, first));
             let linear = linearise_step(&model, &state, &controls, 100.0);
+            let part = |row: usize, column: usize| parts[column / 4][row][column % 4];
             // on a processor without AVX2 both are the same code
-            for row in 0..8 {
-                for column in 0..12_usize {
-                    let found = match column.checked_sub(8) {
-                        Some(control) => linear.b[(row, control)],
-                        None => linear.a[(row, column)],
-                    };
-                    assert_eq!(found, parts[column / 4][row][column % 4], "{file} {row} {column}");
-                }
-            }
+            assert_eq!(linear.a, SMatrix::<f64, 8, 8>::from_fn(part), "{file}");
+            assert_eq!(linear.b, SMatrix::<f64, 8, 4>::from_fn(|i, j| part(i, 8 + j)), "{file}");
             state.roll += 0.2;
             state.alpha += 0.03 * f64::from(turn);
             state.q -= 0.3;
