@@ -19,8 +19,7 @@ done
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target/aarch64}
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu"
-# what is built is run once: crates are compiled quickly rather than to be fast
-build=(--config 'profile.dev.package."*".opt-level=1' --ignore-rust-version --target "$triple" --no-default-features --features "${1-learn}")
+build=(--ignore-rust-version --target "$triple" --no-default-features --features "${1-learn}")
 
 cargo test "${build[@]}" --test learn --test physics -- --nocapture gradient:: formula:: portable_numbers::
 if [ -n "${LIBRARY:-}" ]; then

@@ -101,18 +101,21 @@ type Wide = Lanes<32, true, Pair<std::arch::x86_64::__m512>>;
 impl Machine {
     /// The instruction set that is asked for, or the widest below it that this processor supports.
     pub fn new(wanted: Instructions) -> Machine {
-        #[cfg(target_arch = "x86_64")]
-        if wanted == Instructions::Widest && is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has the feature
-            return Machine::Avx512(unsafe { room_avx512() });
-        } else if wanted != Instructions::Portable
-            && is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("fma")
-        {
-            // SAFETY: the processor has the features
-            return Machine::Avx2(unsafe { room_avx2() });
+        match wanted {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Widest if is_x86_feature_detected!("avx512f") => {
+                // SAFETY: the processor has the feature
+                Machine::Avx512(unsafe { room_avx512() })
+            }
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Widest | Instructions::Avx2
+                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") =>
+            {
+                // SAFETY: the processor has the features
+                Machine::Avx2(unsafe { room_avx2() })
+            }
+            _ => Machine::Baseline(Units::new(Base::zero())),
         }
-        Machine::Baseline(Units::new(Base::zero()))
     }
 
     /// Rolls out every block and writes the returns.
