@@ -24,16 +24,21 @@ pub struct Arguments {
     /// Folder of the exploration; a round goes into a folder `round-NN` below it.
     #[arg(long)]
     out: PathBuf,
-    /// The round: 0 is random, later ones are planned with CEM-MPC through `--model`, half, a quarter
-    /// and so on of their actions still random.
+    /// The round: 0 is random or flown by --controller, later ones are planned with CEM-MPC through `--model`, half, a
+    /// quarter and so on of their actions still random.
     #[arg(long, default_value_t = 0)]
     round: u32,
     /// Episodes of 1000 steps; 175 in round 0, else 25, as in the paper.
     #[arg(long)]
     episodes: Option<u32>,
-    /// Model to plan with, the last one trained.
+    /// Model to plan with, the last one trained; with --controller a model of the aircraft, from which its cruise airspeed
+    /// and rudder are taken.
     #[arg(long)]
     model: Option<PathBuf>,
+    /// Controller that flies round 0 towards random attitudes, half of the actions still random: `any` or `adaptive`, which
+    /// need no model of the aircraft's dynamics. Without it all actions of round 0 are random.
+    #[arg(long, value_name = "NAME", requires = "model")]
+    controller: Option<Explorer>,
     /// Seed of targets and actions.
     #[arg(long, default_value_t = 1)]
     seed: u32,
@@ -41,6 +46,29 @@ pub struct Arguments {
     plant: PlantArgs,
     #[command(flatten)]
     start: StartArguments,
+}
+
+/// A controller that explores an aircraft without a model of its dynamics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Explorer {
+    /// The policy for any aircraft.
+    Any,
+    /// The adaptive attitude hold.
+    Adaptive,
+}
+
+impl Explorer {
+    /// The controller's name on the command line.
+    pub fn name(self) -> &'static str {
+        self.kind().name()
+    }
+
+    fn kind(self) -> ControllerKind {
+        match self {
+            Explorer::Any => ControllerKind::Any,
+            Explorer::Adaptive => ControllerKind::Adaptive,
+        }
+    }
 }
 
 /// Simulates the episodes that have no file yet.
@@ -52,13 +80,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     let load = |path: &PathBuf| GreyBox::load(&shipped(path));
     let models: Vec<GreyBox> = arguments.model.iter().map(load).collect::<Result<_, _>>()?;
-    let planner = match (models.first(), arguments.round) {
-        (None, 0) => None,
-        (Some(model), 1..) => Some(control::build(ControllerKind::Cem, model)?),
-        (None, _) => {
-            bail!("round {} is planned: give the model to plan with, --model", arguments.round)
+    let controller = match (models.first(), arguments.round, arguments.controller) {
+        (None, 0, _) => None,
+        (Some(model), 0, Some(explorer)) => Some(control::build(explorer.kind(), model)?),
+        (Some(_), 0, None) => bail!(
+            "round 0 is random and takes no --model; give --round 1 or later, or --controller any"
+        ),
+        (Some(model), _, None) => Some(control::build(ControllerKind::Cem, model)?),
+        (Some(_), round, Some(_)) => {
+            bail!("--controller flies round 0; round {round} is planned with --model")
         }
-        (Some(_), _) => bail!("round 0 is random and takes no --model; give --round 1 or later"),
+        (None, round, _) => {
+            bail!("round {round} is planned: give the model to plan with, --model")
+        }
     };
     let folder = arguments.out.join(format!("round-{:02}", arguments.round));
     std::fs::create_dir_all(&folder)
@@ -70,16 +104,17 @@ pub fn fly(arguments: &Arguments, stop: &Interruption) -> Result<Ended> {
     start::introduce(&plant, &models)?;
     let flown = AtomicU32::new(0);
     (0..count).into_par_iter().try_for_each_init(
-        || (Simulator::new(&plant), planner.as_ref().map(|p| p.boxed_clone())),
-        |(simulator, planner), episode| -> Result<()> {
+        || (Simulator::new(&plant), controller.as_ref().map(|c| c.boxed_clone())),
+        |(simulator, controller), episode| -> Result<()> {
             let path = folder.join(format!("episode-{episode:03}.csv"));
             if stop.is_set() || path.exists() {
                 return Ok(());
             }
             let simulator = simulator.as_mut().map_err(|e| anyhow::anyhow!("{e}"))?;
             let place = Place { seed: arguments.seed.into(), round: arguments.round, episode };
-            let planner = planner.as_mut().map(|p| p.as_mut() as &mut dyn control::Controller);
-            let flight = explore(simulator, planner, &place)?;
+            let controller =
+                controller.as_mut().map(|c| c.as_mut() as &mut dyn control::Controller);
+            let flight = explore(simulator, controller, &place)?;
             save(&flight, &path)?;
             let done = flown.fetch_add(1, Ordering::Relaxed) + 1;
             if done.is_multiple_of(25) {

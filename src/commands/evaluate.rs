@@ -1,6 +1,7 @@
 //! `greylag evaluate`: flies controllers to targets and scores them.
 
 mod any;
+mod derivatives;
 mod draws;
 mod tables;
 mod targets;

@@ -18,6 +18,7 @@ use crate::commands::files::shipped;
 use crate::commands::flown_with::{Chosen, FlownWith};
 use crate::commands::watchdog;
 use crate::commands::{margin, punctual};
+use crate::control::aircraft_estimate::AircraftEstimator;
 use crate::control::cem::Change;
 use crate::control::envelope::EnvelopeLimiter;
 use crate::control::{self, Controller, ControllerKind, build};
@@ -321,6 +322,7 @@ pub fn companion_with_planner(
     };
     let mut pilot = Pilot::new(Config::for_model(model)?, fallback)?;
     pilot.protect_with(EnvelopeLimiter::new(model));
+    pilot.estimate_with(AircraftEstimator::new(&model.airframe));
     let placement =
         if kind.pace() == control::Pace::Planned { Placement::Thread } else { Placement::Loop };
     Ok(Companion { pilot, controller, placement })

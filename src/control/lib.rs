@@ -2,6 +2,7 @@
 
 pub mod adaptive;
 pub mod aircraft_check;
+pub mod aircraft_estimate;
 pub mod any;
 mod authority;
 pub mod cem;

@@ -86,6 +86,7 @@ impl Desk {
             if let Some(recorder) = &self.recorder {
                 let mut row = Row::new(state, &decision, 0.0);
                 row.residuals = self.pilot.residual_shares();
+                row.derivatives = self.pilot.derivatives();
                 recorder.row(if shown { row } else { row.without_surfaces() });
             }
             watch(state, &decision);

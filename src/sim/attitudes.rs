@@ -60,8 +60,19 @@ pub fn attitudes(airframe: &Airframe, seed: u64, number: u64) -> [Target; LEGS] 
 pub fn fly(
     model: &GreyBox,
     controller: &mut dyn Controller,
+    flight: [u64; 2],
+    changed: Option<&Changed>,
+) -> Minute {
+    fly_watched(model, controller, flight, changed, |_| {})
+}
+
+/// Like [`fly`]. Calls `watch` with each observation before the controller's command.
+pub fn fly_watched(
+    model: &GreyBox,
+    controller: &mut dyn Controller,
     [seed, number]: [u64; 2],
     changed: Option<&Changed>,
+    mut watch: impl FnMut(&Observation),
 ) -> Minute {
     let mut world = Imagined::cruising(model.clone());
     let cruise = model.airframe.envelope.airspeed_cruise_mps;
@@ -77,6 +88,7 @@ pub fn fly(
         for step in 0..LEG {
             let tick = leg * LEG + step;
             let now = tick as f64 * STEP;
+            watch(&seen);
             let mut command = controller.command(&seen, target);
             if let Some(changed) = changed.filter(|_| tick >= changes_at) {
                 if at_change.is_none() {

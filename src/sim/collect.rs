@@ -31,7 +31,7 @@ const CHOICES: u64 = 12;
 pub struct Place {
     /// Seed of the collection.
     pub seed: u64,
-    /// Round, from 0. Round 0 has random actions only.
+    /// Round, from 0. In round 0 no model has been learned yet.
     pub round: u32,
     /// Episode within the round, from 0.
     pub episode: u32,
@@ -56,9 +56,9 @@ impl Place {
         Target { roll, pitch: within(bin / BINS, ENVELOPE[1]), airspeed }
     }
 
-    /// Fraction of random actions: 1 in round 0, halved in each further round.
+    /// Fraction of random actions beside a controller: one half in round 0, and 0.5ⁿ in round n.
     pub fn random_part(&self) -> f64 {
-        0.5_f64.powi(self.round.min(100) as i32)
+        0.5_f64.powi(self.round.clamp(1, 100) as i32)
     }
 }
 
@@ -94,23 +94,23 @@ impl Wander {
     }
 }
 
-/// Flies an episode of [`STEPS`] steps. `planner` acts, except during random intervals with random actions. Without a
-/// planner all actions are random. The episode ends early if a state is not finite.
+/// Flies an episode of [`STEPS`] steps. `controller` acts, except during random intervals with random actions. Without a
+/// controller all actions are random. The episode ends early if a state is not finite.
 ///
 /// # Errors
 ///
 /// If the simulator cannot be reset.
 pub fn explore(
     simulator: &mut Simulator,
-    planner: Option<&mut dyn Controller>,
+    controller: Option<&mut dyn Controller>,
     place: &Place,
 ) -> Result<Flight, Trouble> {
     let target = place.target(simulator.start().airspeed_mps);
     simulator.reseed(place.stream(CHOICES).next_u32());
     let mut seen = simulator.reset()?;
-    let mut planner = planner;
-    if let Some(planner) = &mut planner {
-        planner.reset(place.stream(CHOICES).next_u64());
+    let mut controller = controller;
+    if let Some(controller) = &mut controller {
+        controller.reset(place.stream(CHOICES).next_u64());
     }
     let (mut wander, mut choices) = (Wander::new(place), place.stream(CHOICES));
     let mut random = true;
@@ -120,9 +120,9 @@ pub fn explore(
             random = choices.random_bool(place.random_part());
         }
         let wandering = wander.next(step);
-        let command = match &mut planner {
-            Some(planner) if !random => {
-                let command = planner.command(&seen, &target);
+        let command = match &mut controller {
+            Some(controller) if !random => {
+                let command = controller.command(&seen, &target);
                 if command.is_finite() { command } else { wandering }
             }
             _ => wandering,

@@ -99,7 +99,7 @@ fn heartbeats_go_on_while_the_vehicle_clock_stands() {
 }
 
 #[test]
-fn each_residual_that_is_known_comes_once_a_second_under_its_name() {
+fn each_known_residual_and_derivative_comes_once_a_second_under_its_name() {
     let (mut clients, mut double) = new();
     clients.handle(at_ms(0), peer(1), &hello(V2), &mut double);
     assert_eq!(count(&run(&mut clients, &mut double, 0, 3000), 251), 0, "none is known");
@@ -116,6 +116,14 @@ fn each_residual_that_is_known_comes_once_a_second_under_its_name() {
     assert_eq!(named("res_pitch"), [1.5; 3]);
     assert_eq!(named("res_fz"), [-0.25; 3]);
     assert_eq!((named("res_roll").len(), count(&seen, 251)), (0, 15), "five of six for 3 s");
+    double.status.residuals = [f64::NAN; 6];
+    double.status.derivatives = [90.0, -12.5, f64::NAN, f64::NAN, f64::NAN];
+    let seen = run(&mut clients, &mut double, 6000, 9000);
+    let damping = seen.iter().filter(|s| match s.message() {
+        MavMessage::NAMED_VALUE_FLOAT(m) => m.name.to_str() == Ok("est_L_p") && m.value == -12.5,
+        _ => false,
+    });
+    assert_eq!((damping.count(), count(&seen, 251)), (3, 6), "two derivatives for 3 s");
 }
 
 #[test]

@@ -8,8 +8,9 @@ use comfy_table::Table;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Arguments, progress};
+use super::{Arguments, derivatives, progress};
 use crate::commands::files::{self, shipped};
+use crate::control::aircraft_estimate::AircraftEstimator;
 use crate::control::{ControllerKind, Needs, build};
 use crate::model::GreyBox;
 use crate::model::population::{Drawn, Layout, Population};
@@ -56,15 +57,18 @@ impl Knowledge {
 
 /// One minute of one aircraft.
 #[derive(Serialize)]
-struct Flight {
+pub(super) struct Flight {
     aircraft: String,
-    controller: &'static str,
+    pub(super) controller: &'static str,
     knows: Knowledge,
     /// What changed after 30 s.
     #[serde(skip_serializing_if = "Option::is_none")]
     change: Option<&'static str>,
     /// `None` where no controller could be designed.
     minute: Option<Minute>,
+    /// Derivatives estimated in this flight over the aircraft's own, in the order of `DERIVATIVES`; `None` where they are
+    /// unknown. Empty after a change.
+    pub(super) derivative_ratios: Vec<Option<f64>>,
 }
 
 #[derive(Serialize)]
@@ -128,6 +132,11 @@ pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
 /// Prints the tables of the drawn aircraft, of those after a change, and of the aircraft of given models.
 fn print(kinds: &[ControllerKind], drawn: &[Flight], changed: &[Flight], others: &[Flight]) {
     println!("{}", summary(kinds, drawn));
+    println!("{}", derivatives::table(kinds, drawn));
+    println!(
+        "estimated in the minute from body rates and deflections, without a model: error relative to the aircraft's own derivative, and the \
+         share of flights that reveal it"
+    );
     println!(
         "lost: beyond recovery within 60 s of 12 random attitudes; settled and integral: of those kept, the integral relative to that of"
     );
@@ -192,14 +201,24 @@ fn of_controller(
 ) -> Vec<Flight> {
     // the design of an LQI takes longer than its flight
     let mut controller = build(kind, from).ok();
-    let mut fly = |changed: &Option<Changed>| Flight {
-        aircraft: exact.airframe.name.clone(),
-        controller: kind.name(),
-        knows,
-        change: changed.as_ref().map(|c| c.change().name()),
-        minute: controller
-            .as_mut()
-            .map(|c| attitudes::fly(exact, c.as_mut(), flight, changed.as_ref())),
+    let mut fly = |changed: &Option<Changed>| {
+        let mut estimator = AircraftEstimator::new(&exact.airframe);
+        let minute = controller.as_mut().map(|c| {
+            attitudes::fly_watched(exact, c.as_mut(), flight, changed.as_ref(), |seen| {
+                estimator.see(seen.time, &seen.state, &seen.actuators);
+            })
+        });
+        Flight {
+            aircraft: exact.airframe.name.clone(),
+            controller: kind.name(),
+            knows,
+            change: changed.as_ref().map(|c| c.change().name()),
+            minute,
+            derivative_ratios: match changed {
+                None => derivatives::ratios(&estimator, exact),
+                Some(_) => Vec::new(),
+            },
+        }
     };
     changes.iter().map(&mut fly).collect()
 }
@@ -267,7 +286,7 @@ fn summary(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
     table
 }
 
-fn kept(flight: &Flight) -> Option<Minute> {
+pub(super) fn kept(flight: &Flight) -> Option<Minute> {
     flight.minute.filter(|m| m.lost_s.is_none())
 }
 

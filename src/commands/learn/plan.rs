@@ -4,6 +4,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::budget::{Algorithm, Budget};
+use crate::commands::collect::Explorer;
 
 /// Folder of the flights, below that of a learning.
 pub const FLIGHTS: &str = "flights";
@@ -16,7 +17,12 @@ pub const POLICY: &str = "policy";
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// JSBSim, with these further options of `greylag collect`.
-    Simulator(Vec<OsString>),
+    Simulator {
+        /// Options of the aircraft.
+        options: Vec<OsString>,
+        /// Controller of the first flights; `None` for random actions.
+        explorer: Option<Explorer>,
+    },
     /// Recorded logs at these paths.
     Logs(Vec<PathBuf>),
     /// Recent logs with which an earlier learning is continued.
@@ -91,7 +97,7 @@ impl Inputs<'_> {
     /// The stages in order: flights, model, flights planned through that model, model, …, policy.
     pub fn stages(&self) -> Vec<Stage> {
         let mut stages = Vec::new();
-        if let Source::Simulator(_) = self.source {
+        if let Source::Simulator { .. } = self.source {
             stages.push(self.flights(0));
             for round in 1..=self.rounds {
                 stages.push(self.model(Some(round)));
@@ -122,10 +128,17 @@ impl Inputs<'_> {
         if round > 0 {
             line = line.with("--model", self.folder(Some(round)).join("model.toml"));
         }
-        if let Source::Simulator(options) = &self.source {
+        let mut how = match round {
+            0 => "with random actions".to_owned(),
+            _ => "planned through that model".to_owned(),
+        };
+        if let Source::Simulator { options, explorer } = &self.source {
+            if let Some(explorer) = explorer.filter(|_| round == 0) {
+                line = line.with("--controller", explorer.name()).with("--model", self.prior);
+                how = format!("flown by {} with random actions", explorer.name());
+            }
             line = line.and(options.iter().cloned());
         }
-        let how = if round == 0 { "with random actions" } else { "planned through that model" };
         Stage { what: format!("{episodes} flights {how}"), line: line.0 }
     }
 
@@ -140,7 +153,7 @@ impl Inputs<'_> {
             .with("--seed", self.seed.to_string())
             .with("--out", self.folder(round));
         match &self.source {
-            Source::Simulator(_) => {
+            Source::Simulator { .. } => {
                 line = line.with("--collect", self.out.join(FLIGHTS));
                 line = line.with("--integrator", "jsbsim");
             }
@@ -225,7 +238,8 @@ mod tests {
 
     #[test]
     fn every_round_is_flown_by_the_model_of_the_rounds_before() {
-        let stages = stages_of(Source::Simulator(vec!["--hide".into(), "gain=0.1".into()]), &[]);
+        let options = vec!["--hide".into(), "gain=0.1".into()];
+        let stages = stages_of(Source::Simulator { options, explorer: Some(Explorer::Any) }, &[]);
         let lines: Vec<String> = stages.iter().map(Stage::command).collect();
         assert_eq!(lines.len(), 7, "{lines:#?}");
         for (k, round) in [(0, 0), (2, 1), (4, 2)] {
@@ -235,6 +249,8 @@ mod tests {
         for (k, folder) in [(1, "out/model-1"), (3, "out/model-2"), (5, "out/model")] {
             assert!(lines[k].contains(&format!("--out {folder} --collect")), "{}", lines[k]);
         }
+        assert!(lines[0].contains("--controller any --model prior.toml"), "{}", lines[0]);
+        assert!(!lines[2].contains("--controller"), "{}", lines[2]);
         assert!(lines[2].contains("--model out/model-1/model.toml"), "{}", lines[2]);
         assert!(lines[4].contains("--model out/model-2/model.toml"), "{}", lines[4]);
         assert!(lines[6].contains("--env model:out/model ") && lines[6].contains("--seed 7"));

@@ -36,6 +36,7 @@ pub use polarity::Answers;
 use crate::monitor::Monitor;
 use complaints::{Complaints, due};
 use estimate::{Estimate, Frame, RESTART, within};
+use greylag_control::aircraft_estimate::AircraftEstimator;
 use greylag_control::envelope::EnvelopeLimiter;
 use greylag_control::{Controller, Observation, Overruled, Target};
 use greylag_link::autopilot::{AttitudeSetpoint, Mode, Parameter, Severity, Sticks};
@@ -54,14 +55,14 @@ const SWINGS_AGAIN_S: f64 = 20.0;
 ///
 /// Kinds of methods:
 ///
-/// - set-up before flight: [`Pilot::take_on`], [`Pilot::follow`], [`Pilot::protect_with`], [`Pilot::monitor_with`];
+/// - set-up before flight: [`Pilot::take_on`], [`Pilot::follow`], [`Pilot::protect_with`], [`Pilot::monitor_with`],
+///   [`Pilot::estimate_with`];
 /// - time: [`Pilot::advance`], about every 10 ms, with or without frames, and [`Pilot::excuse`] after a stall of
 ///   this computer;
 /// - tick: [`Pilot::observe`] with a state frame, then [`Pilot::decide`] with the plan for the request that `observe`
 ///   returned, once per frame and in this order; [`Pilot::monitor`] after the command is out;
 /// - requests of clients: the trait [`Autopilot`](greylag_link::autopilot::Autopilot), between two ticks;
-/// - vehicle: [`Pilot::engaged`] when a flight controller (not the simulator's shim) has given control
-///   authority.
+/// - vehicle: [`Pilot::engaged`] when a flight controller, not the simulator's shim, has given control authority.
 ///
 /// All times are vehicle time and must not decrease. A clock that jumps back by more than 1 s counts as a restart of
 /// the vehicle; the pilot then drops all earlier states.
@@ -122,6 +123,8 @@ pub struct Pilot {
     refused: Option<Fault>,
     /// The model monitor, if set.
     monitor: Option<Monitor>,
+    /// The estimator of the aircraft's derivatives, if set.
+    estimator: Option<AircraftEstimator>,
     /// The envelope limiter, if set.
     envelope: Option<EnvelopeLimiter>,
     /// The last command of a controller, if the envelope limiter changed it; otherwise `None`.
@@ -191,6 +194,7 @@ impl Pilot {
             upset: false,
             refused: None,
             monitor: None,
+            estimator: None,
             envelope: None,
             overruled: None,
         })

@@ -1,9 +1,11 @@
-//! The pilot's use of the model monitor: deviations are reported to the ground stations.
+//! The pilot's use of the model monitor, whose deviations are reported to the ground stations, and of the estimator of the
+//! aircraft.
 
 use super::Pilot;
 use crate::monitor::Monitor;
+use greylag_control::aircraft_estimate::{AircraftEstimator, DERIVATIVES};
 use greylag_link::autopilot::Severity;
-use greylag_link::vehicle::Telemetry;
+use greylag_link::vehicle::{Faults, Telemetry};
 
 impl Pilot {
     /// Sets the model monitor. From now on it compares measurements with its predictions while the pilot is armed.
@@ -11,22 +13,36 @@ impl Pilot {
         self.monitor = Some(monitor);
     }
 
-    /// Compares a state with known surface positions. To be called after its command is sent: no command depends on the
-    /// result.
+    /// Sets the estimator of the aircraft's derivatives. From now on it is updated while the pilot is armed.
+    pub fn estimate_with(&mut self, estimator: AircraftEstimator) {
+        self.estimator = Some(estimator);
+    }
+
+    /// Evaluates a state with known surface positions in the model monitor and in the estimator of the aircraft. To be called
+    /// after its command is sent: no command depends on the results.
     pub fn monitor(&mut self, frame: &Telemetry) {
-        let Some(monitor) = &mut self.monitor else { return };
         if !self.armed {
-            return monitor.forget();
+            return self.forget_residuals();
         }
-        if let Some(warning) = monitor.see(frame) {
+        if let Some(estimator) = &mut self.estimator {
+            match frame.faults {
+                Faults::NONE => estimator.see(frame.time, &frame.state, &frame.actuators),
+                _ => estimator.interrupt(),
+            }
+        }
+        let warning = self.monitor.as_mut().and_then(|monitor| monitor.see(frame));
+        if let Some(warning) = warning {
             self.texts.say(Severity::Warning, warning.to_string());
         }
     }
 
-    /// Clears the monitor, for instance when the surfaces do not follow the commands.
+    /// Clears the monitor and interrupts the estimator, for instance when the surfaces do not follow the commands.
     pub fn forget_residuals(&mut self) {
         if let Some(monitor) = &mut self.monitor {
             monitor.forget();
+        }
+        if let Some(estimator) = &mut self.estimator {
+            estimator.interrupt();
         }
     }
 
@@ -34,5 +50,12 @@ impl Pilot {
     /// if unknown.
     pub fn residual_shares(&self) -> [f64; 6] {
         self.monitor.as_ref().map_or([f64::NAN; 6], Monitor::shares)
+    }
+
+    /// The derivatives of the aircraft estimated since the start, in the order and the units of
+    /// [`AircraftEstimator::derivatives`]; NaN if unknown.
+    pub fn derivatives(&self) -> [f64; DERIVATIVES.len()] {
+        let known = self.estimator.as_ref().map(AircraftEstimator::derivatives);
+        known.unwrap_or([f64::NAN; DERIVATIVES.len()])
     }
 }

@@ -197,6 +197,7 @@ impl Autopilot for Pilot {
             actuators: seen.map_or_else(ActuatorState::default, |t| t.actuators),
             load: self.load,
             residuals: self.residual_shares(),
+            derivatives: self.derivatives(),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use crate::pilot::{Decision, mode_name};
-use greylag_link::autopilot::RESIDUALS;
+use greylag_link::autopilot::{ESTIMATES, RESIDUALS};
 use greylag_link::vehicle::{Faults, Telemetry};
 use greylag_logs::Sample;
 use greylag_logs::csv::Rows;
@@ -20,11 +20,13 @@ pub struct Row {
     /// Model residuals divided by the half widths of their bands, as in `Status::residuals`; dimensionless, NaN if
     /// unknown.
     pub residuals: [f64; 6],
+    /// Derivatives of the aircraft estimated in flight, as in `Status::derivatives`; NaN if unknown.
+    pub derivatives: [f64; 5],
 }
 
 impl Row {
     /// Names of the columns in addition to those of the log format.
-    pub const EXTRA: [&'static str; 12] = [
+    pub const EXTRA: [&'static str; 17] = [
         "airspeed_target_mps",
         "mode",
         "armed",
@@ -37,12 +39,22 @@ impl Row {
         RESIDUALS[3],
         RESIDUALS[4],
         RESIDUALS[5],
+        ESTIMATES[0],
+        ESTIMATES[1],
+        ESTIMATES[2],
+        ESTIMATES[3],
+        ESTIMATES[4],
     ];
 
     /// The row of a tick: a state with its decision and latency (µs).
     pub fn new(state: &Telemetry, decision: &Decision, latency_us: f64) -> Self {
-        let residuals = [f64::NAN; 6];
-        Row { sample: sample(state, decision), decision: *decision, latency_us, residuals }
+        Row {
+            sample: sample(state, decision),
+            decision: *decision,
+            latency_us,
+            residuals: [f64::NAN; 6],
+            derivatives: [f64::NAN; 5],
+        }
     }
 
     /// Removes the surfaces from the row, for a controller that is commanded attitudes. The companion's surface
@@ -68,25 +80,22 @@ impl Row {
         let digit = |flag: bool| if flag { "1" } else { "0" };
         let airspeed = format!("{}", d.target.airspeed);
         let latency = format!("{:.1}", self.latency_us);
-        let residuals = self.residuals.map(|share| match share.is_finite() {
-            true => format!("{share:.3}"),
+        let text = |value: f64| match value.is_finite() {
+            true => format!("{value:.3}"),
             false => String::new(),
-        });
-        let [fx, fy, fz, roll, pitch, yaw] = residuals.each_ref().map(String::as_str);
-        let extra = [
+        };
+        let (residuals, derivatives) = (self.residuals.map(text), self.derivatives.map(text));
+        let decided = [
             &*airspeed,
             mode_name(d.mode),
             digit(d.armed),
             d.source.name(),
             digit(d.failsafe),
             &*latency,
-            fx,
-            fy,
-            fz,
-            roll,
-            pitch,
-            yaw,
         ];
+        let mut extra = [""; Row::EXTRA.len()];
+        let measured = residuals.iter().chain(&derivatives).map(String::as_str);
+        extra.iter_mut().zip(decided.into_iter().chain(measured)).for_each(|(to, from)| *to = from);
         out.row(&self.sample, &extra)
     }
 }

@@ -274,6 +274,7 @@ impl Control {
             clients: self.clients.counts(),
             signing: self.ports.signing(),
             timing: self.timing,
+            derivatives: self.pilot.derivatives(),
             recording,
         };
         summary.save();

@@ -24,6 +24,8 @@ pub struct Summary {
     pub signing: Option<SigningCounts>,
     /// Timing of the control loop.
     pub timing: Timing,
+    /// Derivatives of the aircraft estimated in flight, as in `Status::derivatives`; NaN if unknown.
+    pub derivatives: [f64; 5],
     /// Path of the recording and its counters; `None` without a recording.
     pub recording: Option<(PathBuf, Written)>,
 }
@@ -36,6 +38,28 @@ impl Summary {
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))
         {
             let _ = writeln!(file, "{self}");
+        }
+    }
+}
+
+/// Quantities and units of the derivatives.
+const QUANTITIES: [(&str, &str); 5] = [
+    ("roll acceleration at full aileron", "rad/s2"),
+    ("L_p", "1/s"),
+    ("pitch acceleration at full elevator", "rad/s2"),
+    ("M_q", "1/s"),
+    ("M_alpha", "1/s2"),
+];
+
+impl Summary {
+    /// One line with the known derivatives; none if all are unknown.
+    fn write_derivatives(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = QUANTITIES.iter().zip(self.derivatives).filter(|(_, value)| value.is_finite());
+        let known: Vec<String> =
+            all.map(|((what, unit), value)| format!("{what} {value:.2} {unit}")).collect();
+        match known.is_empty() {
+            true => Ok(()),
+            false => writeln!(f, "estimated in flight, at cruise airspeed: {}", known.join(", ")),
         }
     }
 }
@@ -78,6 +102,7 @@ impl fmt::Display for Summary {
                 t.overtaken
             )?;
         }
+        self.write_derivatives(f)?;
         write!(
             f,
             "clients: {} frames, {} bad, {} setpoints refused, {} for others",

@@ -47,7 +47,7 @@ impl Clients {
                 }
                 let mut send = |message| session.send(&message, self.identity, &mut self.outbox);
                 match stream.id {
-                    NAMED_VALUE_FLOAT => telemetry::residuals(status, &scene).for_each(send),
+                    NAMED_VALUE_FLOAT => telemetry::named_values(status, &scene).for_each(send),
                     id => telemetry::message(id, status, &scene).into_iter().for_each(&mut send),
                 }
             }

@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Message, answer, mode, setpoint};
-use crate::autopilot::{RESIDUALS, Status};
+use crate::autopilot::{ESTIMATES, RESIDUALS, Status};
 use greylag_physics::Time;
 
 /// A message that can be streamed.
@@ -44,7 +44,7 @@ pub const STREAMS: [Stream; 14] = [
     stream(NAMED_VALUE_FLOAT, 1.0, 12),
 ];
 
-/// Message id of NAMED_VALUE_FLOAT, which is sent once for each known residual.
+/// Message id of NAMED_VALUE_FLOAT, which is sent once for each known residual and each known derivative.
 pub const NAMED_VALUE_FLOAT: u32 = 251;
 
 /// Index of message `id` in [`STREAMS`]; `None` if it is not a stream.
@@ -72,10 +72,12 @@ pub struct Scene {
     pub bad_frames: u64,
 }
 
-/// One NAMED_VALUE_FLOAT for each known residual.
-pub fn residuals(status: &Status, scene: &Scene) -> impl Iterator<Item = Message> {
+/// One NAMED_VALUE_FLOAT for each known residual and each known derivative.
+pub fn named_values(status: &Status, scene: &Scene) -> impl Iterator<Item = Message> {
     let time_boot_ms = boot_ms(scene.now);
-    let known = RESIDUALS.iter().zip(status.residuals).filter(|(_, value)| value.is_finite());
+    let residuals = RESIDUALS.iter().zip(status.residuals);
+    let derivatives = ESTIMATES.iter().zip(status.derivatives);
+    let known = residuals.chain(derivatives).filter(|(_, value)| value.is_finite());
     known.map(move |(name, value)| {
         Message::coded(MavMessage::NAMED_VALUE_FLOAT(NAMED_VALUE_FLOAT_DATA {
             time_boot_ms,

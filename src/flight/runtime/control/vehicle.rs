@@ -161,6 +161,7 @@ impl Control {
             let latency_us = latency.as_secs_f64() * 1e6;
             let mut row = Row::new(state, decision, latency_us);
             row.residuals = self.pilot.residual_shares();
+            row.derivatives = self.pilot.derivatives();
             recorder.row(if shown { row } else { row.without_surfaces() });
         }
     }
