@@ -27,9 +27,9 @@ pub struct Cell {
     pub inputs: BTreeMap<String, String>,
     /// Numbers of the cells whose folders this cell reads.
     pub after: Vec<usize>,
-    /// SHA-256 over the program's version (not its commit), [`words`](Cell::words) and [`inputs`](Cell::inputs). The
-    /// folders of earlier cells in `words` contain the identities of those cells. The folder of this cell is excluded.
-    /// Equal identities mean equal results.
+    /// SHA-256 over the program's version (not its commit), [`words`](Cell::words) and [`inputs`](Cell::inputs). It
+    /// depends on earlier cells, because `words` name their folders and a folder's name contains the identity. The
+    /// folder of this cell is excluded. Equal identities mean equal results.
     pub identity: String,
 }
 

@@ -18,7 +18,7 @@ pub struct Gathered {
     pub failed: Vec<(String, Failure)>,
     /// Ids of the cells that have started and have no result.
     pub begun: Vec<String>,
-    /// Cells that have only a result of another command or of other inputs.
+    /// Cells whose only result is of another command or of other inputs.
     pub stale: Vec<String>,
     /// Cells that have not started.
     pub missing: Vec<String>,

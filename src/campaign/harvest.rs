@@ -131,11 +131,11 @@ fn document(path: &Path) -> Result<Option<Value>, CampaignError> {
     let text = std::fs::read_to_string(path).map_err(CampaignError::io("cannot read", path))?;
     serde_json::from_str(&text)
         .map(Some)
-        .map_err(|e| CampaignError::content(path, format!("is no JSON: {e}")))
+        .map_err(|e| CampaignError::content(path, format!("is not valid JSON: {e}")))
 }
 
 fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, CampaignError> {
-    let wrong = |e: csv::Error| CampaignError::content(path, format!("is no table: {e}"));
+    let wrong = |e: csv::Error| CampaignError::content(path, format!("is not valid CSV: {e}"));
     let mut reader = csv::Reader::from_path(path).map_err(wrong)?;
     let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for row in reader.deserialize() {

@@ -102,8 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// The answer with separate parts for tuning and for the added effect, if the second of two models was made from the
-/// first. `None` otherwise.
+/// The answer for a model and its amendment, with the error change by tuning apart from that by the added effect.
+/// `None` unless there are two models and the second was amended from the first.
 #[cfg(feature = "study")]
 fn traced(
     arguments: &Arguments,
@@ -129,8 +129,7 @@ fn traced(
     Ok(None)
 }
 
-/// The answer with the command to run next. The parts of tuning and of the effect are separate if the second model was
-/// made from the first.
+/// The answer with the command to run next. For a model and its amendment it is that of `traced`.
 fn answer(
     arguments: &Arguments,
     models: &[GreyBox],
@@ -189,8 +188,8 @@ fn baselines(comparison: &Comparison) -> Option<String> {
     (!all.is_empty()).then_some(said)
 }
 
-/// Free-run errors in the units of each state. If a model's file has constants of the flights, the table also has the
-/// errors without these constants.
+/// Free-run errors in the units of each state. If a model's file has constants of the flights (trims, sensor errors),
+/// the table also has the errors without these constants.
 fn free_run_table(comparison: &Comparison) -> Table {
     let header = [
         "", "s", "NRMSE", "lost", "roll °", "pitch °", "V m/s", "p °/s", "q °/s", "r °/s", "α °",

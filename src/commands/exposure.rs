@@ -18,8 +18,8 @@ pub fn check<'a>(
     let links = open.join(", ");
     if asked == Asked::Nothing {
         bail!(
-            "other machines reach {links}, and whoever reaches it steers the aircraft: sign it (`greylag link key FILE`, \
-             then --sign FILE), or say --insecure"
+            "other machines can reach {links} and steer the aircraft: sign the link (`greylag link key FILE`, then \
+             --sign FILE), or allow it with --insecure"
         );
     }
     Ok(Some(format!("INSECURE: whoever reaches {links} steers the aircraft")))

@@ -1,4 +1,4 @@
-//! Links and their peers as identifiers.
+//! Identifiers of links and of the peers on them.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -22,7 +22,7 @@ pub struct PeerId {
 impl fmt::Display for PeerId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.address == SERIAL {
-            true => write!(f, "the end of the serial wire (link {})", self.link.0),
+            true => write!(f, "the device on the serial port (link {})", self.link.0),
             false => write!(f, "{} (link {})", self.address, self.link.0),
         }
     }

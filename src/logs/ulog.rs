@@ -6,7 +6,7 @@
 //! topic; `yule_log` brings a logger and a regular-expression engine along. Neither skips topics
 //! that nobody asked for. The independent check is pyulog (`tests/logs_crosscheck.py`).
 //!
-//! Not read: logged strings, appended-data offsets beyond what follows in file order, defaults of
+//! Not read: logged strings, offsets of appended data (it is read in file order), defaults of
 //! parameters. Parameter changes in flight overwrite the value.
 
 mod layout;
@@ -25,18 +25,18 @@ use super::window::Window;
 use layout::Layout;
 use subscriptions::{Subscription, Subscriptions};
 
-/// Magic, version and start time.
+/// Bytes of the file's header: magic, version and start time.
 const HEADER: usize = 16;
-/// Size and kind of a record.
+/// Bytes of a record's header: size and kind.
 const RECORD: usize = 3;
-/// The longest record with the beginning of those after it.
+/// Bytes that are viewed at once: the longest record and the beginning of those after it.
 const LONGEST: usize = RECORD + u16::MAX as usize + 1024;
 /// Valid records in a row that show where a damaged file is readable again.
 const IN_STEP: usize = 3;
 /// The kinds of records.
 const KINDS: &[u8] = b"BFIMPQARDCLSO";
 
-/// Records behind the present one that are known to follow each other.
+/// Consecutive records after the present one that were found valid.
 #[derive(Clone, Copy, Default)]
 struct Ahead {
     records: usize,
@@ -45,7 +45,7 @@ struct Ahead {
 
 #[derive(Default)]
 struct Reader {
-    /// What was seen ahead when the last record was judged.
+    /// Records after the last one that were checked together with it.
     ahead: Ahead,
     formats: BTreeMap<String, String>,
     /// One for each topic, however often it is subscribed to.
@@ -87,7 +87,7 @@ enum Place {
     Damage,
 }
 
-/// Reads the topics with their fields that `wanted` names; everything else is counted.
+/// Reads the fields for which `wanted(topic, field)` is true. Records of all topics are counted.
 pub(super) fn read<'a>(
     source: &'a mut dyn Read,
     wanted: &dyn Fn(&str, &str) -> bool,
@@ -138,8 +138,8 @@ fn header(view: &[u8]) -> Option<(usize, u8)> {
 impl Reader {
     /// Kind of content at the beginning of `view`.
     ///
-    /// A record that several others follow is valid. Where the file is damaged, it must have the
-    /// size of its topic as well.
+    /// A record is valid if several others follow it. After a damaged place, the record itself must
+    /// also be a data record of the size of its topic.
     fn place(&mut self, view: &[u8]) -> Place {
         let Some((len, kind)) = header(view) else { return Place::Damage };
         let exact = kind == b'D' && self.fits(view, len);
@@ -155,8 +155,8 @@ impl Reader {
         if fits { Place::Record(len) } else { Place::Damage }
     }
 
-    /// Whether valid records follow one of `len` bytes. Those that were seen ahead of the record before it need
-    /// no second look, unless the record declares something.
+    /// Whether valid records follow a record of `len` bytes. Records that were checked together with the preceding
+    /// one are not checked again, unless this record is a declaration.
     fn goes_on(&mut self, rest: &[u8], len: usize, kind: u8) -> bool {
         let seen = match self.ahead {
             Ahead { records, bytes } if kind == b'D' && records > 0 && bytes >= len => {
@@ -196,8 +196,7 @@ impl Reader {
                     return false;
                 }
             }
-            // Numbers may contain the letters of the other record kinds, so that only data records show where to
-            // resume.
+            // The bytes of a number may look like another kind of record, so reading resumes only at data records.
             if kind != b'D' && undeclared == Undeclared::Refused {
                 return false;
             }

@@ -17,7 +17,7 @@ pub struct Training {
     pub seeds: Vec<(String, Vec<CurvePoint>)>,
 }
 
-/// Trainings for comparison, like Figure 2 of the paper.
+/// Trainings for comparison, as in Figure 2 of \[GSFM26\].
 #[derive(Clone, Debug)]
 pub struct LearningReport<'a> {
     /// Title of the page.
@@ -77,11 +77,11 @@ impl LearningReport<'_> {
         let options = over.map(|(name, figures)| ChoiceOption { name: name.into(), figures });
         let choice =
             Choice { anchor: "over".into(), label: "Over".into(), options: options.into() };
-        let note = "The policy as it is at each evaluation, flown in what it is trained in on targets that \
-                    are none of those it is scored on at last. Lines: interquartile mean of the seeds; shaded: their \
-                    least and most.";
-        let ends = "TD3 keeps its policy with the least error, the analytic gradient its last. The knee is \
-                    where nine tenths of the way from the first error to the least are made.";
+        let note = "Each point is an evaluation of the policy at that time, in its training environment. The targets \
+                    differ from those of the final evaluation. Lines: interquartile mean over the seeds; shaded: \
+                    smallest to largest value.";
+        let ends = "TD3 keeps the policy with the smallest error, the analytic gradient keeps the last policy. The \
+                    knee is the first evaluation with 90 % of the reduction from the first to the smallest error.";
         let mut provenance = Table::new("Provenance", &[("Item", Left), ("Value", Left)]);
         self.provenance
             .iter()
@@ -89,7 +89,7 @@ impl LearningReport<'_> {
         let mut sections = vec![
             self.answer(),
             Section::new("Learning curves", note, vec![Figure::Choice(choice)]),
-            Section::new("Where they came to", ends, vec![Figure::Table(self.table())]),
+            Section::new("Best and last evaluations", ends, vec![Figure::Table(self.table())]),
             Section::new("Provenance", "", vec![Figure::Table(provenance)]),
         ];
         sections.retain(|s| !s.figures.is_empty());

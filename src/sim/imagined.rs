@@ -16,7 +16,7 @@ use greylag_physics::{Controls, State};
 /// Aircraft per block of lanes.
 pub const WIDTH: usize = ROW;
 
-/// Steps of 10 ms of an episode, as many as in JSBSim.
+/// Number of steps of an episode, 10 ms each. Episodes in JSBSim have the same number.
 pub const STEPS: u32 = 1000;
 
 /// Validity limits of the model, at which the episode ends: angles θ, α, β (rad), rates p, q, r (rad/s), airspeed
@@ -57,8 +57,8 @@ pub struct Stepped {
 /// Many aircraft simulated by a model at once, for training. Each has its own target, actuator filters and episode. To
 /// fly a controller in one aircraft, use [`Imagined`](crate::environment::Imagined).
 ///
-/// The exact actuator filters are part of the state. The air density is constant, since it would change by less than 1
-/// % over an episode.
+/// The state includes the complete memories of the actuator filters. The air density is constant, since it would change
+/// by less than 1 % over an episode.
 #[derive(Clone, Debug)]
 pub struct Imagination {
     model: Arc<GreyBox>,
@@ -224,7 +224,7 @@ impl Batch {
     }
 }
 
-/// A roll angle wrapped to −π..π after less than a turn.
+/// Wraps `roll` (rad) to −π..π. It may lie outside this range by less than one turn.
 #[inline(always)]
 fn wrapped(roll: Block) -> Block {
     let (half, turn) =

@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         let _ = std::fs::remove_dir_all(if made { folder } else { &prior });
     })?;
     if !fitted.exists() {
-        println!("the estimate from size is in {}", prior.display());
+        println!("the model estimated from the dimensions is in {}", prior.display());
         return Ok(status);
     }
     let page = folder.join("aircraft.html");

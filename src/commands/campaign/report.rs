@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (plan, store) = arguments.which.open()?;
     let records = arguments.records(&plan, &store)?;
     if records.is_empty() {
-        bail!("no cell of campaign {} is done; greylag campaign run does them", plan.file.name);
+        bail!("no cell of campaign {} is done; run greylag campaign run first", plan.file.name);
     }
     let programs: BTreeSet<&str> = records.iter().map(|r| r.program.as_str()).collect();
     if programs.len() > 1 {

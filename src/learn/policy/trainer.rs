@@ -22,7 +22,7 @@ const START: u64 = 20;
 const ACT: u64 = 21;
 const UPDATE: u64 = 22;
 
-/// Settings of a policy training. [`PolicyRecipe::default`] is the paper's.
+/// Settings of a policy training. [`PolicyRecipe::default`] has those of \[GSFM26\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PolicyRecipe {
     /// Hyperparameters of TD3.
@@ -72,7 +72,7 @@ pub enum PolicyError {
     #[error(transparent)]
     Shape(#[from] ShapeError),
     /// The environment cannot continue.
-    #[error("the world it is trained in: {0}")]
+    #[error("the training environment: {0}")]
     World(#[from] Trouble),
     /// A checkpoint belongs to another training.
     #[error(
@@ -106,7 +106,8 @@ pub struct PolicyProgress {
     /// Mean loss of the critics; NaN before the first update.
     pub loss: f64,
     /// Mean reward per step. A step that loses the aircraft counts here as the smallest reward of a single step (−1.1,
-    /// `Task::worst`). The critics learn its sum over all further steps (−110, `Task::of_loss`).
+    /// `Task::worst`). The critics learn the discounted sum of that reward over all further steps (−110,
+    /// `Task::of_loss`).
     pub reward: f64,
     /// Number of episodes started.
     pub episodes: u64,

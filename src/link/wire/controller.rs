@@ -223,7 +223,7 @@ fn measured(message: MavMessage) -> Option<ControllerMessage> {
 }
 
 /// Air density from pressure and temperature (°C), kg/m³; NaN outside the lower atmosphere. The message specifies hPa.
-/// PX4 of 2025 sends Pa, which the value reveals in this atmosphere.
+/// PX4 releases of 2025 send Pa, so a value above 10 000 is taken as Pa.
 fn density(pressure: f64, temperature: f64) -> f64 {
     let pressure = if pressure > 10_000.0 { pressure / 100.0 } else { pressure };
     let believable = (200.0..=1100.0).contains(&pressure) && (-80.0..=85.0).contains(&temperature);

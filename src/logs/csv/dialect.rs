@@ -1,4 +1,4 @@
-//! Names of the columns of a table in other programs.
+//! Names that other programs give to the columns of a table.
 //!
 //! Sources: `FGOutputTextFile.cpp` of JSBSim (output sections and property names), the topics of PX4 as ulog2csv writes
 //! them, the records of ArduPilot as `mavlogdump --format csv` writes them (TYPE.field).
@@ -125,7 +125,7 @@ pub(super) struct Found {
     pub offset: f64,
 }
 
-/// Meaning of the header's names that are not those of the log format.
+/// Interpretation of the header names that are not column names of the log format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Dialect {
     /// The columns under other names.
@@ -137,7 +137,7 @@ pub(super) struct Dialect {
 }
 
 impl Dialect {
-    /// Meaning of `names` for the columns that neither they nor the mapping fill.
+    /// Finds the columns that are neither in the header `names` nor in the mapping, under their other names.
     pub fn of(names: &[String], mapping: &Mapping) -> Dialect {
         let has = |name: &str| names.iter().any(|n| n == name);
         let mut dialect = Dialect::default();
@@ -152,7 +152,7 @@ impl Dialect {
             let scale = if dialect.time_by_steps { 1.0 } else { *unit };
             dialect.take("time_s", name, scale);
         }
-        // JSBSim writes a property with or without its path, and the unit of a subsystem in brackets.
+        // JSBSim writes a property with or without this prefix.
         let ending = |name: &str| {
             let same = |n: &&String| n.strip_prefix("/fdm/jsbsim/").unwrap_or(n) == name;
             names.iter().find(same).cloned()
@@ -192,7 +192,7 @@ impl Dialect {
         self.quaternion.is_some() && attitude || self.found.iter().any(|f| f.column == column)
     }
 
-    /// The names of the file that fill columns.
+    /// Whether the file's column `name` fills a column of the log format.
     pub fn reads(&self, name: &str) -> bool {
         self.found.iter().any(|f| f.field == name)
             || self.quaternion.as_ref().is_some_and(|q| q.iter().any(|n| n == name))

@@ -7,7 +7,7 @@ use crate::stretches::{Keep, Level, MOST, Stretches, Watch};
 
 /// Rows of a stretch.
 pub(super) const STRETCH: usize = 4096;
-/// One airspeed in this number of rows is kept for the whole table.
+/// For the phases of the whole table, one airspeed in this number of rows is kept.
 const COARSE: usize = 16;
 /// Backward step of the time at which another recording may begin, s.
 const BACK_S: f64 = 1.0;
@@ -34,13 +34,13 @@ impl Thin {
         self.keep == Keep::All || (number / STRETCH).is_multiple_of(self.level.every())
     }
 
-    /// Takes row `number` of the file, kept or not.
+    /// Adds row `number` of the file to the statistics of the whole table, even if the row is not kept.
     pub fn take(&mut self, number: usize, row: &Sample) {
         if self.keep == Keep::All {
             return;
         }
         if row.time_s < self.last_s - BACK_S {
-            // Another recording may begin: its first rows show it.
+            // Another recording may begin. Its first rows decide this, so all further rows are kept.
             self.keep = Keep::All;
         }
         self.last_s = row.time_s;
@@ -59,7 +59,7 @@ impl Thin {
         fewer.is_some()
     }
 
-    /// Keeps those of `all` whose rows are kept; `places` are the numbers of their rows.
+    /// Removes the entries of `all` whose rows are not kept. `places` has the row number of each entry.
     pub fn thin<T: Copy>(&self, all: &mut Vec<T>, places: &[usize]) {
         let mut place = places.iter();
         all.retain(|_| place.next().is_some_and(|place| self.keeps(*place)));
@@ -80,7 +80,7 @@ pub(crate) struct Whole {
 }
 
 impl Whole {
-    /// The stretches, with the phases of the whole; rows are `period` apart, s.
+    /// The stretches, with the phases of the whole table. `period` is the time between two rows, s.
     pub(crate) fn stretches(&self, period: f64, flies: &Flying) -> Option<Stretches> {
         let (from, to) = self.watch.span_s?;
         let airspeeds: Vec<Sample> = self

@@ -35,7 +35,7 @@ fn throttle(model: &GreyBox) -> &'static str {
     if coefficient(model, LAG) > 0.0 { LATE_THROTTLE } else { THROTTLE }
 }
 
-/// Filter of the thrust's lag after the throttle filter. Empty if the thrust has no lag.
+/// XML of the thrust's lag filter, whose input is the filtered throttle. Empty if the thrust has no lag.
 pub(super) fn lag(model: &GreyBox) -> String {
     let lag = coefficient(model, LAG);
     if lag <= 0.0 {

@@ -2,9 +2,9 @@
 
 use super::{Estimate, Figures, Measures, Tail, helmbold};
 
-/// Tailplane: volume coefficient, distance in chords, efficiency, elevator effectiveness.
+/// Tailplane: volume coefficient, tail arm in chords, efficiency, elevator effectiveness.
 const TAIL: [f64; 4] = [0.5, 2.8, 0.95, 0.5];
-/// Fin: volume coefficient, distance in spans, lift slope (1/rad), rudder effectiveness.
+/// Fin: volume coefficient, tail arm in spans, lift slope (1/rad), rudder effectiveness.
 const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
 /// Oswald efficiency factor of the wing.
 const EFFICIENCY: f64 = 0.85;
@@ -40,9 +40,9 @@ impl Measures {
         };
         vec![
             ("CL0", self.zero_lift(), 0.5, "estimate: camber and incidence of the wing"),
-            ("CLalpha", self.slope(f), 0.1, "Helmbold, with the tailplane behind its downwash"),
+            ("CLalpha", self.slope(f), 0.1, "Helmbold, with downwash at the tailplane"),
             ("CLq", rate, 0.5, "Etkin and Reid 5.4"),
-            ("CLde", self.elevator(f)[0], 0.5, "tail volume 0.5, half of it by the elevator"),
+            ("CLde", self.elevator(f)[0], 0.5, "tail volume 0.5, elevator effectiveness 0.5"),
         ]
     }
 
@@ -77,9 +77,9 @@ impl Measures {
         vec![
             ("Cl0", 0.0, 0.0, "symmetric"),
             ("Clbeta", -0.08, 0.5, "estimate: some dihedral"),
-            ("Clp", -0.1 * f.wing, 0.25, "strip theory at the ratio of published small aircraft"),
+            ("Clp", -0.1 * f.wing, 0.25, "strip theory, scaled to published small aircraft"),
             ("Clr", f.lift / 4.0, 0.5, "Etkin and Reid 5.8"),
-            ("Clda", 0.032 * f.wing, 0.5, "at the ratio of published small aircraft"),
+            ("Clda", 0.032 * f.wing, 0.5, "scaled to published small aircraft"),
         ]
     }
 
@@ -94,7 +94,7 @@ impl Measures {
             ("Cm0", -slope * alpha, 0.5, "trimmed at the cruise airspeed without elevator"),
             ("Cmalpha", slope, 0.5, "estimate: static margin"),
             ("Cmq", damping, 0.3, "Etkin and Reid 5.4"),
-            ("Cmde", self.elevator(f)[1], 0.5, "tail volume 0.5, half of it by the elevator"),
+            ("Cmde", self.elevator(f)[1], 0.5, "tail volume 0.5, elevator effectiveness 0.5"),
         ]
     }
 
@@ -130,7 +130,7 @@ impl Measures {
 /// Derivatives of side force, rolling and yawing moment with respect to a rudder on the fin, 1/rad.
 pub(super) fn rudder() -> Vec<Estimate> {
     let force = FIN[2] * FIN[3] * FIN[0] / FIN[1];
-    let source = "fin volume 0.04, half of it by the rudder";
+    let source = "fin volume 0.04, rudder effectiveness 0.55";
     vec![
         ("CYdr", force, 0.5, source),
         ("Cldr", 0.05 * force, 1.0, source),

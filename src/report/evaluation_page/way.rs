@@ -96,7 +96,7 @@ fn measures(report: &EvaluationReport) -> Section {
         "Median over the targets with its 95 % bootstrap interval, then the worst of all. {}",
         limits(report)
     );
-    Section::new("On the way", &note, figures)
+    Section::new("Transient response", &note, figures)
 }
 
 fn push(

@@ -22,7 +22,7 @@ pub(crate) struct Kept {
     pub alpha_deg: f64,
     /// Time outside each limit, s.
     pub outside_s: OutsideS,
-    /// Whether load factor and angle of attack stayed within their limits, except for the permitted transient.
+    /// Whether load factor and angle of attack exceeded their limits by at most 5 % (`quality::TRANSIENT`).
     pub kept: bool,
 }
 
@@ -56,7 +56,7 @@ pub(super) fn of_segment(samples: &[Sample], segment: &Segment, limits: &Limits)
     Track { moments, target, before, lost_s: 0.0 }.quality(limits)
 }
 
-/// Measures of the whole flight, over the samples at which the airspeed is unknown or counts as flight.
+/// Measures of the whole flight, over the samples whose airspeed is unknown or at least `flying_from_mps`.
 pub(crate) fn kept(samples: &[Sample], envelope: &EnvelopeFlown) -> Kept {
     let flying = |s: &Sample| s.airspeed_mps.is_nan() || s.airspeed_mps >= envelope.flying_from_mps;
     let together = |a: &Sample, b: &Sample| flying(a) && flying(b) && b.time_s - a.time_s <= GAP_S;
@@ -127,7 +127,7 @@ pub(crate) fn section(report: &FlightReport) -> Option<Section> {
         ("At a stop (%)", Align::Right),
         ("Outside (s)", Align::Right),
     ];
-    let mut table = Table::new("On the way", &columns);
+    let mut table = Table::new("Transient response", &columns);
     let range = |[least, most]: [f64; 2]| format!("{} to {}", number(least), number(most));
     for (segment, q) in report.segments.iter().zip(&qualities) {
         let to = [segment.roll_target_rad, segment.pitch_target_rad].map(signed);
@@ -160,5 +160,5 @@ pub(crate) fn section(report: &FlightReport) -> Option<Section> {
         number(limits.bank_deg),
         range(limits.pitch_deg),
     );
-    Some(Section::new("On the way", &note, vec![Figure::Table(table)]))
+    Some(Section::new("Transient response", &note, vec![Figure::Table(table)]))
 }

@@ -247,7 +247,7 @@ fn right(model: &GreyBox, flights: &[Reconstruction], mut asked: PerFlight) -> R
     Right { flights, asked, notes }
 }
 
-/// The `fit` with its scores `after`, and a note on the installation that the fit has estimated.
+/// The `fit` with its scores `after`, and a note on the estimated installation: the common misalignment of the axes.
 ///
 /// The installation is kept only if it does not increase the error of the held-out flights.
 fn installed(
@@ -306,7 +306,7 @@ fn notes(model: &GreyBox, tuned: &GreyBox, fit: &Fit) -> Vec<String> {
             .map(|(name, by)| format!("{name} is zero: {by} stands in its place.")),
     );
     notes.extend(parameters::taken_over(&fit.model).map(|(of, by)| {
-        format!("The shape constants of {of} stay as they were fitted without {by}, which can take up whatever they could.")
+        format!("The shape constants of {of} are held as fitted without {by}, which can represent any change of them.")
     }));
     let held = parameters::held_at_zero(model);
     if !held.is_empty() {

@@ -37,7 +37,7 @@ pub struct Runs {
 pub type Trace = [Vec<f64>; 8];
 
 /// Free runs of `model` over all `flights`, sampled at the `horizons` (s) and at the points of the growth curve up to the
-/// longest horizon. If the model's file states constants of a flight, they are applied to that flight.
+/// longest horizon. Constants of a flight in the model's file (trims, sensor errors) are applied to that flight.
 pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Vec<Trace>) {
     let longest = horizons.iter().copied().fold(0.0, f64::max);
     let growth = (1..=GROWTH_POINTS).map(|k| longest * k as f64 / GROWTH_POINTS as f64);
@@ -59,7 +59,7 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     (Runs { times, runs, scale: model.scale() }, traces)
 }
 
-/// Converts the states of `trace` to those that the sensors of the flight would measure, with their errors.
+/// Converts the states of `trace` to those that the flight's sensors would measure, sensor errors included.
 fn measured_from(trace: &mut Trace, known: &KnownFlight) {
     for k in 0..trace[0].len() {
         let state = known.as_measured(std::array::from_fn(|i| trace[i][k]));
@@ -100,7 +100,7 @@ fn fly_one(model: &GreyBox, flight: &Prepared, times: &[f64]) -> (Vec<Vec<Look>>
     (runs, trace)
 }
 
-/// Number of runs whose paths are held at once before they enter the trace.
+/// Largest number of runs whose paths are in memory before they are appended to the trace.
 const RUNS_AT_A_TIME: usize = 256;
 
 /// States of a run that starts at one time of a flight.
@@ -138,8 +138,8 @@ pub fn from_moment(model: &GreyBox, flight: &Prepared, time_s: f64, seconds: f64
     Some(path)
 }
 
-/// One run from sample `start`: the states after each number of steps in `looks`, and the predicted states of the first `keep`
-/// samples.
+/// Integrates one run from sample `start`. Returns the measured and the predicted state after each number of steps in
+/// `looks`, and the predicted states of the first `keep` samples.
 fn run(
     model: &GreyBox,
     flight: &Prepared,

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 /// Length of the window for rates.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Largest lag of a late frame, sequence numbers. With a larger lag the sender has restarted its counter.
+/// A frame is late if it lags by fewer sequence numbers than this. A larger lag is taken as a restart of the counter.
 const LATE: u32 = 32;
 /// Largest number of round-trip times that are kept.
 const TRIPS: usize = 256;
 
-/// Statistics of one message.
+/// Statistics of the frames with one message id.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Traffic {
     /// Number of frames received.
@@ -88,7 +88,7 @@ impl Survey {
         self.messages.entry(id).or_insert(fresh).note(host, bytes);
     }
 
-    /// Restarts a message's statistics, for instance when its rate was granted.
+    /// Restarts a message's statistics, for instance when the controller has accepted its rate.
     pub(super) fn restart(&mut self, host: Duration, id: u32) {
         if let Some(traffic) = self.messages.get_mut(&id) {
             let Traffic { hz, in_window, .. } = *traffic;

@@ -1,4 +1,5 @@
-//! Noise of each channel, estimated from the residual of a rich model: spectrum, level, and residuals by blocks.
+//! Noise of each channel: spectrum, level, and residuals by blocks. It is estimated from the residual of a rich fit,
+//! a fit with the columns of all coefficients and candidates.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -24,7 +25,8 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Estimates the noise from the residual in column `last` after a fit of the other columns in `rich`, one entry a flight.
+    /// Estimates the noise as the residual of column `last` after a fit by the other columns. `rich` has the columns of
+    /// each flight.
     pub fn estimate(cells: &Cells, rich: &[Placed], last: usize) -> Noise {
         let mut residuals = vec![Vec::new(); cells.list.len()];
         let whiteners = std::array::from_fn(|channel| {
