@@ -23,7 +23,7 @@ use super::stretches::Keep;
 use super::topics::{Topic, Topics};
 use super::window::Window;
 use layout::Layout;
-use subscriptions::{Subscription, Subscriptions};
+use subscriptions::{Series, Subscription, Subscriptions};
 
 /// Bytes of the file's header: magic, version and start time.
 const HEADER: usize = 16;
@@ -51,6 +51,7 @@ struct Reader {
     /// One for each topic, however often it is subscribed to.
     layouts: BTreeMap<String, Rc<Layout>>,
     subscriptions: Subscriptions,
+    series: Series,
     keep: Keep,
     /// The values of a record.
     values: Vec<f64>,
@@ -276,9 +277,9 @@ impl Reader {
         let number = u16::from_le_bytes([*low, *high]);
         let key = (name, u16::from(*instance));
         let old =
-            self.subscriptions.insert(number, Subscription { key, layout, topic: None, count: 0 });
+            self.subscriptions.insert(number, Subscription { key, layout, place: None, count: 0 });
         if let Some(old) = old {
-            self.keep(old);
+            self.count(old);
         }
     }
 
@@ -309,26 +310,28 @@ impl Reader {
         if !micros.is_finite() {
             return;
         }
-        let keep = self.keep;
-        let topic = subscription
-            .topic
-            .get_or_insert_with(|| Topic::new(layout.fields.iter().map(|f| f.name.clone()), keep));
+        let place = match subscription.place {
+            Some(place) => place,
+            None => {
+                let names = layout.fields.iter().map(|f| f.name.clone());
+                self.series.place(&subscription.key, || Topic::new(names, self.keep))
+            }
+        };
+        subscription.place = Some(place);
         self.values.clear();
         self.values.extend(layout.fields.iter().map(|f| f.kind.at(body, f.offset)));
-        topic.push(micros * 1e-6, &self.values);
+        self.series.at(place).push(micros * 1e-6, &self.values);
     }
 
-    fn keep(&mut self, old: Subscription) {
-        *self.out.counts.entry(old.key.clone()).or_default() += old.count;
-        if let Some(topic) = old.topic.filter(|t| !t.time_s.is_empty()) {
-            self.out.topics.entry(old.key).or_insert(topic);
-        }
+    /// Adds the number of records of a subscription that ends.
+    fn count(&mut self, old: Subscription) {
+        *self.out.counts.entry(old.key).or_default() += old.count;
     }
 
     fn finish(mut self) -> Topics {
-        let mut subscriptions = std::mem::take(&mut self.subscriptions).all;
-        subscriptions.sort_by_key(|(number, _)| *number);
-        subscriptions.into_iter().for_each(|(_, s)| self.keep(s));
+        let subscriptions = std::mem::take(&mut self.subscriptions).all;
+        subscriptions.into_iter().for_each(|(_, s)| self.count(s));
+        self.out.topics = std::mem::take(&mut self.series).all();
         self.out.findings.extend(damage(self.skipped, &self.holes));
         if self.dropouts > 0 {
             self.out.findings.push(Finding::warning(format!(
