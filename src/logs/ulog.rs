@@ -12,7 +12,7 @@
 mod layout;
 mod subscriptions;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::rc::Rc;
 
@@ -58,8 +58,10 @@ struct Reader {
     out: Topics,
     dropout_ms: u64,
     dropouts: usize,
+    /// Data records whose message number no subscription has.
     orphans: usize,
-    bad_fields: usize,
+    /// Topics whose format the file had not stated when it subscribed to them.
+    formless: BTreeSet<String>,
     short: usize,
     /// Whether the last bytes were a record.
     in_step: bool,
@@ -192,7 +194,7 @@ impl Reader {
             if kind == b'D' {
                 let number = view.get(RECORD..).and_then(|b| b.first_chunk::<2>());
                 let known = number.and_then(|n| self.subscriptions.get(u16::from_le_bytes(*n)));
-                let fits = known.map(|known| known.fits(len));
+                let fits = known.and_then(|known| known.fits(len));
                 if !fits.unwrap_or(undeclared == Undeclared::Allowed) {
                     return false;
                 }
@@ -212,7 +214,7 @@ impl Reader {
     fn fits(&self, view: &[u8], len: usize) -> bool {
         let number = view.get(RECORD..).and_then(|b| b.first_chunk());
         let known = number.and_then(|b| self.subscriptions.get(u16::from_le_bytes(*b)));
-        known.is_some_and(|known| known.fits(len))
+        known.and_then(|known| known.fits(len)).unwrap_or(false)
     }
 
     /// Counts a byte that belongs to no record.
@@ -264,7 +266,7 @@ impl Reader {
         let [instance, low, high, name @ ..] = body else { return };
         let name = String::from_utf8_lossy(name).into_owned();
         if !self.formats.contains_key(&name) {
-            self.bad_fields += 1;
+            self.formless.insert(name.clone());
         }
         let known = self.layouts.entry(name.clone());
         let layout = known.or_insert_with(|| {
@@ -339,10 +341,18 @@ impl Reader {
                 self.dropouts, self.dropout_ms
             )));
         }
-        if self.orphans + self.bad_fields > 0 {
+        if self.orphans > 0 {
             self.out.findings.push(Finding::warning(format!(
                 "{} records of topics that the file does not declare were left out",
-                self.orphans + self.bad_fields
+                self.orphans
+            )));
+        }
+        if !self.formless.is_empty() {
+            let of = self.out.counts.iter().filter(|((name, _), _)| self.formless.contains(name));
+            let records: usize = of.map(|(_, count)| count).sum();
+            self.out.findings.push(Finding::warning(format!(
+                "the file lacks the format of {} topics that it subscribes to: their {records} records were left out",
+                self.formless.len()
             )));
         }
         if self.short > 0 {

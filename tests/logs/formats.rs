@@ -343,3 +343,27 @@ fn a_topic_of_a_ulog_that_is_subscribed_to_again_continues_its_series() {
         assert_eq!(count, Some(400), "{later}");
     }
 }
+
+#[test]
+fn records_without_a_format_and_records_without_a_subscription_are_counted_apart() {
+    let truth = samples(400);
+    let log = ulog(&truth);
+    let without = |kind: u8, name: &str| -> Vec<u8> {
+        let of =
+            |r: &Vec<u8>| r[2] == kind && r.windows(name.len()).any(|part| part == name.as_bytes());
+        let kept = ulog_records(&log).into_iter().filter(|r| !of(r));
+        log[..16].iter().copied().chain(kept.flatten()).collect()
+    };
+    let said = |bytes: &[u8]| {
+        let log = read(bytes);
+        assert_eq!(log.flight.samples.len(), 400);
+        let lost = log.findings.iter().filter(|f| f.text.contains("left out"));
+        lost.map(|f| f.text.clone()).collect::<Vec<_>>()
+    };
+    // No column needs the target.
+    let name = "vehicle_attitude_setpoint";
+    let formless = "the file lacks the format of 1 topics that it subscribes to: their 400 records were left out";
+    assert_eq!(said(&without(b'F', name)), [formless]);
+    let undeclared = "400 records of topics that the file does not declare were left out";
+    assert_eq!(said(&without(b'A', name)), [undeclared]);
+}

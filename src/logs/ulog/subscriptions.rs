@@ -17,10 +17,11 @@ pub(super) struct Subscription {
 }
 
 impl Subscription {
-    /// Whether a record of `len` bytes has the topic's size.
-    pub fn fits(&self, len: usize) -> bool {
+    /// Whether a record of `len` bytes has the topic's size; `None` if the size is unknown, because the file lacks the
+    /// topic's format.
+    pub fn fits(&self, len: usize) -> Option<bool> {
         let sizes = RECORD + 2 + self.layout.size..=RECORD + 2 + self.layout.padded;
-        self.layout.size > 0 && sizes.contains(&len)
+        (self.layout.size > 0).then(|| sizes.contains(&len))
     }
 }
 
