@@ -620,6 +620,17 @@ fn the_way_there_and_back_is_measured_five_times_a_second() {
 }
 
 #[test]
+fn a_time_that_was_not_ours_is_no_round_trip() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(5000);
+    // The last two are 1 ms ahead of our clock, and 3.001 s behind it.
+    for ts1 in [0, -1, i64::MIN, i64::MAX, 5_001_000_000, 1_999_000_000] {
+        played.says(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 1, ts1, ..Default::default() }));
+        assert!(played.real.survey().round_trips().is_empty(), "{ts1} ns");
+    }
+}
+
+#[test]
 fn channels_are_released_only_when_ardupilot_gets_them_back() {
     for (stack, authority) in
         [(Stack::Px4, Authority::Surfaces), (Stack::Ardupilot, Authority::Attitude)]
