@@ -367,7 +367,12 @@ fn a_radio_is_believed_only_while_nothing_is_overridden() {
     played.run(2000);
     assert_eq!(played.real.radio_warning(), None);
     played.says(&receiver(true));
-    assert!(played.real.radio_warning().is_some());
+    // How long it flies so is not known yet.
+    let warning = played.real.radio_warning().unwrap();
+    assert!(warning.contains("in MANUAL for FS_LONG_TIMEOUT, then returns"), "{warning}");
+    played.parameter("FS_LONG_TIMEOUT", 2.0);
+    let warning = played.real.radio_warning().unwrap();
+    assert!(warning.contains("in MANUAL for 2 s, then returns"), "{warning}");
     played.says(&receiver(false));
     played.engage();
     // Our own overrides look like one.
