@@ -559,6 +559,30 @@ fn states_that_come_late_twice_after_a_gap_or_a_restart_are_told_apart_with_thei
 }
 
 #[test]
+fn a_velocity_over_ground_that_no_aircraft_has_is_left_out() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    let position = |vx: i16| {
+        let (lat, lon) = (450_000_000, 75_000_000);
+        MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+            lat,
+            lon,
+            vx,
+            ..Default::default()
+        })
+    };
+    played.run(1000);
+    played.says(&position(2000));
+    assert_eq!(played.state(1000).velocity, [20.0, 0.0, 0.0]);
+    // The smallest and the largest number of the field.
+    for vx in [i16::MIN, i16::MAX] {
+        played.says(&position(vx));
+        let boot_ms = played.ms + 10;
+        played.ms += 10;
+        assert_eq!(played.state(boot_ms).velocity, [20.0, 0.0, 0.0], "{vx}");
+    }
+}
+
+#[test]
 fn a_controllers_force_that_was_never_believed_is_that_of_level_flight() {
     let mut played = Played::new(Stack::Px4, Authority::Surfaces);
     played.heartbeat();
