@@ -22,8 +22,17 @@ use crate::sysid::compare::{Answer, Comparison, HorizonScore, ModelResult, Optio
 use crate::sysid::flight_path::ActuatorClock;
 use crate::sysid::flight_path::reconstruction::Reconstruction;
 
-/// Letters that identify the models in the tables.
-const LETTERS: std::ops::RangeInclusive<char> = 'A'..='Z';
+/// Letters that identify the models in the tables: A to Z, then AA to ZZ, and so on without an end.
+fn letters() -> impl Iterator<Item = String> {
+    (1usize..).map(|place| {
+        let (mut letters, mut left) = (Vec::new(), place);
+        while left > 0 {
+            letters.push(char::from(b'A' + ((left - 1) % 26) as u8));
+            left = (left - 1) / 26;
+        }
+        letters.into_iter().rev().collect::<String>()
+    })
+}
 
 /// Options of `greylag compare`.
 #[derive(clap::Args)]
@@ -162,7 +171,7 @@ fn page(arguments: &Arguments, comparison: &Comparison) -> String {
 
 fn print(comparison: &Comparison) {
     print_answer(&comparison.answer);
-    for (model, letter) in comparison.models.iter().zip(LETTERS) {
+    for (model, letter) in comparison.models.iter().zip(letters()) {
         println!("{letter}  {}", model.name);
         model.sentences.iter().for_each(|sentence| println!("   {sentence}"));
         println!();
@@ -196,9 +205,9 @@ fn free_run_table(comparison: &Comparison) -> Table {
         "β °",
     ];
     let mut table = table(header, 1);
-    for (model, letter) in comparison.models.iter().zip(LETTERS) {
+    for (model, letter) in comparison.models.iter().zip(letters()) {
         let without = model.known.as_ref().map_or(&[][..], |k| k.without.as_slice());
-        let with = model.free_run.iter().map(|s| (letter.to_string(), s));
+        let with = model.free_run.iter().map(|s| (letter.clone(), s));
         let all = with.chain(without.iter().map(|s| (format!("{letter} without"), s)));
         for (name, score) in all.filter(|(_, s)| s.runs > 0) {
             table.add_row(free_run_row(name, score));
@@ -224,14 +233,14 @@ fn free_run_row(name: String, score: &HorizonScore) -> Vec<String> {
 fn channel_table(models: &[ModelResult]) -> Table {
     let header = ["", "channel", "unexplained", "measured sd", "residual", "noise", "unit"];
     let mut table = table(header, 2);
-    for (model, letter) in models.iter().zip(LETTERS) {
+    for (model, letter) in models.iter().zip(letters()) {
         for c in &model.channels {
             let share = match c.unexplained_fraction {
                 share if share.is_nan() => "not excited".into(),
                 share => format!("{:.2} %", 100.0 * share),
             };
             table.add_row([
-                letter.to_string(),
+                letter.clone(),
                 format!("{} {}", c.channel.symbol(), c.name),
                 share,
                 number(c.measured_sd),
@@ -253,5 +262,19 @@ fn number(x: f64) -> String {
             let places = (2 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
             format!("{x:.places$}")
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_model_has_letters_of_its_own() {
+        let all: Vec<String> = letters().take(1000).collect();
+        let at = |places: [usize; 7]| places.map(|place| all[place].as_str());
+        assert_eq!(at([0, 25, 26, 51, 52, 701, 702]), ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]);
+        let distinct: std::collections::BTreeSet<&String> = all.iter().collect();
+        assert_eq!(distinct.len(), 1000);
     }
 }

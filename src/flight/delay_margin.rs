@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::pilot::TICK_S;
 use greylag_control::{Controller, Observation, Target};
-use greylag_model::{GreyBox, Integrator, Trim, Twin};
+use greylag_model::{GreyBox, Integrator, Trim, TrimError, Twin};
 use greylag_physics::actuators::Actuators;
 use greylag_physics::{Command, Time};
 
@@ -26,22 +26,30 @@ const TICK_MS: usize = 10;
 
 /// The smallest delay at which `controller` makes the pitch or the roll loop of `model` oscillate. The simulation
 /// starts in level flight at the cruise airspeed and applies a pulse of full deflection. `None` if the loops are stable
-/// up to 0.12 s, or if the trim fails.
+/// up to 0.12 s.
 ///
 /// Surface positions are computed from undelayed commands, because a real flight controller does not report them.
 /// The search takes about a second for a controller that computes its command in microseconds.
-pub fn delay_margin(controller: &dyn Controller, model: &GreyBox) -> Option<Duration> {
+///
+/// # Errors
+/// If the model has no trim at the cruise airspeed. The delay margin is then unknown.
+pub fn delay_margin(
+    controller: &dyn Controller,
+    model: &GreyBox,
+) -> Result<Option<Duration>, TrimError> {
     // JSBSim's Euler steps delay the attitude by one cycle, unlike an aircraft
     let model = &{
         let mut continuous = model.clone();
         continuous.integrator = Integrator::Rk4;
         continuous
     };
+    let trim = Trim::straight(model, model.airframe.envelope.airspeed_cruise_mps, ALTITUDE_M)?;
     let mut delays = (0..=LONGEST_MS).step_by(STEP_MS);
     let swings = |delay: usize| {
-        [Axis::Pitch, Axis::Roll].into_iter().any(|axis| swings(controller, model, axis, delay))
+        let mut axes = [Axis::Pitch, Axis::Roll].into_iter();
+        axes.any(|axis| swings(controller, model, &trim, axis, delay))
     };
-    delays.find(|delay| swings(*delay)).map(|ms| Duration::from_millis(ms as u64))
+    Ok(delays.find(|delay| swings(*delay)).map(|ms| Duration::from_millis(ms as u64)))
 }
 
 /// The axis whose surface command is delayed.
@@ -51,11 +59,16 @@ enum Axis {
     Roll,
 }
 
-/// Whether the rate about `axis` still oscillates at the end of a simulation with the delay `delay_ms`.
-fn swings(controller: &dyn Controller, model: &GreyBox, axis: Axis, delay_ms: usize) -> bool {
+/// Whether the rate about `axis` still oscillates at the end of a simulation from `trim` with the delay `delay_ms`.
+fn swings(
+    controller: &dyn Controller,
+    model: &GreyBox,
+    trim: &Trim,
+    axis: Axis,
+    delay_ms: usize,
+) -> bool {
     let envelope = &model.airframe.envelope;
     let airspeed = envelope.airspeed_cruise_mps;
-    let Ok(trim) = Trim::straight(model, airspeed, ALTITUDE_M) else { return false };
     let mut controller = controller.boxed_clone();
     controller.reset(0);
     let mut twin = Twin::at_rest(trim.state, &trim.controls, ALTITUDE_M);
@@ -144,18 +157,33 @@ mod tests {
     use greylag_control::{ControllerKind, build};
     use std::path::Path;
 
+    fn x8() -> GreyBox {
+        GreyBox::load(Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../params/x8/jsbsim.toml"
+        )))
+        .unwrap()
+    }
+
+    #[test]
+    fn a_model_without_a_trim_has_no_delay_margin_instead_of_a_large_one() {
+        let model = x8();
+        let lqi = build(ControllerKind::Lqi, &model).unwrap();
+        let mut grounded = model.clone();
+        // Nothing flies at this airspeed.
+        grounded.airframe.envelope.airspeed_cruise_mps = 0.0;
+        let error = delay_margin(lqi.as_ref(), &grounded).unwrap_err();
+        assert_eq!((error.model, error.airspeed_mps), (model.name.clone(), 0.0));
+    }
+
     #[test]
     fn the_model_says_of_delay_what_the_official_simulator_does() {
         // JSBSim with steps of 1 ms oscillates after a pulse of full deflection: with `lqi` from 46 ms on, in pitch;
         // with `lqi-damped` from 104 ms on (`examples/delay_margin.rs`).
-        let model = GreyBox::load(Path::new(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../params/x8/jsbsim.toml"
-        )))
-        .unwrap();
+        let model = x8();
         let margin = |kind| {
-            delay_margin(build(kind, &model).unwrap().as_ref(), &model)
-                .map_or(120, |d| d.as_millis())
+            let margin = delay_margin(build(kind, &model).unwrap().as_ref(), &model).unwrap();
+            margin.map_or(120, |d| d.as_millis())
         };
         let (lqi, damped) = (margin(ControllerKind::Lqi), margin(ControllerKind::LqiDamped));
         assert!(lqi.abs_diff(46) <= 8 && damped.abs_diff(104) <= 8, "{lqi} {damped}");

@@ -12,7 +12,7 @@
 mod layout;
 mod subscriptions;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::rc::Rc;
 
@@ -23,7 +23,7 @@ use super::stretches::Keep;
 use super::topics::{Topic, Topics};
 use super::window::Window;
 use layout::Layout;
-use subscriptions::{Subscription, Subscriptions};
+use subscriptions::{Series, Subscription, Subscriptions};
 
 /// Bytes of the file's header: magic, version and start time.
 const HEADER: usize = 16;
@@ -51,14 +51,17 @@ struct Reader {
     /// One for each topic, however often it is subscribed to.
     layouts: BTreeMap<String, Rc<Layout>>,
     subscriptions: Subscriptions,
+    series: Series,
     keep: Keep,
     /// The values of a record.
     values: Vec<f64>,
     out: Topics,
     dropout_ms: u64,
     dropouts: usize,
+    /// Data records whose message number no subscription has.
     orphans: usize,
-    bad_fields: usize,
+    /// Topics whose format the file had not stated when it subscribed to them.
+    formless: BTreeSet<String>,
     short: usize,
     /// Whether the last bytes were a record.
     in_step: bool,
@@ -191,7 +194,7 @@ impl Reader {
             if kind == b'D' {
                 let number = view.get(RECORD..).and_then(|b| b.first_chunk::<2>());
                 let known = number.and_then(|n| self.subscriptions.get(u16::from_le_bytes(*n)));
-                let fits = known.map(|known| known.fits(len));
+                let fits = known.and_then(|known| known.fits(len));
                 if !fits.unwrap_or(undeclared == Undeclared::Allowed) {
                     return false;
                 }
@@ -211,7 +214,7 @@ impl Reader {
     fn fits(&self, view: &[u8], len: usize) -> bool {
         let number = view.get(RECORD..).and_then(|b| b.first_chunk());
         let known = number.and_then(|b| self.subscriptions.get(u16::from_le_bytes(*b)));
-        known.is_some_and(|known| known.fits(len))
+        known.and_then(|known| known.fits(len)).unwrap_or(false)
     }
 
     /// Counts a byte that belongs to no record.
@@ -263,7 +266,7 @@ impl Reader {
         let [instance, low, high, name @ ..] = body else { return };
         let name = String::from_utf8_lossy(name).into_owned();
         if !self.formats.contains_key(&name) {
-            self.bad_fields += 1;
+            self.formless.insert(name.clone());
         }
         let known = self.layouts.entry(name.clone());
         let layout = known.or_insert_with(|| {
@@ -276,9 +279,9 @@ impl Reader {
         let number = u16::from_le_bytes([*low, *high]);
         let key = (name, u16::from(*instance));
         let old =
-            self.subscriptions.insert(number, Subscription { key, layout, topic: None, count: 0 });
+            self.subscriptions.insert(number, Subscription { key, layout, place: None, count: 0 });
         if let Some(old) = old {
-            self.keep(old);
+            self.count(old);
         }
     }
 
@@ -309,26 +312,28 @@ impl Reader {
         if !micros.is_finite() {
             return;
         }
-        let keep = self.keep;
-        let topic = subscription
-            .topic
-            .get_or_insert_with(|| Topic::new(layout.fields.iter().map(|f| f.name.clone()), keep));
+        let place = match subscription.place {
+            Some(place) => place,
+            None => {
+                let names = layout.fields.iter().map(|f| f.name.clone());
+                self.series.place(&subscription.key, || Topic::new(names, self.keep))
+            }
+        };
+        subscription.place = Some(place);
         self.values.clear();
         self.values.extend(layout.fields.iter().map(|f| f.kind.at(body, f.offset)));
-        topic.push(micros * 1e-6, &self.values);
+        self.series.at(place).push(micros * 1e-6, &self.values);
     }
 
-    fn keep(&mut self, old: Subscription) {
-        *self.out.counts.entry(old.key.clone()).or_default() += old.count;
-        if let Some(topic) = old.topic.filter(|t| !t.time_s.is_empty()) {
-            self.out.topics.entry(old.key).or_insert(topic);
-        }
+    /// Adds the number of records of a subscription that ends.
+    fn count(&mut self, old: Subscription) {
+        *self.out.counts.entry(old.key).or_default() += old.count;
     }
 
     fn finish(mut self) -> Topics {
-        let mut subscriptions = std::mem::take(&mut self.subscriptions).all;
-        subscriptions.sort_by_key(|(number, _)| *number);
-        subscriptions.into_iter().for_each(|(_, s)| self.keep(s));
+        let subscriptions = std::mem::take(&mut self.subscriptions).all;
+        subscriptions.into_iter().for_each(|(_, s)| self.count(s));
+        self.out.topics = std::mem::take(&mut self.series).all();
         self.out.findings.extend(damage(self.skipped, &self.holes));
         if self.dropouts > 0 {
             self.out.findings.push(Finding::warning(format!(
@@ -336,10 +341,18 @@ impl Reader {
                 self.dropouts, self.dropout_ms
             )));
         }
-        if self.orphans + self.bad_fields > 0 {
+        if self.orphans > 0 {
             self.out.findings.push(Finding::warning(format!(
                 "{} records of topics that the file does not declare were left out",
-                self.orphans + self.bad_fields
+                self.orphans
+            )));
+        }
+        if !self.formless.is_empty() {
+            let of = self.out.counts.iter().filter(|((name, _), _)| self.formless.contains(name));
+            let records: usize = of.map(|(_, count)| count).sum();
+            self.out.findings.push(Finding::warning(format!(
+                "the file lacks the format of {} topics that it subscribes to: their {records} records were left out",
+                self.formless.len()
             )));
         }
         if self.short > 0 {

@@ -282,8 +282,8 @@ mod tests {
     use super::*;
     use crate::GreyBox;
 
-    fn made(tail: Tail, rudder: Option<f64>) -> GreyBox {
-        let measures = Measures {
+    fn measures(tail: Tail, rudder: Option<f64>) -> Measures {
+        Measures {
             name: "Own".into(),
             mass: 11.0,
             span: 2.9,
@@ -293,7 +293,11 @@ mod tests {
             travel: 0.4363,
             static_thrust: 60.0,
             pitch_speed: 50.0,
-        };
+        }
+    }
+
+    fn made(tail: Tail, rudder: Option<f64>) -> GreyBox {
+        let measures = measures(tail, rudder);
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("airframe.toml"), measures.airframe()).unwrap();
         std::fs::write(folder.path().join("model.toml"), measures.model()).unwrap();
@@ -333,5 +337,20 @@ mod tests {
     fn both_kinds_of_tail_make_files_that_load() {
         assert!(made(Tail::Conventional, Some(0.4)).has_rudder());
         assert!(!made(Tail::FlyingWing, None).has_rudder());
+    }
+
+    #[test]
+    fn the_coefficients_of_a_flying_wing_do_not_come_from_a_tail() {
+        let of_tail = ["tailplane", "tail volume", "fin volume", "Etkin and Reid 5.4"];
+        let sources = |tail: Tail| -> Vec<&'static str> {
+            let sections = measures(tail, None).sections();
+            sections.iter().flat_map(|(_, all)| all.iter().map(|estimate| estimate.3)).collect()
+        };
+        let named = |source: &&'static str| of_tail.iter().any(|words| source.contains(words));
+        let wing: Vec<_> = sources(Tail::FlyingWing).into_iter().filter(named).collect();
+        assert_eq!(wing, [""; 0]);
+        // CLalpha, CLq, CLde, CYbeta, Cmq, Cmde, Cnbeta and Cnr.
+        let tail = sources(Tail::Conventional).into_iter().filter(named).count();
+        assert_eq!(tail, 8);
     }
 }

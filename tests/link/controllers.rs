@@ -367,7 +367,12 @@ fn a_radio_is_believed_only_while_nothing_is_overridden() {
     played.run(2000);
     assert_eq!(played.real.radio_warning(), None);
     played.says(&receiver(true));
-    assert!(played.real.radio_warning().is_some());
+    // How long it flies so is not known yet.
+    let warning = played.real.radio_warning().unwrap();
+    assert!(warning.contains("in MANUAL for FS_LONG_TIMEOUT, then returns"), "{warning}");
+    played.parameter("FS_LONG_TIMEOUT", 2.0);
+    let warning = played.real.radio_warning().unwrap();
+    assert!(warning.contains("in MANUAL for 2 s, then returns"), "{warning}");
     played.says(&receiver(false));
     played.engage();
     // Our own overrides look like one.
@@ -554,6 +559,30 @@ fn states_that_come_late_twice_after_a_gap_or_a_restart_are_told_apart_with_thei
 }
 
 #[test]
+fn a_velocity_over_ground_that_no_aircraft_has_is_left_out() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    let position = |vx: i16| {
+        let (lat, lon) = (450_000_000, 75_000_000);
+        MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+            lat,
+            lon,
+            vx,
+            ..Default::default()
+        })
+    };
+    played.run(1000);
+    played.says(&position(2000));
+    assert_eq!(played.state(1000).velocity, [20.0, 0.0, 0.0]);
+    // The smallest and the largest number of the field.
+    for vx in [i16::MIN, i16::MAX] {
+        played.says(&position(vx));
+        let boot_ms = played.ms + 10;
+        played.ms += 10;
+        assert_eq!(played.state(boot_ms).velocity, [20.0, 0.0, 0.0], "{vx}");
+    }
+}
+
+#[test]
 fn a_controllers_force_that_was_never_believed_is_that_of_level_flight() {
     let mut played = Played::new(Stack::Px4, Authority::Surfaces);
     played.heartbeat();
@@ -617,6 +646,17 @@ fn the_way_there_and_back_is_measured_five_times_a_second() {
     // The newest 256 are kept.
     (0..300).for_each(|_| answer(&mut played, 5));
     assert_eq!(played.real.survey().round_trips(), vec![ms(5); 256]);
+}
+
+#[test]
+fn a_time_that_was_not_ours_is_no_round_trip() {
+    let mut played = Played::new(Stack::Px4, Authority::Surfaces);
+    played.run(5000);
+    // The last two are 1 ms ahead of our clock, and 3.001 s behind it.
+    for ts1 in [0, -1, i64::MIN, i64::MAX, 5_001_000_000, 1_999_000_000] {
+        played.says(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 1, ts1, ..Default::default() }));
+        assert!(played.real.survey().round_trips().is_empty(), "{ts1} ns");
+    }
 }
 
 #[test]

@@ -297,3 +297,73 @@ fn other_readers_read_the_same_numbers() {
     println!("{said}");
     assert!(run.status.success(), "{said}{complained}");
 }
+
+/// The records of a ULog, each with its header, behind the header of the file.
+fn ulog_records(log: &[u8]) -> Vec<Vec<u8>> {
+    let (mut records, mut at) = (Vec::new(), 16);
+    while at < log.len() {
+        let size = usize::from(u16::from_le_bytes([log[at], log[at + 1]]));
+        records.push(log[at..at + 3 + size].to_vec());
+        at += 3 + size;
+    }
+    records
+}
+
+/// A flight as a ULog that subscribes to each topic again in the middle, under message numbers that are higher by `later`.
+fn resubscribed(samples: &[Sample], later: u8) -> Vec<u8> {
+    let log = ulog(samples);
+    let records = ulog_records(&log);
+    let again: Vec<Vec<u8>> = records.iter().filter(|r| r[2] == b'A').cloned().collect();
+    let middle = again.len() * (samples.len() / 2);
+    let (mut out, mut data) = (log[..16].to_vec(), 0);
+    for mut record in records {
+        if record[2] == b'D' {
+            if data == middle {
+                for mut subscription in again.clone() {
+                    subscription[4] += later;
+                    out.extend(subscription);
+                }
+            }
+            record[3] += if data < middle { 0 } else { later };
+            data += 1;
+        }
+        out.extend(record);
+    }
+    out
+}
+
+#[test]
+fn a_topic_of_a_ulog_that_is_subscribed_to_again_continues_its_series() {
+    let truth = samples(400);
+    for later in [0, 20] {
+        let log = read(&resubscribed(&truth, later));
+        let [angles, others, _] = difference(&truth, &log.flight.samples);
+        assert!(angles < 2e-6 && others < 5e-6, "{later}: {angles} {others}");
+        let count = log.topics.iter().find(|(name, ..)| name == "vehicle_attitude").map(|t| t.2);
+        assert_eq!(count, Some(400), "{later}");
+    }
+}
+
+#[test]
+fn records_without_a_format_and_records_without_a_subscription_are_counted_apart() {
+    let truth = samples(400);
+    let log = ulog(&truth);
+    let without = |kind: u8, name: &str| -> Vec<u8> {
+        let of =
+            |r: &Vec<u8>| r[2] == kind && r.windows(name.len()).any(|part| part == name.as_bytes());
+        let kept = ulog_records(&log).into_iter().filter(|r| !of(r));
+        log[..16].iter().copied().chain(kept.flatten()).collect()
+    };
+    let said = |bytes: &[u8]| {
+        let log = read(bytes);
+        assert_eq!(log.flight.samples.len(), 400);
+        let lost = log.findings.iter().filter(|f| f.text.contains("left out"));
+        lost.map(|f| f.text.clone()).collect::<Vec<_>>()
+    };
+    // No column needs the target.
+    let name = "vehicle_attitude_setpoint";
+    let formless = "the file lacks the format of 1 topics that it subscribes to: their 400 records were left out";
+    assert_eq!(said(&without(b'F', name)), [formless]);
+    let undeclared = "400 records of topics that the file does not declare were left out";
+    assert_eq!(said(&without(b'A', name)), [undeclared]);
+}

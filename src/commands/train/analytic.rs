@@ -36,7 +36,8 @@ pub fn climb(
 ) -> Result<Option<Arc<Actor>>> {
     let path = folder.join(CURVE);
     let context = || format!("cannot write {}", path.display());
-    let mut curve = CurveFile::open(&path, 0).with_context(context)?;
+    let mut curve =
+        CurveFile::open(&path, 0).with_context(|| format!("cannot open {}", path.display()))?;
     let mut trainer = AnalyticTrainer::new(recipe.clone(), model.clone())?;
     if let Some(actor) = from {
         trainer = trainer.starting_from(actor)?;

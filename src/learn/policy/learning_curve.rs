@@ -75,6 +75,13 @@ pub struct CurveError {
     source: csv::Error,
 }
 
+impl CurveError {
+    /// Whether there is no file.
+    fn is_not_found(&self) -> bool {
+        matches!(self.source.kind(), csv::ErrorKind::Io(why) if why.kind() == std::io::ErrorKind::NotFound)
+    }
+}
+
 /// The points of the curve in `path`.
 ///
 /// # Errors
@@ -151,9 +158,12 @@ impl CurveFile {
     ///
     /// # Errors
     ///
-    /// If the file cannot be written.
+    /// If there is a file that cannot be read, which is left as it is, or if the file cannot be written.
     pub fn open(path: &Path, steps: u64) -> std::io::Result<CurveFile> {
-        let mut points = read(path).unwrap_or_default();
+        let mut points = match read(path) {
+            Err(why) if why.is_not_found() => Vec::new(),
+            points => points.map_err(std::io::Error::other)?,
+        };
         points.retain(|p| p.steps <= steps);
         let mut file = File::create(path)?;
         writeln!(file, "{COLUMNS}")?;
@@ -224,6 +234,19 @@ mod tests {
         assert!(read.len() == 2 && read[1].easy_deg == 2.0 && read[1].loss.is_nan());
         std::fs::write(&path, "steps\nmany\n").unwrap();
         assert!(super::read(&path).unwrap_err().to_string().contains("curve.csv"));
+    }
+
+    #[test]
+    fn a_curve_that_cannot_be_read_is_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CURVE);
+        std::fs::write(&path, "steps\nmany\n").unwrap();
+        let error = CurveFile::open(&path, 10).map(|_| ()).unwrap_err();
+        assert!(error.to_string().contains("curve.csv"), "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "steps\nmany\n");
+        // A file that was made and not yet written is an empty curve.
+        std::fs::write(&path, "").unwrap();
+        assert!(CurveFile::open(&path, 10).unwrap().points().is_empty());
     }
 
     #[test]

@@ -121,6 +121,11 @@ pub fn travels(travels: &Travels) -> bool {
 pub fn position([latitude, longitude]: [f64; 2]) -> bool {
     latitude.abs() <= 90.0 && longitude.abs() <= 180.0
 }
+/// Whether a velocity over ground, m/s, is plausible: at most 250 m/s in each component, the largest airspeed and the
+/// largest wind together.
+pub fn ground_velocity(values: [f64; 3]) -> bool {
+    values.iter().all(|x| x.abs() <= 250.0)
+}
 /// Whether a wind velocity, m/s, is plausible: at most 100 m/s in each component.
 pub fn wind(values: [f64; 3]) -> bool {
     values.iter().all(|x| x.abs() <= 100.0)

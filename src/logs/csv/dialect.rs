@@ -217,13 +217,16 @@ pub(super) fn unit_of(step: f64) -> f64 {
     }
 }
 
-/// Seconds since 1970-01-01 of a date and time in ISO 8601 (2026-11-27T07:42:01.25Z).
+/// Seconds since 1970-01-01 UTC of a date and time in ISO 8601 (2026-11-27T07:42:01.25Z, 2026-11-27T09:42:01.25+02:00). A
+/// time without an offset is taken as UTC.
 pub(super) fn time(text: &str) -> Option<f64> {
     let (date, clock) = text.split_once(['T', ' '])?;
     let mut date = date.split('-').map(|part| part.parse::<i64>().ok());
     let (year, month, day) = (date.next()??, date.next()??, date.next()??);
-    let clock = clock.trim_end_matches('Z');
-    let clock = clock.split_once('+').map_or(clock, |(clock, _)| clock);
+    let (clock, ahead_s) = match clock.find(['+', '-']) {
+        Some(sign) => (clock[..sign].trim_end(), offset_s(&clock[sign..])?),
+        None => (clock.trim_end_matches('Z'), 0.0),
+    };
     let mut parts = clock.split(':').map(|part| part.replace(',', ".").parse::<f64>().ok());
     let (hour, minute) = (parts.next()??, parts.next()??);
     let second = parts.next().unwrap_or(Some(0.0))?;
@@ -235,7 +238,26 @@ pub(super) fn time(text: &str) -> Option<f64> {
     let (era, of_era) = (y.div_euclid(400), y.rem_euclid(400));
     let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
     let days = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
-    Some(days as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second)
+    Some(days as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second - ahead_s)
+}
+
+/// Time by which a local clock is ahead of UTC, s, from its offset: ±hh:mm, ±hhmm or ±hh.
+fn offset_s(text: &str) -> Option<f64> {
+    let (sign, digits) = match text.split_at_checked(1)? {
+        ("+", digits) => (1.0, digits),
+        ("-", digits) => (-1.0, digits),
+        _ => return None,
+    };
+    let digits = match digits.split_once(':') {
+        Some((hours, minutes)) => format!("{hours:0>2}{minutes}"),
+        None => digits.to_owned(),
+    };
+    let is_offset = [2, 4].contains(&digits.len()) && digits.bytes().all(|b| b.is_ascii_digit());
+    let number = |text: &str| text.parse::<f64>().ok();
+    let (hours, minutes) = digits.split_at_checked(2).filter(|_| is_offset)?;
+    let minutes = if minutes.is_empty() { 0.0 } else { number(minutes)? };
+    let whole = 3600.0 * number(hours)? + 60.0 * minutes;
+    (minutes < 60.0 && whole < 86_400.0).then_some(sign * whole)
 }
 
 #[cfg(test)]
@@ -249,6 +271,24 @@ mod tests {
         assert_eq!(time("2026-11-27 07:42:01"), Some(1_795_765_321.0));
         assert_eq!(time("17.5"), None);
         assert_eq!(time("2024-13-01T00:00:00"), None);
+    }
+
+    #[test]
+    fn a_local_time_with_its_offset_is_seconds_of_utc() {
+        let utc = time("2026-11-27T07:42:01.25Z").unwrap();
+        for local in [
+            "2026-11-27T09:42:01.25+02:00",
+            "2026-11-27T02:42:01.25-05:00",
+            "2026-11-27T13:12:01.25+0530",
+            "2026-11-26T23:42:01,25-08",
+            "2026-11-27 09:42:01.25 +02:00",
+            "2026-11-27T07:42:01.25-00:00",
+        ] {
+            assert_eq!(time(local), Some(utc), "{local}");
+        }
+        for wrong in ["+", "-5x:00", "+25:00", "+02:60", "+2:0:0", "+02:00:00"] {
+            assert_eq!(time(&format!("2026-11-27T07:42:01{wrong}")), None, "{wrong}");
+        }
     }
 
     #[test]

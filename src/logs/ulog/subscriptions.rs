@@ -1,5 +1,6 @@
 //! The topics of a ULog by the numbers of their messages.
 
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use super::RECORD;
@@ -10,16 +11,49 @@ use crate::topics::Topic;
 pub(super) struct Subscription {
     pub key: (String, u16),
     pub layout: Rc<Layout>,
-    /// Records of the message; `None` before the first.
-    pub topic: Option<Topic>,
+    /// Place of its records in the [`Series`]; `None` before the first record.
+    pub place: Option<usize>,
     pub count: usize,
 }
 
 impl Subscription {
-    /// Whether a record of `len` bytes has the topic's size.
-    pub fn fits(&self, len: usize) -> bool {
+    /// Whether a record of `len` bytes has the topic's size; `None` if the size is unknown, because the file lacks the
+    /// topic's format.
+    pub fn fits(&self, len: usize) -> Option<bool> {
         let sizes = RECORD + 2 + self.layout.size..=RECORD + 2 + self.layout.padded;
-        self.layout.size > 0 && sizes.contains(&len)
+        (self.layout.size > 0).then(|| sizes.contains(&len))
+    }
+}
+
+/// The records of the topics, one series for each topic and instance. All subscriptions of a topic and instance continue
+/// the same series.
+#[derive(Default)]
+pub(super) struct Series {
+    places: BTreeMap<(String, u16), usize>,
+    topics: Vec<Topic>,
+}
+
+impl Series {
+    /// Place of the series of `key`, which begins with `new` if it is the first of its key.
+    pub fn place(&mut self, key: &(String, u16), new: impl FnOnce() -> Topic) -> usize {
+        if let Some(place) = self.places.get(key) {
+            return *place;
+        }
+        self.topics.push(new());
+        self.places.insert(key.clone(), self.topics.len() - 1);
+        self.topics.len() - 1
+    }
+
+    /// The series at a place that [`Series::place`] returned.
+    pub fn at(&mut self, place: usize) -> &mut Topic {
+        &mut self.topics[place]
+    }
+
+    /// The series with records, by topic and instance.
+    pub fn all(mut self) -> BTreeMap<(String, u16), Topic> {
+        let taken = self.places.into_iter();
+        let taken = taken.map(|(key, place)| (key, std::mem::take(&mut self.topics[place])));
+        taken.filter(|(_, topic)| !topic.time_s.is_empty()).collect()
     }
 }
 

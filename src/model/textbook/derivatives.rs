@@ -10,6 +10,14 @@ const FIN: [f64; 4] = [0.04, 0.4, 3.0, 0.55];
 const EFFICIENCY: f64 = 0.85;
 
 impl Measures {
+    /// The one of two sources that fits the aircraft's tail.
+    fn source(&self, conventional: &'static str, flying_wing: &'static str) -> &'static str {
+        match self.tail {
+            Tail::Conventional => conventional,
+            Tail::FlyingWing => flying_wing,
+        }
+    }
+
     /// Lift slope of wing and tailplane, 1/rad.
     pub(super) fn slope(&self, f: &Figures) -> f64 {
         match self.tail {
@@ -38,11 +46,17 @@ impl Measures {
             Tail::Conventional => 2.0 * tailplane() * TAIL[0],
             Tail::FlyingWing => 0.9 * f.wing,
         };
+        let slope = self.source("Helmbold, with downwash at the tailplane", "Helmbold");
+        let damping = self.source("Etkin and Reid 5.4", "estimate: 0.9 of the wing's lift slope");
+        let elevator = self.source(
+            "tail volume 0.5, elevator effectiveness 0.5",
+            "elevons: 0.07 of the wing's lift slope, scaled to published small aircraft",
+        );
         vec![
             ("CL0", self.zero_lift(), 0.5, "estimate: camber and incidence of the wing"),
-            ("CLalpha", self.slope(f), 0.1, "Helmbold, with downwash at the tailplane"),
-            ("CLq", rate, 0.5, "Etkin and Reid 5.4"),
-            ("CLde", self.elevator(f)[0], 0.5, "tail volume 0.5, elevator effectiveness 0.5"),
+            ("CLalpha", self.slope(f), 0.1, slope),
+            ("CLq", rate, 0.5, damping),
+            ("CLde", self.elevator(f)[0], 0.5, elevator),
         ]
     }
 
@@ -64,11 +78,17 @@ impl Measures {
 
     pub(super) fn side(&self, _: &Figures) -> Vec<Estimate> {
         let fin = if self.tail == Tail::Conventional { FIN[2] * FIN[0] / FIN[1] } else { 0.15 };
+        let slip = self
+            .source("fin volume 0.04, and the fuselage", "estimate: winglets 0.15, fuselage 0.05");
+        let rate = self.source(
+            "Etkin and Reid 5.8",
+            "estimate: the side force of the winglets at 0.4 spans behind the centre of mass",
+        );
         vec![
             ("CY0", 0.0, 0.0, "symmetric"),
-            ("CYbeta", -fin - 0.05, 0.5, "fin volume 0.04, and the fuselage"),
+            ("CYbeta", -fin - 0.05, 0.5, slip),
             ("CYp", 0.0, 0.0, "small"),
-            ("CYr", 2.0 * fin * FIN[1], 0.5, "Etkin and Reid 5.8"),
+            ("CYr", 2.0 * fin * FIN[1], 0.5, rate),
             ("CYda", 0.0, 0.0, "small"),
         ]
     }
@@ -90,11 +110,16 @@ impl Measures {
         };
         let slope = -margin * self.slope(f);
         let alpha = (f.lift - self.zero_lift()) / self.slope(f);
+        let rate = self.source("Etkin and Reid 5.4", "estimate: -0.35 of the wing's lift slope");
+        let elevator = self.source(
+            "tail volume 0.5, elevator effectiveness 0.5",
+            "elevons: their lift at 0.8 chords behind the centre of mass, scaled to published small aircraft",
+        );
         vec![
             ("Cm0", -slope * alpha, 0.5, "trimmed at the cruise airspeed without elevator"),
             ("Cmalpha", slope, 0.5, "estimate: static margin"),
-            ("Cmq", damping, 0.3, "Etkin and Reid 5.4"),
-            ("Cmde", self.elevator(f)[1], 0.5, "tail volume 0.5, elevator effectiveness 0.5"),
+            ("Cmq", damping, 0.3, rate),
+            ("Cmde", self.elevator(f)[1], 0.5, elevator),
         ]
     }
 
@@ -103,11 +128,12 @@ impl Measures {
         let fin = FIN[0] * FIN[2];
         let (stiffness, damping) =
             if conventional { (fin - 0.05, -2.0 * FIN[1] * fin) } else { (0.03, -0.04) };
+        let winglets = "estimate: winglets of a flying wing";
         vec![
             ("Cn0", 0.0, 0.0, "symmetric"),
-            ("Cnbeta", stiffness, 0.5, "fin volume 0.04 less the fuselage"),
+            ("Cnbeta", stiffness, 0.5, self.source("fin volume 0.04 less the fuselage", winglets)),
             ("Cnp", -f.lift / 8.0, 0.5, "Etkin and Reid 5.8"),
-            ("Cnr", damping, 0.5, "fin volume 0.04"),
+            ("Cnr", damping, 0.5, self.source("fin volume 0.04", winglets)),
             ("Cnda", -0.005, 1.0, "adverse yaw of published small aircraft"),
         ]
     }

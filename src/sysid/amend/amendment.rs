@@ -259,22 +259,28 @@ fn installed(
     let with = fit.model.known.clone();
     Arc::make_mut(&mut fit.model.known).installation = None;
     let bare = judge.scores(&fit.model);
-    let words = learned::in_words(&shared);
     let errors = judge::judged(&after).zip(judge::judged(&bare));
-    let (said, [a, b]) = match errors {
-        Some((a, b)) if a <= b => ("kept as [installation]", [a, b]),
-        Some((a, b)) => ("not kept", [a, b]),
-        None => ("not kept, because no held-out flight can validate it", [f64::NAN; 2]),
-    };
-    let note = format!(
-        "The measured axes of the fitted flights have a common misalignment ({words}), which is {said}: the error of the flights \
-         held out is {a:.5} with it, {b:.5} without."
-    );
-    if a <= b {
+    let errors = errors.filter(|(a, b)| !a.is_nan() && !b.is_nan());
+    let note = installation_note(&learned::in_words(&shared), errors);
+    if errors.is_some_and(|(a, b)| a <= b) {
         fit.model.known = with;
         return (fit, after, Some(note));
     }
     (fit, bare, Some(note))
+}
+
+/// Note on the estimated installation, with its angles `words`, from the scaled `errors` of the held-out flights with it and
+/// without it. `errors` is `None` if no free run over held-out flights has an error.
+fn installation_note(words: &str, errors: Option<(f64, f64)>) -> String {
+    let found =
+        format!("The measured axes of the fitted flights have a common misalignment ({words})");
+    let Some((a, b)) = errors else {
+        return format!("{found}, which is not kept, because no held-out flight can validate it.");
+    };
+    let said = if a <= b { "kept as [installation]" } else { "not kept" };
+    format!(
+        "{found}, which is {said}: the error of the flights held out is {a:.5} with it, {b:.5} without."
+    )
 }
 
 /// Adds the effect `added` to `model` at its starting values.
@@ -336,4 +342,21 @@ pub fn split(flight: &Reconstruction) -> [Reconstruction; 2] {
         }
     }
     parts.map(|segments| Reconstruction { segments, ..flight.clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_installation_that_no_held_out_flight_validates_is_noted_without_an_error() {
+        let note = installation_note("roll 1.0°", None);
+        assert!(note.contains("(roll 1.0°), which is not kept, because no held-out"), "{note}");
+        assert!(!note.contains("NaN") && !note.contains("the error of"), "{note}");
+        let note = installation_note("roll 1.0°", Some((0.25, 0.5)));
+        assert!(note.contains("kept as [installation]: the error of the flights"), "{note}");
+        assert!(note.ends_with("is 0.25000 with it, 0.50000 without."), "{note}");
+        let note = installation_note("roll 1.0°", Some((0.5, 0.25)));
+        assert!(note.contains("which is not kept: the error of the flights held out"), "{note}");
+    }
 }

@@ -96,7 +96,8 @@ impl Run<'_> {
         }
         let path = self.folder.join(CURVE);
         let context = || format!("cannot write {}", path.display());
-        let mut curve = CurveFile::open(&path, trainer.steps()).with_context(context)?;
+        let mut curve = CurveFile::open(&path, trainer.steps())
+            .with_context(|| format!("cannot open {}", path.display()))?;
         let (mut best, before) = (curve.best(), curve.seconds());
         let start = Instant::now();
         let (first, goal) = (trainer.steps(), trainer.recipe().steps);

@@ -75,8 +75,8 @@ impl Default for AirData {
 }
 
 impl AirData {
-    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad; `None` below 3 m/s or if the
-    /// measurement is not finite.
+    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad; `None` below 3 m/s, or if the
+    /// measurement or the estimate is not finite. The estimate then restarts.
     pub fn update(&mut self, m: &Measured, step: f64) -> Option<[f64; 2]> {
         let needed =
             m.attitude.iter().chain(&m.rates).chain(&m.specific_force).chain([&m.airspeed]);
@@ -97,7 +97,12 @@ impl AirData {
         }
         self.propagate(m, step);
         self.correct(m);
-        let [u, v, w] = self.state.filter(|x| x.iter().all(|x| x.is_finite()))?;
+        let mut numbers = self.state.iter().flatten().chain(self.covariance.iter().flatten());
+        if !numbers.all(|x| x.is_finite()) {
+            // otherwise no later measurement would give angles
+            *self = AirData::default();
+        }
+        let [u, v, w] = self.state?;
         let speed = (u * u + v * v + w * w).sqrt().max(SLOWEST);
         Some([w.atan2(u), (v / speed).clamp(-1.0, 1.0).asin()])
     }
@@ -239,6 +244,17 @@ mod tests {
         assert_eq!(air.update(&Measured { airspeed: 0.0, ..level() }, 0.01), None);
         assert!(air.update(&level(), 0.01).unwrap()[0].to_degrees() < 4.0);
         assert!(air.update(&level(), f64::NAN).is_some());
+    }
+
+    #[test]
+    fn an_estimate_that_is_not_finite_is_forgotten() {
+        for (state, variance) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (0.0, f64::NAN)] {
+            let covariance = diagonal([variance; 3]);
+            let mut air = AirData { state: Some([20.0, 0.0, state]), covariance };
+            assert_eq!(air.update(&level(), 0.01), None, "{state} {variance}");
+            let again = air.update(&level(), 0.01).unwrap();
+            assert!((again[0].to_degrees() - 3.0).abs() < 0.1, "{state} {variance}: {again:?}");
+        }
     }
 
     /// Measurement at `t` seconds in a steady turn at the rate `turn` (rad/s), with the velocity `air` (m/s) relative

@@ -105,7 +105,9 @@ impl Assembly {
                 self.air = Some((host, [airspeed, altitude, climb]));
             }
             ControllerMessage::Incidence(angles) => self.incidence = Some((host, angles)),
-            ControllerMessage::Position { position, velocity } if limits::position(position) => {
+            ControllerMessage::Position { position, velocity }
+                if limits::position(position) && limits::ground_velocity(velocity) =>
+            {
                 (self.last.position, self.last.velocity) = (position, velocity);
                 self.new_velocity = true;
             }

@@ -70,8 +70,11 @@ impl Real {
                 self.parameters.take(&name, value);
             }
             ControllerMessage::TimeSync { ours } => {
-                if let Ok(sent) = u64::try_from(ours) {
-                    self.survey.trip(host.saturating_sub(Duration::from_nanos(sent)));
+                let sent = u64::try_from(ours).ok().map(Duration::from_nanos);
+                // a reply to another program has the time of its clock
+                let trip = sent.and_then(|sent| host.checked_sub(sent));
+                if let Some(trip) = trip.filter(|trip| *trip <= GONE) {
+                    self.survey.trip(trip);
                 }
             }
             message => {

@@ -16,9 +16,10 @@ impl Real {
         let by_channels =
             (self.profile.stack, self.profile.authority) == (Stack::Ardupilot, Authority::Surfaces);
         (by_channels && self.radio == Some(true)).then(|| {
-            let patience = self.parameters.get("FS_LONG_TIMEOUT").unwrap_or(f64::NAN);
+            let patience = self.parameters.get("FS_LONG_TIMEOUT");
+            let patience = patience.map_or("FS_LONG_TIMEOUT".into(), |s| format!("{s} s"));
             format!(
-                "a radio is bound: if this computer dies, ArduPilot flies on the radio's sticks in MANUAL for {patience} s, \
+                "a radio is bound: if this computer dies, ArduPilot flies on the radio's sticks in MANUAL for {patience}, \
                  then returns. Put its throttle at cruise and be ready to fly"
             )
         })

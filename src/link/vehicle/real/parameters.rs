@@ -13,7 +13,7 @@ const AT_ONCE: usize = 4;
 /// Number of requests for one name after which the controller counts as lacking the parameter.
 const TRIES: u32 = 5;
 /// Valid pulse widths of a channel, µs.
-const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
+pub(super) const PULSE: std::ops::RangeInclusive<f64> = 800.0..=2200.0;
 
 /// State of one rule's parameter.
 #[derive(Clone, Copy, Debug)]
@@ -75,8 +75,12 @@ impl Parameters {
         names
     }
 
-    /// Stores a reported value. Parameters outside the rules are ignored.
+    /// Stores a reported value. Parameters outside the rules are ignored. A value that is not finite is ignored as well:
+    /// the last finite value stays, or the parameter stays unread.
     pub(super) fn take(&mut self, name: &str, value: f64) {
+        if !value.is_finite() {
+            return;
+        }
         for entry in &mut self.entries {
             if let Some(at) = entry.rule.names.iter().position(|known| *known == name) {
                 entry.value = Some((at, value));
@@ -114,8 +118,26 @@ impl Parameters {
             .into_iter()
             .filter(|(_, standing, _)| matches!(standing, Standing::Bad(_) | Standing::Unknown))
             .map(|(.., words)| words)
+            .chain((1..=3).filter_map(|number| self.disorder(number)))
             .collect();
         (!bad.is_empty()).then(|| bad.join("; "))
+    }
+
+    /// Text about a channel whose RCn_MIN, RCn_TRIM and RCn_MAX are each valid, but not in this order; `None` for a
+    /// channel in order, or one without these parameters. The trim of the throttle channel is not read.
+    fn disorder(&self, number: usize) -> Option<String> {
+        let read =
+            |name: &str| self.get(&format!("RC{number}_{name}")).filter(|x| PULSE.contains(x));
+        let (low, high) = (read("MIN")?, read("MAX")?);
+        let trim = read("TRIM").unwrap_or(low);
+        if low < high && (low..=high).contains(&trim) {
+            return None;
+        }
+        let named = read("TRIM").map_or(String::new(), |trim| format!(", RC{number}_TRIM {trim}"));
+        Some(format!(
+            "RC{number}_MIN {low}{named}, RC{number}_MAX {high} are not in ascending order: \
+             calibrate channel {number} again"
+        ))
     }
 }
 
@@ -280,5 +302,32 @@ mod tests {
         let parameters = answered(|name| (name == "RC_OPTIONS").then_some(42.0));
         let words = parameters.obstacle(1, false).unwrap();
         assert!(words.contains("RC_OPTIONS is 42: set it to 40"), "{words}");
+    }
+
+    #[test]
+    fn a_value_that_is_no_number_is_not_stored() {
+        let mut parameters = Parameters::new(Stack::Px4.rules(Authority::Attitude));
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            parameters.take("COM_OF_LOSS_T", value);
+            assert_eq!(parameters.get("COM_OF_LOSS_T"), None, "{value} while nothing is known");
+        }
+        parameters.take("COM_OF_LOSS_T", 0.25);
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            parameters.take("COM_OF_LOSS_T", value);
+            assert_eq!(parameters.get("COM_OF_LOSS_T"), Some(0.25), "{value}");
+        }
+    }
+
+    #[test]
+    fn a_channel_whose_ends_are_in_the_wrong_order_is_an_obstacle() {
+        for (changed, pulse, words) in [
+            ("RC1_MIN", 2000.0, "RC1_MIN 2000, RC1_TRIM 1500, RC1_MAX 1900 are not in ascending"),
+            ("RC2_TRIM", 2000.0, "RC2_MIN 1100, RC2_TRIM 2000, RC2_MAX 1900 are not in ascending"),
+            ("RC3_MAX", 1100.0, "RC3_MIN 1100, RC3_MAX 1100 are not in ascending"),
+        ] {
+            let parameters = answered(|name| (name == changed).then_some(pulse));
+            let said = parameters.obstacle(1, false).unwrap_or_default();
+            assert!(said.contains(words), "{said}");
+        }
     }
 }
