@@ -4,6 +4,8 @@
 //! "Adaptive Control", 2nd ed., 1995, section 2.2) on ω̇ = g u − a ω − m α̂. Both sides are differentiated and pass the
 //! same low-pass filters. The differentiation removes constant and slow influences (trim, wind, asymmetry).
 
+use greylag_model::STEP;
+
 /// Corner frequency of the low-pass filters on both sides of the regression, rad/s.
 const CORNER: f64 = 20.0;
 /// Corner frequencies of two first-order lags that approximate an unknown servo and an unknown delay, rad/s.
@@ -18,27 +20,17 @@ const AGEING: f64 = 1e-3;
 
 /// Prior of control power, damping and stiffness of an axis, in units of (g/V)², g/V and (g/V)² at the cruise airspeed V.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Prior {
+pub(super) struct Prior {
     pub mean: [f64; 3],
     pub sd: [f64; 3],
     /// Lower limit of the control power, (g/V)².
     pub least: f64,
 }
 
-/// Meaning of [`Seen::command`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Input {
-    /// The commanded deflection. The regression adds the lags of an assumed servo and delay.
-    Command,
-    /// The measured deflection.
-    Deflection,
-}
-
 /// The running estimate of one axis, roll or pitch.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Estimate {
+pub(super) struct Estimate {
     prior: Prior,
-    input: Input,
     /// Power, damping, stiffness, in the prior's units.
     pub theta: [f64; 3],
     covariance: [[f64; 3]; 3],
@@ -48,10 +40,10 @@ pub(crate) struct Estimate {
 
 /// Measurements of one axis at one instant.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
+pub(super) struct Seen {
     /// Body rate, rad/s.
     pub rate: f64,
-    /// Command in force or measured deflection over full travel, −1..1, positive for positive rates.
+    /// Command in force, −1..1, positive for positive rates.
     pub command: f64,
     /// Estimate of the axis's incidence angle, rad. Zero for an axis without stiffness.
     pub incidence: f64,
@@ -59,55 +51,42 @@ pub(crate) struct Seen {
     pub speed: f64,
     /// V/g at cruise, s.
     pub time: f64,
-    /// Time since the previous instant, s.
-    pub step: f64,
 }
 
 impl Estimate {
-    pub(crate) fn new(prior: Prior, input: Input) -> Estimate {
+    pub(super) fn new(prior: Prior) -> Estimate {
         let mut covariance = [[0.0; 3]; 3];
         (0..3).for_each(|k| covariance[k][k] = prior.sd[k] * prior.sd[k]);
-        Estimate { prior, input, theta: prior.mean, covariance, servo: [0.0; 2], filters: None }
-    }
-
-    /// Restarts the filters; the estimates remain.
-    pub(crate) fn interrupt(&mut self) {
-        self.filters = None;
-    }
-
-    /// Ratio of the standard deviation of parameter `k` (power, damping, stiffness) to that of its prior.
-    pub(crate) fn narrowed(&self, k: usize) -> f64 {
-        self.covariance[k][k].sqrt() / self.prior.sd[k]
+        Estimate { prior, theta: prior.mean, covariance, servo: [0.0; 2], filters: None }
     }
 
     /// Updates the estimate with the measurements of one instant. Measurements that contain a NaN or an infinity are ignored.
-    pub(crate) fn see(&mut self, seen: &Seen) {
-        let Seen { rate, command, incidence, speed, time, step } = *seen;
+    pub(super) fn see(&mut self, seen: &Seen) {
+        let Seen { rate, command, incidence, speed, time } = *seen;
         if ![rate, command, incidence, speed].iter().all(|x| x.is_finite()) {
             return;
         }
         let [first, second] = &mut self.servo;
-        *first += step * SERVO[0] * (command - *first);
-        *second += step * SERVO[1] * (*first - *second);
-        let deflection = if self.input == Input::Command { *second } else { command };
+        *first += STEP * SERVO[0] * (command - *first);
+        *second += STEP * SERVO[1] * (*first - *second);
         let square = speed * speed;
-        let raw = [rate, deflection * square, rate * speed, incidence * square];
+        let raw = [rate, *second * square, rate * speed, incidence * square];
         let [low, slope] = self.filters.get_or_insert([raw, [0.0; 4]]);
         let mut bend = 0.0;
         for k in 0..4 {
-            low[k] += step * CORNER * (raw[k] - low[k]);
+            low[k] += STEP * CORNER * (raw[k] - low[k]);
             let steep = CORNER * (raw[k] - low[k]);
-            slope[k] += step * CORNER * (steep - slope[k]);
+            slope[k] += STEP * CORNER * (steep - slope[k]);
             if k == 0 {
                 bend = CORNER * (steep - slope[k]);
             }
         }
         let x = [slope[1], -slope[2] * time, -slope[3]];
-        self.learn(x, bend * time * time, NOISE * time, step);
+        self.learn(x, bend * time * time, NOISE * time);
     }
 
-    /// One step of the least squares, `step` seconds after the previous one: `y` = θ·x with an error of `noise`.
-    fn learn(&mut self, x: [f64; 3], y: f64, noise: f64, step: f64) {
+    /// One step of the least squares: `y` = θ·x with an error of `noise`.
+    fn learn(&mut self, x: [f64; 3], y: f64, noise: f64) {
         let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let spread: [f64; 3] = std::array::from_fn(|k| dot(&self.covariance[k], &x));
         let variance = dot(&x, &spread) + noise * noise + (SHARE * y).powi(2);
@@ -119,7 +98,7 @@ impl Estimate {
             }
             let before = self.prior.sd[i] * self.prior.sd[i];
             if self.covariance[i][i] < before {
-                self.covariance[i][i] += AGEING * step * before;
+                self.covariance[i][i] += AGEING * STEP * before;
             }
         }
         self.theta[0] = self.theta[0].max(self.prior.least);
@@ -129,16 +108,15 @@ impl Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use greylag_model::STEP;
 
     /// Power, in units of (g/V)², that is estimated for ω̇ = g u − a ω with V/g = 2 s after five seconds of a square wave.
     fn found(power: f64, damping: f64) -> f64 {
         let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
-        let mut estimate = Estimate::new(prior, Input::Command);
+        let mut estimate = Estimate::new(prior);
         let (time, mut rate, mut servo) = (2.0, 0.0, [0.0; 2]);
         for k in 0..500 {
             let command = if k / 40 % 2 == 0 { 0.1 } else { -0.1 };
-            estimate.see(&Seen { rate, command, incidence: 0.0, speed: 1.0, time, step: STEP });
+            estimate.see(&Seen { rate, command, incidence: 0.0, speed: 1.0, time });
             servo[0] += STEP * SERVO[0] * (command - servo[0]);
             servo[1] += STEP * SERVO[1] * (servo[0] - servo[1]);
             rate += STEP * (power * servo[1] - damping * rate);
@@ -159,16 +137,9 @@ mod tests {
     #[test]
     fn what_is_no_number_is_left_out() {
         let prior = Prior { mean: [400.0, 15.0, 0.0], sd: [250.0, 10.0, 1e-6], least: 25.0 };
-        let mut estimate = Estimate::new(prior, Input::Command);
-        let seen = Seen {
-            rate: f64::NAN,
-            command: 0.0,
-            incidence: 0.0,
-            speed: 1.0,
-            time: 2.0,
-            step: STEP,
-        };
+        let mut estimate = Estimate::new(prior);
+        let seen = Seen { rate: f64::NAN, command: 0.0, incidence: 0.0, speed: 1.0, time: 2.0 };
         estimate.see(&seen);
-        assert_eq!(estimate, Estimate::new(prior, Input::Command));
+        assert_eq!(estimate, Estimate::new(prior));
     }
 }

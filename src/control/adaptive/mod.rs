@@ -5,8 +5,10 @@
 //! and light aircraft. The priors are medians of a distribution of aircraft (`greylag aircraft draw`), except the mean of the
 //! roll power. The gains were tuned on aircraft drawn from this distribution, see `docs/validation/any-aircraft.md`.
 
-use crate::aircraft_estimate::axis::{Estimate, Input, Prior, Seen};
+mod estimate;
+
 use crate::{Controller, Observation, Target};
+use estimate::{Estimate, Prior, Seen};
 use greylag_model::STEP;
 use greylag_physics::atmosphere::STANDARD_GRAVITY;
 use greylag_physics::{Airframe, Command};
@@ -43,6 +45,22 @@ const NOSE_DOWN: f64 = 0.15;
 const YAW_DAMPING: f64 = 0.25;
 const RUDDER_MOST: f64 = 0.5;
 
+/// Estimate of the aircraft at its cruise airspeed. The control powers are effective values over about a tenth of a second. A
+/// slow servo or a delay reduces them below the aerodynamic values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belief {
+    /// Roll acceleration at full aileron, rad/s².
+    pub roll_power: f64,
+    /// Decay of the roll rate, 1/s.
+    pub roll_damping: f64,
+    /// Pitch acceleration at full elevator, rad/s².
+    pub pitch_power: f64,
+    /// Decay of the pitch rate at a constant incidence, 1/s.
+    pub pitch_damping: f64,
+    /// Nose-down pitch acceleration per angle of attack, 1/s².
+    pub pitch_stiffness: f64,
+}
+
 /// One axis: its estimate and the integral of its loop.
 #[derive(Clone, Debug)]
 struct Axis {
@@ -52,7 +70,7 @@ struct Axis {
 
 impl Axis {
     fn new(prior: Prior) -> Axis {
-        Axis { estimate: Estimate::new(prior, Input::Command), integral: 0.0 }
+        Axis { estimate: Estimate::new(prior), integral: 0.0 }
     }
 
     /// The command (−1..1) that drives `rate` to `wanted` (rad/s). `feed` maps damping (1/s) and stiffness (1/s²) to the
@@ -102,6 +120,19 @@ impl Adaptive {
             axes: [ROLL, PITCH].map(Axis::new),
             incidence: 0.0,
             thrust: 0.0,
+        }
+    }
+
+    /// The present estimate of the aircraft.
+    pub fn belief(&self) -> Belief {
+        let time = self.cruise / STANDARD_GRAVITY;
+        let [roll, pitch] = [0, 1].map(|k| self.axes[k].estimate.theta);
+        Belief {
+            roll_power: roll[0] / (time * time),
+            roll_damping: roll[1] / time,
+            pitch_power: pitch[0] / (time * time),
+            pitch_damping: pitch[1] / time,
+            pitch_stiffness: pitch[2] / (time * time),
         }
     }
 
@@ -174,7 +205,6 @@ impl Controller for Adaptive {
             incidence,
             speed,
             time,
-            step: STEP,
         };
         self.axes[0].estimate.see(&seen_of(state.p, before.aileron, 0.0));
         self.axes[1].estimate.see(&seen_of(state.q, -before.elevator, self.incidence));
