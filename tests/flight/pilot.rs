@@ -270,6 +270,15 @@ fn disarming_in_the_air_needs_force() {
 }
 
 #[test]
+fn disarming_without_an_airspeed_is_refused_without_naming_one() {
+    let mut flight = Flight::new();
+    assert_eq!(flight.pilot.arm(flight.now, true), Verdict::Accepted);
+    let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else { panic!() };
+    assert!(words.contains("airspeed unknown") && !words.contains("NaN"), "{words}");
+    assert_eq!(flight.pilot.disarm(flight.now, true), Verdict::Accepted);
+}
+
+#[test]
 fn return_is_refused_by_name() {
     let mut flight = Flight::armed();
     let Verdict::Denied(words) = flight.pilot.set_mode(flight.now, Mode::Return) else { panic!() };
