@@ -735,6 +735,12 @@ fn a_companion_with_our_ids_and_a_second_autopilot_are_intruders_and_others_are_
     assert_eq!(complaints(&mut played, "a second autopilot (system 2, component 1)"), 1);
     (0..3).for_each(|_| played.says_from(3, 1, &second));
     assert_eq!(complaints(&mut played, "a second autopilot (system 3, component 1)"), 1);
+    // Both go on beating in turn.
+    for _ in 0..3 {
+        played.says_from(2, 1, &second);
+        played.says_from(3, 1, &second);
+    }
+    assert_eq!(complaints(&mut played, "a second autopilot"), 2);
     assert_eq!(played.real.system(), Some(1));
 }
 

@@ -168,7 +168,8 @@ impl Real {
     }
 
     fn intrude(&mut self, from: Source, what: &str) {
-        if self.intruder.replace(from) != Some(from) {
+        if !self.intruders.contains(&from) {
+            self.intruders.push(from);
             let words = format!(
                 "{what} (system {}, component {}) is on the vehicle's link: disconnect it or change its ids",
                 from.system, from.component
