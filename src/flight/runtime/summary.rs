@@ -117,6 +117,9 @@ impl fmt::Display for Summary {
                 "\nsignatures: {} made, {} right; refused: {} frames without one, {} false, {} used before",
                 s.signed, s.believed, s.unsigned, s.forged, s.replayed
             )?;
+            if s.unsignable > 0 {
+                write!(f, "; not sent: {} MAVLink 1 frames, which cannot be signed", s.unsignable)?;
+            }
         }
         if let Some((folder, w)) = &self.recording {
             write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
@@ -125,5 +128,28 @@ impl fmt::Display for Summary {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_were_not_sent_for_want_of_a_signature_are_counted() {
+        let text = |unsignable| {
+            let summary = Summary {
+                duration_s: 1.0,
+                vehicle: VehicleCounts::default(),
+                clients: ClientCounts::default(),
+                signing: Some(SigningCounts { unsignable, ..SigningCounts::default() }),
+                timing: Timing::default(),
+                derivatives: [f64::NAN; 5],
+                recording: None,
+            };
+            summary.to_string()
+        };
+        assert!(text(3).contains("not sent: 3 MAVLink 1 frames"), "{}", text(3));
+        assert!(!text(0).contains("not sent"), "{}", text(0));
     }
 }
