@@ -62,6 +62,20 @@ impl Summary {
             false => writeln!(f, "estimated in flight, at cruise airspeed: {}", known.join(", ")),
         }
     }
+
+    /// One line with the signing counters; none without signing.
+    fn write_signatures(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(s) = &self.signing else { return Ok(()) };
+        write!(
+            f,
+            "\nsignatures: {} made, {} right; refused: {} frames without one, {} false, {} used before",
+            s.signed, s.believed, s.unsigned, s.forged, s.replayed
+        )?;
+        match s.unsignable {
+            0 => Ok(()),
+            n => write!(f, "; not sent: {n} MAVLink 1 frames, which cannot be signed"),
+        }
+    }
 }
 
 impl fmt::Display for Summary {
@@ -111,16 +125,7 @@ impl fmt::Display for Summary {
             c.refused_setpoints,
             c.for_others
         )?;
-        if let Some(s) = &self.signing {
-            write!(
-                f,
-                "\nsignatures: {} made, {} right; refused: {} frames without one, {} false, {} used before",
-                s.signed, s.believed, s.unsigned, s.forged, s.replayed
-            )?;
-            if s.unsignable > 0 {
-                write!(f, "; not sent: {} MAVLink 1 frames, which cannot be signed", s.unsignable)?;
-            }
-        }
+        self.write_signatures(f)?;
         if let Some((folder, w)) = &self.recording {
             write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
             if w.dropped > 0 {
