@@ -94,8 +94,8 @@ impl Limits {
         }
     }
 
-    /// `wanted`, limited to its range and to a change of one slew step from `last`. An actuator whose command is NaN keeps
-    /// its last command: every later step from NaN would panic in the clamp.
+    /// `wanted`, limited to its range and to a change of one slew step from `last`. An actuator whose command is NaN
+    /// keeps its last command: every later step from NaN would panic in the clamp.
     pub fn slew(&self, last: Command, wanted: Command) -> Command {
         let wanted = wanted.clamped();
         let near = |from: f64, to: f64, step: f64| {

@@ -95,7 +95,8 @@ impl Recorder {
         self.queue.hand_over(Entry::Row(Box::new(row)));
     }
 
-    /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970).
+    /// Records one datagram, or complete frames of a stream, sent or received at `unix_us` (µs since 1970). Frames of
+    /// messages outside the dialect are left out.
     pub fn bytes(&self, unix_us: u64, bytes: &[u8]) {
         self.queue.hand_over(Entry::Bytes { unix_us, bytes: bytes.into() });
     }

@@ -32,7 +32,7 @@ pub struct Summary {
 
 impl Summary {
     /// Writes `summary.txt` into the recording's folder. An existing file is not overwritten. Errors are ignored,
-    /// because a failing disk has been reported already.
+    /// because the caller has the same text.
     pub(super) fn save(&self) {
         if let Some((folder, _)) = &self.recording
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))
