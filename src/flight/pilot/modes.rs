@@ -105,7 +105,9 @@ impl Autopilot for Pilot {
         let landed = airspeed <= self.config.disarm_airspeed_max_mps;
         if self.armed && !force && !landed {
             return rejected(match airspeed.is_nan() {
-                true => "disarming refused: airspeed unknown, so it may be flying: force it".to_owned(),
+                true => {
+                    "disarming refused: airspeed unknown, so it may be flying: force it".to_owned()
+                }
                 false => format!("disarming refused: flying at {airspeed:.1} m/s"),
             });
         }
