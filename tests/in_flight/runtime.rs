@@ -1,14 +1,15 @@
 //! The whole companion over real sockets: a scripted vehicle on one side, clients on the other.
 
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpStream, UdpSocket};
 use std::time::Duration;
 
 use crate::flight_support::*;
 use crate::real_time;
 use greylag::control::{Controller, ControllerKind, Observation, Target};
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Pace, Placement};
+use greylag::flight::runtime::{Event, Pace, Placement, Signing, VehicleLink};
+use greylag::link::signing::Key;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::physics::Command;
 use mavlink::dialects::ardupilotmega::*;
@@ -264,6 +265,26 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     assert!(text.matches(",OFFBOARD,1,late,0,").count() > 300);
     // The tlog holds both sides' traffic: at least a state frame's five messages with its answer.
     assert!(written.frames >= 6 * written.rows, "{written:?}");
+}
+
+#[test]
+fn unsigned_frames_of_a_vehicle_on_a_signed_link_are_reported_without_a_client() {
+    let root = tempfile::tempdir().unwrap();
+    let key = root.path().join("key");
+    Key::from_bytes([7; 32]).save(&key).unwrap();
+    let mut options = options(Pace::RealTime);
+    options.signing = Some(Signing { key, vehicle: VehicleLink::Signed, local: vec![] });
+    let companion = Companion::start(&options);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let heartbeat = frame(1, 200, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    socket.send_to(&heartbeat, companion.vehicle()).unwrap();
+    let events = companion.flight.as_ref().unwrap().events.clone();
+    // Without the report the only event is that of a missing vehicle, after 2 s.
+    let reported = std::iter::from_fn(|| events.recv_timeout(2 * PATIENCE).ok())
+        .take(5)
+        .any(|event| matches!(event, Event::Text(text) if text.words.contains("signature")));
+    assert!(reported);
+    companion.end();
 }
 
 real_time::tests!(

@@ -64,6 +64,7 @@ impl Control {
         let packet = match arrival {
             Arrival::Packet(mut packet) => {
                 self.ports.sift(unix_us(), &mut packet);
+                self.report_refusals();
                 packet
             }
             Arrival::Remark(remark) => {
