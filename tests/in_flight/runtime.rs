@@ -287,6 +287,46 @@ fn unsigned_frames_of_a_vehicle_on_a_signed_link_are_reported_without_a_client()
     companion.end();
 }
 
+/// A state frame of the vehicle at `time_usec`, in level flight.
+fn state_frame(time_usec: u64) -> Vec<u8> {
+    let mut actuators = ACTUATOR_OUTPUT_STATUS_DATA { time_usec, active: 5, ..Default::default() };
+    actuators.actuator[2] = 0.2;
+    let attitude = ATTITUDE_QUATERNION_DATA {
+        time_boot_ms: (time_usec / 1000) as u32,
+        q1: 1.0,
+        rollspeed: time_usec as f32 * 1e-9,
+        ..Default::default()
+    };
+    let messages = [
+        MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA { time_usec, zacc: -9.8, ..Default::default() }),
+        MavMessage::VFR_HUD(VFR_HUD_DATA { airspeed: 20.0, alt: 600.0, ..Default::default() }),
+        MavMessage::AOA_SSA(AOA_SSA_DATA { time_usec, ..Default::default() }),
+        MavMessage::ACTUATOR_OUTPUT_STATUS(actuators),
+        MavMessage::ATTITUDE_QUATERNION(attitude),
+    ];
+    messages.iter().flat_map(|message| frame(1, 200, message)).collect()
+}
+
+#[test]
+fn of_many_states_in_one_datagram_the_newest_is_answered() {
+    let companion = Companion::start(&options(Pace::RealTime));
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    let states: Vec<u8> = (1..=12).flat_map(|k| state_frame(10_000 * k)).collect();
+    socket.send_to(&states, companion.vehicle()).unwrap();
+    let answered = std::iter::from_fn(|| {
+        let mut bytes = [0; 2048];
+        let (len, _) = socket.recv_from(&mut bytes).ok()?;
+        Some(messages(&bytes[..len]))
+    });
+    let time = answered.flatten().find_map(|message| match message {
+        MavMessage::HIL_ACTUATOR_CONTROLS(m) => Some(m.time_usec),
+        _ => None,
+    });
+    assert_eq!(time, Some(120_000));
+    companion.end();
+}
+
 real_time::tests!(
     an_attitude_is_flown_and_setpoint_loss_ends_level_in_hold,
     a_lost_vehicle_is_told_and_flown_in_hold_when_it_is_back,
