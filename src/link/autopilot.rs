@@ -70,7 +70,7 @@ pub enum Severity {
 pub struct Text {
     /// Severity of the line.
     pub severity: Severity,
-    /// The text, of any length. It is sent in chunks of 50 characters.
+    /// The text. Its first 400 characters are sent, in chunks of 50 characters.
     pub words: String,
 }
 

@@ -261,12 +261,40 @@ fn an_airspeed_that_is_late_is_not_called_wrong_and_a_short_gap_is_not_said() {
 }
 
 #[test]
+fn an_airspeed_that_stays_late_after_a_restart_of_the_clock_is_said() {
+    let mut flight = Flight::armed();
+    let mut late = |from_us: u64| {
+        flight.now = Time::from_micros(from_us);
+        for _ in 0..70 {
+            flight.now = flight.now.plus(TICK);
+            let mut seen = frame(flight.now);
+            seen.faults.insert(Faults::LATE_AIR);
+            flight.tick_with(seen);
+        }
+        flight.texts()
+    };
+    for from_us in [60_000_000, 0] {
+        let said = late(from_us);
+        assert!(said.contains("airspeed and altitude are late"), "{from_us}: {said}");
+    }
+}
+
+#[test]
 fn disarming_in_the_air_needs_force() {
     let mut flight = Flight::armed();
     let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else { panic!() };
     assert!(words.contains("20.0 m/s"), "{words}");
     assert_eq!(flight.pilot.disarm(flight.now, true), Verdict::Accepted);
     assert_eq!(flight.tick().command, Command::IDLE);
+}
+
+#[test]
+fn disarming_without_an_airspeed_is_refused_without_naming_one() {
+    let mut flight = Flight::new();
+    assert_eq!(flight.pilot.arm(flight.now, true), Verdict::Accepted);
+    let Verdict::Rejected(words) = flight.pilot.disarm(flight.now, false) else { panic!() };
+    assert!(words.contains("airspeed unknown") && !words.contains("NaN"), "{words}");
+    assert_eq!(flight.pilot.disarm(flight.now, true), Verdict::Accepted);
 }
 
 #[test]

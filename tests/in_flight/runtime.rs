@@ -1,14 +1,15 @@
 //! The whole companion over real sockets: a scripted vehicle on one side, clients on the other.
 
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpStream, UdpSocket};
 use std::time::Duration;
 
 use crate::flight_support::*;
 use crate::real_time;
 use greylag::control::{Controller, ControllerKind, Observation, Target};
 use greylag::flight::recorder::Place;
-use greylag::flight::runtime::{Pace, Placement};
+use greylag::flight::runtime::{Event, Pace, Placement, Signing, VehicleLink};
+use greylag::link::signing::Key;
 use greylag::logs::csv::{self, Tolerance};
 use greylag::physics::Command;
 use mavlink::dialects::ardupilotmega::*;
@@ -264,6 +265,66 @@ fn a_planner_that_is_always_late_leaves_the_fallback_flying_and_is_recorded() {
     assert!(text.matches(",OFFBOARD,1,late,0,").count() > 300);
     // The tlog holds both sides' traffic: at least a state frame's five messages with its answer.
     assert!(written.frames >= 6 * written.rows, "{written:?}");
+}
+
+#[test]
+fn unsigned_frames_of_a_vehicle_on_a_signed_link_are_reported_without_a_client() {
+    let root = tempfile::tempdir().unwrap();
+    let key = root.path().join("key");
+    Key::from_bytes([7; 32]).save(&key).unwrap();
+    let mut options = options(Pace::RealTime);
+    options.signing = Some(Signing { key, vehicle: VehicleLink::Signed, local: vec![] });
+    let companion = Companion::start(&options);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let heartbeat = frame(1, 200, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    socket.send_to(&heartbeat, companion.vehicle()).unwrap();
+    let events = companion.flight.as_ref().unwrap().events.clone();
+    // Without the report the only event is that of a missing vehicle, after 2 s.
+    let reported = std::iter::from_fn(|| events.recv_timeout(2 * PATIENCE).ok())
+        .take(5)
+        .any(|event| matches!(event, Event::Text(text) if text.words.contains("signature")));
+    assert!(reported);
+    companion.end();
+}
+
+/// A state frame of the vehicle at `time_usec`, in level flight.
+fn state_frame(time_usec: u64) -> Vec<u8> {
+    let mut actuators = ACTUATOR_OUTPUT_STATUS_DATA { time_usec, active: 5, ..Default::default() };
+    actuators.actuator[2] = 0.2;
+    let attitude = ATTITUDE_QUATERNION_DATA {
+        time_boot_ms: (time_usec / 1000) as u32,
+        q1: 1.0,
+        rollspeed: time_usec as f32 * 1e-9,
+        ..Default::default()
+    };
+    let messages = [
+        MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA { time_usec, zacc: -9.8, ..Default::default() }),
+        MavMessage::VFR_HUD(VFR_HUD_DATA { airspeed: 20.0, alt: 600.0, ..Default::default() }),
+        MavMessage::AOA_SSA(AOA_SSA_DATA { time_usec, ..Default::default() }),
+        MavMessage::ACTUATOR_OUTPUT_STATUS(actuators),
+        MavMessage::ATTITUDE_QUATERNION(attitude),
+    ];
+    messages.iter().flat_map(|message| frame(1, 200, message)).collect()
+}
+
+#[test]
+fn of_many_states_in_one_datagram_the_newest_is_answered() {
+    let companion = Companion::start(&options(Pace::RealTime));
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    let states: Vec<u8> = (1..=12).flat_map(|k| state_frame(10_000 * k)).collect();
+    socket.send_to(&states, companion.vehicle()).unwrap();
+    let answered = std::iter::from_fn(|| {
+        let mut bytes = [0; 2048];
+        let (len, _) = socket.recv_from(&mut bytes).ok()?;
+        Some(messages(&bytes[..len]))
+    });
+    let time = answered.flatten().find_map(|message| match message {
+        MavMessage::HIL_ACTUATOR_CONTROLS(m) => Some(m.time_usec),
+        _ => None,
+    });
+    assert_eq!(time, Some(120_000));
+    companion.end();
 }
 
 real_time::tests!(

@@ -474,6 +474,18 @@ fn streams_are_asked_for_at_the_first_frame_and_then_once_a_second() {
 }
 
 #[test]
+fn a_controller_that_sends_nothing_but_heartbeats_is_asked_once_a_second_too() {
+    let mut played = Played::new(Stack::Px4, Authority::Attitude);
+    played.every = u64::MAX;
+    played.heartbeat();
+    played.ms = 10;
+    played.run(2490);
+    let asked = played.commands(SET_MESSAGE_INTERVAL).into_iter();
+    let times: Vec<u64> = asked.filter(|(_, [id, _])| *id == 31.0).map(|(ms, _)| ms).collect();
+    assert_eq!(times, [10, 1010, 2010]);
+}
+
+#[test]
 fn a_stream_that_is_denied_is_an_obstacle_with_the_remedy() {
     let mut played = Played::new(Stack::Ardupilot, Authority::Attitude);
     played.heartbeat();
@@ -735,6 +747,12 @@ fn a_companion_with_our_ids_and_a_second_autopilot_are_intruders_and_others_are_
     assert_eq!(complaints(&mut played, "a second autopilot (system 2, component 1)"), 1);
     (0..3).for_each(|_| played.says_from(3, 1, &second));
     assert_eq!(complaints(&mut played, "a second autopilot (system 3, component 1)"), 1);
+    // Both go on beating in turn.
+    for _ in 0..3 {
+        played.says_from(2, 1, &second);
+        played.says_from(3, 1, &second);
+    }
+    assert_eq!(complaints(&mut played, "a second autopilot"), 2);
     assert_eq!(played.real.system(), Some(1));
 }
 

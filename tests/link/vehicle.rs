@@ -278,6 +278,15 @@ fn a_frame_that_comes_early_after_a_gap_tells_the_gap() {
 }
 
 #[test]
+fn a_clock_at_its_last_microsecond_is_a_gap_and_no_overflow() {
+    let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
+    let mut order = |us| take(&mut sitl, &Shown::at(us).bytes())[0].order;
+    assert_eq!(order(0), Order::First);
+    assert_eq!(order(u64::MAX), Order::Next { lost: u32::MAX });
+    assert_eq!(order(10_000), Order::First);
+}
+
+#[test]
 fn a_force_that_was_never_believed_is_that_of_level_flight() {
     let mut sitl = Sitl::new(1, Travels::alike(DEFLECTION));
     let mut shown = Shown::at(0);

@@ -118,7 +118,7 @@ impl Pilot {
         self.setpoint = None;
         self.sticks = None;
         self.vehicle_lost = false;
-        (self.loss_reported, self.vehicle_back) = (false, None);
+        (self.loss_reported, self.vehicle_back, self.air_late) = (false, None, None);
         self.complaints = Complaints::default();
         self.oscillation = Oscillation::default();
         self.oscillated = None;

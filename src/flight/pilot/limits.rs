@@ -94,10 +94,13 @@ impl Limits {
         }
     }
 
-    /// `wanted`, limited to its range and to a change of one slew step from `last`.
+    /// `wanted`, limited to its range and to a change of one slew step from `last`. An actuator whose command is NaN
+    /// keeps its last command: every later step from NaN would panic in the clamp.
     pub fn slew(&self, last: Command, wanted: Command) -> Command {
         let wanted = wanted.clamped();
-        let near = |from: f64, to: f64, step: f64| to.clamp(from - step, from + step);
+        let near = |from: f64, to: f64, step: f64| {
+            if to.is_nan() { from } else { to.clamp(from - step, from + step) }
+        };
         Command {
             aileron: near(last.aileron, wanted.aileron, self.surface_step),
             elevator: near(last.elevator, wanted.elevator, self.surface_step),
@@ -187,6 +190,17 @@ mod tests {
         assert!((now.aileron - 1.0).abs() < 1e-9 && (now.elevator + 1.0).abs() < 1e-9);
         // The throttle takes 20 ticks for full travel: 0.5 after ten.
         assert!((now.throttle - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_command_that_is_nan_keeps_the_last_one() {
+        let e = x8();
+        let last = Command { aileron: 0.1, elevator: -0.2, throttle: 0.3, rudder: 0.05 };
+        let nan = f64::NAN;
+        let none = Command { aileron: nan, elevator: nan, throttle: nan, rudder: nan };
+        assert_eq!(e.slew(last, none), last);
+        let one = e.slew(last, Command { elevator: nan, aileron: 0.2, ..last });
+        assert!((one.aileron - 0.2).abs() < 1e-12 && one.elevator == -0.2, "{one:?}");
     }
 
     #[test]

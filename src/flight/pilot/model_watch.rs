@@ -1,5 +1,5 @@
-//! The pilot's use of the model monitor, whose deviations are reported to the ground stations, and of the estimator of the
-//! aircraft.
+//! The model monitor and the estimator of the aircraft in the pilot. Deviations from the model are reported to the
+//! ground stations.
 
 use super::Pilot;
 use crate::monitor::Monitor;
@@ -18,8 +18,8 @@ impl Pilot {
         self.estimator = Some(estimator);
     }
 
-    /// Evaluates a state with known surface positions in the model monitor and in the estimator of the aircraft. To be called
-    /// after its command is sent: no command depends on the results.
+    /// Evaluates a state with known surface positions in the model monitor and in the estimator of the aircraft. To be
+    /// called after its command is sent: no command depends on the results.
     pub fn monitor(&mut self, frame: &Telemetry) {
         if !self.armed {
             return self.forget_residuals();

@@ -104,7 +104,12 @@ impl Autopilot for Pilot {
         let airspeed = self.airspeed();
         let landed = airspeed <= self.config.disarm_airspeed_max_mps;
         if self.armed && !force && !landed {
-            return rejected(format!("disarming refused: flying at {airspeed:.1} m/s"));
+            return rejected(match airspeed.is_nan() {
+                true => {
+                    "disarming refused: airspeed unknown, so it may be flying: force it".to_owned()
+                }
+                false => format!("disarming refused: flying at {airspeed:.1} m/s"),
+            });
         }
         if self.armed {
             self.texts.say(Severity::Notice, "disarmed");

@@ -106,6 +106,8 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
     let known = |fault: Faults, x: f64| {
         if state.faults.contains(fault) { f64::NAN } else { x }
     };
+    // airspeed and altitude have two faults: implausible, or stale
+    let in_air = |x: f64| known(Faults::LATE_AIR, known(Faults::AIR, x));
     // Without a rudder both values are zero. The rudder columns then stay empty.
     let rudder =
         if (z.rudder, c.rudder) == (0.0, 0.0) { [f64::NAN; 2] } else { [z.rudder, c.rudder] };
@@ -113,12 +115,12 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
         time_s: state.time.as_secs_f64(),
         attitude_rad: [s.roll, s.pitch, state.yaw].map(|x| known(Faults::ATTITUDE, x)),
         rates_radps: [s.p, s.q, s.r].map(|x| known(Faults::RATES, x)),
-        airspeed_mps: known(Faults::AIR, s.airspeed),
+        airspeed_mps: in_air(s.airspeed),
         alpha_rad: known(Faults::INCIDENCE, s.alpha),
         beta_rad: known(Faults::INCIDENCE, s.beta),
         specific_force_mps2: state.specific_force.map(|x| known(Faults::SPECIFIC_FORCE, x)),
         velocity_ned_mps: state.velocity,
-        altitude_m: known(Faults::AIR, state.altitude),
+        altitude_m: in_air(state.altitude),
         aileron_rad: known(Faults::ACTUATORS, z.aileron),
         elevator_rad: known(Faults::ACTUATORS, z.elevator),
         throttle: known(Faults::ACTUATORS, z.throttle),
@@ -131,5 +133,54 @@ fn sample(state: &Telemetry, decision: &Decision) -> Sample {
         pitch_target_rad: decision.target.pitch,
         rate_hold_s: state.rate_hold_s,
         ..Sample::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pilot::Source;
+    use greylag_control::Target;
+    use greylag_link::autopilot::Mode;
+    use greylag_link::vehicle::{Order, VANE_SD};
+    use greylag_physics::{ActuatorState, Command, State, Time};
+
+    /// Airspeed (m/s) and altitude (m) in the row of a state with `faults`.
+    fn recorded(faults: Faults) -> [f64; 2] {
+        let state = Telemetry {
+            time: Time::default(),
+            order: Order::First,
+            faults,
+            state: State { airspeed: 20.0, ..State::NEUTRAL },
+            incidence_sd: VANE_SD,
+            yaw: 0.0,
+            rate_hold_s: 0.0,
+            specific_force: [0.0, 0.0, -9.81],
+            actuators: ActuatorState::default(),
+            altitude: 600.0,
+            position: [f64::NAN; 2],
+            velocity: [f64::NAN; 3],
+            wind: [f64::NAN; 3],
+        };
+        let decision = Decision {
+            time: Time::default(),
+            command: Command::IDLE,
+            source: Source::Disarmed,
+            armed: false,
+            mode: Mode::Hold,
+            target: Target { roll: f64::NAN, pitch: f64::NAN, airspeed: 20.0 },
+            failsafe: false,
+            refused: None,
+        };
+        let sample = Row::new(&state, &decision, 0.0).sample;
+        [sample.airspeed_mps, sample.altitude_m]
+    }
+
+    #[test]
+    fn airspeed_and_altitude_that_are_stale_or_implausible_are_omitted() {
+        assert_eq!(recorded(Faults::NONE), [20.0, 600.0]);
+        for fault in [Faults::LATE_AIR, Faults::AIR] {
+            assert!(recorded(fault).iter().all(|x| x.is_nan()), "{fault}");
+        }
     }
 }

@@ -142,6 +142,32 @@ mod tests {
         assert_eq!(bench.in_time(false), ready(0.2, 0.1 + 0.1 + 0.1));
     }
 
+    /// A controller that panics at its first command.
+    #[derive(Clone)]
+    struct Failing;
+
+    impl Controller for Failing {
+        fn boxed_clone(&self) -> Box<dyn Controller> {
+            Box::new(self.clone())
+        }
+        fn name(&self) -> &'static str {
+            "failing"
+        }
+        fn reset(&mut self, _seed: u64) {}
+        fn command(&mut self, _: &Observation, _: &Target) -> Command {
+            panic!("the test's own panic")
+        }
+    }
+
+    #[test]
+    fn a_planner_whose_controller_has_panicked_is_not_called_busy() {
+        let failing = Box::new(Failing);
+        let mut planner = Threaded::start(failing, Duration::ZERO, Pace::Lockstep).unwrap();
+        for _ in 0..3 {
+            assert_eq!(planner.plan(&any_request(false), Instant::now()), Plan::None);
+        }
+    }
+
     #[test]
     fn in_lockstep_the_plan_is_waited_for() {
         let mut bench = Bench::new(Pace::Lockstep, &[true]);

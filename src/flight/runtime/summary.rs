@@ -32,7 +32,7 @@ pub struct Summary {
 
 impl Summary {
     /// Writes `summary.txt` into the recording's folder. An existing file is not overwritten. Errors are ignored,
-    /// because a failing disk has been reported already.
+    /// because the caller has the same text.
     pub(super) fn save(&self) {
         if let Some((folder, _)) = &self.recording
             && let Ok(mut file) = File::create_new(folder.join("summary.txt"))
@@ -60,6 +60,20 @@ impl Summary {
         match known.is_empty() {
             true => Ok(()),
             false => writeln!(f, "estimated in flight, at cruise airspeed: {}", known.join(", ")),
+        }
+    }
+
+    /// One line with the signing counters; none without signing.
+    fn write_signatures(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(s) = &self.signing else { return Ok(()) };
+        write!(
+            f,
+            "\nsignatures: {} made, {} right; refused: {} frames without one, {} false, {} used before",
+            s.signed, s.believed, s.unsigned, s.forged, s.replayed
+        )?;
+        match s.unsignable {
+            0 => Ok(()),
+            n => write!(f, "; not sent: {n} MAVLink 1 frames, which cannot be signed"),
         }
     }
 }
@@ -111,13 +125,7 @@ impl fmt::Display for Summary {
             c.refused_setpoints,
             c.for_others
         )?;
-        if let Some(s) = &self.signing {
-            write!(
-                f,
-                "\nsignatures: {} made, {} right; refused: {} frames without one, {} false, {} used before",
-                s.signed, s.believed, s.unsigned, s.forged, s.replayed
-            )?;
-        }
+        self.write_signatures(f)?;
         if let Some((folder, w)) = &self.recording {
             write!(f, "\nrecorded {} rows, {} frames in {}", w.rows, w.frames, folder.display())?;
             if w.dropped > 0 {
@@ -125,5 +133,28 @@ impl fmt::Display for Summary {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_were_not_sent_for_want_of_a_signature_are_counted() {
+        let text = |unsignable| {
+            let summary = Summary {
+                duration_s: 1.0,
+                vehicle: VehicleCounts::default(),
+                clients: ClientCounts::default(),
+                signing: Some(SigningCounts { unsignable, ..SigningCounts::default() }),
+                timing: Timing::default(),
+                derivatives: [f64::NAN; 5],
+                recording: None,
+            };
+            summary.to_string()
+        };
+        assert!(text(3).contains("not sent: 3 MAVLink 1 frames"), "{}", text(3));
+        assert!(!text(0).contains("not sent"), "{}", text(0));
     }
 }

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::peer::PeerId;
 
-/// Silence after which another client may take control authority, equal to the timeout that ends OFFBOARD. A restarted
-/// client thus waits no longer than the aircraft.
+/// Silence after which another client may take control authority. It equals the default timeout that ends OFFBOARD: a
+/// restarted client has authority again when the aircraft changes to HOLD.
 const RELEASE: Duration = Duration::from_secs(1);
 
 /// Holder of control authority for one kind of setpoint. It prevents two simultaneous streams from alternating on the

@@ -1,7 +1,7 @@
 //! Checksum of MAVLink frames: CRC-16/MCRF4XX.
 //!
-//! A log of an hour has a million frames, and most of the time to separate them is that of their checksums: the tables of
-//! the crate `crc` take sixteen bytes at a time.
+//! A log of an hour has a million frames. Most of the time for parsing them is spent on their checksums. The tables of
+//! the crate `crc` process 16 bytes at a time.
 
 use crc::{CRC_16_MCRF4XX, Crc, Table};
 

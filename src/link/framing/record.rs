@@ -1,15 +1,15 @@
-//! One frame by itself, as a record of a log holds it.
+//! Check that the bytes of a log record are exactly one frame.
 
 use super::{Candidate, Frame, examine};
 
-/// Kind of bytes that should be one frame and nothing else.
+/// Classification of bytes that should be exactly one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Whole<'a> {
     /// A frame of the dialect with a valid CRC.
     Known(Frame<'a>),
     /// A plausible frame of a message outside the dialect, whose CRC cannot be checked.
     Unknown,
-    /// Bytes that are no frame, or that are not all of one.
+    /// Bytes that are not a frame, or not exactly one.
     Damaged,
 }
 

@@ -9,6 +9,8 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use super::STAMP_MAX;
+
 /// Interval between writes.
 const EVERY: Duration = Duration::from_secs(1);
 /// Range of timestamps that may have been used since the last write: 2 s, in units of 10 µs.
@@ -54,9 +56,11 @@ impl StampFile {
         let path = PathBuf::from(name);
         let failed = |why| StampError::File { path: path.clone(), why };
         let last = match fs::read_to_string(&path) {
-            Ok(text) => {
-                text.trim().parse().map_err(|_| StampError::Content { path: path.clone() })?
-            }
+            // no signature could be newer than the largest timestamp
+            Ok(text) => match text.trim().parse::<u64>() {
+                Ok(last) if last < STAMP_MAX - MARGIN => last,
+                _ => return Err(StampError::Content { path: path.clone() }),
+            },
             Err(why) if why.kind() == ErrorKind::NotFound => 0,
             Err(why) => return Err(failed(why)),
         };
@@ -129,8 +133,11 @@ mod tests {
     #[test]
     fn a_file_of_something_else_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("key.stamp"), "yesterday").unwrap();
-        let words = StampFile::open(&folder.path().join("key")).unwrap_err().to_string();
-        assert!(words.contains("does not hold a timestamp"), "{words}");
+        // A word, and numbers beyond the 48 bits of a timestamp.
+        for content in ["yesterday", "281474976710656", "18446744073709551615"] {
+            fs::write(folder.path().join("key.stamp"), content).unwrap();
+            let words = StampFile::open(&folder.path().join("key")).unwrap_err().to_string();
+            assert!(words.contains("does not hold a timestamp"), "{content}: {words}");
+        }
     }
 }

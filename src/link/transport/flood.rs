@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// Datagrams per second that are accepted from one sender. A flight controller that sends each message separately sends
 /// 500. A parameter list or a log at full speed takes 1000.
 const PER_SECOND: f64 = 4000.0;
-/// Burst in datagrams: as many as accumulate in a stall of this computer of some seconds.
+/// Burst in datagrams. A flight controller that sends 500 per second accumulates as many in a stall of 2 s.
 const BURST: f64 = 1000.0;
 /// Number of senders with a separate limit. All other senders share one limit.
 const SENDERS: usize = 64;

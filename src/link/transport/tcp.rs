@@ -25,7 +25,7 @@ const CHUNK: usize = 1024;
 const PARTIAL_FRAME_TIMEOUT: Duration = Duration::from_millis(100);
 /// Delay after a failed `accept`, for instance without free file descriptors.
 const ACCEPT_RETRY: Duration = Duration::from_millis(100);
-/// Time without an accepted byte after which a peer is disconnected.
+/// Longest time for writing a frame, after which the peer is disconnected, and for a connection attempt.
 const STALLED: Duration = Duration::from_secs(5);
 /// Interval between connection attempts. It doubles from the first value up to the second.
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));

@@ -66,8 +66,8 @@ struct Controller {
 pub struct Real {
     profile: Profile,
     controller: Option<Controller>,
-    /// Another autopilot on the link, or another companion with the ids of this companion.
-    intruder: Option<Source>,
+    /// Other autopilots on the link, and another companion with the ids of this companion. Each was reported once.
+    intruders: Vec<Source>,
     /// Another component of the controller's system (such as a gimbal or a camera) that sends heartbeats, with the time
     /// of the last one.
     sibling: Option<(Duration, Source)>,
@@ -108,7 +108,7 @@ impl Real {
         Real {
             profile,
             controller: None,
-            intruder: None,
+            intruders: Vec::new(),
             sibling: None,
             now: Duration::ZERO,
             parameters: Parameters::new(profile.stack.rules(profile.authority)),

@@ -266,7 +266,7 @@ impl Sitl {
                 Order::Repeated
             }
             std::cmp::Ordering::Greater => {
-                let periods = (now - before + PERIOD_US / 2) / PERIOD_US;
+                let periods = (now - before).saturating_add(PERIOD_US / 2) / PERIOD_US;
                 let lost = u32::try_from(periods.saturating_sub(1)).unwrap_or(u32::MAX);
                 self.counts.lost = self.counts.lost.saturating_add(lost.into());
                 self.counts.states += 1;

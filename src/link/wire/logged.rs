@@ -10,7 +10,8 @@ use super::{Frame, decode};
 pub enum Own {
     /// Milliseconds since the sender started, modulo 2³².
     BootMs(u32),
-    /// Microseconds since the sender started, or since 1970, depending on the sender.
+    /// Microseconds since the sender started, or since 1970, depending on the sender. Those of SERVO_OUTPUT_RAW are
+    /// modulo 2³².
     Micros(u64),
     /// The message has no timestamp.
     None,
@@ -105,7 +106,7 @@ const READ: [u32; 17] = [
 
 /// Decodes a frame; `None` for messages without the flight's states or commands.
 pub fn read(frame: &Frame<'_>) -> Option<Logged> {
-    // Most messages of a real log are others, and decoding costs more than everything else that is done with them.
+    // Most messages of a log are not used, and decoding is the most expensive step of reading. The id is checked first.
     READ.contains(&frame.id).then(|| decode(frame)).flatten().and_then(logged)
 }
 

@@ -211,6 +211,11 @@ fn centidegrees(degrees: f64) -> u16 {
     }
 }
 
+/// A speed (m/s) in cm/s; 65535 if it is unknown.
+fn centimetres_per_second(speed: f64) -> u16 {
+    if speed.is_finite() { (speed * 100.0) as u16 } else { u16::MAX }
+}
+
 fn gps_raw(status: &Status, scene: &Scene) -> MavMessage {
     let [north, east, _] = status.velocity;
     let unknown = GPS_RAW_INT_DATA {
@@ -230,7 +235,7 @@ fn gps_raw(status: &Status, scene: &Scene) -> MavMessage {
             lat: (latitude * 1e7).round() as i32,
             lon: (longitude * 1e7).round() as i32,
             alt: (status.altitude * 1e3).round() as i32,
-            vel: (north.hypot(east) * 100.0) as u16,
+            vel: centimetres_per_second(north.hypot(east)),
             cog: centidegrees(east.atan2(north).to_degrees()),
             ..unknown
         },
@@ -299,5 +304,17 @@ fn landed(status: &Status) -> MavLandedState {
         (_, true) => MavLandedState::MAV_LANDED_STATE_IN_AIR,
         (true, false) => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
         (false, false) => MavLandedState::MAV_LANDED_STATE_UNDEFINED,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_speed_or_an_angle_that_is_not_known_is_not_sent_as_zero() {
+        // UINT16_MAX of GPS_RAW_INT.vel and .cog
+        assert_eq!([17.256, 0.0, f64::NAN].map(centimetres_per_second), [1725, 0, 65535]);
+        assert_eq!([-90.0, f64::NAN].map(centidegrees), [27000, 65535]);
     }
 }

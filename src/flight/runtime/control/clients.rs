@@ -49,7 +49,7 @@ impl Control {
     }
 
     /// Reports once that frames were refused because their signature is missing or invalid.
-    fn report_refusals(&mut self) {
+    pub(super) fn report_refusals(&mut self) {
         let refused = self.ports.signing().map_or(0, |counts| counts.refused());
         if refused > 0 && !self.told_refusals {
             self.told_refusals = true;

@@ -14,7 +14,7 @@ use greylag_link::transport::Arrival;
 use greylag_link::vehicle::{Notice, Order, Telemetry};
 use greylag_physics::Time;
 
-/// Largest number of states from one packet. A TCP chunk of 1024 bytes holds four.
+/// Largest number of states from one packet. A TCP chunk of 1024 bytes holds four. Of more states the newest is kept.
 const STATES_PER_PACKET: usize = 8;
 
 /// A state with the peer and the arrival time of the packet that completed it.
@@ -64,6 +64,7 @@ impl Control {
         let packet = match arrival {
             Arrival::Packet(mut packet) => {
                 self.ports.sift(unix_us(), &mut packet);
+                self.report_refusals();
                 packet
             }
             Arrival::Remark(remark) => {
@@ -75,14 +76,15 @@ impl Control {
         self.record(packet.arrived, &packet.bytes);
         // The states are collected first, because the reply to each tick also uses `vehicle`.
         let mut states: [Option<Telemetry>; STATES_PER_PACKET] = [None; STATES_PER_PACKET];
-        let mut places = states.iter_mut();
+        let mut count = 0;
         self.vehicle.handle(
             packet.arrived.saturating_duration_since(self.started),
             packet.peer,
             &packet.bytes,
             |state| {
-                if let Some(place) = places.next() {
-                    *place = Some(state);
+                if state.order != Order::Late {
+                    states[count.min(STATES_PER_PACKET - 1)] = Some(state);
+                    count += 1;
                 }
             },
         );
@@ -95,7 +97,7 @@ impl Control {
             }
         }
         let mut newest = newest;
-        for state in states.into_iter().flatten().filter(|state| state.order != Order::Late) {
+        for state in states.into_iter().flatten() {
             let heard = Heard { state, peer: packet.peer, arrived: packet.arrived };
             match (newest.replace(heard), self.clock.pace()) {
                 (Some(_), Pace::RealTime) => self.timing.overtaken += 1,

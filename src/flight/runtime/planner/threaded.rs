@@ -59,9 +59,14 @@ impl Threaded {
         let Some(requests) = &self.requests else {
             return Plan::None;
         };
-        if requests.try_send((self.tick, Request { engage, ..*request })).is_err() {
-            self.owed = engage;
-            return Plan::Busy;
+        match requests.try_send((self.tick, Request { engage, ..*request })) {
+            Ok(()) => {}
+            // the controller's thread has ended; the fallback flies
+            Err(error) if error.is_disconnected() => return Plan::None,
+            Err(_) => {
+                self.owed = engage;
+                return Plan::Busy;
+            }
         }
         self.owed = false;
         self.wait(arrived)

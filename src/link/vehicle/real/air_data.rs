@@ -75,8 +75,8 @@ impl Default for AirData {
 }
 
 impl AirData {
-    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad; `None` below 3 m/s, or if the
-    /// measurement or the estimate is not finite. The estimate then restarts.
+    /// Updates with a measurement `step` seconds after the last one. Returns α and β, rad; `None` below 3 m/s, or if
+    /// the measurement or the estimate is not finite. The estimate then restarts.
     pub fn update(&mut self, m: &Measured, step: f64) -> Option<[f64; 2]> {
         let needed =
             m.attitude.iter().chain(&m.rates).chain(&m.specific_force).chain([&m.airspeed]);

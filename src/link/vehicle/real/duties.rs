@@ -90,7 +90,7 @@ impl Real {
 
     /// Requests streams and parameters, and measures the latency.
     fn ask(&mut self, host: Duration, to: Source, bytes: &mut Vec<u8>) {
-        let first = self.survey.windows() == 0 && self.survey.messages().count() <= 1;
+        let first = self.survey.is_new() && self.survey.messages().count() <= 1;
         if self.survey.turn(host) || first {
             self.requests.turn();
             if let Some(words) = self.requests.complaint(self.profile.stack) {

@@ -71,7 +71,7 @@ impl Real {
             }
             ControllerMessage::TimeSync { ours } => {
                 let sent = u64::try_from(ours).ok().map(Duration::from_nanos);
-                // a reply to another program has the time of its clock
+                // a reply to another program contains the time of that program's clock
                 let trip = sent.and_then(|sent| host.checked_sub(sent));
                 if let Some(trip) = trip.filter(|trip| *trip <= GONE) {
                     self.survey.trip(trip);
@@ -168,7 +168,8 @@ impl Real {
     }
 
     fn intrude(&mut self, from: Source, what: &str) {
-        if self.intruder.replace(from) != Some(from) {
+        if !self.intruders.contains(&from) {
+            self.intruders.push(from);
             let words = format!(
                 "{what} (system {}, component {}) is on the vehicle's link: disconnect it or change its ids",
                 from.system, from.component

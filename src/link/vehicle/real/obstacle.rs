@@ -45,7 +45,7 @@ impl Real {
         if Stack::of(controller.autopilot) != Some(self.profile.stack) {
             return Some(self.wrong_stack(controller.autopilot));
         }
-        if let Some(Source { system, component }) = self.intruder {
+        if let Some(Source { system, component }) = self.intruders.last() {
             return Some(format!(
                 "system {system}, component {component} is on the vehicle's link too: \
                  disconnect it, then start again"

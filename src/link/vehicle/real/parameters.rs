@@ -75,8 +75,8 @@ impl Parameters {
         names
     }
 
-    /// Stores a reported value. Parameters outside the rules are ignored. A value that is not finite is ignored as well:
-    /// the last finite value stays, or the parameter stays unread.
+    /// Stores a reported value. Parameters outside the rules are ignored. A value that is not finite is ignored as
+    /// well: the last finite value stays, or the parameter stays unread.
     pub(super) fn take(&mut self, name: &str, value: f64) {
         if !value.is_finite() {
             return;

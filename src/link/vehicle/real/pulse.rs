@@ -9,8 +9,8 @@ const RATE: f64 = 100.0;
 /// Fraction of the nominal rate below which control authority is returned.
 const LEAST: f64 = 0.4;
 
-/// Largest fraction of lost frames in each of two consecutive windows. Commands are then lost as often. Surfaces that
-/// receive only every fourth command oscillate. A single gap of 0.2 s stays below the limit.
+/// Largest fraction of lost frames in each of two consecutive windows. Commands are probably lost at the same
+/// rate. Surfaces that receive only every fourth command oscillate. A single gap of 0.2 s stays below the limit.
 const LOSSY: f64 = 0.35;
 
 /// Counters of states and cycles in the open window.

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use super::parameters::{PULSE, Parameters};
 use greylag_physics::Command;
 
-/// Valid scales FW_MAN_R_SC and FW_MAN_P_SC of PX4's manual control. PX4 allows 0 as well, with which the sticks have no
-/// effect: it cannot be divided by.
+/// Valid scales FW_MAN_R_SC and FW_MAN_P_SC of PX4's manual control. PX4 also allows 0, with which the sticks have no
+/// effect. The companion divides by the scale, so 0 is invalid here.
 const SCALE: RangeInclusive<f64> = 0.1..=1.0;
 /// Valid trims TRIM_ROLL and TRIM_PITCH of PX4, normalised.
 const TRIM: RangeInclusive<f64> = -0.5..=0.5;
@@ -48,7 +48,8 @@ impl Default for Scaling {
 }
 
 impl Scaling {
-    /// The scaling by the parameters with these names, and PX4's defaults for unread ones; `None` if a value is invalid.
+    /// The scaling by the parameters with these names, and PX4's defaults for unread ones; `None` if a value is
+    /// invalid.
     fn of(parameters: &Parameters, scale: &str, trim: &str) -> Option<Scaling> {
         let scale = parameters.get(scale).unwrap_or(1.0);
         let trim = parameters.get(trim).unwrap_or(0.0);
@@ -72,9 +73,9 @@ impl Default for Channel {
 }
 
 impl Channel {
-    /// The channel by RCn_MIN, RCn_TRIM, RCn_MAX and RCn_REVERSED of channel `number`, and ArduPilot's defaults for unread
-    /// ones; `None` if the values are invalid: an end beyond 800 µs to 2200 µs, ends in the wrong order, a trim that is not
-    /// between them.
+    /// The channel by RCn_MIN, RCn_TRIM, RCn_MAX and RCn_REVERSED of channel `number`, and ArduPilot's defaults for
+    /// unread ones; `None` if the values are invalid: an end beyond 800 µs to 2200 µs, ends in the wrong order, a trim
+    /// that is not between them.
     fn of(parameters: &Parameters, number: usize) -> Option<Channel> {
         let read = |name: &str| parameters.get(&format!("RC{number}_{name}"));
         let usual = Channel::default();
@@ -127,8 +128,8 @@ impl Sticks {
 
     /// Pulse widths of channels 1 to 3 (roll, pitch, throttle), µs, from RCn_MIN, RCn_TRIM, RCn_MAX, RCn_REVERSED.
     ///
-    /// ArduPilot's pitch channel is positive nose up, the elevator command positive nose down. If the controller reports an
-    /// invalid value in flight, the last valid pulse widths of the channel are used.
+    /// ArduPilot's pitch channel is positive nose up, the elevator command positive nose down. If the controller
+    /// reports an invalid value in flight, the last valid pulse widths of the channel are used.
     pub(super) fn pulses(&mut self, command: &Command, parameters: &Parameters) -> [u16; 3] {
         for (channel, number) in self.channels.iter_mut().zip(1..) {
             *channel = Channel::of(parameters, number).unwrap_or(*channel);
@@ -239,8 +240,8 @@ mod tests {
         assert_eq!(sent(0.0, 1.0), (1400, 1000));
     }
 
-    /// Pulse widths of roll, pitch and throttle, µs, at half right aileron, half of the elevator up and half throttle, with
-    /// the remainders of no earlier command.
+    /// Pulse widths of roll, pitch and throttle, µs, at half right aileron, half of the elevator up and half throttle,
+    /// with the remainders of no earlier command.
     fn half(sticks: &Sticks, parameters: &Parameters) -> [u16; 3] {
         let command = Command { aileron: 0.5, elevator: -0.5, throttle: 0.5, rudder: 0.0 };
         let mut sticks = Sticks { remainders: Default::default(), ..*sticks };
@@ -307,7 +308,7 @@ mod tests {
             };
             assert_eq!(sent(&parameters, 0.25, 0.2), [300, 500, 0]);
             parameters.take(name, value);
-            // No deflection is no stick: 0 / 0 once was no number, from then on for ever.
+            // With a scale of 0, zero deflection would be 0 / 0, and the remainder would stay NaN.
             assert_eq!(sent(&parameters, 0.0, -0.1), [0, 0, 0], "{name} = {value}");
             assert_eq!(sent(&parameters, 0.25, 0.2), [300, 500, 0], "{name} = {value}");
         }

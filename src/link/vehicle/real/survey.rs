@@ -117,6 +117,11 @@ impl Survey {
         true
     }
 
+    /// Whether no window was begun yet: `turn` was not called since the controller was found.
+    pub(super) fn is_new(&self) -> bool {
+        self.window_ends.is_none()
+    }
+
     /// Stores a round-trip time.
     pub(super) fn trip(&mut self, time: Duration) {
         if self.trips.len() == TRIPS {
