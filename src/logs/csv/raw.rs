@@ -202,13 +202,14 @@ pub(crate) fn read(
     }
     out.cut_short = records.cut_short();
     out.whole = thin.whole();
+    // The order of a quaternion's components is found from body rates, which need times in seconds.
+    if head.dialect.time_by_steps {
+        in_seconds(&mut out.rows);
+    }
     if head.dialect.quaternion.is_some() {
         let order = mapping.quaternion().and_then(|q| q.order);
         let order = order.unwrap_or_else(|| quaternion::order(&out.rows, &quaternions));
         quaternion::fill(&mut out.rows, &quaternions, order);
-    }
-    if head.dialect.time_by_steps {
-        in_seconds(&mut out.rows);
     }
     Ok(out)
 }
@@ -218,4 +219,28 @@ fn in_seconds(rows: &mut [Sample]) {
     let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
     let unit = dialect::unit_of(period_s(&times));
     rows.iter_mut().for_each(|row| row.time_s *= unit);
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    fn table(text: &str) -> Raw {
+        raw(text.as_bytes(), Path::new("t.csv"), &Mapping::default()).unwrap()
+    }
+
+    #[test]
+    fn the_order_of_a_quaternion_is_found_by_the_rates_with_times_in_microseconds() {
+        let mut text = String::from("timestamp,q[0],q[1],q[2],q[3],p_radps,q_radps,r_radps\n");
+        for k in 0..200 {
+            let turn = UnitQuaternion::from_euler_angles(0.3 + 0.002 * f64::from(k), 0.1, 0.5);
+            let [x, y, z, w] = [turn.i, turn.j, turn.k, turn.w];
+            text += &format!("{},{x},{y},{z},{w},0.2,0,0\n", 10_000 * k);
+        }
+        let row = table(&text).rows[100];
+        assert!((row.time_s - 1.0).abs() < 1e-9, "{row:?}");
+        assert!((row.attitude_rad[0] - 0.5).abs() < 1e-9, "{row:?}");
+    }
 }
