@@ -190,7 +190,12 @@ pub(crate) fn read(
                 quaternions.extend(head.quaternion(record));
             }
             Some(_) => {}
-            None => out.unreadable.push(number),
+            // A quote that is not closed takes the lines behind it into its record: each of them is lost.
+            None => {
+                let lines = record.lines();
+                out.unreadable.extend(number..number + lines);
+                number += lines - 1;
+            }
         }
         number += 1;
         if thin.is_full(out.rows.len()) {
@@ -242,5 +247,17 @@ mod tests {
         let row = table(&text).rows[100];
         assert!((row.time_s - 1.0).abs() < 1e-9, "{row:?}");
         assert!((row.attitude_rad[0] - 0.5).abs() < 1e-9, "{row:?}");
+    }
+
+    #[test]
+    fn lines_behind_a_quote_that_is_not_closed_are_counted_as_lost() {
+        let row = |k: i32| format!("{k},0.1,\"AUTO\"\n");
+        let rows: Vec<String> = (0..10).map(row).collect();
+        let text = format!("time_s,roll_rad,mode\n{}", rows.concat());
+        assert_eq!(table(&text).rows.len(), 10);
+        let spoiled =
+            text.replacen("2,0.1,\"AUTO\"\n3", "2,\"0.1\n3", 1).replace("\"AUTO\"", "AUTO");
+        let table = table(&spoiled);
+        assert_eq!((table.rows.len(), table.unreadable), (2, (2..10).collect::<Vec<usize>>()));
     }
 }

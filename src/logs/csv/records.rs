@@ -88,6 +88,12 @@ impl<'a> Fields<'a> {
         })
     }
 
+    /// Number of lines that the record spans; more than one with a line end between quotes.
+    pub fn lines(self) -> usize {
+        let open = self.bytes.last().is_none_or(|b| *b != b'\n');
+        memchr_iter(b'\n', self.bytes).count() + usize::from(open)
+    }
+
     pub fn get(self, i: usize) -> Option<&'a [u8]> {
         let start = if i == 0 { 0 } else { self.ends.get(i - 1)? + self.between };
         self.bytes.get(start..*self.ends.get(i)?)
