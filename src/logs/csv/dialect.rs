@@ -175,7 +175,7 @@ impl Dialect {
         let turns = lacks(&dialect, "roll_rad") && lacks(&dialect, "pitch_rad");
         let whole = QUATERNIONS.iter().find(|q| q.iter().all(|name| has(name)));
         dialect.quaternion = match mapping.quaternion() {
-            Some(own) => Some(own.fields.clone()),
+            Some(own) => own.fields.iter().all(|name| has(name)).then(|| own.fields.clone()),
             None => whole.filter(|_| turns).map(|q| q.map(str::to_owned)),
         };
         dialect
