@@ -31,7 +31,7 @@ enum Reason {
     Unreadable,
     /// A needed column is empty.
     Incomplete,
-    /// An angle, an airspeed or an infinite number that no aircraft shows.
+    /// An angle or an airspeed that no aircraft shows, or an infinite number in any column.
     Impossible,
     /// Its time is not later than that of the row before.
     OutOfOrder,
@@ -41,7 +41,7 @@ impl Reason {
     const ALL: [(Reason, &'static str); 4] = [
         (Reason::Unreadable, "hold what is no number"),
         (Reason::Incomplete, "lack a needed column"),
-        (Reason::Impossible, "hold an impossible angle or airspeed"),
+        (Reason::Impossible, "hold an infinite number, or an impossible angle or airspeed"),
         (Reason::OutOfOrder, "are not later than the row before"),
     ];
 }
@@ -241,5 +241,8 @@ mod tests {
             rows.reasons(),
             "1 hold what is no number, 1 lack a needed column, 1 are not later than the row before"
         );
+        let mut rows = Rows::default();
+        take(&mut rows, 1, Some(Sample { altitude_m: f64::INFINITY, ..row(1.0, 17.0) }));
+        assert!(rows.reasons().contains("1 hold an infinite number"), "{}", rows.reasons());
     }
 }
