@@ -8,8 +8,8 @@
 //! A step back in the time of the attitude or of the gyros begins another flight, because a card that is read as a
 //! whole holds one log after the other. The step back after a single damaged time does not.
 //!
-//! Not read: texts but the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
-//! E L` carry their own scale, which is what pymavlink applies, too).
+//! Not read: texts except the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters
+//! `c C e E L` carry their own scale, which is what pymavlink applies, too).
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -150,7 +150,7 @@ struct Reader {
     out: Topics,
     /// The flights before the present one.
     lives: Vec<Topics>,
-    /// Bytes that belong to no record, and the seconds lost at each place of them.
+    /// Number of bytes that belong to no record, and the time that is lost at each such place, s.
     skipped: usize,
     holes: Vec<f64>,
     in_step: bool,

@@ -23,7 +23,7 @@ enum Share {
 /// Where one field goes.
 enum To {
     Nowhere,
-    /// A column, as it is: what most fields are.
+    /// A column without scale and offset, as most fields are.
     Column(Place),
     Targets(Vec<Target>),
 }
@@ -51,7 +51,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// Where the fields with these names go, and their table, without rows yet.
+    /// The targets of fields with these names, and their table without rows.
     pub fn of(names: &[String], delimiter: u8, path: &Path, mapping: &Mapping) -> (Head, Raw) {
         let dialect = Dialect::of(names, mapping);
         let mut targets: Vec<Vec<Target>> =
@@ -125,7 +125,7 @@ enum Decimal {
     PointOrComma,
 }
 
-/// The number in a field; NaN of an empty one, `None` of what is neither a number nor a date.
+/// The number in a field. NaN if it is empty, `None` if it is neither a number nor a date.
 fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     if let Some(x) = short(field) {
         return Some(x);
@@ -183,7 +183,7 @@ fn short(field: &[u8]) -> Option<f64> {
     (1..TENS.len()).contains(&count).then(|| sign * (whole as f64 / TENS[behind]))
 }
 
-/// The number that eight digits write (Lemire, "Quickly parsing eight digits"); `None` of other letters.
+/// The number that eight digits write (Lemire, "Quickly parsing eight digits"). `None` if one of them is not a digit.
 fn eight(digits: [u8; 8]) -> Option<u64> {
     const ZEROS: u64 = 0x3030_3030_3030_3030;
     const ABOVE: u64 = 0x4646_4646_4646_4646;

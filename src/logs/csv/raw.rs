@@ -46,8 +46,8 @@ const BEGINS: f64 = 0.1;
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// Judges every row, those included that could not be read, by `judge`: it gets the row's number, the row and the
-    /// rows that are kept before it. The kept rows stay in place, because a copy of a long table is large.
+    /// Judges every row by `judge`, also those that could not be read (`None`). `judge` gets the row's number, the row
+    /// and the rows that are kept before it. The kept rows stay in place, because a copy of a long table is large.
     pub(super) fn judged(
         &mut self,
         judge: impl Fn(&mut rows::Rows, usize, Option<Sample>, &[Sample]) -> Option<Sample>,

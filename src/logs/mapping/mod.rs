@@ -255,7 +255,7 @@ impl Mapping {
         let others = match format {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
-            // The stamps of one are not of the clock of the other.
+            // The topics of px4_msgs and of MAVROS have time stamps of different clocks.
             Format::Ros if topics.first("vehicle_attitude").is_some() => px4::rules(topics),
             Format::Ros => mavros::rules(topics, self.mixer()),
             Format::Dataflash => ardupilot::rules(topics, self.mixer()),
