@@ -1,5 +1,6 @@
 //! The CSV form of a flight log: one row a sample, a header row, SI units.
 
+mod airspeed;
 mod dialect;
 mod head;
 mod quaternion;

@@ -4,6 +4,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 use super::CsvError;
+use super::airspeed;
 use super::dialect;
 use super::head::Head;
 use super::quaternion;
@@ -210,6 +211,9 @@ pub(crate) fn read(
     // The order of a quaternion's components is found from body rates, which need times in seconds.
     if head.dialect.time_by_steps {
         in_seconds(&mut out.rows);
+    }
+    if head.dialect.equivalent {
+        out.notes.push(airspeed::make_true(&mut out.rows));
     }
     if head.dialect.quaternion.is_some() {
         let order = mapping.quaternion().and_then(|q| q.order);

@@ -303,7 +303,8 @@ impl Mapping {
     }
 }
 
-/// The rules of a format without a mapping.
-pub(super) fn format_rules(format: Format, topics: &Topics) -> Vec<Rule> {
-    Mapping::default().rules(format, topics)
+/// The rules for the columns of a table that are named by record or message and field.
+pub(super) fn table_rules() -> Vec<Rule> {
+    let of_dataflash = ardupilot::rules(&Topics::default(), None);
+    of_dataflash.into_iter().chain(telemetry::of_table()).collect()
 }
