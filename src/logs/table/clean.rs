@@ -12,8 +12,8 @@ pub(super) fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>,
     if increasing && finite(all_times) && all.iter().all(|s| finite(s)) {
         return (Cow::Borrowed(all_times), all);
     }
-    let mut times = Vec::with_capacity(all_times.len());
-    let mut series = vec![Vec::with_capacity(all_times.len()); all.len()];
+    let mut times: Vec<f64> = Vec::with_capacity(all_times.len());
+    let mut series: Vec<Vec<f64>> = vec![Vec::with_capacity(all_times.len()); all.len()];
     for (i, t) in all_times.iter().enumerate() {
         let last = times.last().copied().unwrap_or(f64::NEG_INFINITY);
         let usable = t.is_finite() && *t > last && !is_ahead(&all_times[i..], last);
