@@ -102,7 +102,7 @@ fn on_wings(rows: &[Sample], hovers: &[(f64, f64)], flies: &Flying) -> Vec<Findi
     }
 }
 
-/// Error text for a log that holds hover only.
+/// Text of the finding on a log in which the vehicle only hovers.
 const NEVER_ON_WINGS: &str = "there is no flight in this log: the vehicle never flies on its wings alone; give a log with forward flight";
 
 /// Finding for a vehicle without wings; an error if the log is used for computation.

@@ -39,8 +39,8 @@ pub(super) const COLUMNS: [(&str, Get, Place); 29] = [
     ("pitch_target_rad", |s| s.pitch_target_rad, |s| &mut s.pitch_target_rad),
     ("rate_hold_s", |s| s.rate_hold_s, |s| &mut s.rate_hold_s),
 ];
-/// Number of rows in which all columns are looked at before the next ones are: they stay in the processor's cache, while
-/// all rows of a long log do not.
+/// Rows of a block. All columns of a block are read before those of the next one, so that the block stays in the
+/// processor's cache.
 pub(super) const BLOCK: usize = 512;
 /// Columns that a flight log must have.
 pub(super) const NEEDED: [&str; 7] =

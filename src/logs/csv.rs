@@ -1,5 +1,6 @@
 //! The CSV form of a flight log: one row a sample, a header row, SI units.
 
+mod airspeed;
 mod dialect;
 mod head;
 mod quaternion;
@@ -65,7 +66,7 @@ pub enum CsvError {
         rows: usize,
         /// Reasons for dropping, with counts.
         reasons: String,
-        /// The first of those dropped, the header being row 1.
+        /// Number of the first dropped row. The header is row 1.
         first: usize,
     },
 }
@@ -79,7 +80,7 @@ pub struct Reading {
     pub unknown_columns: Vec<String>,
     /// Rows dropped as out of order, repeated, non-finite where needed, or impossible.
     pub dropped: usize,
-    /// The numbers of the first of them, the header being row 1.
+    /// Numbers of the first dropped rows. The header is row 1.
     pub dropped_rows: Vec<usize>,
     /// Whether the file ends in the middle of a row; that row is not read.
     pub cut_short: bool,
@@ -111,7 +112,7 @@ pub fn parse(bytes: &[u8], path: &Path, tolerance: Tolerance) -> Result<Reading,
     }
 }
 
-/// Drops the unusable rows; an error beside the others if they are too many.
+/// Drops the unusable rows. If they are too many, the error is returned beside the other rows.
 pub(super) fn settle(
     mut raw: Raw,
     path: &Path,

@@ -6,10 +6,10 @@
 //! and knows no instances. The independent check is pymavlink (`tests/logs_crosscheck.py`).
 //!
 //! A step back in the time of the attitude or of the gyros begins another flight, because a card that is read as a
-//! whole holds one log after the other.
+//! whole holds one log after the other. The step back after a single damaged time does not.
 //!
-//! Not read: texts but the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters `c C e
-//! E L` carry their own scale, which is what pymavlink applies, too).
+//! Not read: texts except the firmware's name, arrays (`a`), units and multipliers of FMTU and MULT (the format letters
+//! `c C e E L` carry their own scale, which is what pymavlink applies, too).
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -60,6 +60,8 @@ struct Instance {
     number: u16,
     count: usize,
     topic: Option<Topic>,
+    /// Time of the sample before the last one, s.
+    earlier_s: Option<f64>,
 }
 
 /// Size of format `letter`, bytes.
@@ -148,7 +150,7 @@ struct Reader {
     out: Topics,
     /// The flights before the present one.
     lives: Vec<Topics>,
-    /// Bytes that belong to no record, and the seconds lost at each place of them.
+    /// Number of bytes that belong to no record, and the time that is lost at each such place, s.
     skipped: usize,
     holes: Vec<f64>,
     in_step: bool,
@@ -232,7 +234,12 @@ impl Reader {
         let instance = declared.instance.map_or(0, number_of);
         let place = declared.read.iter().position(|i| i.number == instance);
         let place = place.unwrap_or_else(|| {
-            declared.read.push(Instance { number: instance, count: 0, topic: None });
+            declared.read.push(Instance {
+                number: instance,
+                count: 0,
+                topic: None,
+                earlier_s: None,
+            });
             declared.read.len() - 1
         });
         declared.read[place].count += 1;
@@ -245,8 +252,12 @@ impl Reader {
         if !declared.wanted {
             return;
         }
-        let last = declared.read[place].topic.as_ref().and_then(Topic::last_s);
-        if declared.role == Role::Clock && last.is_some_and(|last| time_s < last - BACK_S) {
+        let instance = &mut declared.read[place];
+        let last = instance.topic.as_ref().and_then(Topic::last_s);
+        let earlier = std::mem::replace(&mut instance.earlier_s, last);
+        let goes_back = last.is_some_and(|last| time_s < last - BACK_S)
+            && earlier.is_none_or(|earlier| time_s <= earlier);
+        if declared.role == Role::Clock && goes_back {
             self.another_life();
         }
         self.sample(kind, place, time_s, body);
@@ -325,4 +336,39 @@ fn firmware(declared: &Declared, body: &[u8]) -> Option<String> {
     let message = declared.fields.iter().find(|f| f.0 == "Message");
     let said = message.map(|f| text(body.get(f.2..).unwrap_or_default()));
     said.filter(|t| t.contains("Ardu") || t.contains("APM:"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A log of attitudes at these times, µs.
+    fn log(times_us: &[u64]) -> Vec<u8> {
+        let padded = |text: &str, width: usize| {
+            let mut bytes = text.as_bytes().to_vec();
+            bytes.resize(width, 0);
+            bytes
+        };
+        let head = vec![0xA3, 0x95, FMT, 7, 15];
+        let (letters, labels) = (padded("Qf", 16), padded("TimeUS,Roll", 64));
+        let mut out = [head, padded("ATT", 4), letters, labels].concat();
+        for time_us in times_us {
+            out.extend([0xA3, 0x95, 7]);
+            out.extend(time_us.to_le_bytes());
+            out.extend(0f32.to_le_bytes());
+        }
+        out
+    }
+
+    #[test]
+    fn a_restart_begins_another_flight_and_a_damaged_time_does_not() {
+        let flights = |times_us: &[u64]| {
+            let bytes = log(times_us);
+            let mut source = &bytes[..];
+            let (lives, _) = read(&mut source, &|_| true, Keep::All);
+            lives.len()
+        };
+        assert_eq!(flights(&[9_000_000, 9_020_000, 20_000, 40_000]), 2);
+        assert_eq!(flights(&[1_000_000, 1_020_000, 9_000_000_000, 1_040_000, 1_060_000]), 1);
+    }
 }

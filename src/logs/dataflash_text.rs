@@ -94,7 +94,8 @@ impl<'a> Binary<'a> {
         if name == "MSG"
             && let Some(firmware) = self.firmware.take()
         {
-            let values = vec![firmware.as_str(); letters.len()];
+            let value = |l| if b"nNZ".contains(&l) { firmware.as_str() } else { "0" };
+            let values: Vec<&str> = letters.bytes().map(value).collect();
             out.extend(record(kind, letters, &values).unwrap_or_default());
         }
         Some(out)
@@ -117,7 +118,19 @@ impl Read for Binary<'_> {
     }
 }
 
-/// The record of a line's values; `None` if there are too few.
+/// The number of a field with this format `letter`; `None` if it is none, so that its line is damaged.
+fn number(letter: u8, text: &str) -> Option<f64> {
+    match (text.trim().parse::<f64>(), letter) {
+        (Ok(x), _) => Some(x),
+        // C libraries write an undefined number in many ways.
+        (Err(_), b'f' | b'd') => Some(f64::NAN),
+        // A flight mode may be written by its name.
+        (Err(_), b'M') => Some(0.0),
+        (Err(_), _) => None,
+    }
+}
+
+/// The record of a line's values; `None` if there are too few, or if one of them is not what the declaration says.
 fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
     let mut out = [&DATAFLASH_MAGIC[..], &[kind]].concat();
     let last = letters.len().checked_sub(1)?;
@@ -125,7 +138,7 @@ fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
         // A text may hold commas.
         let rest = if i == last && b"nNZ".contains(&letter) { values.len() } else { i + 1 };
         let text = values.get(i..rest)?.join(",");
-        let x: f64 = text.trim().parse().unwrap_or(0.0);
+        let x = if b"nNZag".contains(&letter) { 0.0 } else { number(letter, &text)? };
         match letter {
             b'b' => out.extend((x as i8).to_le_bytes()),
             b'B' | b'M' => out.push(x as u8),
@@ -150,4 +163,18 @@ fn record(kind: u8, letters: &str, values: &[&str]) -> Option<Vec<u8>> {
         }
     }
     Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_with_a_number_that_cannot_be_read_is_no_record_of_zeros() {
+        let made = |values: &[&str]| record(7, "QfMN", values);
+        let whole = made(&["12", "-nan(ind)", "Auto", "a, b"]).unwrap();
+        assert_eq!(whole[3..11], 12u64.to_le_bytes());
+        assert!(f32::from_le_bytes(whole[11..15].try_into().unwrap()).is_nan());
+        assert_eq!(made(&["x12", "0.5", "Auto", "a"]), None);
+    }
 }

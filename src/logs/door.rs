@@ -33,7 +33,7 @@ impl Opened {
         Ok(Opened { start, rest })
     }
 
-    /// All of it from the start.
+    /// The whole unpacked content.
     pub fn reader(self) -> Box<dyn Read> {
         Box::new(io::Cursor::new(self.start).chain(self.rest))
     }

@@ -38,7 +38,7 @@ const KNOWN: [(&[u8], &str); 11] = [
     (b"%PDF", "it is a PDF document"),
 ];
 
-/// What is said of a ROS 2 bag by a program without their reader.
+/// Message on a ROS 2 bag of a program that is built without the reader of bags.
 #[cfg(not(feature = "ros"))]
 pub(super) const BAG_WITHOUT_READER: &str = "it is a ROS 2 bag (MCAP), which this program was built without a reader for: build it with --features study, as `cargo greylag` and the installed program are";
 

@@ -133,10 +133,10 @@ fn rudder(log: &Log) -> Option<Finding> {
     )))
 }
 
-/// Share of the rows, or of the time by its own rate, that a column must cover to count as there.
+/// Fraction of the rows, or of the samples expected at its own rate, from which a column counts as present.
 const PRESENT: f64 = 0.5;
 
-/// Number of rows that each column fills.
+/// Number of rows with a value, for each column.
 fn filled(samples: &[Sample]) -> [usize; COLUMNS.len()] {
     let mut counts = [0; COLUMNS.len()];
     for block in samples.chunks(BLOCK) {
@@ -147,7 +147,7 @@ fn filled(samples: &[Sample]) -> [usize; COLUMNS.len()] {
     counts
 }
 
-/// Whether `column`, of which so many rows are `filled`, covers enough of the log to count as there.
+/// Whether `column` counts as present. `filled` has the number of rows with a value, for each column.
 fn has(log: &Log, filled: &[usize; COLUMNS.len()], column: &str) -> bool {
     let samples = &log.flight.samples;
     let whole = samples.first().zip(samples.last()).map_or(0.0, |(a, b)| b.time_s - a.time_s);
@@ -160,7 +160,7 @@ fn has(log: &Log, filled: &[usize; COLUMNS.len()], column: &str) -> bool {
     count > 0 && (count as f64 >= PRESENT * samples.len() as f64 || covered)
 }
 
-/// The actuators that the log does not show, and those that commands show through the actuator model.
+/// The actuators without data, and those whose position follows from the command by the actuator model.
 fn actuators(has: impl Fn(&str) -> bool) -> (Vec<String>, Vec<String>) {
     let mut missing = Vec::new();
     let mut instead = Vec::new();
@@ -211,7 +211,7 @@ fn density(has: impl Fn(&str) -> bool) -> Vec<String> {
     }
 }
 
-/// The purpose that slow channels serve as well.
+/// The purpose for which slow channels suffice.
 const INCIDENCE: &str = "alpha, beta";
 
 fn purposes(log: &Log) -> Vec<Purpose> {

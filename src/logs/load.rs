@@ -64,7 +64,7 @@ pub struct Log {
     pub topics: Vec<(String, u16, usize)>,
     /// Rows of the table dropped as out of order, repeated, incomplete or impossible.
     pub dropped: usize,
-    /// The numbers of the first of them; in a CSV the header is row 1, else the first row is.
+    /// Numbers of the first dropped rows. In a CSV the header is row 1, in other formats the first row is.
     pub dropped_rows: Vec<usize>,
     /// Findings for the log's user.
     pub findings: Vec<Finding>,

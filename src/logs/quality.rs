@@ -34,7 +34,7 @@ const STRAIGHT: f64 = 0.7;
 const KINK: f64 = 10.0;
 /// Fewest samples from kink to kink.
 const APART: f64 = 3.0;
-/// Shortest time that one value must stay to be called frozen, s; and in usual times between changes.
+/// Shortest time for which a frozen value stays constant: in s, and in usual times between changes.
 pub(super) const FROZEN_S: f64 = 0.5;
 const FROZEN_STEPS: f64 = 20.0;
 /// Samples on both sides whose median a spike is compared with.
@@ -135,7 +135,7 @@ fn steps(times: &[f64]) -> Vec<f64> {
     times.windows(2).map(|w| w[1] - w[0]).collect()
 }
 
-/// Those of the `stays` (from, to, s) of one value that are long for a channel with `values` at `times`, s.
+/// The intervals of one value, `stays` (from, to, s), that are long for a channel with `values` at `times` (s).
 pub(super) fn frozen_of(
     column: &str,
     times: &[f64],
@@ -150,7 +150,7 @@ pub(super) fn frozen_of(
     stays
 }
 
-/// How long one value must stay to be called frozen, s; `None` where too little changes.
+/// Time from which a constant value counts as frozen, s. `None` if there are too few changes.
 fn frozen_s(changes: &[f64]) -> Option<f64> {
     let usual = quantile(&steps(changes), 0.9);
     let enough = changes.len() >= ENOUGH / 2 && !usual.is_nan();

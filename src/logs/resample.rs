@@ -15,7 +15,7 @@ pub(super) const SAME_S: f64 = 1e-6;
 pub(super) struct Reader<'a> {
     times: &'a [f64],
     series: Cow<'a, [Vec<f64>]>,
-    /// The longest time that it is carried over, s.
+    /// The longest time between two samples that is bridged, s.
     limit: f64,
     to: Target,
     /// Where the last row's time was found.
@@ -78,7 +78,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Turns quaternions so that neighbours lie on one side of the sphere, as q and −q are one attitude.
+/// Changes the signs of quaternions so that the dot product of neighbours is positive: q and −q are one attitude.
 fn one_sided(q: &mut [Vec<f64>]) {
     for i in 1..q[0].len() {
         let dot: f64 = q.iter().map(|s| s[i] * s[i - 1]).sum();

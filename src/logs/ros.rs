@@ -30,9 +30,9 @@ use chunk::Body;
 use records::{bytes, op};
 use streams::Streams;
 
-/// Code and length of a record.
+/// Bytes of a record's header: code and length.
 const HEAD: usize = 9;
-/// Number, sequence and two times of a message.
+/// Bytes of a message's header: channel, sequence number and two times.
 const MESSAGE: usize = 22;
 /// The longest message or definition that is read, bytes; longer ones are counted only.
 const LONGEST: u64 = 1 << 20;

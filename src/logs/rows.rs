@@ -9,7 +9,7 @@ const REFUSED_SHARE: f64 = 0.05;
 const PITOT_AT_REST: f64 = -5.0;
 /// A column with values in less than this share of the rows is taken as that of a slower sensor.
 const FILLED_SHARE: f64 = 0.95;
-/// Fewest rows that a column must fill to be taken for a slower sensor's: one that failed fills few.
+/// Fewest rows that the column of a slower sensor fills. A sensor that failed fills fewer.
 const ENOUGH: usize = 50;
 /// Row numbers kept in the report of unusable rows.
 const ROWS_NAMED: usize = 20;
@@ -31,7 +31,7 @@ enum Reason {
     Unreadable,
     /// A needed column is empty.
     Incomplete,
-    /// An angle, an airspeed or an infinite number that no aircraft shows.
+    /// An angle or an airspeed that no aircraft shows, or an infinite number in any column.
     Impossible,
     /// Its time is not later than that of the row before.
     OutOfOrder,
@@ -41,7 +41,7 @@ impl Reason {
     const ALL: [(Reason, &'static str); 4] = [
         (Reason::Unreadable, "hold what is no number"),
         (Reason::Incomplete, "lack a needed column"),
-        (Reason::Impossible, "hold an impossible angle or airspeed"),
+        (Reason::Impossible, "hold an infinite number, or an impossible angle or airspeed"),
         (Reason::OutOfOrder, "are not later than the row before"),
     ];
 }
@@ -104,7 +104,8 @@ impl Rows {
         Rows { samples: rows, ..self }
     }
 
-    /// Row `number` if it is usable after one of the time `last`; counts it. `None` is a row that could not be read.
+    /// Counts row `number`, and returns it if it is usable after a row at the time `last` (s). `None` is a row that
+    /// could not be read.
     pub fn judged(
         &mut self,
         number: usize,
@@ -137,7 +138,7 @@ impl Rows {
         self.samples.extend(later);
     }
 
-    /// Row `number`, complete or not, if it is later than the time `last`; counts it.
+    /// Counts row `number`, and returns it, complete or not, if it is later than `last` (s).
     pub fn later(&mut self, number: usize, sample: Sample, last: Option<f64>) -> Option<Sample> {
         let later = last.is_none_or(|last| sample.time_s > last);
         if later && sample.time_s.is_finite() {
@@ -160,7 +161,7 @@ impl Rows {
         said.map(|((_, text), count)| format!("{count} {text}")).collect::<Vec<_>>().join(", ")
     }
 
-    /// Why a sample cannot be used after one of the time `last`.
+    /// Why a sample cannot be used after a row at the time `last` (s).
     fn fault(&self, s: &Sample, last: Option<f64>) -> Option<Reason> {
         let missing = NEEDED
             .iter()
@@ -241,5 +242,8 @@ mod tests {
             rows.reasons(),
             "1 hold what is no number, 1 lack a needed column, 1 are not later than the row before"
         );
+        let mut rows = Rows::default();
+        take(&mut rows, 1, Some(Sample { altitude_m: f64::INFINITY, ..row(1.0, 17.0) }));
+        assert!(rows.reasons().contains("1 hold an infinite number"), "{}", rows.reasons());
     }
 }

@@ -5,11 +5,11 @@ use std::fmt;
 use super::{Sample, phases};
 use greylag_num::statistics::mean;
 
-/// Standard deviation of a deflection that counts as movement, rad: 0.2°. By a rudder of
-/// Cn = 0.07/rad that is the moment of 0.2° of sideslip at Cnβ = 0.07/rad, less than a vane's noise
-/// of 0.3°. Ten seconds of doublets of 5° in ten minutes of flight are 0.6°.
+/// Standard deviation of a deflection that counts as movement, rad: 0.2°. With Cnδr = −0.07/rad its moment is that of
+/// 0.2° of sideslip at Cnβ = 0.07/rad, which is less than the noise of a vane (0.3°). Ten seconds of doublets of 5° in
+/// ten minutes of flight have 0.6°.
 pub const MOVES_RAD: f64 = 0.0035;
-/// The same for a command, as a fraction of the unknown travel. 1 % of 25° of travel is 0.25°, and more than the dead
+/// The same for a command, as a fraction of the unknown travel. 1 % of a travel of 25° is 0.25°. It exceeds the dead
 /// band of a servo (some 4 µs of 500 µs).
 const MOVES_PART: f64 = 0.01;
 /// Smallest number of rows in flight for a decision.

@@ -71,6 +71,8 @@ pub struct Source {
 #[derive(Debug, Default)]
 pub(super) struct Choice {
     read: BTreeMap<String, u16>,
+    /// The instances that the user asked for, by the topic's name.
+    asked: BTreeMap<String, u16>,
     /// All instances of the topics that have several.
     pub sources: Vec<Source>,
     /// Findings about unusual choices.
@@ -90,9 +92,10 @@ impl Choice {
         choice
     }
 
-    /// The instance of the topic of `rule`, unless the rule names one itself.
+    /// The instance of the topic of `rule`: the one that the user asked for, else that of the rule, else the chosen one.
     pub fn instance(&self, rule: &Rule) -> Option<u16> {
-        rule.instance.or_else(|| self.read.get(&rule.topic).copied())
+        let of = |all: &BTreeMap<String, u16>| all.get(&rule.topic).copied();
+        of(&self.asked).or(rule.instance).or_else(|| of(&self.read))
     }
 
     fn topic(&mut self, topics: &Topics, name: &str, rules: &[Rule], asked: &[Asked]) {
@@ -110,6 +113,7 @@ impl Choice {
         let read = named.or(fixed).or_else(|| usual.filter(alive).or_else(first_alive).or(usual));
         let Some(read) = read else { return };
         self.read.insert(name.to_owned(), read);
+        self.asked.extend(named.map(|instance| (name.to_owned(), instance)));
         if let Some(named) = named.filter(|i| !there(i)) {
             let has: Vec<String> = all.iter().map(|(i, _)| topics.naming.written(*i)).collect();
             self.findings.push(Finding::problem(format!(
@@ -131,7 +135,7 @@ impl Choice {
             read: *i == read,
         };
         let sources: Vec<Source> = all.iter().map(source).collect();
-        if fixed.is_none() {
+        if fixed.is_none() || named.is_some() {
             self.findings.extend(said(name, &sources, named.is_some()));
         }
         self.sources.extend(sources);
@@ -162,5 +166,27 @@ fn said(name: &str, sources: &[Source], asked: bool) -> Option<Finding> {
         ))),
         (_, true) if others.is_empty() && usual => None,
         (_, true) => Some(Finding::note(format!("{name}: instance {instance} is read{other}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stretches::Keep;
+
+    #[test]
+    fn an_instance_that_is_asked_for_is_read_though_the_rule_names_another_one() {
+        let mut topics = Topics::default();
+        for instance in [1, 2] {
+            let mut topic = Topic::new(["roll"], Keep::All);
+            (0..3).for_each(|k| topic.push(f64::from(k), &[f64::from(k)]));
+            topics.topics.insert(("ATTITUDE".to_owned(), instance), topic);
+        }
+        let rules = [Rule::linear("roll_rad", "ATTITUDE", "roll", 1.0).of(Some(1))];
+        let asked = [Asked { topic: "ATTITUDE".into(), instance: 2 }];
+        let read = |asked: &[Asked]| Choice::of(&topics, &rules, asked).instance(&rules[0]);
+        assert_eq!((read(&[]), read(&asked)), (Some(1), Some(2)));
+        let choice = Choice::of(&topics, &rules, &asked);
+        assert!(choice.findings[0].text.contains("instance 2 is read, as asked"));
     }
 }

@@ -9,6 +9,7 @@
 //! of its samples, because interpolated rows would count as measurements. The other rows stay empty; required columns
 //! hold the last value there.
 
+mod clean;
 mod whole;
 
 use std::borrow::Cow;
@@ -23,6 +24,7 @@ use super::resample::{Reader, SAME_S};
 use super::sources::{Asked, Choice, Source};
 use super::stretches::Watch;
 use super::topics::{Topic, Topics, period_s};
+use clean::cleaned;
 use greylag_physics::atmosphere::{SEA_LEVEL_DENSITY, standard_density};
 pub(super) use whole::Whole;
 
@@ -286,25 +288,6 @@ fn track_of<'a>(
     let rate_hz = if period > 0.0 { 1.0 / period } else { 0.0 };
     let dead = series.iter().all(|s| s.iter().all(|x| *x == s[0]));
     Some(Track { rule: rule.clone(), origin, times, dead, finite_share, rate_hz, topic })
-}
-
-/// Times that increase with finite values; the topic's own where they do so already.
-fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>, Vec<Vec<f64>>) {
-    let increasing = all_times.windows(2).all(|w| w[0] < w[1]);
-    let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
-    if increasing && finite(all_times) && all.iter().all(|s| finite(s)) {
-        return (Cow::Borrowed(all_times), all);
-    }
-    let mut times = Vec::with_capacity(all_times.len());
-    let mut series = vec![Vec::with_capacity(all_times.len()); all.len()];
-    for (i, t) in all_times.iter().enumerate() {
-        let increasing = times.last().is_none_or(|last| t > last);
-        if t.is_finite() && increasing && all.iter().all(|s| s[i].is_finite()) {
-            times.push(*t);
-            series.iter_mut().zip(&all).for_each(|(to, from)| to.push(from[i]));
-        }
-    }
-    (Cow::Owned(times), series)
 }
 
 fn fill(rows: &mut [Sample], track: &Track<'_>, series: &[Vec<f64>]) {

@@ -34,7 +34,7 @@ const WRAP_MS_S: f64 = 4_294_967.296;
 const BACK_S: f64 = 5.0;
 /// Number of attitudes from which a further system counts as another vehicle.
 const VEHICLE: usize = 50;
-/// Number of successive messages that must show a restart: a single one may be late or wrong.
+/// Number of successive messages that show a restart. A single message may be late or wrong.
 const BACK_FOR: usize = 5;
 
 /// A message before its time is known.

@@ -180,7 +180,7 @@ fn telemetry(topics: &Topics) -> Option<Vehicle> {
 const HOVER_MODES: [f64; 8] = [17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 25.0];
 /// Throttle of the lift motors above which they carry, 0..1.
 const CARRIES: f64 = 0.05;
-/// Time for which a record of QTUN, which is written while the motors may run, counts, s.
+/// Time for which a record of QTUN counts, s. QTUN is written while the lift motors may run.
 const QTUN_HOLDS_S: f64 = 0.5;
 
 /// Times outside wing-borne flight: from, to, s.

@@ -282,6 +282,9 @@ fn check_step(step: &Step) -> Result<(), String> {
         (roll.abs() + tidy(moved(Axis::Roll)), pitch.abs() + tidy(moved(Axis::Pitch)));
     within("roll_deg with its excitation", farthest_roll, 0.0, ROLL_MAX_DEG)?;
     within("pitch_deg with its excitation", farthest_pitch, 0.0, PITCH_MAX_DEG)?;
+    for airspeed in farthest_airspeeds(step) {
+        within("airspeed_mps with its excitation", airspeed, AIRSPEED_MPS[0], AIRSPEED_MPS[1])?;
+    }
     for e in &step.excitations {
         let most = match e.axis {
             Axis::Aileron | Axis::Elevator | Axis::Throttle | Axis::Rudder => 1.0,
@@ -296,4 +299,45 @@ fn check_step(step: &Step) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Smallest and largest airspeed target of a step with its excitations, m/s.
+fn farthest_airspeeds(step: &Step) -> [f64; 2] {
+    let mut farthest = [step.target.airspeed; 2];
+    for e in step.excitations.iter().filter(|e| e.axis == Axis::Airspeed) {
+        let [down, up] = match e.shape {
+            Shape::Step { .. } => [e.amplitude.min(0.0), e.amplitude.max(0.0)],
+            _ => [-e.peak(), e.peak()],
+        };
+        farthest[0] += down;
+        farthest[1] += up;
+    }
+    farthest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::menu::MENU;
+
+    #[test]
+    fn the_menu_of_a_slow_aircraft_reads_back() {
+        for manoeuvre in MENU {
+            let schedule = manoeuvre.schedule().at_cruise(8.0);
+            let back = Schedule::parse(&schedule.to_toml());
+            assert!(back.is_ok(), "{}: {back:?}", manoeuvre.name);
+        }
+    }
+
+    #[test]
+    fn an_airspeed_is_limited_with_its_excitation() {
+        let with = |amplitude: f64| {
+            let shape = Shape::Step { width: 1.0 };
+            let step = Step::hold(5.0, 0.0, 0.0, 10.0);
+            let excitation = Excitation::new(Axis::Airspeed, amplitude, 0.0, shape);
+            Schedule::new("s", "", vec![step.with(excitation)])
+        };
+        assert!(with(5.0).is_ok() && with(-5.0).is_ok() && with(20.0).is_ok());
+        assert!(with(-12.0).unwrap_err().contains("airspeed_mps with its excitation = -2"));
+    }
 }

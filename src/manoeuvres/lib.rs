@@ -21,8 +21,9 @@ use greylag_physics::Command;
 pub const ROLL_MAX_DEG: f64 = 70.0;
 /// Largest |pitch angle| of a schedule, degrees.
 pub const PITCH_MAX_DEG: f64 = 35.0;
-/// Smallest and largest airspeed of a schedule, m/s.
-pub const AIRSPEED_MPS: [f64; 2] = [5.0, 400.0];
+/// Smallest and largest airspeed of a schedule, m/s. They include the menu's stall of a slow aircraft, at 0.6 of its
+/// cruise airspeed.
+pub const AIRSPEED_MPS: [f64; 2] = [2.0, 400.0];
 /// Cruise airspeed of the aircraft for which the menu and the drawn flights are written, m/s.
 pub const CRUISE_MPS: f64 = 20.0;
 /// Longest duration of a schedule, s.

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Least-squares solution of `rows` · x = `values`. If it is not unique, the solution of minimum norm. `None` if an
-/// input is not finite.
+/// input is not finite, or if there are no rows.
 pub fn least_squares<const N: usize>(rows: &[[f64; N]], values: &[f64]) -> Option<[f64; N]> {
-    if !rows.iter().flatten().chain(values).all(|x| x.is_finite()) {
+    if rows.is_empty() || !rows.iter().flatten().chain(values).all(|x| x.is_finite()) {
         return None;
     }
     let matrix = DMatrix::from_fn(rows.len(), N, |i, j| rows[i][j]);
@@ -25,5 +25,6 @@ mod tests {
         let found = least_squares(&rows, &values).unwrap();
         assert!((found[0] - 2.0).abs() < 1e-9 && (found[2] - 0.25).abs() < 1e-9, "{found:?}");
         assert_eq!(least_squares(&[[f64::NAN]], &[1.0]), None);
+        assert_eq!(least_squares::<2>(&[], &[]), None);
     }
 }

@@ -13,13 +13,15 @@ pub const LONGEST: u64 = 1 << 20;
 /// # Errors
 /// If the file cannot be read, is not UTF-8, or is longer than [`LONGEST`].
 pub fn read(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > LONGEST {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LONGEST + 1).read_to_end(&mut bytes)?;
+    // The length comes first: the limit may cut a character, which would read as text that is not UTF-8.
+    if bytes.len() as u64 > LONGEST {
         let words = format!("it is longer than {} KiB, which no such file is", LONGEST >> 10);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, words));
     }
-    Ok(text)
+    let not_utf8 = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text");
+    String::from_utf8(bytes).map_err(not_utf8)
 }
 
 #[cfg(test)]
@@ -35,5 +37,9 @@ mod tests {
         assert!(refused.contains("longer than 1024 KiB"), "{refused}");
         std::fs::write(&path, " ".repeat(LONGEST as usize)).unwrap();
         assert_eq!(read(&path).unwrap().len() as u64, LONGEST);
+        // The limit lies within one of these characters of two bytes.
+        std::fs::write(&path, "é".repeat(LONGEST as usize)).unwrap();
+        let refused = read(&path).unwrap_err().to_string();
+        assert!(refused.contains("longer than 1024 KiB"), "{refused}");
     }
 }

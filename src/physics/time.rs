@@ -26,8 +26,20 @@ impl Time {
     pub fn since(self, earlier: Time) -> Duration {
         Duration::from_micros(self.0.saturating_sub(earlier.0))
     }
-    /// The time `later` after this one.
+    /// The time `later` after this one. The largest time if it is out of range.
     pub fn plus(self, later: Duration) -> Self {
-        Time(self.0.saturating_add(later.as_micros() as u64))
+        Time(self.0.saturating_add(u64::try_from(later.as_micros()).unwrap_or(u64::MAX)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_that_is_out_of_range_is_the_last_one() {
+        let start = Time::from_micros(5);
+        assert_eq!(start.plus(Duration::MAX), Time::from_micros(u64::MAX));
+        assert_eq!(start.since(Time::from_micros(7)), Duration::ZERO);
     }
 }

@@ -1,11 +1,9 @@
 //! Names that other programs give to the columns of a table.
 //!
 //! Sources: `FGOutputTextFile.cpp` of JSBSim (output sections and property names), the topics of PX4 as ulog2csv writes
-//! them, the records of ArduPilot as `mavlogdump --format csv` writes them (TYPE.field).
+//! them, the records of ArduPilot and the messages of MAVLink as `mavlogdump --format csv` writes them (TYPE.field).
 
-use crate::Format;
-use crate::mapping::{Mapping, format_rules};
-use crate::topics::Topics;
+use crate::mapping::{Mapping, table_rules};
 
 /// Another name for a column: the column, the name, and the factor to the column's unit.
 struct Alias(&'static str, &'static str, f64);
@@ -134,6 +132,8 @@ pub(super) struct Dialect {
     pub quaternion: Option<[String; 4]>,
     /// Whether the time column has an unknown unit, to be found from its steps.
     pub time_by_steps: bool,
+    /// Whether the airspeed is equivalent airspeed.
+    pub equivalent: bool,
 }
 
 impl Dialect {
@@ -162,20 +162,19 @@ impl Dialect {
                 dialect.take(column, &field, *scale);
             }
         }
-        for format in [Format::Dataflash, Format::Tlog] {
-            for rule in format_rules(format, &Topics::default()) {
-                let Some((field, gain)) = rule.factor() else { continue };
-                let name = format!("{}.{field}", rule.topic);
-                let column = rule.columns()[0].to_owned();
-                if has(&name) && lacks(&dialect, &column) {
-                    dialect.take(&column, &name, gain);
-                }
+        for rule in table_rules() {
+            let Some((field, gain)) = rule.factor() else { continue };
+            let name = format!("{}.{field}", rule.topic);
+            let column = rule.columns()[0].to_owned();
+            if has(&name) && lacks(&dialect, &column) {
+                dialect.take(&column, &name, gain);
+                dialect.equivalent |= rule.equivalent;
             }
         }
         let turns = lacks(&dialect, "roll_rad") && lacks(&dialect, "pitch_rad");
         let whole = QUATERNIONS.iter().find(|q| q.iter().all(|name| has(name)));
         dialect.quaternion = match mapping.quaternion() {
-            Some(own) => Some(own.fields.clone()),
+            Some(own) => own.fields.iter().all(|name| has(name)).then(|| own.fields.clone()),
             None => whole.filter(|_| turns).map(|q| q.map(str::to_owned)),
         };
         dialect
@@ -263,6 +262,21 @@ fn offset_s(text: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn columns_that_are_named_by_record_or_message_are_found() {
+        for (name, column, equivalent) in [
+            ("ATTITUDE.roll", "roll_rad", false),
+            ("RAW_IMU.zacc", "az_mps2", false),
+            ("VFR_HUD.airspeed", "airspeed_mps", true),
+            ("ATT.Roll", "roll_rad", false),
+            ("ARSP.Airspeed", "airspeed_mps", true),
+        ] {
+            let dialect = Dialect::of(&[name.to_owned()], &Mapping::default());
+            let found: Vec<&str> = dialect.found.iter().map(|f| f.column.as_str()).collect();
+            assert_eq!((found, dialect.equivalent), (vec![column], equivalent), "{name}");
+        }
+    }
 
     #[test]
     fn a_date_is_seconds_since_1970() {

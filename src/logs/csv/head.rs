@@ -7,7 +7,7 @@ use super::dialect::{self, Dialect};
 use super::raw::Raw;
 use super::records::Fields;
 use crate::columns::{COLUMNS, EITHER, NEEDED, Place, index};
-use crate::mapping::{Mapping, TEXT};
+use crate::mapping::{Entry, Mapping, TEXT};
 use crate::{Sample, mixed};
 
 /// Where a field goes: place, scale, offset; whether it is one part of a sum.
@@ -23,7 +23,7 @@ enum Share {
 /// Where one field goes.
 enum To {
     Nowhere,
-    /// A column, as it is: what most fields are.
+    /// A column without scale and offset, as most fields are.
     Column(Place),
     Targets(Vec<Target>),
 }
@@ -51,7 +51,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// Where the fields with these names go, and their table, without rows yet.
+    /// The targets of fields with these names, and their table without rows.
     pub fn of(names: &[String], delimiter: u8, path: &Path, mapping: &Mapping) -> (Head, Raw) {
         let dialect = Dialect::of(names, mapping);
         let mut targets: Vec<Vec<Target>> =
@@ -68,7 +68,7 @@ impl Head {
         let table = Raw {
             missing,
             unknown_columns: unknown.filter(|n| !n.is_empty() && !dialect.reads(n)).collect(),
-            notes: dialect.said().into_iter().collect(),
+            notes: dialect.said().into_iter().chain(lacking(names, mapping)).collect(),
             ..Raw::default()
         };
         let place = |name: &String| names.iter().position(|n| n == name).unwrap_or(usize::MAX);
@@ -125,7 +125,7 @@ enum Decimal {
     PointOrComma,
 }
 
-/// The number in a field; NaN of an empty one, `None` of what is neither a number nor a date.
+/// The number in a field. NaN if it is empty, `None` if it is neither a number nor a date.
 fn number(field: &[u8], decimal: Decimal) -> Option<f64> {
     if let Some(x) = short(field) {
         return Some(x);
@@ -183,7 +183,7 @@ fn short(field: &[u8]) -> Option<f64> {
     (1..TENS.len()).contains(&count).then(|| sign * (whole as f64 / TENS[behind]))
 }
 
-/// The number that eight digits write (Lemire, "Quickly parsing eight digits"); `None` of other letters.
+/// The number that eight digits write (Lemire, "Quickly parsing eight digits"). `None` if one of them is not a digit.
 fn eight(digits: [u8; 8]) -> Option<u64> {
     const ZEROS: u64 = 0x3030_3030_3030_3030;
     const ABOVE: u64 = 0x4646_4646_4646_4646;
@@ -221,6 +221,20 @@ fn targets(name: &str, mapping: &Mapping, dialect: &Dialect) -> Vec<Target> {
     targets
 }
 
+/// Note on the fields that the mapping names and the table does not have.
+fn lacking(names: &[String], mapping: &Mapping) -> Option<String> {
+    let lacks = |field: &String| !names.contains(field);
+    let columns = mapping.of_topic(TEXT).filter(|(_, entry)| lacks(&entry.field));
+    let mut parts: Vec<String> =
+        columns.map(|(column, entry)| format!("{TEXT}.{} for {column}", entry.field)).collect();
+    let turn = mapping.quaternion().filter(|turn| turn.topic == TEXT);
+    let fields = turn.into_iter().flat_map(|turn| &turn.fields).filter(|field| lacks(field));
+    parts.extend(fields.map(|field| format!("{TEXT}.{field} for the attitude")));
+    (!parts.is_empty()).then(|| {
+        format!("the mapping names columns that the table does not have: {}", parts.join(", "))
+    })
+}
+
 /// The needed columns that are not among `names`, each with what would satisfy it.
 fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvError> {
     let has = |column: &str| {
@@ -228,9 +242,14 @@ fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvE
         names.iter().any(|n| n == name)
     };
     let missing = |column, remedy| CsvError::Column { path: path.to_owned(), column, remedy };
+    let remedy = |column: &str| match mapping.get(column) {
+        Some(Entry { topic, field, .. }) => {
+            format!("the mapping takes it from {topic}.{field}, which the table does not have")
+        }
+        None => "add it, in the unit its name ends with".into(),
+    };
     let alone = NEEDED.into_iter().filter(|column| !has(column) && !mapping.makes(column));
-    let alone =
-        alone.map(|column| missing(column, "add it, in the unit its name ends with".into()));
+    let alone = alone.map(|column| missing(column, remedy(column)));
     let either = EITHER.into_iter().filter(|(command, position)| !has(command) && !has(position));
     let either = either.map(|(command, position)| {
         missing(command, format!("add it, or the position `{position}`"))
@@ -241,6 +260,24 @@ fn missing_columns(names: &[String], mapping: &Mapping, path: &Path) -> Vec<CsvE
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_mapping_names_and_the_table_lacks_is_said() {
+        let text = "schema = 1\n[columns]\nalpha_rad = { from = \"csv.aoa\" }\n\
+            airspeed_mps = { from = \"csv.tas\" }\n\
+            [attitude]\nquaternion = [\"csv.a\", \"csv.b\", \"csv.c\", \"csv.d\"]\n";
+        let mapping = Mapping::parse(text, Path::new("m.toml")).unwrap();
+        let names = ["time_s", "a", "b", "c"].map(str::to_owned);
+        let (_, table) = Head::of(&names, b',', Path::new("t.csv"), &mapping);
+        let note = table.notes.join("; ");
+        for part in ["csv.aoa for alpha_rad", "csv.tas for airspeed_mps", "csv.d for the attitude"]
+        {
+            assert!(note.contains(part), "{note}");
+        }
+        let missing: Vec<String> = table.missing.iter().map(CsvError::to_string).collect();
+        let missing = missing.join("\n");
+        assert!(missing.contains("`roll_rad`") && missing.contains("from csv.tas"), "{missing}");
+    }
 
     #[test]
     fn a_short_number_is_that_of_the_standard_library_to_the_bit() {

@@ -4,6 +4,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 use super::CsvError;
+use super::airspeed;
 use super::dialect;
 use super::head::Head;
 use super::quaternion;
@@ -46,8 +47,8 @@ const BEGINS: f64 = 0.1;
 const RECORDING: usize = 50;
 
 impl Raw {
-    /// Judges every row, those included that could not be read, by `judge`: it gets the row's number, the row and the
-    /// rows that are kept before it. The kept rows stay in place, because a copy of a long table is large.
+    /// Judges every row by `judge`, also those that could not be read (`None`). `judge` gets the row's number, the row
+    /// and the rows that are kept before it. The kept rows stay in place, because a copy of a long table is large.
     pub(super) fn judged(
         &mut self,
         judge: impl Fn(&mut rows::Rows, usize, Option<Sample>, &[Sample]) -> Option<Sample>,
@@ -190,7 +191,12 @@ pub(crate) fn read(
                 quaternions.extend(head.quaternion(record));
             }
             Some(_) => {}
-            None => out.unreadable.push(number),
+            // A quote that is not closed takes the lines behind it into its record: each of them is lost.
+            None => {
+                let lines = record.lines();
+                out.unreadable.extend(number..number + lines);
+                number += lines - 1;
+            }
         }
         number += 1;
         if thin.is_full(out.rows.len()) {
@@ -202,13 +208,17 @@ pub(crate) fn read(
     }
     out.cut_short = records.cut_short();
     out.whole = thin.whole();
+    // The order of a quaternion's components is found from body rates, which need times in seconds.
+    if head.dialect.time_by_steps {
+        in_seconds(&mut out.rows);
+    }
+    if head.dialect.equivalent {
+        out.notes.push(airspeed::make_true(&mut out.rows));
+    }
     if head.dialect.quaternion.is_some() {
         let order = mapping.quaternion().and_then(|q| q.order);
         let order = order.unwrap_or_else(|| quaternion::order(&out.rows, &quaternions));
         quaternion::fill(&mut out.rows, &quaternions, order);
-    }
-    if head.dialect.time_by_steps {
-        in_seconds(&mut out.rows);
     }
     Ok(out)
 }
@@ -218,4 +228,40 @@ fn in_seconds(rows: &mut [Sample]) {
     let times: Vec<f64> = rows.iter().map(|s| s.time_s).collect();
     let unit = dialect::unit_of(period_s(&times));
     rows.iter_mut().for_each(|row| row.time_s *= unit);
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    fn table(text: &str) -> Raw {
+        raw(text.as_bytes(), Path::new("t.csv"), &Mapping::default()).unwrap()
+    }
+
+    #[test]
+    fn the_order_of_a_quaternion_is_found_by_the_rates_with_times_in_microseconds() {
+        let mut text = String::from("timestamp,q[0],q[1],q[2],q[3],p_radps,q_radps,r_radps\n");
+        for k in 0..200 {
+            let turn = UnitQuaternion::from_euler_angles(0.3 + 0.002 * f64::from(k), 0.1, 0.5);
+            let [x, y, z, w] = [turn.i, turn.j, turn.k, turn.w];
+            text += &format!("{},{x},{y},{z},{w},0.2,0,0\n", 10_000 * k);
+        }
+        let row = table(&text).rows[100];
+        assert!((row.time_s - 1.0).abs() < 1e-9, "{row:?}");
+        assert!((row.attitude_rad[0] - 0.5).abs() < 1e-9, "{row:?}");
+    }
+
+    #[test]
+    fn lines_behind_a_quote_that_is_not_closed_are_counted_as_lost() {
+        let row = |k: i32| format!("{k},0.1,\"AUTO\"\n");
+        let rows: Vec<String> = (0..10).map(row).collect();
+        let text = format!("time_s,roll_rad,mode\n{}", rows.concat());
+        assert_eq!(table(&text).rows.len(), 10);
+        let spoiled =
+            text.replacen("2,0.1,\"AUTO\"\n3", "2,\"0.1\n3", 1).replace("\"AUTO\"", "AUTO");
+        let table = table(&spoiled);
+        assert_eq!((table.rows.len(), table.unreadable), (2, (2..10).collect::<Vec<usize>>()));
+    }
 }

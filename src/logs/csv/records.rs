@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use memchr::{memchr_iter, memchr2};
 
-/// Whole lines of a source: a last one without its end may miss digits, and is held back.
+/// Whole lines of a source. A last line without its end is held back, because it may lack digits.
 pub(super) struct Lines<'a> {
     source: &'a mut dyn BufRead,
     line: Vec<u8>,
@@ -49,7 +49,7 @@ type Quoted<'a> = ::csv::Reader<io::Chain<Cursor<Vec<u8>>, Lines<'a>>>;
 /// Where the records come from.
 enum Origin<'a> {
     Plain(Lines<'a>),
-    /// From the first line with a quote on, or with a line end within it.
+    /// From the first line that has a quote, or a carriage return within it.
     Quoted(Box<Quoted<'a>>),
     /// After an error.
     Nothing,
@@ -86,6 +86,12 @@ impl<'a> Fields<'a> {
             start = end + self.between;
             field
         })
+    }
+
+    /// Number of lines that the record spans; more than one with a line end between quotes.
+    pub fn lines(self) -> usize {
+        let open = self.bytes.last().is_none_or(|b| *b != b'\n');
+        memchr_iter(b'\n', self.bytes).count() + usize::from(open)
     }
 
     pub fn get(self, i: usize) -> Option<&'a [u8]> {

@@ -255,7 +255,7 @@ impl Mapping {
         let others = match format {
             Format::Csv => Vec::new(),
             Format::Ulog => px4::rules(topics),
-            // The stamps of one are not of the clock of the other.
+            // The topics of px4_msgs and of MAVROS have time stamps of different clocks.
             Format::Ros if topics.first("vehicle_attitude").is_some() => px4::rules(topics),
             Format::Ros => mavros::rules(topics, self.mixer()),
             Format::Dataflash => ardupilot::rules(topics, self.mixer()),
@@ -303,7 +303,8 @@ impl Mapping {
     }
 }
 
-/// The rules of a format without a mapping.
-pub(super) fn format_rules(format: Format, topics: &Topics) -> Vec<Rule> {
-    Mapping::default().rules(format, topics)
+/// The rules for the columns of a table that are named by record or message and field.
+pub(super) fn table_rules() -> Vec<Rule> {
+    let of_dataflash = ardupilot::rules(&Topics::default(), None);
+    of_dataflash.into_iter().chain(telemetry::of_table()).collect()
 }

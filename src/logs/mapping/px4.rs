@@ -150,7 +150,7 @@ fn commands(topics: &Topics) -> Vec<Rule> {
     out
 }
 
-/// The first motor, where one runs at any time of the log.
+/// The first motor, if it runs at any time of the log.
 fn motor(topics: &Topics) -> Option<Rule> {
     let (topic, field) = ("actuator_motors", "control[0]");
     let runs = topics.first(topic)?.field(field)?.iter().any(|x| x.is_finite());
@@ -158,7 +158,7 @@ fn motor(topics: &Topics) -> Option<Rule> {
     runs.then(|| Rule::sum("throttle_cmd", topic, vec![term]))
 }
 
-/// Commands from the servos' outputs and the torque of each by its parameters CA_SV_CSn_TRQ_*.
+/// Commands from the servo outputs, weighted by the torques of the surfaces (parameters CA_SV_CSn_TRQ_*).
 fn allocated(topics: &Topics) -> Vec<Rule> {
     let mut out = Vec::new();
     for (column, axis, sign) in

@@ -9,7 +9,7 @@ use crate::topics::Topic;
 pub enum Shape {
     /// The value without a change.
     Linear,
-    /// A servo's pulse to −1..1, each side of its trim by its own range.
+    /// Converts a servo pulse to −1..1, with a separate range on each side of the trim.
     Surface {
         /// Pulse at −1, µs.
         min: f64,
@@ -18,9 +18,9 @@ pub enum Shape {
         /// Pulse at 1, µs.
         max: f64,
     },
-    /// A motor of PX4: NaN stops it.
+    /// The command of a motor of PX4. NaN stops the motor.
     Motor,
-    /// A pulse to 0..1.
+    /// Converts a pulse to 0..1.
     Range {
         /// Pulse at 0, µs.
         min: f64,

@@ -105,6 +105,14 @@ fn airspeed(topics: &Topics, system: u8) -> Rule {
     }
 }
 
+/// The rules for a table whose columns are named by message and field, such as `ATTITUDE.roll`. The sender is not known:
+/// the airspeed of VFR_HUD is taken as that of a real autopilot, equivalent airspeed.
+pub fn of_table() -> Vec<Rule> {
+    let mut out = states();
+    out.push(Rule::linear("airspeed_mps", "VFR_HUD", "airspeed", 1.0).equivalent());
+    out
+}
+
 fn states() -> Vec<Rule> {
     let degree = 1_f64.to_radians();
     let mut out = vec![Rule::quaternion("ATTITUDE_QUATERNION", ["q1", "q2", "q3", "q4"])];

@@ -135,7 +135,7 @@ pub(super) fn entry(column: &str, e: WrittenEntry) -> Result<Entry, String> {
     })
 }
 
-/// Refuses a time over which no rate can be taken.
+/// Refuses a time span (s) over which no slope can be fitted.
 pub(super) fn over(what: &str, time: Option<f64>) -> Result<(), String> {
     match time {
         Some(x) if !(x > 0.0 && x <= 10.0) => {

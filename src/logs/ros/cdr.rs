@@ -33,7 +33,7 @@ impl<'b> Cdr<'b> {
         self.body.len() - self.at
     }
 
-    /// The next `count` bytes, of numbers of `size` bytes.
+    /// The bytes of the next `count` numbers, each of `size` bytes.
     fn take(&mut self, size: usize, count: usize) -> Option<&'b [u8]> {
         let from = self.at.next_multiple_of(size.min(self.widest));
         let to = size.checked_mul(count)?.checked_add(from)?;

@@ -1,4 +1,4 @@
-//! Records of an MCAP file that a bag's topics are declared by, and the codes of all.
+//! The records of an MCAP file that declare a bag's topics, and the codes of all records.
 //!
 //! Not by the crate `mcap` (0.26.0): its readers hold the largest record in memory, a camera's image for example, and end at
 //! the first damage.

@@ -11,9 +11,9 @@ use crate::topics::{Topic, Topics};
 
 /// Stamps later than this, s, count from 1970; earlier ones from the boot of the vehicle or the start of a simulation.
 const SINCE_1970_S: f64 = 1e8;
-/// Attitudes from which on a further namespace counts as another vehicle.
+/// Number of attitudes from which a further namespace counts as another vehicle.
 const VEHICLE: usize = 10;
-/// Topics with which a vehicle is counted as one.
+/// Topics with an attitude, by which vehicles are counted.
 const ATTITUDES: [&str; 2] = ["vehicle_attitude", "imu/data"];
 
 /// Package of the messages of PX4.
@@ -92,7 +92,7 @@ pub(super) struct Streams<'w> {
 }
 
 impl<'w> Streams<'w> {
-    /// No topics yet; `wanted` says which fields of which are read.
+    /// No topics yet. The fields for which `wanted(topic, field)` is true are read.
     pub fn new(wanted: &'w dyn Fn(&str, &str) -> bool, keep: Keep) -> Streams<'w> {
         Streams {
             wanted,
@@ -152,7 +152,7 @@ impl<'w> Streams<'w> {
         self.channels.contains_key(&channel)
     }
 
-    /// Counts a message; returns whether it is read, which one that is `short` enough may be.
+    /// Counts a message. Returns whether it is to be read. A message that is not `short` enough is not.
     pub fn counts(&mut self, channel: u16, short: bool) -> bool {
         let stream = self.channels.get(&channel).and_then(|i| self.streams.get_mut(*i));
         let Some(stream) = stream else {
@@ -257,7 +257,7 @@ impl Stream {
     }
 }
 
-/// A field's name that asks whether any field of a topic may be wanted.
+/// Name that stands for any field of a topic.
 pub(super) const ANY: &str = "";
 
 /// The plan of a channel's messages; `None` if it has no definition.

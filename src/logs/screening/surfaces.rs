@@ -76,7 +76,7 @@ fn throttle(column: &str, size: f64) -> Finding {
     }
 }
 
-/// ṗ on p, r, β and the aileron: positive is right wing down.
+/// Regression of ṗ on p, r, β and the aileron: positive is right wing down.
 fn aileron(rows: &[Sample], flies: &Flying) -> Option<Finding> {
     let (column, get) =
         moving(rows, [("aileron_rad", |s| s.aileron_rad), ("aileron_cmd", |s| s.aileron_cmd)])?;

@@ -1,0 +1,54 @@
+//! The usable samples of a channel: finite values at increasing times.
+
+use std::borrow::Cow;
+
+/// A time that is this much later than the two after it is wrong, s.
+const AHEAD_S: f64 = 1.0;
+
+/// Times that increase with finite values; the topic's own where they do so already.
+pub(super) fn cleaned(all_times: &[f64], all: Vec<Vec<f64>>) -> (Cow<'_, [f64]>, Vec<Vec<f64>>) {
+    let increasing = all_times.windows(2).all(|w| w[0] < w[1]);
+    let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
+    if increasing && finite(all_times) && all.iter().all(|s| finite(s)) {
+        return (Cow::Borrowed(all_times), all);
+    }
+    let mut times: Vec<f64> = Vec::with_capacity(all_times.len());
+    let mut series: Vec<Vec<f64>> = vec![Vec::with_capacity(all_times.len()); all.len()];
+    for (i, t) in all_times.iter().enumerate() {
+        let last = times.last().copied().unwrap_or(f64::NEG_INFINITY);
+        let usable = t.is_finite() && *t > last && !is_ahead(&all_times[i..], last);
+        if usable && all.iter().all(|s| s[i].is_finite()) {
+            times.push(*t);
+            series.iter_mut().zip(&all).for_each(|(to, from)| to.push(from[i]));
+        }
+    }
+    (Cow::Owned(times), series)
+}
+
+/// Whether the first of `times` is far ahead of the next two, which continue from `last` (s). All later samples would be
+/// left out behind such a damaged time.
+fn is_ahead(times: &[f64], last: f64) -> bool {
+    let [t, next @ ..] = times else { return false };
+    let continues = |next: &f64| *next > last && *next < t - AHEAD_S;
+    next.len() >= 2 && next[..2].iter().all(continues)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_damaged_time_costs_its_own_sample_only() {
+        let mut times: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        times[40] = 1e6;
+        times[60] = 0.0;
+        let values = vec![(0..100).map(f64::from).collect()];
+        let (kept, series) = cleaned(&times, values);
+        assert_eq!((kept.len(), series[0].len()), (98, 98));
+        assert!(kept.windows(2).all(|w| w[0] < w[1]) && series[0][40] == 41.0);
+        // A clock that starts again is not mended: the two recordings are not one.
+        let again: Vec<f64> = (0..100).map(|k| f64::from(k % 50)).collect();
+        let (kept, _) = cleaned(&again, vec![vec![0.0; 100]]);
+        assert_eq!(kept.len(), 50);
+    }
+}
