@@ -8,6 +8,8 @@ use greylag_physics::catalogue::describe;
 
 /// Largest number of recommendations for candidates whose evidence is near the threshold.
 const UNSEEN: usize = 2;
+/// Manoeuvres for an effect whose file states none.
+const ONE_BY_ONE: &str = "flights that move its variables one by one, at two airspeeds";
 
 /// Advice on the next flight, in descending order of usefulness; empty if there is none.
 pub fn advice(
@@ -74,13 +76,21 @@ fn designable(a: &str, b: &str) -> Option<[String; 2]> {
     [a, b].iter().all(|id| *id != askew::ID).then(|| [a.to_owned(), b.to_owned()])
 }
 
+/// The manoeuvres that separate the effect `id` from others. An effect file need not state them.
 fn separating(id: &str) -> String {
-    describe(id).and_then(|a| a.entry).map_or(String::new(), |e| e.separated_by.to_owned())
+    let stated = describe(id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
+    (if stated.is_empty() { ONE_BY_ONE } else { stated }).to_owned()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_effect_without_stated_manoeuvres_still_gets_some() {
+        assert_eq!(separating("no such effect"), ONE_BY_ONE);
+        assert_ne!(separating("drag_beta2"), ONE_BY_ONE);
+    }
 
     #[test]
     fn no_flight_is_designed_between_an_effect_and_misaligned_axes() {

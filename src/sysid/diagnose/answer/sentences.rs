@@ -250,12 +250,19 @@ fn asserted(c: &Candidate) -> String {
     );
     if !c.indistinguishable_from.is_empty() {
         let separate = describe(&c.id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
-        text += &format!(
-            " It could also be {}: these data cannot tell them apart; to be sure, fly {separate}.",
-            c.indistinguishable_from.join(" or ")
-        );
+        text += &alike(&c.indistinguishable_from.join(" or "), separate);
     }
     text
+}
+
+/// Sentence on the effects `others` that may be the cause as well, with the manoeuvres `separate` that would decide. An
+/// effect file need not state such manoeuvres.
+fn alike(others: &str, separate: &str) -> String {
+    let fly = match separate {
+        "" => String::new(),
+        manoeuvres => format!("; to be sure, fly {manoeuvres}"),
+    };
+    format!(" It could also be {others}: these data cannot tell them apart{fly}.")
 }
 
 /// What a flexible model could remove, in words, if it exceeds chance.
@@ -326,4 +333,16 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
         notes.push(format!("Left out of the catalogue: {}.", options.without.join(", ")));
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_stated_manoeuvres_are_to_be_flown() {
+        let said = alike("mass or inertia", "");
+        assert_eq!(said, " It could also be mass or inertia: these data cannot tell them apart.");
+        assert!(alike("mass", "fast rolls").ends_with("apart; to be sure, fly fast rolls."));
+    }
 }
