@@ -54,7 +54,8 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
 
 /// A warning if a forecast without aerodynamics is better than the model at the longest horizon that a run reaches.
 pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
-    let score = free_run.iter().rev().find(|s| s.runs > 0 && s.rmse_scaled.is_finite())?;
+    let reached = free_run.iter().filter(|s| s.runs > 0 && s.rmse_scaled.is_finite());
+    let score = reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
     let horizon = score.horizon_s;
     let at = |f: &ForecastResult| {
         let there = f.free_run.iter().find(|s| s.horizon_s == horizon)?;
@@ -66,4 +67,28 @@ pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option
          of the reference scale, the model by {:.3}.",
         score.rmse_scaled
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_horizon_decides_in_any_order_of_horizons() {
+        let at = |horizon_s, rmse_scaled| {
+            let states = Vec::new();
+            HorizonScore {
+                horizon_s,
+                runs: 3,
+                diverged: 0,
+                divergence_rate: 0.0,
+                rmse_scaled,
+                states,
+            }
+        };
+        let forecast =
+            ForecastResult { name: "hold the state", free_run: vec![at(10.0, 0.1), at(1.0, 0.02)] };
+        let said = beaten(&[at(10.0, 0.2), at(1.0, 0.01)], &[forecast]).unwrap();
+        assert!(said.contains("10 s ahead"), "{said}");
+    }
 }
