@@ -272,9 +272,14 @@ impl Runs {
             theil_u: rmse / (root_mean_square(&predicted) + root_mean_square(&measured)),
             bias_share: bias,
             variance_share: variance,
-            covariance_share: (1.0 - bias - variance).max(0.0),
+            covariance_share: at_least_zero(1.0 - bias - variance),
         }
     }
+}
+
+/// `x`, or 0 if it is negative. An undefined `x` stays NaN, which `f64::max` would replace by 0.
+fn at_least_zero(x: f64) -> f64 {
+    if x < 0.0 { 0.0 } else { x }
 }
 
 fn root_mean_square(x: &[f64]) -> f64 {
@@ -314,6 +319,9 @@ mod tests {
         assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
         assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
         assert_eq!(score.states[2].rmse, 0.0);
+        // without an error, none of its shares is defined
+        let s = &score.states[2];
+        assert!(s.bias_share.is_nan() && s.variance_share.is_nan() && s.covariance_share.is_nan());
         // a roll of 179° predicted as −179° has an error of 2°
         let e = error(&[179_f64.to_radians(); 8], &[-179_f64.to_radians(); 8]);
         assert!((e[0] - 2_f64.to_radians()).abs() < 1e-9);
