@@ -42,11 +42,11 @@ pub(super) fn known(
         known.push(Known { name: named.name.clone(), width, offset: value - named.value });
     }
     let constants = problem.per_flight.constants();
-    for (k, (list, flight)) in placed.iter_mut().zip(flights).enumerate() {
+    for (list, flight) in placed.iter_mut().zip(flights) {
         let columns = per_flight::columns(&problem.per_flight, model, flight);
         for (constant, column) in constants.iter().zip(columns) {
             list.push((known.len(), column));
-            let name = format!("{} of flight {}", constant.name, k + 1);
+            let name = format!("{} of flight {}", constant.name, flight.measured.name);
             known.push(Known { name, width: constant.width, offset: 0.0 });
         }
     }
@@ -54,7 +54,7 @@ pub(super) fn known(
         for (i, column) in flight.sensors.iter().enumerate() {
             list.push((known.len(), column.clone()));
             known.push(Known {
-                name: format!("{} of flight {}", sensors::NAMES[i], k + 1),
+                name: format!("{} of flight {}", sensors::NAMES[i], flight.measured.name),
                 width: problem.sensors[k][i],
                 offset: sensors::mean(i),
             });
