@@ -199,6 +199,7 @@ fn one_model(
     let traces = paths.into_iter().zip(flights).zip(&series);
     let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
     let mut sentences = verdict::sentences(&free_run, &channels);
+    sentences.extend(verdict::unpredicted(&series));
     sentences.extend(known.as_ref().and_then(|k| k.sentence(&free_run)));
     ModelResult {
         name: model.name.clone(),

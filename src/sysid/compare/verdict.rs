@@ -3,6 +3,7 @@
 use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
 use crate::weak_form::channels::ChannelId;
+use crate::weak_form::windows::Series;
 
 /// Sentences on a model. The worst force and the worst moment come first, then the other channels.
 ///
@@ -69,9 +70,40 @@ pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option
     ))
 }
 
+/// A warning if predictions of the model over the flights' `series` are not numbers, for example the square root of a
+/// negative angle. These windows have no residual and are not in the channels' results.
+pub fn unpredicted(series: &[Vec<Series>]) -> Option<String> {
+    let of = |channel: &ChannelId| {
+        let own = series.iter().flatten().filter(|s| s.channel == *channel);
+        let pairs = own.flat_map(|s| s.measured.iter().zip(&s.predicted));
+        let measured: Vec<_> = pairs.filter(|(measured, _)| measured.is_finite()).collect();
+        let lost = measured.iter().filter(|(_, predicted)| !predicted.is_finite()).count();
+        (lost > 0).then(|| format!("{} {lost} of {}", channel.name(), measured.len()))
+    };
+    let all: Vec<String> = ChannelId::ALL.iter().filter_map(of).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "The model predicts no number in some windows, which are left out of the channels: {}.",
+            all.join(", ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn windows_without_a_prediction_are_counted() {
+        let series = |predicted: [f64; 3]| {
+            let measured = vec![1.0, 2.0, f64::NAN];
+            let channel = ChannelId::Lift;
+            Series { channel, measured, predicted: predicted.to_vec(), noise_variance: 0.0 }
+        };
+        assert_eq!(unpredicted(&[vec![series([1.0, 2.0, f64::NAN])]]), None);
+        let said = unpredicted(&[vec![series([1.0, f64::NAN, f64::NAN])]]).unwrap();
+        assert!(said.ends_with("left out of the channels: lift 1 of 2."), "{said}");
+    }
 
     #[test]
     fn the_longest_horizon_decides_in_any_order_of_horizons() {
