@@ -70,8 +70,8 @@ pub fn advice(
     list
 }
 
-/// The pair for `greylag design --between`; `None` if one of the two is the misalignment of the axes, which is no effect of
-/// the catalogue.
+/// The pair for `greylag design --between`; `None` if one of the two is the misalignment of the axes, which is no
+/// effect of the catalogue.
 fn designable(a: &str, b: &str) -> Option<[String; 2]> {
     [a, b].iter().all(|id| *id != askew::ID).then(|| [a.to_owned(), b.to_owned()])
 }

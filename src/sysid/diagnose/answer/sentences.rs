@@ -12,7 +12,7 @@ use greylag_physics::catalogue::describe;
 
 /// Distance from the prior mean, in prior standard deviations, beyond which a tuned coefficient gets a note.
 const FAR: f64 = 3.0;
-/// Least share that is reported; a smaller one is printed as zero.
+/// Smallest share that is reported. A smaller share would be printed as zero.
 const SHOWN: f64 = 0.005;
 /// Half width of a 95 % interval in standard deviations.
 pub const INTERVAL: f64 = 1.96;
@@ -27,7 +27,7 @@ pub struct Content<'a> {
     pub found: &'a Found,
     /// Overall verdict on the model.
     pub verdict: Verdict,
-    /// Why it is [`Verdict::Unknown`], unless figures that cannot be are the reason.
+    /// Reason for [`Verdict::Unknown`]; `None` for other verdicts, and if an impossible estimate is the reason.
     pub why_unknown: Option<WhyUnknown>,
     /// Physically impossible figures, in words.
     pub doubtful: &'a [String],
@@ -41,19 +41,19 @@ pub struct Content<'a> {
     pub trims: &'a [FlightTrim],
 }
 
-/// Why a diagnosis has no verdict although its figures are possible.
+/// Reason why a diagnosis has no verdict although no estimate is physically impossible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhyUnknown {
-    /// The remaining errors of the sensors may account for what is left in every channel.
+    /// The remaining errors of the sensors may account for the residual in every channel.
     SensorsMayAccount,
     /// The model as given has no sure error in any channel.
     GivenModelFaultless,
-    /// A flexible model of the states removes little of what is left.
+    /// A flexible model of the states removes little of the residual.
     NotOfTheStates,
 }
 
-/// The sentences, the most important first: impossible figures, instruments where they explain the flights, the
-/// aircraft.
+/// The sentences, the most important first: impossible estimates, misaligned axes, missing effects with the verdict,
+/// then the remaining residual and the sensors.
 pub fn sentences(content: &Content) -> Vec<String> {
     let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
@@ -265,7 +265,7 @@ fn alike(others: &str, separate: &str) -> String {
     format!(" It could also be {others}: these data cannot tell them apart{fly}.")
 }
 
-/// What a flexible model could remove, in words, if it exceeds chance.
+/// Phrase for the error that a flexible model could remove; empty if it does not exceed chance.
 fn removable(found: &Found) -> String {
     let more = found.remainder.total > found.remainder.total_threshold;
     match more && found.learnable() >= SHOWN {

@@ -15,8 +15,8 @@ pub struct Term {
     pub sd: f64,
 }
 
-/// Whether a further term was `added` to `terms`. If it was not, or if the model with it cannot be evaluated (`None`), the
-/// terms are cut to their former `count`.
+/// Whether a further term was `added` to `terms`. If it was not, or if the model with it cannot be evaluated (`None`),
+/// the terms are cut to their former `count`.
 pub fn kept(terms: &mut Vec<Term>, count: usize, added: Option<bool>) -> bool {
     let added = added == Some(true);
     if !added {

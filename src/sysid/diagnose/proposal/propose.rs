@@ -27,7 +27,8 @@ const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
 /// Proposes a formula for the effect that `model` lacks according to `flights`, if a diagnosis leaves it unexplained,
-/// and tests it on `held_out`; reports to `progress`, which may cancel.
+/// and tests it on `held_out`. Constants of single flights in the model's file are not used. `progress` receives the
+/// stages and may cancel.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).
@@ -92,7 +93,7 @@ pub fn propose(
     Ok(proposal)
 }
 
-/// Channels in which a formula is searched for; without those that a rudder drives if the model has no rudder.
+/// Channels in which a formula is searched. If `rudder` moves and the model has no rudder, its channels are left out.
 fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
     let mut channels = failing(found);
@@ -100,9 +101,9 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     channels
 }
 
-/// Whether a free form fits better than the adopted formula of the library although that is simpler and removes
-/// hardly less error: the form is then uncertain. The evidences are from two rounds of tuning, so this only withholds
-/// a grade.
+/// Whether a free form has more evidence than the adopted formula of the library, which is simpler and removes hardly
+/// less error. The form of the formula is then not certain. The evidences come from different tunings of the model and
+/// are not strictly comparable, so they only withhold the grade.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);

@@ -13,9 +13,10 @@ use greylag_physics::formula::file::channel_name;
 
 /// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV.
 ///
-/// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index in `flights` from 0, the
-/// mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the residual of each
-/// channel (N or N m; empty if it is not measured). The name of a residual's column is `left_` followed by the channel.
+/// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index in `flights` from 0,
+/// the mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the
+/// residual of each channel (N or N m; empty if it is not measured). The name of a residual's column is `left_`
+/// followed by the channel.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).

@@ -13,9 +13,9 @@ use greylag_physics::rigid_body::{self, RigidBody, Vector};
 use greylag_physics::{Channel, Wrench};
 
 /// Number of sensor-error columns: gyros p, q, r (rad/s), α, β (rad), airspeed (relative), accelerometers x, y, z
-/// (m/s²), then delays (s) of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of
-/// the recorded actuators, and the actuators' blur (half the variance, in squared samples, of the time over which a
-/// record is averaged).
+/// (m/s²), then the delays (s) of α, β, airspeed, accelerometers, of the angular accelerations relative to the moments,
+/// and of the recorded actuators. The last column is the actuators' blur: half the variance of the time over which a
+/// record is averaged, in squared sampling intervals.
 pub const SENSORS: usize = 16;
 
 /// A flight evaluated under a model.
@@ -31,7 +31,7 @@ pub struct Ready {
     pub sensors: Vec<Column>,
     /// Derivatives of the prediction with respect to aileron, elevator and throttle, by segment and sample.
     controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
-    /// Model that predicts the aircraft's accelerations, if it is a different one.
+    /// Model that predicts the aircraft's accelerations; `None` for the model of the residual.
     accelerating: Option<GreyBox>,
 }
 
@@ -45,7 +45,7 @@ impl Ready {
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
         let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 7, |place, add| {
-            // derivatives are those at the start of a step, also for its end, which RK4 evaluates too
+            // RK4 also evaluates the end of a step; the derivatives there are approximated by those at the start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
                 here.value

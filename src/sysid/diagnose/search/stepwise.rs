@@ -131,8 +131,8 @@ fn select(
     Ok(aside)
 }
 
-/// The last record of each effect. A candidate that was set aside is ranked again after another effect has been added, and
-/// may be refused again.
+/// The last record of each effect. A candidate that was set aside is ranked again after another effect has been added,
+/// and may be refused again.
 fn latest(refused: Vec<Selected>) -> Vec<Selected> {
     let mut kept: Vec<Selected> = Vec::new();
     for one in refused {
