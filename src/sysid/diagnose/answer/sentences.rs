@@ -77,7 +77,7 @@ pub fn sentences(content: &Content) -> Vec<String> {
         )
     }));
     if verdict == Verdict::Unexplained {
-        let open = channels.iter().filter(|c| !c.abstained);
+        let open = channels.iter().filter(|c| !c.abstained && c.unexplained_fraction.is_finite());
         let worst = open.max_by(|a, b| a.unexplained_fraction.total_cmp(&b.unexplained_fraction));
         all.extend(worst.and_then(|c| {
             let regime = c.worst_regime.as_ref()?;
