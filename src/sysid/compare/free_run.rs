@@ -59,6 +59,27 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     (Runs { times, runs, scale: model.scale() }, traces)
 }
 
+/// Largest relative difference between a horizon and the time of the sample at which its error is computed.
+const UNEVEN: f64 = 0.25;
+
+/// A note for each horizon (s) that the samples of a flight hardly reach. `steps` holds the names of the flights and
+/// their sampling intervals, s.
+pub fn uneven(steps: &[(&str, f64)], horizons: &[f64]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (name, dt) in steps {
+        for horizon in horizons {
+            let sampled = dt * (horizon / dt).round().max(1.0);
+            if (sampled - horizon).abs() > UNEVEN * horizon {
+                notes.push(format!(
+                    "{name}: its samples are {dt:.3} s apart, so its error at the horizon {horizon} s is that at \
+                     {sampled:.3} s"
+                ));
+            }
+        }
+    }
+    notes
+}
+
 /// Converts the states of `trace` to those that the flight's sensors would measure, sensor errors included.
 fn measured_from(trace: &mut Trace, known: &KnownFlight) {
     for k in 0..trace[0].len() {
@@ -293,6 +314,17 @@ fn deviation(x: &[f64], mean: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_horizon_between_two_samples_is_noted() {
+        let all = uneven(&[("a", 0.01), ("b", 0.2)], &[0.05, 1.0]);
+        assert_eq!(
+            all,
+            [
+                "b: its samples are 0.200 s apart, so its error at the horizon 0.05 s is that at 0.200 s"
+            ]
+        );
+    }
 
     #[test]
     fn theils_shares_of_known_errors() {
