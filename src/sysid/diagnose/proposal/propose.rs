@@ -143,8 +143,8 @@ fn empty(
     }
 }
 
-/// Completes the proposal with its sentences, and with the effect file if there is no objection; `from` names the
-/// flights searched.
+/// Adds the sentences to the proposal, and the effect file if there is no objection. `from` names the flights of the
+/// search.
 fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldOut, from: &str) {
     proposal.refused.extend(objection(&tested));
     proposal.sentences.extend(sentences(proposal, first, terms, &tested));
@@ -156,7 +156,7 @@ fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldO
     proposal.held_out = Some(tested);
 }
 
-/// The library's formula, or one with lagged controls or free forms if that is better.
+/// The library's formula, or a better formula with lagged controls or free forms.
 fn beyond_library(
     ask: &Ask,
     library: Climbed,

@@ -114,8 +114,8 @@ impl Ready {
         Ready { accelerating: model.cloned(), ..self }
     }
 
-    /// Predictions of one unit of each of the coefficients `wanted` of `model`, which must contain the effects of the
-    /// flight's model; shape constants and those of input effects have empty columns.
+    /// Predictions for one unit of each of the coefficients `wanted` of `model`. `model` must contain the effects of
+    /// the flight's model. The columns of shape constants and of coefficients of input effects are empty.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
         // a formula with a lag needs the past of the deflections, which the flight's own model may not remember
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
@@ -154,8 +154,8 @@ impl Ready {
         columns
     }
 
-    /// Change of the residual for a unit of a parameter that changes the rigid body to `body` at `step`. The
-    /// accelerations are predicted ones, since measured ones share the residual's noise.
+    /// Change of the residual for one unit of a parameter. A change of the parameter by `step` changes the rigid body
+    /// to `body`. The accelerations are predicted, because measured accelerations share the residual's noise.
     fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
         let old = &model.body;
         let model = self.accelerating.as_ref().unwrap_or(model);
@@ -219,7 +219,8 @@ pub fn of_body(model: &GreyBox, index: usize) -> bool {
     changed_body(model, index).is_some()
 }
 
-/// The rigid body of `model` with the coefficient `index` perturbed, and the perturbation, if it changes the body.
+/// The rigid body of `model` after a perturbation of the coefficient `index`, and the perturbation. `None` if the body
+/// does not depend on the coefficient.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;
     let mut moved = model.clone();

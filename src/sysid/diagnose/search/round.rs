@@ -160,8 +160,8 @@ impl Round {
         })
     }
 
-    /// Scores of all candidates, best evidence first; nonlinear ones near the top are linearised again at their best
-    /// fit.
+    /// Scores of all candidates in descending order of rank. Nonlinear candidates near the top are linearised again at
+    /// their best fit.
     pub fn rank(&mut self) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
@@ -284,7 +284,7 @@ fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
 }
 
-/// Appends candidates and residual to the nuisance parameters' columns; returns the residual's index.
+/// Appends the columns of candidates and residual to those of the nuisance parameters. Returns the residual's index.
 fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready]) -> usize {
     let last = count + made.columns.first().map_or(0, Vec::len);
     for ((list, own), flight) in placed.iter_mut().zip(&made.columns).zip(flights) {

@@ -92,7 +92,7 @@ pub fn search(
     Ok(found)
 }
 
-/// Adds the best candidates one by one until none passes; returns those that were refused.
+/// Adds the best candidates one by one until none passes. Returns the refused candidates that were set aside.
 fn select(
     problem: &Problem,
     model: &GreyBox,
