@@ -11,8 +11,8 @@ use greylag_model::GreyBox;
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
-/// The nuisance parameters and their columns: the free coefficients, then the constants of each flight, then its sensor
-/// errors. `linear_columns` holds the columns of the coefficients in which the model is linear.
+/// The nuisance parameters and their columns: the free coefficients, then the constants of all flights, then the sensor
+/// errors of all flights. `linear_columns` holds the columns of the coefficients in which the model is linear.
 pub(super) fn known(
     problem: &Problem,
     model: &GreyBox,
