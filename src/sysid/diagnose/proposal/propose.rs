@@ -15,6 +15,7 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::diagnose::{DiagnoseError, Options, Verdict};
 use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::known::not_used;
 use crate::progress::{Progress, part, report};
 use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
@@ -40,13 +41,13 @@ pub fn propose(
     progress: &Progress,
 ) -> Result<Proposal, DiagnoseError> {
     let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
-    known(&options.without)?;
-    known(&options.with)?;
-    let (problem, _, mut notes) = problem(model, flights, options)?;
+    known(&[&options.without[..], &options.with[..]].concat())?;
+    let (problem, searched_on, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
     // before the search, which takes minutes
     let (test, used, more) = self::problem(model, held_out, options)?;
     notes.extend(more);
+    notes.extend(not_used(&model.known, &[&searched_on[..], &used[..]].concat()));
     notes.extend(excitation::check(&test.flights)?);
     let mut found = search(&problem, model, options, &part(progress, [0.0, SEARCHED]))?;
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));
@@ -88,7 +89,7 @@ pub fn propose(
     report(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();
     let tested = tested(&test, &tuned, &terms, options, names).ok_or_else(unusable)?;
-    let from = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+    let from = searched_on.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
     conclude(&mut proposal, &first, &terms, tested, &from);
     Ok(proposal)
 }
