@@ -7,7 +7,8 @@ use std::ops::ControlFlow;
 pub struct Stage<'a> {
     /// Current activity, in words for the user.
     pub doing: &'a str,
-    /// Share of the whole task that is done, 0 to 1. It never decreases.
+    /// Estimated share of the whole task that is done, 0 to 1. It may fall, for example when a search removes an
+    /// effect.
     pub fraction: f64,
     /// Candidates of a diagnosis in the current ranking, the best first. Empty before the ranking and in other tasks.
     pub ranking: &'a [FirstLook],

@@ -59,6 +59,27 @@ pub fn fly(model: &GreyBox, flights: &[Prepared], horizons: &[f64]) -> (Runs, Ve
     (Runs { times, runs, scale: model.scale() }, traces)
 }
 
+/// Largest relative difference between a horizon and the time of the sample at which its error is computed.
+const UNEVEN: f64 = 0.25;
+
+/// A note for each horizon (s) that the samples of a flight hardly reach. `steps` holds the names of the flights and
+/// their sampling intervals, s.
+pub fn uneven(steps: &[(&str, f64)], horizons: &[f64]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (name, dt) in steps {
+        for horizon in horizons {
+            let sampled = dt * (horizon / dt).round().max(1.0);
+            if (sampled - horizon).abs() > UNEVEN * horizon {
+                notes.push(format!(
+                    "{name}: its samples are {dt:.3} s apart, so its error at the horizon {horizon} s is that at \
+                     {sampled:.3} s"
+                ));
+            }
+        }
+    }
+    notes
+}
+
 /// Converts the states of `trace` to those that the flight's sensors would measure, sensor errors included.
 fn measured_from(trace: &mut Trace, known: &KnownFlight) {
     for k in 0..trace[0].len() {
@@ -272,9 +293,14 @@ impl Runs {
             theil_u: rmse / (root_mean_square(&predicted) + root_mean_square(&measured)),
             bias_share: bias,
             variance_share: variance,
-            covariance_share: (1.0 - bias - variance).max(0.0),
+            covariance_share: at_least_zero(1.0 - bias - variance),
         }
     }
+}
+
+/// `x`, or 0 if it is negative. An undefined `x` stays NaN, which `f64::max` would replace by 0.
+fn at_least_zero(x: f64) -> f64 {
+    if x < 0.0 { 0.0 } else { x }
 }
 
 fn root_mean_square(x: &[f64]) -> f64 {
@@ -288,6 +314,17 @@ fn deviation(x: &[f64], mean: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_horizon_between_two_samples_is_noted() {
+        let all = uneven(&[("a", 0.01), ("b", 0.2)], &[0.05, 1.0]);
+        assert_eq!(
+            all,
+            [
+                "b: its samples are 0.200 s apart, so its error at the horizon 0.05 s is that at 0.200 s"
+            ]
+        );
+    }
 
     #[test]
     fn theils_shares_of_known_errors() {
@@ -314,6 +351,9 @@ mod tests {
         assert_eq!((score.runs, score.diverged, score.divergence_rate), (2, 1, 0.5));
         assert!((score.rmse_scaled - DIVERGENCE_BOUND / 2_f64.sqrt()).abs() < 1e-12);
         assert_eq!(score.states[2].rmse, 0.0);
+        // without an error, none of its shares is defined
+        let s = &score.states[2];
+        assert!(s.bias_share.is_nan() && s.variance_share.is_nan() && s.covariance_share.is_nan());
         // a roll of 179° predicted as −179° has an error of 2°
         let e = error(&[179_f64.to_radians(); 8], &[-179_f64.to_radians(); 8]);
         assert!((e[0] - 2_f64.to_radians()).abs() < 1e-9);

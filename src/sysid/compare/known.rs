@@ -27,7 +27,8 @@ impl KnownUse {
     /// Sentence on the constants used, with the errors `with` and without the constants at the longest horizon that a run
     /// reaches. `None` if no run reaches any horizon.
     pub fn sentence(&self, with: &[HorizonScore]) -> Option<String> {
-        let both = with.iter().zip(&self.without).rfind(|(a, b)| a.runs > 0 && b.runs > 0)?;
+        let reached = with.iter().zip(&self.without).filter(|(a, b)| a.runs > 0 && b.runs > 0);
+        let both = reached.max_by(|(a, _), (b, _)| a.horizon_s.total_cmp(&b.horizon_s))?;
         let mut what = Vec::new();
         if !self.flights.is_empty() {
             what.push(format!("constants of their own for {}", self.flights.join(", ")));
@@ -43,5 +44,29 @@ impl KnownUse {
             with.rmse_scaled,
             without.rmse_scaled
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_is_on_the_longest_horizon_in_any_order_of_horizons() {
+        let at = |horizon_s, rmse_scaled| {
+            let states = Vec::new();
+            HorizonScore {
+                horizon_s,
+                runs: 3,
+                diverged: 0,
+                divergence_rate: 0.0,
+                rmse_scaled,
+                states,
+            }
+        };
+        let without = vec![at(10.0, 0.5), at(1.0, 0.4)];
+        let used = KnownUse { flights: vec!["a".into()], by_installation: Vec::new(), without };
+        let said = used.sentence(&[at(10.0, 0.2), at(1.0, 0.1)]).unwrap();
+        assert!(said.contains("over 10 s is 0.20000 with it, 0.50000 without"), "{said}");
     }
 }

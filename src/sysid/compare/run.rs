@@ -67,6 +67,8 @@ pub fn compare(
     let slowest = first.airframe.envelope.flying_from_mps();
     let (used, prepared, mut notes) = usable(flights, slowest)?;
     notes.extend(short_of(&prepared, &options.horizons_s));
+    let steps: Vec<(&str, f64)> = prepared.iter().map(|f| (f.name.as_str(), f.dt)).collect();
+    notes.extend(free_run::uneven(&steps, &options.horizons_s));
     let forecasts = forecasts(&prepared, first.scale(), &options.horizons_s);
     let share = 1.0 / models.len() as f64;
     let models = models
@@ -199,6 +201,7 @@ fn one_model(
     let traces = paths.into_iter().zip(flights).zip(&series);
     let free_run: Vec<_> = options.horizons_s.iter().map(|h| runs.score(*h)).collect();
     let mut sentences = verdict::sentences(&free_run, &channels);
+    sentences.extend(verdict::unpredicted(&series));
     sentences.extend(known.as_ref().and_then(|k| k.sentence(&free_run)));
     ModelResult {
         name: model.name.clone(),

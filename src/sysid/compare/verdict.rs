@@ -3,6 +3,7 @@
 use super::forecast::ForecastResult;
 use super::result::{ChannelResult, HorizonScore};
 use crate::weak_form::channels::ChannelId;
+use crate::weak_form::windows::Series;
 
 /// Sentences on a model. The worst force and the worst moment come first, then the other channels.
 ///
@@ -54,7 +55,8 @@ fn diverges(scores: &[HorizonScore]) -> Option<String> {
 
 /// A warning if a forecast without aerodynamics is better than the model at the longest horizon that a run reaches.
 pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option<String> {
-    let score = free_run.iter().rev().find(|s| s.runs > 0 && s.rmse_scaled.is_finite())?;
+    let reached = free_run.iter().filter(|s| s.runs > 0 && s.rmse_scaled.is_finite());
+    let score = reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s))?;
     let horizon = score.horizon_s;
     let at = |f: &ForecastResult| {
         let there = f.free_run.iter().find(|s| s.horizon_s == horizon)?;
@@ -66,4 +68,59 @@ pub fn beaten(free_run: &[HorizonScore], forecasts: &[ForecastResult]) -> Option
          of the reference scale, the model by {:.3}.",
         score.rmse_scaled
     ))
+}
+
+/// A warning if predictions of the model over the flights' `series` are not numbers, for example the square root of a
+/// negative angle. These windows have no residual and are not in the channels' results.
+pub fn unpredicted(series: &[Vec<Series>]) -> Option<String> {
+    let of = |channel: &ChannelId| {
+        let own = series.iter().flatten().filter(|s| s.channel == *channel);
+        let pairs = own.flat_map(|s| s.measured.iter().zip(&s.predicted));
+        let measured: Vec<_> = pairs.filter(|(measured, _)| measured.is_finite()).collect();
+        let lost = measured.iter().filter(|(_, predicted)| !predicted.is_finite()).count();
+        (lost > 0).then(|| format!("{} {lost} of {}", channel.name(), measured.len()))
+    };
+    let all: Vec<String> = ChannelId::ALL.iter().filter_map(of).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "The model predicts no number in some windows, which are left out of the channels: {}.",
+            all.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_without_a_prediction_are_counted() {
+        let series = |predicted: [f64; 3]| {
+            let measured = vec![1.0, 2.0, f64::NAN];
+            let channel = ChannelId::Lift;
+            Series { channel, measured, predicted: predicted.to_vec(), noise_variance: 0.0 }
+        };
+        assert_eq!(unpredicted(&[vec![series([1.0, 2.0, f64::NAN])]]), None);
+        let said = unpredicted(&[vec![series([1.0, f64::NAN, f64::NAN])]]).unwrap();
+        assert!(said.ends_with("left out of the channels: lift 1 of 2."), "{said}");
+    }
+
+    #[test]
+    fn the_longest_horizon_decides_in_any_order_of_horizons() {
+        let at = |horizon_s, rmse_scaled| {
+            let states = Vec::new();
+            HorizonScore {
+                horizon_s,
+                runs: 3,
+                diverged: 0,
+                divergence_rate: 0.0,
+                rmse_scaled,
+                states,
+            }
+        };
+        let forecast =
+            ForecastResult { name: "hold the state", free_run: vec![at(10.0, 0.1), at(1.0, 0.02)] };
+        let said = beaten(&[at(10.0, 0.2), at(1.0, 0.01)], &[forecast]).unwrap();
+        assert!(said.contains("10 s ahead"), "{said}");
+    }
 }

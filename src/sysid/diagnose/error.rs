@@ -41,9 +41,9 @@ pub enum DiagnoseError {
         /// Name of the model.
         model: String,
     },
-    /// An effect to be excluded is not in the catalogue.
+    /// An effect to be tried or excluded is not in the catalogue.
     #[error(
-        "cannot leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
+        "cannot try or leave out effect {id:?}: it is unknown; `greylag effects list` names those there are"
     )]
     UnknownEffect {
         /// The unknown identifier.
@@ -53,4 +53,15 @@ pub enum DiagnoseError {
     // not transparent: `Cancelled` must appear in the chain of error sources
     #[error("cancelled")]
     Cancelled(#[from] Cancelled),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_effect_may_be_one_to_be_tried() {
+        let said = DiagnoseError::UnknownEffect { id: "gyroscope".into() }.to_string();
+        assert!(said.contains("cannot try or leave out effect \"gyroscope\""), "{said}");
+    }
 }

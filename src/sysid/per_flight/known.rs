@@ -113,9 +113,50 @@ pub fn trimmed<'a>(known: &Known, flights: &'a [Reconstruction]) -> Vec<&'a str>
     flights.iter().filter(has).map(|f| f.name.as_str()).collect()
 }
 
+/// Note of a search that does not use the constants in `known` of those `flights` that have any.
+pub fn not_used(known: &Known, flights: &[&Reconstruction]) -> Option<String> {
+    let has = |f: &&&Reconstruction| known.of(&f.name).is_some();
+    let names: Vec<&str> = flights.iter().filter(has).map(|f| f.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The model's file has constants of {}, which this search does not use: a formula may stand for them.",
+            names.join(", ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use greylag_logs::Sampling;
+
+    #[test]
+    fn constants_that_a_search_does_not_use_are_noted() {
+        let flight = |name: &str| Reconstruction {
+            name: name.into(),
+            step_s: 0.01,
+            sampling: Sampling::Held,
+            segments: Vec::new(),
+            nuisances: Vec::new(),
+            noise: [0.0; 8],
+            left: [0.0; 8],
+            force_noise: [0.0; 3],
+            rudder: None,
+            notes: Vec::new(),
+        };
+        let (a, b) = (flight("a.csv"), flight("b.csv"));
+        let constants = FlightConstants {
+            source: String::new(),
+            axes_deg: None,
+            trims: Some([0.0; trims::TRIMS.len()]),
+            sensors: None,
+        };
+        let mut known = Known::default();
+        assert_eq!(not_used(&known, &[&a, &b]), None);
+        known.flights.insert("b.csv".into(), constants);
+        let said = not_used(&known, &[&a, &b]).unwrap();
+        assert!(said.starts_with("The model's file has constants of b.csv, which"), "{said}");
+    }
 
     #[test]
     fn trims_have_the_same_names_in_files_and_in_fits() {

@@ -16,11 +16,15 @@ pub fn between(
         model: &model.name,
         scores: &model.free_run,
     });
-    // error at the longest horizon up to ANSWER_S that a run reaches
+    // error at the longest horizon up to ANSWER_S that a run reaches, or else at the shortest one, as in the answer
     let error = |f: &ForecastResult| {
-        let reached = f.free_run.iter().filter(|s| s.runs > 0 && s.horizon_s <= ANSWER_S);
-        let last = reached.max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s));
-        last.map_or(f64::INFINITY, |s| s.rmse_scaled)
+        let reached = || f.free_run.iter().filter(|s| s.runs > 0);
+        let longest = reached()
+            .filter(|s| s.horizon_s <= ANSWER_S + 1e-9)
+            .max_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s));
+        let score =
+            longest.or_else(|| reached().min_by(|a, b| a.horizon_s.total_cmp(&b.horizon_s)));
+        score.map_or(f64::INFINITY, |s| s.rmse_scaled)
     };
     let best = forecasts.iter().min_by(|a, b| error(a).total_cmp(&error(b)));
     Answer::of(&Subject {
@@ -30,4 +34,39 @@ pub fn between(
         effects: Vec::new(),
         baseline: best.map(|f| (f.name, &f.free_run[..])),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::result::HorizonScore;
+
+    #[test]
+    fn horizons_beyond_that_of_the_answer_have_a_best_forecast_too() {
+        let at = |horizon_s, rmse_scaled| {
+            let states = Vec::new();
+            HorizonScore {
+                horizon_s,
+                runs: 3,
+                diverged: 0,
+                divergence_rate: 0.0,
+                rmse_scaled,
+                states,
+            }
+        };
+        let model = ModelResult {
+            name: "m".into(),
+            sentences: Vec::new(),
+            free_run: vec![at(10.0, 0.02), at(20.0, 0.05)],
+            known: None,
+            growth: Vec::new(),
+            channels: Vec::new(),
+            traces: Vec::new(),
+        };
+        let forecast =
+            |name, error| ForecastResult { name, free_run: vec![at(10.0, error), at(20.0, error)] };
+        let all = [forecast("hold", 0.3), forecast("straight", 0.1)];
+        let best = between(&[model], &[], &all).numbers.baseline.unwrap();
+        assert_eq!((best.name.as_str(), best.error), ("straight", 0.1));
+    }
 }

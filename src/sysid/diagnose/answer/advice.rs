@@ -3,10 +3,13 @@
 use crate::diagnose::answer::result::{Advice, Candidate, ChannelLeft, Verdict};
 use crate::diagnose::answer::sentences::figures;
 use crate::diagnose::search::stepwise::Found;
+use crate::per_flight::askew;
 use greylag_physics::catalogue::describe;
 
 /// Largest number of recommendations for candidates whose evidence is near the threshold.
 const UNSEEN: usize = 2;
+/// Manoeuvres for an effect whose file states none.
+const ONE_BY_ONE: &str = "flights that move its variables one by one, at two airspeeds";
 
 /// Advice on the next flight, in descending order of usefulness; empty if there is none.
 pub fn advice(
@@ -21,7 +24,7 @@ pub fn advice(
             list.push(Advice {
                 manoeuvre: separating(&c.id),
                 why: format!("it distinguishes {} from {other}", c.id),
-                between: Some([c.id.clone(), other.clone()]),
+                between: designable(&c.id, other),
             });
         }
     }
@@ -31,7 +34,7 @@ pub fn advice(
             list.push(Advice {
                 manoeuvre: separating(&a.id),
                 why: format!("{} is the closest shape; this shows whether it is the cause", a.id),
-                between: Some([a.id.clone(), b.id.clone()]),
+                between: designable(&a.id, &b.id),
             });
         }
         list.extend(channels.iter().filter_map(|c| c.worst_regime.clone()).take(1).map(|regime| {
@@ -67,6 +70,31 @@ pub fn advice(
     list
 }
 
+/// The pair for `greylag design --between`; `None` if one of the two is the misalignment of the axes, which is no
+/// effect of the catalogue.
+fn designable(a: &str, b: &str) -> Option<[String; 2]> {
+    [a, b].iter().all(|id| *id != askew::ID).then(|| [a.to_owned(), b.to_owned()])
+}
+
+/// The manoeuvres that separate the effect `id` from others. An effect file need not state them.
 fn separating(id: &str) -> String {
-    describe(id).and_then(|a| a.entry).map_or(String::new(), |e| e.separated_by.to_owned())
+    let stated = describe(id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
+    (if stated.is_empty() { ONE_BY_ONE } else { stated }).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_without_stated_manoeuvres_still_gets_some() {
+        assert_eq!(separating("no such effect"), ONE_BY_ONE);
+        assert_ne!(separating("drag_beta2"), ONE_BY_ONE);
+    }
+
+    #[test]
+    fn no_flight_is_designed_between_an_effect_and_misaligned_axes() {
+        assert_eq!(designable("inertia", askew::ID), None);
+        assert_eq!(designable("inertia", "mass"), Some(["inertia".into(), "mass".into()]));
+    }
 }

@@ -72,7 +72,7 @@ pub fn void(found: &Found, options: &Options) -> Vec<String> {
     candidates.filter(may_be_zero).map(|c| c.id).collect()
 }
 
-/// Smallest detectable amounts; for effects that joined the model, those from before they joined.
+/// Smallest detectable amounts. Effects that have joined the model keep the amounts of the first round.
 fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     let mut least = detectable(&found.first, found.threshold);
     if let Some(last) = &found.last {
@@ -81,7 +81,7 @@ fn least(found: &Found) -> BTreeMap<&'static str, f64> {
     least
 }
 
-/// Largest standard deviation relative to its value, of a fitted contribution.
+/// Standard deviation of a fitted contribution relative to its value: 1/√(Wald statistic).
 fn relative(score: &Score) -> f64 {
     score.wald.max(1e-9).sqrt().recip()
 }
@@ -92,7 +92,7 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     let parameters = about.coefficients.iter().enumerate().map(|(k, c)| {
         let [value, sd, sums] =
             fitted(found, s.id, c.name).unwrap_or([s.score.values[k], 0.0, 0.0]);
-        // the standard deviation of the round that selected it includes the blocks' scatter
+        // the standard deviation of the round that selected the effect includes the scatter between blocks
         parameter(&about, k, value, sd.max(s.score.deviations[k]).hypot(sums))
     });
     let parameters = parameters.collect();
@@ -130,8 +130,8 @@ fn selected(found: &Found, s: &Selected, options: &Options) -> Option<Candidate>
     })
 }
 
-/// Value of a coefficient that has joined the model, its standard deviation from the noise, and that from the sums
-/// over samples.
+/// Value of a coefficient that has joined the model, and its standard deviations due to noise and due to the
+/// discretisation.
 fn fitted(found: &Found, id: &str, name: &str) -> Option<[f64; 3]> {
     let round = found.round();
     let full = format!("{id}.{name}");
@@ -153,7 +153,7 @@ fn open(found: &Found, trial: &Trial, score: &Score, about: &Description) -> Can
     let parameters = (0..about.coefficients.len())
         .map(|k| parameter(about, k, score.values[k], score.deviations[k]))
         .collect();
-    // estimates by flight mean nothing for evidence within chance
+    // below the chance level, the estimates by flight are noise
     let by_flight = match score.evidence > found.threshold {
         true => flights(round, &checks::by_flight(round, trial, score)),
         false => Vec::new(),

@@ -14,9 +14,9 @@ pub enum Verdict {
     Adequate,
     /// Something is missing, but no effect of the catalogue explains it.
     Unexplained,
-    /// The flights allow no verdict. A figure is physically impossible; or remaining sensor errors may account for the
-    /// residual in every channel; or the given model has no certain error; or a flexible model of the states removes
-    /// little of the residual.
+    /// The flights allow no verdict. This has one of four reasons: an estimate is physically impossible, the remaining
+    /// sensor errors may account for the residual in every channel, the given model has no certain error, or a flexible
+    /// model of the states removes little of the residual.
     Unknown,
 }
 
@@ -81,20 +81,20 @@ pub struct Candidate {
     pub id: String,
     /// Description of the effect, in one sentence.
     pub description: &'static str,
-    /// Whether the diagnosis asserts that the model lacks it.
+    /// Whether the diagnosis asserts that the model lacks the effect.
     pub asserted: bool,
     /// Classification of the evidence.
     pub status: Status,
-    /// The smaller of its penalised gain and its block-robust Wald statistic, in the round that selected it, or in
-    /// the last one.
+    /// The smaller of penalised gain and block-robust Wald statistic, in the round that selected the effect; for a
+    /// candidate that was not selected, in the last round.
     pub evidence: f64,
     /// Evidence that chance reaches in the null flights.
     pub threshold: f64,
-    /// Its parameters, fitted together with the model's own coefficients.
+    /// Parameters of the effect, fitted together with the model's own coefficients.
     pub parameters: Vec<Parameter>,
-    /// Channels (D, L, Y, l, m, n) whose residual it reduces, the largest reduction first.
+    /// Channels (D, L, Y, l, m, n) whose residual the effect reduces, the largest reduction first.
     pub channels: Vec<String>,
-    /// Ids of effects that these data cannot distinguish from it.
+    /// Ids of effects that these data cannot distinguish from this effect.
     pub indistinguishable_from: Vec<String>,
     /// Relative reduction of the error on segments that the fit did not use; NaN (null) if not computed.
     pub heldout_error_reduction: f64,
@@ -106,7 +106,8 @@ pub struct Candidate {
     pub minimum_detectable: Option<f64>,
     /// Reasons not to assert it although its evidence exceeds the threshold.
     pub refused: Vec<String>,
-    /// Its contribution over the regime variable that shows it best.
+    /// Its contribution over the regime variable that explains most of its variance. `None` for candidates of low rank
+    /// and with [`Detail::Lean`](crate::diagnose::Detail::Lean).
     pub curve: Option<Curve>,
 }
 
@@ -182,7 +183,7 @@ pub struct ChannelLeft {
     pub worst_regime: Option<String>,
     /// The product of states that correlates most with the remaining residual, if that exceeds chance.
     pub left_with: Option<String>,
-    /// Whether these flights cannot judge the model as given in this channel.
+    /// Whether these flights do not suffice to assess the given model in this channel.
     pub abstained: bool,
     /// Reason for abstaining, if `abstained`.
     pub why_abstained: Option<String>,

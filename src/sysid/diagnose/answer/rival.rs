@@ -1,10 +1,10 @@
 //! Misaligned measured axes as a rival explanation of the residual.
 //!
 //! A board pitched by 3° turns part of every roll into yaw, as a product of inertia does, and part of lift into drag.
-//! Kinematics cannot show it, since everything that the board measures is rotated alike, so it is tested with the
-//! aerodynamics: once effects were found, the search is repeated with the misalignment angles free, under the same
-//! noise, and both explanations are compared by their residuals and numbers of constants (Bayesian information
-//! criterion).
+//! Kinematics cannot show the misalignment, because it rotates all quantities that the board measures equally. It is
+//! therefore tested with the aerodynamics. After effects were found, the search is repeated with free misalignment
+//! angles and the same noise. The Bayesian information criterion compares both explanations: their residuals and their
+//! numbers of constants.
 
 use crate::diagnose::answer::result::Verdict;
 use crate::diagnose::answer::run::verdict;
@@ -20,7 +20,7 @@ use greylag_model::GreyBox;
 
 /// Prior standard deviation of each misalignment angle, °: a board mounted by eye.
 const MOUNTED_DEG: f64 = 3.0;
-/// The angles must remove at least this share of what the best effect removes for the second search to be made.
+/// The second search is made only if the angles remove at least this share of the error that the best effect removes.
 const WORTH: f64 = 0.3;
 
 /// The better explanation of the flights of `problem`: `found`, or one with misaligned axes. If both are equally
@@ -53,7 +53,8 @@ pub fn against_axes(
     Ok(found)
 }
 
-/// The problem with the angles free, if an effect is missing and the angles remove a fair part of the residual.
+/// The problem with free misalignment angles. `None` if no effect is missing or if the angles remove too little of the
+/// residual.
 fn worth(problem: &Problem, found: &Found) -> Option<Problem> {
     if problem.per_flight.askew_deg.is_some() || verdict(found) == Verdict::Adequate {
         return None;

@@ -35,7 +35,7 @@ const REFUSED: f64 = 0.01;
 /// Reason for refusing every effect when any figure is physically impossible.
 const CANNOT_BE: &str =
     "a figure of these flights cannot be, so that nothing is said about forces and moments";
-/// Reason to refuse an effect whose contribution another one accounts for.
+/// Reason for refusing an effect whose contribution another effect accounts for.
 const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have settled";
 
 /// Determines which effects of the catalogue `model` lacks according to `flights`.
@@ -44,8 +44,8 @@ const MAY_BE_ZERO: &str = "its 95 % interval holds zero once all effects have se
 /// cancel.
 ///
 /// # Errors
-/// There is too little flight or excitation, an id to be left out is unknown, a flight has no clock, or `progress`
-/// cancelled.
+/// There is too little flight or excitation, the id of an effect is unknown, the sampling interval of a flight is not
+/// usable, the model cannot be evaluated over the flights, or `progress` cancelled.
 pub fn diagnose(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -152,14 +152,14 @@ fn settings(options: &Options) -> Settings {
 /// Objections to effects beyond the search's own checks, and the tuned coefficients.
 struct Judged {
     abstained: [Option<String>; 6],
-    /// Whether `compare` finds no certain error of the model as given in any channel.
+    /// Whether `compare` finds no certain error of the given model in any channel.
     faultless: bool,
     tuned: Vec<Tuned>,
     doubtful: Vec<String>,
 }
 
-/// Refuses effects in channels that the flights cannot judge, effects whose amount may be zero, and all effects
-/// beside impossible figures.
+/// Refuses effects in channels in which the flights cannot assess the model, and effects whose amount may be zero.
+/// Refuses all effects if an estimate is physically impossible.
 fn judge(
     found: &mut Found,
     model: &GreyBox,
@@ -204,7 +204,7 @@ fn spoken(
     }
 }
 
-/// From `compare`: why each channel cannot be judged, and whether no channel has a certain error.
+/// Results of `compare`: the reason why each channel cannot be assessed, and whether no channel has a certain error.
 fn compared(
     model: &GreyBox,
     flights: &[&Reconstruction],

@@ -12,7 +12,7 @@ use greylag_physics::catalogue::describe;
 
 /// Distance from the prior mean, in prior standard deviations, beyond which a tuned coefficient gets a note.
 const FAR: f64 = 3.0;
-/// Least share that is reported; a smaller one is printed as zero.
+/// Smallest share that is reported. A smaller share would be printed as zero.
 const SHOWN: f64 = 0.005;
 /// Half width of a 95 % interval in standard deviations.
 pub const INTERVAL: f64 = 1.96;
@@ -27,7 +27,7 @@ pub struct Content<'a> {
     pub found: &'a Found,
     /// Overall verdict on the model.
     pub verdict: Verdict,
-    /// Why it is [`Verdict::Unknown`], unless figures that cannot be are the reason.
+    /// Reason for [`Verdict::Unknown`]; `None` for other verdicts, and if an impossible estimate is the reason.
     pub why_unknown: Option<WhyUnknown>,
     /// Physically impossible figures, in words.
     pub doubtful: &'a [String],
@@ -41,19 +41,19 @@ pub struct Content<'a> {
     pub trims: &'a [FlightTrim],
 }
 
-/// Why a diagnosis has no verdict although its figures are possible.
+/// Reason why a diagnosis has no verdict although no estimate is physically impossible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhyUnknown {
-    /// The remaining errors of the sensors may account for what is left in every channel.
+    /// The remaining errors of the sensors may account for the residual in every channel.
     SensorsMayAccount,
     /// The model as given has no sure error in any channel.
     GivenModelFaultless,
-    /// A flexible model of the states removes little of what is left.
+    /// A flexible model of the states removes little of the residual.
     NotOfTheStates,
 }
 
-/// The sentences, the most important first: impossible figures, instruments where they explain the flights, the
-/// aircraft.
+/// The sentences, the most important first: impossible estimates, misaligned axes, missing effects with the verdict,
+/// then the remaining residual and the sensors.
 pub fn sentences(content: &Content) -> Vec<String> {
     let Content { verdict, doubtful, effects, channels, measurement, .. } = *content;
     let mut all: Vec<String> = doubtful.to_vec();
@@ -77,7 +77,7 @@ pub fn sentences(content: &Content) -> Vec<String> {
         )
     }));
     if verdict == Verdict::Unexplained {
-        let open = channels.iter().filter(|c| !c.abstained);
+        let open = channels.iter().filter(|c| !c.abstained && c.unexplained_fraction.is_finite());
         let worst = open.max_by(|a, b| a.unexplained_fraction.total_cmp(&b.unexplained_fraction));
         all.extend(worst.and_then(|c| {
             let regime = c.worst_regime.as_ref()?;
@@ -250,15 +250,22 @@ fn asserted(c: &Candidate) -> String {
     );
     if !c.indistinguishable_from.is_empty() {
         let separate = describe(&c.id).and_then(|a| a.entry).map_or("", |e| e.separated_by);
-        text += &format!(
-            " It could also be {}: these data cannot tell them apart; to be sure, fly {separate}.",
-            c.indistinguishable_from.join(" or ")
-        );
+        text += &alike(&c.indistinguishable_from.join(" or "), separate);
     }
     text
 }
 
-/// What a flexible model could remove, in words, if it exceeds chance.
+/// Sentence on the effects `others` that may be the cause as well, with the manoeuvres `separate` that would decide. An
+/// effect file need not state such manoeuvres.
+fn alike(others: &str, separate: &str) -> String {
+    let fly = match separate {
+        "" => String::new(),
+        manoeuvres => format!("; to be sure, fly {manoeuvres}"),
+    };
+    format!(" It could also be {others}: these data cannot tell them apart{fly}.")
+}
+
+/// Phrase for the error that a flexible model could remove; empty if it does not exceed chance.
 fn removable(found: &Found) -> String {
     let more = found.remainder.total > found.remainder.total_threshold;
     match more && found.learnable() >= SHOWN {
@@ -326,4 +333,16 @@ pub fn notes(found: &Found, model: &GreyBox, options: &Options) -> Vec<String> {
         notes.push(format!("Left out of the catalogue: {}.", options.without.join(", ")));
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_stated_manoeuvres_are_to_be_flown() {
+        let said = alike("mass or inertia", "");
+        assert_eq!(said, " It could also be mass or inertia: these data cannot tell them apart.");
+        assert!(alike("mass", "fast rolls").ends_with("apart; to be sure, fly fast rolls."));
+    }
 }

@@ -32,7 +32,7 @@ pub fn channels(found: &Found, abstained: &[Option<String>; 6]) -> Vec<ChannelLe
 
 /// The regime in which a channel's mean residual is most significant, in words; `None` if none is significant.
 fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
-    let mut points: Vec<([f64; RegimeVariable::CONTINUOUS.len()], f64)> = Vec::new();
+    let mut points = Vec::new();
     for (flight, left) in round.flights.iter().zip(residual) {
         for (window, r) in flight.acting.windows.iter().zip(&left[channel]) {
             if r.is_finite() {
@@ -40,13 +40,21 @@ fn worst(round: &Round, residual: &[Column], channel: usize) -> Option<String> {
             }
         }
     }
+    worst_of(points, channel)
+}
+
+/// Regime variables of a window, and its residual.
+type Point = ([f64; RegimeVariable::CONTINUOUS.len()], f64);
+
+fn worst_of(mut points: Vec<Point>, channel: usize) -> Option<String> {
     let mut best: Option<(f64, String)> = None;
     for (k, variable) in RegimeVariable::CONTINUOUS.iter().enumerate() {
         if matches!(variable, RegimeVariable::Time) {
             continue;
         }
         points.sort_by(|a, b| a.0[k].total_cmp(&b.0[k]));
-        for bin in points.chunks(points.len().div_ceil(BINS).max(1)) {
+        // a single window has no standard error
+        for bin in points.chunks(points.len().div_ceil(BINS).max(1)).filter(|bin| bin.len() > 1) {
             let values: Vec<f64> = bin.iter().map(|p| p.1).collect();
             let m = mean(&values);
             let sd = (values.iter().map(|x| (x - m).powi(2)).sum::<f64>()
@@ -88,4 +96,22 @@ pub fn tuned(found: &Found, model: &GreyBox) -> Vec<Tuned> {
         })
     };
     round.coefficients.iter().enumerate().filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_window_is_no_regime() {
+        // 21 windows: the last of five bins has a single one
+        let point = |k: usize| {
+            let mut regime = [0.0; RegimeVariable::CONTINUOUS.len()];
+            regime[0] = k as f64;
+            (regime, if k % 2 == 0 { 0.1 } else { -0.1 })
+        };
+        assert_eq!(worst_of((0..21).map(point).collect(), 1), None);
+        let off = (0..40).map(|k| (point(k).0, 3.0 + point(k).1)).collect();
+        assert!(worst_of(off, 1).unwrap().contains("lift +3.000 N off the model"));
+    }
 }

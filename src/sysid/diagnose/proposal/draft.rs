@@ -15,6 +15,16 @@ pub struct Term {
     pub sd: f64,
 }
 
+/// Whether a further term was `added` to `terms`. If it was not, or if the model with it cannot be evaluated (`None`),
+/// the terms are cut to their former `count`.
+pub fn kept(terms: &mut Vec<Term>, count: usize, added: Option<bool>) -> bool {
+    let added = added == Some(true);
+    if !added {
+        terms.truncate(count);
+    }
+    added
+}
+
 /// Factor in the bounds of a coefficient: ± this factor times the sum of its magnitude and three standard deviations.
 const ROOM: f64 = 10.0;
 
@@ -128,6 +138,18 @@ mod tests {
         assert_eq!(effect.status, Status::Proposed);
         assert_eq!(effect.about.id, "proposed_yaw_by_throttle_beta_aileron");
         assert_eq!((effect.values, effect.about.shape), (vec![0.53, -0.01, 0.02, 0.07, 0.12], 2));
+    }
+
+    #[test]
+    fn a_term_whose_model_cannot_be_evaluated_is_dropped() {
+        let shape = Shape::Linear(Variable::Throttle);
+        let form = Form { channel: Channel::Yaw, of_air: false, shape };
+        let all = || vec![Term { form, value: 0.53, sd: 0.02 }];
+        for (added, count) in [(Some(true), 1), (Some(false), 0), (None, 0)] {
+            let mut terms = all();
+            assert_eq!(kept(&mut terms, 0, added), count == 1);
+            assert_eq!(terms.len(), count, "{added:?}");
+        }
     }
 
     #[test]

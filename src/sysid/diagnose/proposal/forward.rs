@@ -182,7 +182,9 @@ impl Ask<'_> {
                     c.outcome.nulls = nulls;
                 }
                 let stage = Stage { round: &round, scores: &scores, place, threshold };
-                self.joins(&mut c, &given, &stage) == Some(true)
+                let count = c.terms.len();
+                let added = self.joins(&mut c, &given, &stage);
+                draft::kept(&mut c.terms, count, added)
             });
             c.round.get_or_insert(round);
             if !on {

@@ -15,6 +15,7 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::stepwise::{Found, search};
 use crate::diagnose::{DiagnoseError, Options, Verdict};
 use crate::flight_path::reconstruction::Reconstruction;
+use crate::per_flight::known::not_used;
 use crate::progress::{Progress, part, report};
 use crate::rudder;
 use greylag_model::{GreyBox, RUDDER};
@@ -27,7 +28,8 @@ const FREE: [f64; 2] = [0.6, 0.9];
 const TESTED: f64 = 0.9;
 
 /// Proposes a formula for the effect that `model` lacks according to `flights`, if a diagnosis leaves it unexplained,
-/// and tests it on `held_out`; reports to `progress`, which may cancel.
+/// and tests it on `held_out`. Constants of single flights in the model's file are not used. `progress` receives the
+/// stages and may cancel.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).
@@ -39,13 +41,13 @@ pub fn propose(
     progress: &Progress,
 ) -> Result<Proposal, DiagnoseError> {
     let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
-    known(&options.without)?;
-    known(&options.with)?;
-    let (problem, _, mut notes) = problem(model, flights, options)?;
+    known(&[&options.without[..], &options.with[..]].concat())?;
+    let (problem, searched_on, mut notes) = problem(model, flights, options)?;
     notes.extend(excitation::check(&problem.flights)?);
     // before the search, which takes minutes
     let (test, used, more) = self::problem(model, held_out, options)?;
     notes.extend(more);
+    notes.extend(not_used(&model.known, &[&searched_on[..], &used[..]].concat()));
     notes.extend(excitation::check(&test.flights)?);
     let mut found = search(&problem, model, options, &part(progress, [0.0, SEARCHED]))?;
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));
@@ -87,12 +89,12 @@ pub fn propose(
     report(progress, "testing the formula on flights that the search has not seen", TESTED)?;
     let names: Vec<String> = used.iter().map(|f| f.name.clone()).collect();
     let tested = tested(&test, &tuned, &terms, options, names).ok_or_else(unusable)?;
-    let from = flights.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+    let from = searched_on.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
     conclude(&mut proposal, &first, &terms, tested, &from);
     Ok(proposal)
 }
 
-/// Channels in which a formula is searched for; without those that a rudder drives if the model has no rudder.
+/// Channels in which a formula is searched. If `rudder` moves and the model has no rudder, its channels are left out.
 fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     let moved = [Channel::Drag, Channel::Side, Channel::Roll, Channel::Yaw];
     let mut channels = failing(found);
@@ -100,9 +102,9 @@ fn searched(found: &Found, rudder: bool) -> Vec<Channel> {
     channels
 }
 
-/// Whether a free form fits better than the adopted formula of the library although that is simpler and removes
-/// hardly less error: the form is then uncertain. The evidences are from two rounds of tuning, so this only withholds
-/// a grade.
+/// Whether a free form has more evidence than the adopted formula of the library, which is simpler and removes hardly
+/// less error. The form of the formula is then not certain. The evidences come from different tunings of the model and
+/// are not strictly comparable, so they only withhold the grade.
 fn outdone(proposal: &Proposal) -> bool {
     let best = |rungs: &[Rung]| rungs.iter().map(|r| r.evidence).fold(0.0, f64::max);
     let free = proposal.free.as_ref().filter(|free| !free.chosen);
@@ -142,8 +144,8 @@ fn empty(
     }
 }
 
-/// Completes the proposal with its sentences, and with the effect file if there is no objection; `from` names the
-/// flights searched.
+/// Adds the sentences to the proposal, and the effect file if there is no objection. `from` names the flights of the
+/// search.
 fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldOut, from: &str) {
     proposal.refused.extend(objection(&tested));
     proposal.sentences.extend(sentences(proposal, first, terms, &tested));
@@ -155,7 +157,7 @@ fn conclude(proposal: &mut Proposal, first: &Term, terms: &[Term], tested: HeldO
     proposal.held_out = Some(tested);
 }
 
-/// The library's formula, or one with lagged controls or free forms if that is better.
+/// The library's formula, or a better formula with lagged controls or free forms.
 fn beyond_library(
     ask: &Ask,
     library: Climbed,

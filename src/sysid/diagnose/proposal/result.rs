@@ -7,17 +7,17 @@ use crate::diagnose::Verdict;
 /// Properties of the formula's first term that are certain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Grades {
-    /// Whether the channel in which it acts is certain.
+    /// Whether the channel in which the term acts is certain.
     pub channel: bool,
     /// Whether the variables on which it depends are certain.
     pub variables: bool,
-    /// Whether its trend with them (odd, even, monotonic) is certain.
+    /// Whether its trend with these variables (odd, even, monotonic) is certain.
     pub trend: bool,
     /// Whether the form is certain, up to its constants.
     pub form: bool,
 }
 
-/// A form that the flights cannot distinguish from the one found.
+/// A form that the flights cannot distinguish from the first term.
 #[derive(Clone, Debug, Serialize)]
 pub struct Alternative {
     /// Formula, as text.
@@ -33,7 +33,7 @@ pub struct Rung {
     pub formula: String,
     /// Number of variables, numbers and operations in it, its coefficients included.
     pub complexity: usize,
-    /// Share of the error beyond noise in the searched channels that it removes.
+    /// Share of the error beyond noise in the searched channels that the formula removes.
     pub removed: f64,
     /// Evidence of its last term.
     pub evidence: f64,
@@ -48,9 +48,9 @@ pub struct Rung {
 pub struct HeldOut {
     /// Names of the flights.
     pub flights: Vec<String>,
-    /// Share of the error beyond noise in its channels that it removes.
+    /// Share of the error beyond noise in its channels that the formula removes.
     pub removed: f64,
-    /// Reduction of the squared error over the noise's variance.
+    /// Reduction of the squared error, in units of the noise's variance.
     pub fall: f64,
     /// Reduction that chance reaches.
     pub threshold: f64,

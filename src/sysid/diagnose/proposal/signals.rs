@@ -13,9 +13,10 @@ use greylag_physics::formula::file::channel_name;
 
 /// The residual of `model`, tuned to `flights` with sensor errors removed, as CSV.
 ///
-/// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index of the flight from 0, the
-/// mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the residual of each
-/// channel (N or N m; empty if it is not measured). The name of a residual's column is `left_` followed by the channel.
+/// Each window of the weak form (0.37 s, half overlapping) has one row. The columns are the index in `flights` from 0,
+/// the mean of each variable over the window (SI units), dynamic pressure times wing area (`qbar_S`, N), and the
+/// residual of each channel (N or N m; empty if it is not measured). The name of a residual's column is `left_`
+/// followed by the channel.
 ///
 /// # Errors
 /// As [`diagnose`](crate::diagnose::diagnose).
@@ -25,7 +26,8 @@ pub fn signals(
     options: &Options,
 ) -> Result<String, DiagnoseError> {
     let unusable = || DiagnoseError::Unusable { model: model.name.clone() };
-    let (problem, _, _) = problem(model, flights, options)?;
+    let (problem, used, _) = problem(model, flights, options)?;
+    let numbers = numbers(&used, flights);
     let tuned = Round::new(&problem, model.clone(), &[]).ok_or_else(unusable)?.tuned();
     let round = Round::new(&problem, tuned, &[]).ok_or_else(unusable)?;
     let left = round.tuned_residual();
@@ -36,7 +38,7 @@ pub fn signals(
     text += "\n";
     for (k, own) in left.iter().enumerate() {
         for (w, row) in samples.means(&round, k).iter().enumerate() {
-            let _ = write!(text, "{k}");
+            let _ = write!(text, "{}", numbers[k]);
             for x in row {
                 let _ = write!(text, ",{x:.6e}");
             }
@@ -50,4 +52,34 @@ pub fn signals(
         }
     }
     Ok(text)
+}
+
+/// Index in `all` of each of the flights `used`. Flights that are too short are not used.
+fn numbers(used: &[&Reconstruction], all: &[Reconstruction]) -> Vec<usize> {
+    let number = |flight: &&Reconstruction| all.iter().position(|f| std::ptr::eq(f, *flight));
+    used.iter().filter_map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_logs::Sampling;
+
+    #[test]
+    fn a_flight_keeps_its_number_if_an_earlier_one_is_left_out() {
+        let flight = || Reconstruction {
+            name: "f".into(),
+            step_s: 0.01,
+            sampling: Sampling::Held,
+            segments: Vec::new(),
+            nuisances: Vec::new(),
+            noise: [0.0; 8],
+            left: [0.0; 8],
+            force_noise: [0.0; 3],
+            rudder: None,
+            notes: Vec::new(),
+        };
+        let all = [flight(), flight(), flight()];
+        assert_eq!(numbers(&[&all[0], &all[2]], &all), [0, 2]);
+    }
 }

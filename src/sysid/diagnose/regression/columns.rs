@@ -13,9 +13,9 @@ use greylag_physics::rigid_body::{self, RigidBody, Vector};
 use greylag_physics::{Channel, Wrench};
 
 /// Number of sensor-error columns: gyros p, q, r (rad/s), α, β (rad), airspeed (relative), accelerometers x, y, z
-/// (m/s²), then delays (s) of α, β, airspeed, accelerometers, of the angular accelerations behind the moments and of
-/// the recorded actuators, and the actuators' blur (half the variance, in squared samples, of the time over which a
-/// record is averaged).
+/// (m/s²), then the delays (s) of α, β, airspeed, accelerometers, of the angular accelerations relative to the moments,
+/// and of the recorded actuators. The last column is the actuators' blur: half the variance of the time over which a
+/// record is averaged, in squared sampling intervals.
 pub const SENSORS: usize = 16;
 
 /// A flight evaluated under a model.
@@ -31,7 +31,7 @@ pub struct Ready {
     pub sensors: Vec<Column>,
     /// Derivatives of the prediction with respect to aileron, elevator and throttle, by segment and sample.
     controls: Vec<Vec<[[f64; CHANNELS]; 3]>>,
-    /// Model that predicts the aircraft's accelerations, if it is a different one.
+    /// Model that predicts the aircraft's accelerations; `None` for the model of the residual.
     accelerating: Option<GreyBox>,
 }
 
@@ -45,7 +45,7 @@ impl Ready {
             .map(|s| s.iter().map(|at| local::local(model, at, &at.controls)).collect())
             .collect();
         let mut columns = gather(&acting, model.integrator, 1 + INPUTS + 3 + 7, |place, add| {
-            // derivatives are those at the start of a step, also for its end, which RK4 evaluates too
+            // RK4 also evaluates the end of a step; the derivatives there are approximated by those at the start
             let here = &locals[place.segment][place.index];
             let value = if place.at.time_s == acting.segments[place.segment][place.index].time_s {
                 here.value
@@ -114,8 +114,8 @@ impl Ready {
         Ready { accelerating: model.cloned(), ..self }
     }
 
-    /// Predictions of one unit of each of the coefficients `wanted` of `model`, which must contain the effects of the
-    /// flight's model; shape constants and those of input effects have empty columns.
+    /// Predictions for one unit of each of the coefficients `wanted` of `model`. `model` must contain the effects of
+    /// the flight's model. The columns of shape constants and of coefficients of input effects are empty.
     pub fn linear(&self, model: &GreyBox, wanted: Range<usize>) -> Vec<Column> {
         // a formula with a lag needs the past of the deflections, which the flight's own model may not remember
         let remembered = (model.lags() > 0).then(|| self.measured.acting(model));
@@ -154,8 +154,8 @@ impl Ready {
         columns
     }
 
-    /// Change of the residual for a unit of a parameter that changes the rigid body to `body` at `step`. The
-    /// accelerations are predicted ones, since measured ones share the residual's noise.
+    /// Change of the residual for one unit of a parameter. A change of the parameter by `step` changes the rigid body
+    /// to `body`. The accelerations are predicted, because measured accelerations share the residual's noise.
     fn body(&self, model: &GreyBox, body: &RigidBody, step: f64) -> Column {
         let old = &model.body;
         let model = self.accelerating.as_ref().unwrap_or(model);
@@ -219,7 +219,8 @@ pub fn of_body(model: &GreyBox, index: usize) -> bool {
     changed_body(model, index).is_some()
 }
 
-/// The rigid body of `model` with the coefficient `index` perturbed, and the perturbation, if it changes the body.
+/// The rigid body of `model` after a perturbation of the coefficient `index`, and the perturbation. `None` if the body
+/// does not depend on the coefficient.
 fn changed_body(model: &GreyBox, index: usize) -> Option<(RigidBody, f64)> {
     const MOVED: f64 = 1e-3;
     let mut moved = model.clone();

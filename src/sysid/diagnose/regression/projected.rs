@@ -34,8 +34,8 @@ pub struct Projected {
     pub total: DMatrix<f64>,
     /// Products of the candidate columns with the noise of each block.
     pub noise: Vec<DVector<f64>>,
-    /// Square root of `prior` for the candidates: multiplied by a unit normal vector, it gives a draw of the prior's
-    /// error.
+    /// Square root of `prior` for the candidates. Its product with a vector of standard normal numbers is a draw of the
+    /// prior's error.
     pub prior_root: DMatrix<f64>,
     /// Nuisance parameters fitted without any candidate, relative to the point of linearisation.
     pub tuned: DVector<f64>,
@@ -50,9 +50,10 @@ pub struct Projected {
 }
 
 impl Projected {
-    /// Projects the columns of `placed`: by flight, those of the nuisance parameters (from index 0), then the
-    /// candidates, and the residual at index `last`. `shared` is the part of their product with the residual due to
-    /// shared noise, by index, zero beyond its end.
+    /// Projects the columns of `placed`, which has a list for each flight: the nuisance parameters from index 0, then
+    /// the candidates, then the residual at index `last`. `shared` holds, by index, the parts of the columns' products
+    /// with the residual that are due to shared noise; missing entries are zero. `None` if the nuisance parameters
+    /// cannot be estimated.
     pub fn new(
         cells: &Cells,
         placed: &[Placed],
@@ -73,7 +74,7 @@ impl Projected {
             ay[(k, ny - 1)] -= shared_of(k);
             aa[(k, k)] += known.weight();
             ay[(k, ny - 1)] += known.weight() * known.offset;
-            // a direction without information from data or prior stays where it is
+            // a parameter without information from data or prior keeps its value
             if aa[(k, k)] <= 0.0 {
                 aa[(k, k)] = 1.0;
             }
@@ -124,8 +125,8 @@ impl Projected {
         self.total.ncols() - 1
     }
 
-    /// Gram matrix of other columns at the candidates' indices, less their part along the nuisance parameters;
-    /// `whiteners` by channel.
+    /// Gram matrix of other columns with the candidates' indices, less their part along the nuisance parameters.
+    /// `whiteners` holds a whitener for each channel.
     pub fn others(&self, cells: &Cells, placed: &[Placed], whiteners: &[Whitener]) -> DMatrix<f64> {
         let (na, ny) = (self.taken.nrows(), self.taken.ncols());
         let mut gram = DMatrix::zeros(ny, ny);

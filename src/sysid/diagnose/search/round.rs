@@ -27,7 +27,8 @@ const CURVATURES: usize = 2;
 const WORTH: f64 = 0.2;
 /// It is also linearised again if its evidence is within this of the largest one.
 const CLOSE: f64 = 40.0;
-/// A candidate was linearised near zero if its amount is more than this many times the one at the linearisation.
+/// A candidate counts as linearised near zero if its estimated amount exceeds the amount at the point of linearisation
+/// by this factor.
 const NOTHING: f64 = 1e3;
 
 /// Data that all rounds share.
@@ -52,7 +53,8 @@ pub struct Problem {
 pub struct Beside<'a> {
     /// The noise; estimated from this round if `None`.
     pub noise: Option<&'a Noise>,
-    /// Model that predicts the accelerations in the columns of mass and inertia, if the round's own is too far off.
+    /// Model that predicts the accelerations in the columns of mass and inertia; `None` for the round's own model,
+    /// which may be too inaccurate.
     pub accelerating: Option<&'a GreyBox>,
 }
 
@@ -68,7 +70,7 @@ pub struct Round {
     pub known: Vec<Known>,
     /// Index of each free coefficient in the model's list.
     pub coefficients: Vec<usize>,
-    /// Each flight's own constants, which follow the coefficients, by flight.
+    /// Selection of the constants of each flight, which follow the coefficients in `known`.
     pub per_flight: PerFlight,
     /// The candidates with their columns.
     pub trials: Vec<Trial>,
@@ -76,7 +78,7 @@ pub struct Round {
     pub projected: Projected,
     /// Columns by flight: nuisance parameters, candidates, residual, features.
     pub placed: Vec<Placed>,
-    /// Index of the residual in them.
+    /// Index of the residual in `placed`.
     pub last: usize,
     /// Noise of the channels.
     pub noise: Noise,
@@ -87,10 +89,10 @@ pub struct Round {
     /// Descriptions of the candidates.
     pub entries: Vec<Entry>,
     refined: Vec<(&'static str, Vec<f64>)>,
-    /// Spurious products from shared noise, by index, by flight.
+    /// Spurious products of the columns with the residual due to noise that they share, by flight and index.
     pub shared: Vec<Vec<f64>>,
-    /// Columns of the nuisance parameters and the linear candidates for the flights disturbed again, at the same
-    /// indices.
+    /// Columns of the nuisance parameters and the linear candidates for the flights with additional simulated noise, at
+    /// the same indices.
     pub disturbed: Vec<Placed>,
 }
 
@@ -100,7 +102,7 @@ impl Round {
         Round::beside(problem, model, entries, Beside::default())
     }
 
-    /// As `new`, with results of another round or model.
+    /// As [`Round::new`], with results of other rounds.
     pub fn beside(
         problem: &Problem,
         model: GreyBox,
@@ -158,8 +160,8 @@ impl Round {
         })
     }
 
-    /// Scores of all candidates, best evidence first; nonlinear ones near the top are linearised again at their best
-    /// fit.
+    /// Scores of all candidates in descending order of rank. Nonlinear candidates near the top are linearised again at
+    /// their best fit.
     pub fn rank(&mut self) -> Vec<(usize, Score)> {
         let mut scores = self.scores();
         for _ in 0..REFINEMENTS {
@@ -255,7 +257,8 @@ impl Round {
         })
     }
 
-    /// Wald statistic of all free constants of a joined effect against zero; `None` if its constants are not amounts.
+    /// Wald statistic of all free constants of a joined effect against zero. `None` if the effect is nonlinear in them
+    /// and not an input effect, because zero then does not mean that the effect is absent.
     pub fn amount(&self, id: &str) -> Option<f64> {
         let prefix = format!("{id}.");
         let operator = greylag_physics::inputs::Kind::from_id(id).is_some();
@@ -281,7 +284,7 @@ fn up_to(list: &Placed, place: usize) -> Placed {
     list.iter().take_while(|(p, _)| *p <= place).cloned().collect()
 }
 
-/// Appends candidates and residual to the nuisance parameters' columns; returns the residual's index.
+/// Appends the columns of candidates and residual to those of the nuisance parameters. Returns the residual's index.
 fn place(placed: &mut [Placed], count: usize, made: &Columns, flights: &[Ready]) -> usize {
     let last = count + made.columns.first().map_or(0, Vec::len);
     for ((list, own), flight) in placed.iter_mut().zip(&made.columns).zip(flights) {

@@ -82,7 +82,7 @@ pub fn search(
         selected: Vec::new(),
         sums: Vec::new(),
     };
-    let mut aside = select(problem, model, &mut found, &entries, options, progress)?;
+    let mut aside = latest(select(problem, model, &mut found, &entries, options, progress)?);
     found.judge_remainder();
     aside.retain(|s| found.selected.iter().all(|other| other.id != s.id));
     found.selected.append(&mut aside);
@@ -92,7 +92,7 @@ pub fn search(
     Ok(found)
 }
 
-/// Adds the best candidates one by one until none passes; returns those that were refused.
+/// Adds the best candidates one by one until none passes. Returns the refused candidates that were set aside.
 fn select(
     problem: &Problem,
     model: &GreyBox,
@@ -129,6 +129,17 @@ fn select(
         }
     }
     Ok(aside)
+}
+
+/// The last record of each effect. A candidate that was set aside is ranked again after another effect has been added,
+/// and may be refused again.
+fn latest(refused: Vec<Selected>) -> Vec<Selected> {
+    let mut kept: Vec<Selected> = Vec::new();
+    for one in refused {
+        kept.retain(|s| s.id != one.id);
+        kept.push(one);
+    }
+    kept
 }
 
 /// The candidates in the first ranking, for progress reports.
@@ -236,5 +247,43 @@ impl Found {
     fn fraction(&self) -> f64 {
         let left = 0.5_f64.powi(self.selected.len() as i32);
         RANKED + (0.9 - RANKED) * (1.0 - left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_that_is_refused_twice_is_listed_once() {
+        let refused = |id, threshold| Selected {
+            id,
+            score: Score {
+                evidence: 0.0,
+                wald: 0.0,
+                order: 0.0,
+                fall: 0.0,
+                values: Vec::new(),
+                deviations: Vec::new(),
+                weights: Vec::new(),
+                point: 0,
+            },
+            threshold,
+            class: Vec::new(),
+            heldout: f64::NAN,
+            selected: 0.0,
+            by_flight: Vec::new(),
+            channels: Vec::new(),
+            taken: [0.0; 6],
+            refused: vec!["the flights contradict one another".into()],
+            slight: false,
+            trace: None,
+            absorbs_prior_error: false,
+            curved: false,
+            contribution: Vec::new(),
+        };
+        let kept = latest(vec![refused("a", 1.0), refused("b", 1.0), refused("a", 2.0)]);
+        let kept: Vec<(&str, f64)> = kept.iter().map(|s| (s.id, s.threshold)).collect();
+        assert_eq!(kept, [("b", 1.0), ("a", 2.0)]);
     }
 }

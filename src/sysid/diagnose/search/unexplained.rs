@@ -32,19 +32,29 @@ fn measured(first: &Round) -> [Option<Measured>; CHANNELS] {
     })
 }
 
+/// Mean square of the finite values in `channel`. An empty column means zeros. NaN if no value is finite, for example
+/// because the model predicts no number.
 fn mean_square(residual: &[Column], channel: usize) -> f64 {
+    if residual.iter().all(|c| c[channel].is_empty()) {
+        return 0.0;
+    }
     let finite = residual.iter().flat_map(|c| c[channel].iter()).filter(|x| x.is_finite());
     mean(&finite.map(|x| x * x).collect::<Vec<f64>>())
 }
 
-/// Share of each channel's variance beyond noise that remains in `residual` (one column a flight), with the noise under the
-/// model of `first`. NaN if the flights do not measure the channel.
+/// Share of `variance` that the mean square `left` exceeds the noise by, at least 0. A `left` of NaN has the share NaN,
+/// which `f64::max` would replace by 0.
+fn share(left: f64, noise: f64, variance: f64) -> f64 {
+    let share = (left - noise) / variance;
+    if share < 0.0 { 0.0 } else { share }
+}
+
+/// Share of each channel's variance beyond noise that remains in `residual` (one column a flight), with the noise under
+/// the model of `first`. NaN if the flights do not measure the channel or the model predicts no number in it.
 pub fn unexplained(first: &Round, residual: &[Column]) -> [f64; CHANNELS] {
     let measured = measured(first);
     std::array::from_fn(|k| match &measured[k] {
-        Some(Measured { variance, noise }) => {
-            ((mean_square(residual, k) - noise) / variance).max(0.0)
-        }
+        Some(Measured { variance, noise }) => share(mean_square(residual, k), *noise, *variance),
         None => f64::NAN,
     })
 }
@@ -59,4 +69,23 @@ pub fn explained(first: &Round, before: &[Column], after: &[Column]) -> [f64; CH
         }
         None => 0.0,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_channel_without_a_prediction_is_not_explained() {
+        let column = |values: &[f64]| {
+            let mut column = Column::default();
+            column[1] = values.to_vec();
+            vec![column]
+        };
+        let left = |values: &[f64]| share(mean_square(&column(values), 1), 1.0, 10.0);
+        assert!(left(&[f64::NAN, f64::NAN]).is_nan());
+        assert_eq!(left(&[]), 0.0);
+        assert_eq!(left(&[0.5, f64::NAN]), 0.0);
+        assert_eq!(left(&[4.0, -4.0]), 1.5);
+    }
 }

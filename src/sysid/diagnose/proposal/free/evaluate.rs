@@ -60,6 +60,8 @@ fn binary(function: Function, x: f64, y: f64) -> f64 {
         Function::Divide => x / y,
         Function::Min => x.min(y),
         Function::Max => x.max(y),
+        // `clamp` panics for a NaN width
+        Function::Deadband if y.is_nan() => f64::NAN,
         Function::Deadband => x - x.clamp(-y.abs(), y.abs()),
         _ => f64::NAN,
     }
@@ -92,5 +94,7 @@ mod tests {
         by_hand("exp(-(alpha/w)^2) - 1", &|a, _| (-(a / 0.15).powi(2)).exp() - 1.0);
         let unknown = evaluate(&parse("throttle", &[]).unwrap(), &[], 3, &variable);
         assert!(unknown.iter().all(|x| x.is_nan()));
+        let wide = parse("deadband(alpha, throttle)", &[]).unwrap();
+        assert!(evaluate(&wide, &[], 3, &variable).iter().all(|x| x.is_nan()));
     }
 }

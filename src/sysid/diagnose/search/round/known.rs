@@ -11,8 +11,8 @@ use greylag_model::GreyBox;
 
 type KnownColumns = (Vec<Known>, Vec<usize>, Vec<Placed>);
 
-/// The nuisance parameters and their columns: free coefficients (from `linear_columns` where the model is linear in
-/// them), then each flight's own constants, then each flight's sensor errors.
+/// The nuisance parameters and their columns: the free coefficients, then the constants of all flights, then the sensor
+/// errors of all flights. `linear_columns` holds the columns of the coefficients in which the model is linear.
 pub(super) fn known(
     problem: &Problem,
     model: &GreyBox,
@@ -42,11 +42,11 @@ pub(super) fn known(
         known.push(Known { name: named.name.clone(), width, offset: value - named.value });
     }
     let constants = problem.per_flight.constants();
-    for (k, (list, flight)) in placed.iter_mut().zip(flights).enumerate() {
+    for (list, flight) in placed.iter_mut().zip(flights) {
         let columns = per_flight::columns(&problem.per_flight, model, flight);
         for (constant, column) in constants.iter().zip(columns) {
             list.push((known.len(), column));
-            let name = format!("{} of flight {}", constant.name, k + 1);
+            let name = format!("{} of flight {}", constant.name, flight.measured.name);
             known.push(Known { name, width: constant.width, offset: 0.0 });
         }
     }
@@ -54,7 +54,7 @@ pub(super) fn known(
         for (i, column) in flight.sensors.iter().enumerate() {
             list.push((known.len(), column.clone()));
             known.push(Known {
-                name: format!("{} of flight {}", sensors::NAMES[i], k + 1),
+                name: format!("{} of flight {}", sensors::NAMES[i], flight.measured.name),
                 width: problem.sensors[k][i],
                 offset: sensors::mean(i),
             });
@@ -79,7 +79,7 @@ pub(super) fn curved(problem: &Problem, known: &mut [Known], projected: &Project
     }
 }
 
-/// Whether a search estimates the coefficient; gains of nominally one are held.
+/// Whether a search estimates the coefficient. Gains with the nominal value 1 are fixed.
 fn searched(model: &GreyBox, index: usize) -> bool {
     let name = &model.coefficients()[index].name;
     let Some((id, own)) = name.split_once('.') else { return true };
@@ -89,7 +89,7 @@ fn searched(model: &GreyBox, index: usize) -> bool {
     starts == 0 || catalogue::free(&entry).iter().any(|k| about.coefficients[*k].name == own)
 }
 
-/// Derivative of the prediction with respect to a coefficient that the model is not linear in.
+/// Derivative of the prediction with respect to a coefficient in which the model is nonlinear.
 fn tangent(model: &GreyBox, flight: &Ready, index: usize) -> Column {
     let named = &model.coefficients()[index];
     let by = (0.02 * named.value.abs()).max(1e-4);

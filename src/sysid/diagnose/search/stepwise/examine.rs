@@ -123,9 +123,12 @@ fn immaterial(found: &Found, round: &Round, score: &Score) -> Option<String> {
     })
 }
 
-/// Text of a refusal because of a share below its limit.
+/// Text of a refusal because a share is below its limit or, if NaN, cannot be computed.
 fn under(verb: &str, share: f64, of: &str, least: f64) -> String {
-    format!("{verb} {:.0} % {of}, under {:.0} %", 100.0 * share, 100.0 * least)
+    match share.is_nan() {
+        true => format!("the share that {verb} {of} cannot be computed"),
+        false => format!("{verb} {:.0} % {of}, under {:.0} %", 100.0 * share, 100.0 * least),
+    }
 }
 
 /// A remark if `score` may only correct the formula of an effect selected before.
@@ -141,4 +144,19 @@ fn hidden(found: &Found, score: &Score) -> Option<String> {
 /// Whether `score` may only correct the formula of the effect `earlier`.
 fn hides(earlier: &Selected, score: &Score) -> bool {
     score.fall < PRECISION * earlier.score.fall
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_that_cannot_be_computed_is_said_to_be_so() {
+        let of = |share| under("it takes", share, "of the error on held-out segments", HELD_OUT);
+        assert_eq!(of(0.04), "it takes 4 % of the error on held-out segments, under 10 %");
+        assert_eq!(
+            of(f64::NAN),
+            "the share that it takes of the error on held-out segments cannot be computed"
+        );
+    }
 }

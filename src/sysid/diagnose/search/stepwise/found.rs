@@ -8,8 +8,8 @@ use crate::diagnose::search::round::Round;
 use crate::diagnose::search::shape::Shape;
 use crate::diagnose::search::unexplained::unexplained;
 
-/// A channel is adequate if its unexplained share is below this; reconstruction and sampling leave as much with exact
-/// models.
+/// A channel is adequate if its unexplained share is below this. Errors of reconstruction and sampling cause such
+/// shares even with an exact model.
 const ADEQUATE: f64 = 5e-4;
 
 /// Candidate selected by a round, with its checks.
@@ -17,15 +17,15 @@ const ADEQUATE: f64 = 5e-4;
 pub struct Selected {
     /// Identifier of the effect.
     pub id: &'static str,
-    /// Its score in that round.
+    /// Score in the round that selected the effect.
     pub score: Score,
-    /// Threshold of evidence in that round.
+    /// Threshold of evidence in the same round.
     pub threshold: f64,
-    /// Ids that the data cannot distinguish from it.
+    /// Ids of effects that the data cannot distinguish from this effect.
     pub class: Vec<String>,
     /// Relative reduction of the error on held-out segments.
     pub heldout: f64,
-    /// Share of bootstraps in which it ranks first.
+    /// Share of bootstraps in which the effect, or one of `class`, ranks first.
     pub selected: f64,
     /// Estimate of the first free coefficient from each flight, with its standard deviation.
     pub by_flight: Vec<[f64; 2]>,
@@ -62,7 +62,7 @@ pub struct Found {
     pub remainder: Remainder,
     /// Error beyond noise of the last round's model; `None` if that is the first one.
     pub beyond: Option<checks::Beyond>,
-    /// Reduction of its residual by products of the states; `None` if they cannot be fitted.
+    /// Reduction of the last round's residual by products of the states; `None` if they cannot be fitted.
     pub shape: Option<Shape>,
     /// Candidates' scores in the last round.
     pub scores: Vec<(usize, Score)>,

@@ -70,7 +70,7 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses every effect but `except` that acts in one of `channels`, for `reason`.
+    /// Refuses every effect that acts in one of `channels`, for `reason`. The effect `except` is spared.
     pub fn refuse_in(&mut self, channels: &[ChannelId], except: &str, reason: &str) {
         let touched = |c: &usize| channels.contains(&ChannelId::ALL[*c]);
         let spared = |s: &&mut Selected| s.id != except && s.channels.iter().any(touched);
@@ -80,7 +80,8 @@ impl Found {
         self.refuse_companions();
     }
 
-    /// Refuses every effect all of whose channels are `abstained` from, for the reason given there.
+    /// Refuses effects that act only in channels in which the flights cannot assess the model. `abstained` holds the
+    /// reason for each of these channels.
     pub fn refuse_where_abstained(&mut self, abstained: &[Option<String>; 6]) {
         for effect in self.selected.iter_mut().filter(|s| s.refused.is_empty()) {
             let whys: Option<Vec<&String>> =
