@@ -1,4 +1,4 @@
-//! The answer box of an amendment, and of a comparison whose models one amendment made.
+//! The short answer on an amendment, on a diagnosis, and on a comparison of models before and after an amendment.
 
 use std::path::{Path, PathBuf};
 
@@ -73,7 +73,7 @@ fn precedes(one: &Reconstruction, other: &Reconstruction) -> bool {
 /// The answer of a diagnosis and its tuned model, estimated by equation error from its flights.
 #[derive(Clone, Debug)]
 pub struct Diagnosed {
-    /// The model with its own coefficients tuned, no effect added.
+    /// The model with tuned coefficients and without added effects.
     pub tuned: GreyBox,
     /// Reduction of the free-run error on the flights of the diagnosis, by tuning and by each effect.
     pub answer: Answer,
@@ -126,7 +126,7 @@ pub fn diagnosed(
     Ok(Diagnosed { tuned, answer })
 }
 
-/// A fitted coefficient as read from a file.
+/// Estimate of a coefficient, from a fit or from its `amend.json`.
 #[derive(Clone, Debug, Deserialize)]
 struct Known {
     name: String,
@@ -201,7 +201,8 @@ impl Origin {
         (origin.model == before.name).then_some(origin)
     }
 
-    /// `before` with the coefficients that the amendment tuned, no effect added.
+    /// `before` with the coefficients that the amendment tuned, without added effects. `None` if `before` lacks one of
+    /// them.
     pub fn tuned(&self, before: &GreyBox) -> Option<GreyBox> {
         let mut tuned = before.clone();
         let set = |p: &Known| tuned.set_coefficient(&p.name, p.value);

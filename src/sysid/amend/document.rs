@@ -71,7 +71,7 @@ pub enum DocumentError {
     Json(#[from] serde_json::Error),
 }
 
-/// The original model as its files hold it.
+/// Files of the original model.
 #[derive(Clone, Debug)]
 pub struct Original {
     /// Path of the model file.
@@ -108,8 +108,8 @@ impl Original {
     }
 }
 
-/// The files of an amended model, name and text: airframe, effects, model, result. `logs` are those fitted to and
-/// those held out.
+/// Name and text of each file of an amended model: airframe, effects, model, result. The logs are those of the fit,
+/// then those held out.
 ///
 /// # Errors
 /// The original is no model file, or the result holds a number that JSON cannot represent.
