@@ -10,8 +10,8 @@ use greylag_physics::formula::{Variable, Written};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Largest length of a function, characters. Nested tables and nested calls of smoothstep, tanh, sign and deadband repeat
-/// their arguments and multiply the length.
+/// Largest length of a function, characters. Nested tables and nested calls of smoothstep, tanh, sign and deadband
+/// repeat their arguments and multiply the length.
 const LONGEST: usize = 200_000;
 /// Metres in a foot.
 const FT: f64 = 0.3048;
@@ -48,8 +48,8 @@ fn place(channel: Channel) -> (Place, f64) {
 
 fn too_long() -> String {
     format!(
-        "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what is inside tables, \
-         smoothstep, tanh, sign and deadband; nest them less"
+        "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what is inside \
+         tables, smoothstep, tanh, sign and deadband; nest them less"
     )
 }
 

@@ -162,7 +162,7 @@ fn text(file: &toml::Table) -> String {
     out
 }
 
-/// A key as in a TOML file: quoted if it has other characters than letters, digits, `_` and `-`, such as the name of a log.
+/// A key as in a TOML file: quoted if it has other characters than letters, digits, `_` and `-`, as the name of a log.
 fn key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     match !name.is_empty() && name.chars().all(bare) {

@@ -43,8 +43,8 @@ pub fn spreads(flights: &[&Quality]) -> Spreads {
 /// Largest number of values in a [`Thinned`] series.
 const MOST: usize = 4_000_000;
 
-/// A series of at most 4 million values in memory. Of a longer series every second value is held, or every fourth, and so
-/// on.
+/// A series with at most 4 million values in memory. A longer series is represented by every second value, every fourth
+/// value, and so on.
 #[derive(Clone, Debug)]
 pub struct Thinned {
     kept: Vec<f64>,

@@ -39,8 +39,8 @@ pub fn answer(story: &Amendment, seen: Seen) -> Answer {
     })
 }
 
-/// Relation of the flights `held_out` to the flights `fitted`, before corrections. Names do not suffice: logs in two folders
-/// can have one name, and both parts of a divided flight have its name.
+/// Relation of the flights `held_out` to the flights `fitted`, before corrections. Names do not suffice: logs in two
+/// folders can have the same name, and both parts of a divided flight have the name of the flight.
 pub fn seen(fitted: &[Reconstruction], held_out: &[Reconstruction]) -> Seen {
     let (mut same, mut after) = (0, false);
     for held in held_out {
