@@ -175,6 +175,12 @@ impl CampaignFile {
 
     fn check_stage(&self, stage: &StageFile) -> Result<(), String> {
         plain("stage", &stage.name)?;
+        if [SEED, "out"].contains(&stage.name.as_str()) || self.axes.contains_key(&stage.name) {
+            return Err(format!(
+                "stage {0}: in a command {{{0}}} is no folder of a stage; choose another name",
+                stage.name
+            ));
+        }
         distinct(&format!("axis of stage {}", stage.name), stage.over.iter().cloned())?;
         for axis in &stage.over {
             self.known_axis(axis).map_err(|why| format!("stage {}: {why}", stage.name))?;
@@ -228,13 +234,17 @@ impl CampaignFile {
     /// The stage and the levels that `text` names: `stage axis=level …`.
     ///
     /// # Errors
-    /// If there is no such stage, axis or level.
+    /// If there is no such stage, axis or level, or if the stage does not vary the axis.
     pub fn choice(&self, text: &str) -> Result<(String, BTreeMap<String, String>), String> {
         let about = |why: String| format!("{text:?}: {why}");
         let mut words = text.split_whitespace();
         let stage = self.stage(words.next().unwrap_or_default()).map_err(about)?;
         let levels = levels(words).map_err(about)?;
         levels.iter().try_for_each(|(axis, level)| self.known_level(axis, level)).map_err(about)?;
+        if let Some(axis) = levels.keys().find(|axis| !stage.over.contains(axis)) {
+            let (name, over) = (&stage.name, stage.over.join(", "));
+            return Err(about(format!("stage {name} does not vary {axis}, only {over}")));
+        }
         Ok((stage.name.clone(), levels))
     }
 
@@ -291,5 +301,30 @@ fn distinct(what: &str, names: impl Iterator<Item = String>) -> Result<(), Strin
     match names.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(()),
         Some(pair) => Err(format!("{what} {} is there twice", pair[0])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "schema = 1\nname = \"a\"\nseeds = [1]\n[axes]\nkind = [\"x\"]\nother = [\"y\"]\n\
+        [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {kind}\"\n";
+
+    #[test]
+    fn a_choice_of_an_axis_that_the_stage_does_not_vary_is_refused() {
+        let file = CampaignFile::parse(TEXT).unwrap();
+        assert!(file.choice("last kind=x").is_ok());
+        let why = file.choice("last other=y").unwrap_err();
+        assert!(why.contains("stage last does not vary other, only kind, seed"), "{why}");
+    }
+
+    #[test]
+    fn a_stage_whose_placeholder_means_something_else_is_refused() {
+        for name in ["out", "seed", "kind"] {
+            let text = TEXT.replace("name = \"last\"", &format!("name = \"{name}\""));
+            let why = CampaignFile::parse(&text).unwrap_err();
+            assert!(why.contains("choose another name"), "{why}");
+        }
     }
 }

@@ -214,6 +214,9 @@ mod tests {
         assert_eq!((summary.rows.len(), summary.rows[0].ours.mean.value), (1, 12.0));
         let found = &findings(&planned_first.file, &all.records).unwrap()[0];
         assert_eq!(found.outcome, Outcome::Holds, "{}", found.because);
+        let found = &findings(&planned_first.file, &all.records[..6]).unwrap()[0];
+        assert_eq!(found.outcome, Outcome::NoData);
+        assert_eq!(found.because, "no cell of last kind=y has easy.mean_deg");
 
         // results from another machine for cells that are not finished here
         let (mut partly, mut elsewhere) = (all.clone(), all.records.clone());

@@ -153,6 +153,9 @@ impl Draft<'_> {
                 self.stage.over.join(", ")
             ));
         };
+        if let Some(axis) = given.keys().find(|axis| !first.levels.contains_key(*axis)) {
+            return Err(format!("{{{name}}}: stage {stage} does not vary {axis}"));
+        }
         let own: BTreeMap<&String, &String> =
             self.levels.iter().map(|(axis, level)| (axis, &level.name)).collect();
         let wanted = |axis: &String| given.get(axis).or_else(|| own.get(axis).copied());
@@ -221,4 +224,20 @@ fn content(path: &Path) -> Result<String, String> {
         all += &format!("{:?} {}\n", path.file_name(), content(&path)?);
     }
     Ok(hash(all.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_that_an_earlier_stage_does_not_vary_is_refused() {
+        let text = "schema = 1\nname = \"a\"\nseeds = [1]\n[axes]\nkind = [\"x\"]\n\
+            [[stage]]\nname = \"first\"\nover = [\"seed\"]\ncommand = \"collect\"\n\
+            [[stage]]\nname = \"last\"\nover = [\"kind\", \"seed\"]\ncommand = \"evaluate {first:kind=x}\"\n";
+        let file = CampaignFile::parse(text).unwrap();
+        let find = |path: &Path| PathBuf::from(path);
+        let why = plan(file, Path::new("a.toml"), &find).unwrap_err().to_string();
+        assert!(why.contains("stage first does not vary kind"), "{why}");
+    }
 }

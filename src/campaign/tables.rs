@@ -212,7 +212,8 @@ fn finding(file: &CampaignFile, claim: &ClaimFile, records: &[Record]) -> Result
         None => difference(&a, &b),
     };
     let Some(gap) = gap else {
-        let because = format!("no cell of both sides has {}", claim.metric);
+        let empty = if a.is_empty() { &claim.less } else { &claim.than };
+        let because = format!("no cell of {empty} has {}", claim.metric);
         return Ok(Finding { says, outcome: Outcome::NoData, because });
     };
     let outcome = match gap.ci95 {

@@ -16,7 +16,7 @@ use greylag_physics::Airframe;
 pub const LEGS: usize = 12;
 /// Number of steps for which each attitude is commanded: 5 s.
 const LEG: usize = 500;
-/// Steps at the end of each over which the settled error is taken: 1 s.
+/// Number of steps at the end of each attitude over which the settled error is taken: 1 s.
 const SETTLED: usize = 100;
 /// Largest commanded roll and pitch, degrees, if the airframe's envelope allows them.
 const LARGEST_DEG: [f64; 2] = [40.0, 15.0];
@@ -32,7 +32,7 @@ const LOST_SPEED: [f64; 2] = [0.45, 2.5];
 /// Result of one minute of flight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Minute {
-    /// When the aircraft was lost, s; `None` if it was not.
+    /// Time of the loss, s; `None` if the aircraft was not lost.
     pub lost_s: Option<f64>,
     /// Mean over the attitudes of the settled error, degrees; 180 if the aircraft was lost.
     pub settled_deg: f64,

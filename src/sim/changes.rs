@@ -4,11 +4,11 @@ use greylag_model::{GreyBox, JoinError};
 use greylag_physics::Command;
 use greylag_physics::rigid_body::RigidBody;
 
-/// When the aircraft changes, s after the start.
+/// Time of the change after the start, s.
 pub const CHANGE_S: f64 = 30.0;
 /// Mass after the change, as a multiple of the mass before.
 const MASS: f64 = 1.3;
-/// How far aft the centre of gravity moves, as a fraction of the mean chord.
+/// Aft shift of the centre of gravity, as a fraction of the mean chord.
 const AFT: f64 = 0.05;
 
 /// A sudden change of the aircraft.
@@ -20,7 +20,7 @@ pub enum Change {
     Mass,
     /// The centre of gravity moves aft by 5 % of the mean chord.
     CentreOfGravity,
-    /// The left elevon, or the left aileron where there are no elevons, stays where it is.
+    /// The left elevon jams, or the left aileron of an aircraft without elevons.
     StuckSurface,
 }
 
@@ -75,7 +75,7 @@ impl Changed {
         Ok(Changed { change, model: changed, elevons })
     }
 
-    /// What changes.
+    /// Kind of the change.
     pub fn change(&self) -> Change {
         self.change
     }

@@ -56,7 +56,7 @@ impl Place {
         Target { roll, pitch: within(bin / BINS, ENVELOPE[1]), airspeed }
     }
 
-    /// Fraction of random actions beside a controller: one half in round 0, and 0.5ⁿ in round n.
+    /// Fraction of random actions of an episode with a controller: one half in round 0, and 0.5ⁿ in round n.
     pub fn random_part(&self) -> f64 {
         0.5_f64.powi(self.round.clamp(1, 100) as i32)
     }

@@ -76,7 +76,7 @@ impl Imagined {
         Imagined { model, start, twin, previous: [Command::IDLE; 2], steps: 0 }
     }
 
-    /// Goes on with the equations of `model` from the present state.
+    /// Replaces the model; the state stays.
     pub fn change(&mut self, model: GreyBox) {
         self.model = model;
     }

@@ -11,7 +11,7 @@ use serde::Serialize;
 #[cfg(feature = "sitl")]
 use crate::Simulator;
 use crate::episode::{DIVERGED_DEG, Leg, STEPS};
-use crate::summary::{Spreads, spreads};
+use crate::summary::{Spreads, Thinned, spreads};
 use crate::targets::Row;
 use crate::{Environment, Episode, Group, Imagined, Outcome, Trouble};
 use greylag_control::quality::{Limits, Quality};
@@ -275,7 +275,7 @@ fn fly<E: Environment>(
 #[derive(Default)]
 struct Sums {
     flights: Vec<Flown>,
-    cost: Vec<f64>,
+    cost: Thinned,
 }
 
 /// Inputs of a score from one flight.
@@ -299,7 +299,7 @@ impl Sums {
             });
             let Outcome { settled_deg, settling_s, .. } = *outcome;
             self.flights.push(Flown { group: course.group, settled_deg, settling_s, scored });
-            self.cost.extend(outcome.cost.iter().map(|d: &Duration| d.as_secs_f64() * 1e3));
+            outcome.cost.iter().for_each(|d: &Duration| self.cost.push(d.as_secs_f64() * 1e3));
         }
     }
 
@@ -323,9 +323,9 @@ impl Sums {
             model: model.into(),
             groups,
             ms_per_step: Cost {
-                p50: quantile(&self.cost, 0.5),
-                p99: quantile(&self.cost, 0.99),
-                p999: quantile(&self.cost, 0.999),
+                p50: quantile(self.cost.values(), 0.5),
+                p99: quantile(self.cost.values(), 0.99),
+                p999: quantile(self.cost.values(), 0.999),
             },
             limits,
             flights: self.flights.into_iter().filter_map(|f| f.scored).collect(),

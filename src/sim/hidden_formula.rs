@@ -10,8 +10,8 @@ use greylag_physics::formula::{Variable, Written};
 
 /// Newtons per pound of force.
 const LBF: f64 = 4.448_221_615_260_5;
-/// Largest length of a function, characters. Nested calls of smoothstep, tanh, sign and deadband repeat their arguments
-/// and multiply the length.
+/// Largest length of a function, characters. Nested tables and nested calls of smoothstep, tanh, sign and deadband
+/// repeat their arguments and multiply the length.
 const LONGEST: usize = 200_000;
 /// Metres in a foot.
 const FT: f64 = 0.3048;
@@ -44,6 +44,13 @@ fn place(channel: Channel) -> (Place, f64) {
         Channel::Pitch => (Place::Pitch, LBF * FT),
         Channel::Yaw => (Place::Yaw, LBF * FT),
     }
+}
+
+fn too_long() -> String {
+    format!(
+        "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what is inside \
+         tables, smoothstep, tanh, sign and deadband; nest them less"
+    )
 }
 
 fn element(name: &str, parts: &[String]) -> String {
@@ -120,16 +127,20 @@ impl Writer<'_> {
             Node::Variable(v) => variable(*v),
             Node::Parameter(k) => Ok(number(self.value(*k))),
             Node::Power(base, n) => Ok(element("pow", &[self.xml(base)?, number(f64::from(*n))])),
-            Node::Table(x, points) => Ok(table(&self.xml(x)?, points)),
+            Node::Table(x, points) => {
+                let x = self.xml(x)?;
+                // checked before it is written, because every pair of points repeats `x`
+                match x.len().saturating_mul(points.len()) > LONGEST {
+                    true => Err(too_long()),
+                    false => Ok(table(&x, points)),
+                }
+            }
             Node::Call(function, all) if function.has_memory() => self.filter(*function, all),
             Node::Call(function, all) => {
                 let all = all.iter().map(|e| self.xml(e)).collect::<Result<Vec<_>, _>>()?;
                 let written = call(*function, &all);
                 match written.len() > LONGEST {
-                    true => Err(format!(
-                        "the formula takes more than {LONGEST} characters as a function of JSBSim, which repeats what \
-                         is inside smoothstep, tanh, sign and deadband; nest them less"
-                    )),
+                    true => Err(too_long()),
                     false => Ok(written),
                 }
             }
@@ -220,4 +231,21 @@ fn smoothstep(low: &str, high: &str, x: &str) -> String {
     let t = element("max", &[element("min", &[share, number(1.0)]), number(0.0)]);
     let rest = element("difference", &[number(3.0), element("product", &[number(2.0), t.clone()])]);
     element("product", &[t.clone(), t, rest])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nested_tables_that_grow_beyond_measure_are_refused() {
+        let points: Vec<[f64; 2]> = (0..200).map(|k| [f64::from(k), 0.0]).collect();
+        let node = |node| Expression { node, at: 0 };
+        let table = |of: Expression| node(Node::Table(Box::new(of), points.clone()));
+        let mut writer = Writer { values: &[], filters: Vec::new() };
+        let once = table(node(Node::Variable(Variable::Alpha)));
+        assert!(writer.xml(&once).unwrap().starts_with("<sum>"));
+        let why = writer.xml(&table(once)).unwrap_err();
+        assert!(why.contains("inside tables"), "{why}");
+    }
 }

@@ -242,7 +242,7 @@ pub struct Missing {
     pub values: Vec<f64>,
 }
 
-/// An effect cannot be missing.
+/// An effect cannot be hidden from a model.
 #[derive(Debug, thiserror::Error)]
 pub enum MissingError {
     /// The effect does not exist.

@@ -151,13 +151,36 @@ fn text(file: &toml::Table) -> String {
         if !path.is_empty() && !here.is_empty() {
             let _ = writeln!(out, "\n[{path}]");
         }
-        here.iter().for_each(|(key, value)| {
-            let _ = writeln!(out, "{key} = {value}");
+        here.iter().for_each(|(name, value)| {
+            let _ = writeln!(out, "{} = {value}", key(name));
         });
         let dot = if path.is_empty() { "" } else { "." };
-        for (key, value) in below.into_iter().rev() {
-            sections.extend(value.as_table().map(|t| (format!("{path}{dot}{key}"), t)));
+        for (name, value) in below.into_iter().rev() {
+            sections.extend(value.as_table().map(|t| (format!("{path}{dot}{}", key(name)), t)));
         }
     }
     out
+}
+
+/// A key as in a TOML file: quoted if it has other characters than letters, digits, `_` and `-`, as the name of a log.
+fn key(name: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match !name.is_empty() && name.chars().all(bare) {
+        true => name.to_owned(),
+        false => toml::Value::from(name).to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constants_of_a_flight_are_read_back() {
+        let reference = "schema = 1\n[effects.roll_linear]\nClp = { value = -0.5, source = \"a\" }\n\
+                         [flights.\"a b.csv\"]\nsource = \"b\"\ntrims = [0.1, 0.2]\n";
+        let text = starting_model(reference, "m", 1, &[]).unwrap();
+        let read: toml::Table = toml::from_str(&text).unwrap();
+        assert!(read["flights"]["a b.csv"]["trims"].is_array(), "{text}");
+    }
 }

@@ -1,4 +1,4 @@
-//! Summary of quality measures over many flights: median with interval, and the worst.
+//! Summary of quality measures over many flights: median with interval, and the worst. Samples of long series.
 
 use std::collections::BTreeMap;
 
@@ -38,4 +38,62 @@ pub fn spreads(flights: &[&Quality]) -> Spreads {
         })
     };
     MEASURES.iter().filter_map(|m| Some((m.id, of(m)?))).collect()
+}
+
+/// Largest number of values in a [`Thinned`] series.
+const MOST: usize = 4_000_000;
+
+/// A series with at most 4 million values in memory. A longer series is represented by every second value, every fourth
+/// value, and so on.
+#[derive(Clone, Debug)]
+pub struct Thinned {
+    kept: Vec<f64>,
+    every: usize,
+    seen: usize,
+}
+
+impl Default for Thinned {
+    fn default() -> Thinned {
+        Thinned { kept: Vec::new(), every: 1, seen: 0 }
+    }
+}
+
+impl Thinned {
+    /// Appends a value to the series.
+    pub fn push(&mut self, value: f64) {
+        let number = self.seen;
+        self.seen += 1;
+        if number.is_multiple_of(self.every) && self.kept.len() == MOST {
+            let mut place = 0_usize;
+            self.kept.retain(|_| {
+                place += 1;
+                !place.is_multiple_of(2)
+            });
+            self.every *= 2;
+        }
+        if number.is_multiple_of(self.every) {
+            self.kept.push(value);
+        }
+    }
+
+    /// The values that are held, in order.
+    pub fn values(&self) -> &[f64] {
+        &self.kept
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_series_is_thinned_evenly() {
+        let mut series = Thinned::default();
+        for k in 0..2 * MOST + 7 {
+            series.push(k as f64);
+        }
+        let values = series.values();
+        assert!(values.len() <= MOST && values.len() > MOST / 2, "{}", values.len());
+        assert!(values.windows(2).all(|w| w[1] - w[0] == 4.0) && values[0] == 0.0);
+    }
 }

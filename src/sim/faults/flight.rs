@@ -226,7 +226,8 @@ impl CompanionFactory {
         };
         // after a panic the judge only reads the state of the flight
         if catch_unwind(AssertUnwindSafe(|| flight.fly())).is_err() {
-            flight.judge.note(0.0, Finding::Panic);
+            let at_s = flight.judge.now_s();
+            flight.judge.note(at_s, Finding::Panic);
         }
         Ok(flight)
     }

@@ -3,7 +3,7 @@
 use greylag_sitl::plant::Truth;
 
 use super::mix::FaultKind;
-use greylag_flight::pilot::{Decision, Source};
+use greylag_flight::pilot::{Decision, Source, TICK_S};
 use greylag_physics::Command;
 use greylag_physics::airframe::Envelope;
 
@@ -168,6 +168,7 @@ pub struct Judge {
     last: Option<Command>,
     start_m: Option<f64>,
     findings: Vec<Found>,
+    /// Number of finished steps of 10 ms.
     steps: u64,
     /// Number of consecutive uncommanded steps.
     unsteered: u32,
@@ -197,6 +198,11 @@ impl Judge {
             let suspects = if finding.is_own() { [None; 3] } else { self.suspects(finding) };
             self.findings.push(Found { at_s, finding, cause: None, suspects });
         }
+    }
+
+    /// Time of the step in progress, s.
+    pub fn now_s(&self) -> f64 {
+        self.steps as f64 * TICK_S
     }
 
     /// The causes active now or recently.
@@ -281,5 +287,19 @@ impl Judge {
     /// All findings so far.
     pub fn findings(self) -> Vec<Found> {
         self.findings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_physics::Airframe;
+
+    #[test]
+    fn a_finding_after_a_panic_has_the_time_of_its_step() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/airframe.toml");
+        let mut judge = Judge::new(Airframe::load(std::path::Path::new(path)).unwrap().envelope);
+        (0..150).for_each(|_| judge.suffer(Exposure::default()));
+        assert!((judge.now_s() - 1.5).abs() < 1e-9);
     }
 }

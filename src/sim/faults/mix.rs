@@ -121,7 +121,20 @@ pub struct Fault {
     /// End of the fault, s.
     pub to_s: f64,
     /// Severity of the fault, 0..1.
+    #[serde(deserialize_with = "severity")]
     pub strength: f64,
+}
+
+/// Reads a severity. Numbers outside 0..1 would give delays and numbers of bit errors that cannot be simulated.
+fn severity<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let strength = f64::deserialize(from)?;
+    match (0.0..=1.0).contains(&strength) {
+        true => Ok(strength),
+        false => {
+            let why = format!("strength {strength} of a fault; give one from 0 to 1");
+            Err(serde::de::Error::custom(why))
+        }
+    }
 }
 
 impl Fault {
@@ -159,4 +172,23 @@ pub(super) fn one(kind: FaultKind, random: &mut impl Rng) -> Fault {
         _ => random.random_range(1.0..8.0),
     };
     Fault { kind, from_s, to_s: from_s + length, strength: random.random() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_severity_is_read_between_0_and_1() {
+        let read = |strength: &str| {
+            let text =
+                format!("kind = \"delay\"\nfrom_s = 12.0\nto_s = 13.0\nstrength = {strength}");
+            toml::from_str::<Fault>(&text).map(|fault| fault.strength)
+        };
+        assert_eq!(read("1.0").unwrap(), 1.0);
+        for wrong in ["-0.1", "1e30", "nan"] {
+            let why = read(wrong).unwrap_err().to_string();
+            assert!(why.contains("give one from 0 to 1"), "{why}");
+        }
+    }
 }

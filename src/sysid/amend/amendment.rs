@@ -146,14 +146,16 @@ pub fn amend(
     for added in &options.effects {
         joined(&mut model.clone(), added)?;
     }
+    let seen = answer::seen(flights, held_out);
     let Right { flights, asked, notes } = right(model, flights, options.per_flight);
     let options = Options { per_flight: asked, ..options.clone() };
     let mut amended = of_right(model, &flights, held_out, &options, progress)?;
+    amended.amendment.answer = answer::answer(&amended.amendment, seen);
     amended.amendment.notes.extend(notes);
     Ok(amended)
 }
 
-/// Amendment with flights that are already corrected with the constants in the model's file.
+/// Amendment with flights that are already corrected with the constants in the model's file. The answer is empty.
 fn of_right(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -211,7 +213,6 @@ fn of_right(
     let rudder = rudder::unmodelled(flights, model).or(rudder::unmodelled(held_out, model));
     amendment.sentences = rudder.map(rudder::warning).into_iter().collect();
     amendment.sentences.extend(story::sentences(&amendment));
-    amendment.answer = answer::answer(&amendment);
     Ok(Amended { amendment, model: fit.model, tuned: tuned.model })
 }
 

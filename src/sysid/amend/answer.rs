@@ -1,4 +1,4 @@
-//! The answer box of an amendment, and of a comparison whose models one amendment made.
+//! The short answer on an amendment, on a diagnosis, and on a comparison of models before and after an amendment.
 
 use std::path::{Path, PathBuf};
 
@@ -12,12 +12,13 @@ use super::result::{Amendment, Parameter};
 use crate::compare::answer::{Answer, Decisive, Seen, Stage, Subject, Way};
 use crate::compare::{Comparison, HorizonScore, scores};
 use crate::diagnose::{Candidate, Diagnosis, Parameter as Estimate};
-use crate::flight_path::reconstruction::Reconstruction;
+use crate::flight_path::reconstruction::{Instant, Reconstruction};
 use greylag_model::GreyBox;
 use greylag_physics::catalogue;
 
-/// The answer of an amendment, from the errors of the model as given, tuned, and with the added effects.
-pub fn answer(story: &Amendment) -> Answer {
+/// The answer of an amendment, from the errors of the model as given, tuned, and with the added effects. `seen` is the
+/// relation of the held-out flights to the fitted flights.
+pub fn answer(story: &Amendment, seen: Seen) -> Answer {
     let joined: Vec<_> = story.effects.iter().filter(|e| e.joined).collect();
     let effects = joined.iter().filter_map(|e| {
         let own = story.parameters.iter().filter(|p| p.added).map(Known::of);
@@ -29,20 +30,50 @@ pub fn answer(story: &Amendment) -> Answer {
     if !joined.is_empty() {
         stages.push(stage(Way::Effects, &story.after[..]));
     }
-    let fitted = |name: &String| story.flights.iter().any(|f| f.flight == *name);
     Answer::of(&Subject {
         stages,
         flights: story.held_out.clone(),
-        seen: if story.held_out.iter().any(fitted) { Seen::LastThird } else { Seen::Of(0) },
+        seen,
         effects: effects.collect(),
         baseline: None,
     })
 }
 
+/// Relation of the flights `held_out` to the flights `fitted`, before corrections. Names do not suffice: logs in two
+/// folders can have the same name, and both parts of a divided flight have the name of the flight.
+pub fn seen(fitted: &[Reconstruction], held_out: &[Reconstruction]) -> Seen {
+    let (mut same, mut after) = (0, false);
+    for held in held_out {
+        let namesakes: Vec<&Reconstruction> =
+            fitted.iter().filter(|f| f.name == held.name).collect();
+        same += usize::from(namesakes.iter().any(|f| equal(f, held)));
+        after |= namesakes.iter().any(|f| precedes(f, held));
+    }
+    if same == 0 && after { Seen::LastThird } else { Seen::Of(same) }
+}
+
+fn first(flight: &Reconstruction) -> Option<&Instant> {
+    flight.segments.iter().find_map(|s| s.instants.first())
+}
+
+/// Whether two reconstructions are of the same part of the same flight: equal length and equal first sample.
+fn equal(one: &Reconstruction, other: &Reconstruction) -> bool {
+    let count = |f: &Reconstruction| f.segments.iter().map(|s| s.instants.len()).sum::<usize>();
+    let begin = first(one).zip(first(other));
+    count(one) == count(other)
+        && begin.is_some_and(|(a, b)| a.time_s == b.time_s && a.state == b.state)
+}
+
+/// Whether `one` ends before `other` begins, on the log's clock.
+fn precedes(one: &Reconstruction, other: &Reconstruction) -> bool {
+    let last = one.segments.iter().rev().find_map(|s| s.instants.last());
+    last.zip(first(other)).is_some_and(|(a, b)| a.time_s < b.time_s)
+}
+
 /// The answer of a diagnosis and its tuned model, estimated by equation error from its flights.
 #[derive(Clone, Debug)]
 pub struct Diagnosed {
-    /// The model with its own coefficients tuned, no effect added.
+    /// The model with tuned coefficients and without added effects.
     pub tuned: GreyBox,
     /// Reduction of the free-run error on the flights of the diagnosis, by tuning and by each effect.
     pub answer: Answer,
@@ -95,7 +126,7 @@ pub fn diagnosed(
     Ok(Diagnosed { tuned, answer })
 }
 
-/// A fitted coefficient as read from a file.
+/// Estimate of a coefficient, from a fit or from its `amend.json`.
 #[derive(Clone, Debug, Deserialize)]
 struct Known {
     name: String,
@@ -170,7 +201,8 @@ impl Origin {
         (origin.model == before.name).then_some(origin)
     }
 
-    /// `before` with the coefficients that the amendment tuned, no effect added.
+    /// `before` with the coefficients that the amendment tuned, without added effects. `None` if `before` lacks one of
+    /// them.
     pub fn tuned(&self, before: &GreyBox) -> Option<GreyBox> {
         let mut tuned = before.clone();
         let set = |p: &Known| tuned.set_coefficient(&p.name, p.value);
@@ -207,5 +239,50 @@ impl Origin {
     fn fitted(&self, path: &Path) -> bool {
         let hash = std::fs::read(path).map(|content| sha256(&content));
         hash.is_ok_and(|hash| self.logs.iter().any(|log| log.sha256 == hash))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::amend::split;
+    use crate::flight_path::reconstruction::Segment;
+    use greylag_logs::Sampling;
+    use greylag_physics::{Controls, State};
+
+    fn flight(name: &str, roll: f64) -> Reconstruction {
+        let instant = |k: usize| Instant {
+            time_s: 0.01 * k as f64,
+            state: State { roll, ..State::NEUTRAL },
+            yaw: f64::NAN,
+            controls: Controls::default(),
+            command: None,
+            specific_force: [0.0; 3],
+            altitude: 0.0,
+            density: 1.225,
+        };
+        Reconstruction {
+            name: name.into(),
+            step_s: 0.01,
+            sampling: Sampling::Instants,
+            segments: vec![Segment { instants: (0..30).map(instant).collect() }],
+            nuisances: Vec::new(),
+            noise: [0.0; 8],
+            left: [0.0; 8],
+            force_noise: [0.0; 3],
+            rudder: None,
+            notes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn flights_that_were_fitted_are_no_last_third() {
+        let (a, b) = (flight("a.csv", 0.1), flight("b.csv", 0.2));
+        let all = [a.clone(), b];
+        assert_eq!(seen(&all, &all), Seen::Of(2));
+        let [begin, end] = split(&a);
+        assert_eq!(seen(&[begin], &[end]), Seen::LastThird);
+        // a log of the same name in another folder
+        assert_eq!(seen(&all, &[flight("a.csv", 0.3)]), Seen::Of(0));
     }
 }

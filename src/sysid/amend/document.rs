@@ -69,9 +69,26 @@ pub enum DocumentError {
     /// The result holds a number that JSON cannot represent.
     #[error("cannot write {STORY}: {0}")]
     Json(#[from] serde_json::Error),
+    /// The model has a learned residual.
+    #[error(
+        "cannot write the amended model: {model} has a learned residual, which no fit changes and which would be missing \
+         beside it; amend the model without the residual"
+    )]
+    Residual {
+        /// Name of the model.
+        model: String,
+    },
+    /// Two files of the amended model have the same name.
+    #[error(
+        "cannot write the amended model: it has two files {name}; rename the airframe file or the effect"
+    )]
+    Twice {
+        /// The name of both files.
+        name: String,
+    },
 }
 
-/// The original model as its files hold it.
+/// Files of the original model.
 #[derive(Clone, Debug)]
 pub struct Original {
     /// Path of the model file.
@@ -108,17 +125,19 @@ impl Original {
     }
 }
 
-/// The files of an amended model, name and text: airframe, effects, model, result. `logs` are those fitted to and
-/// those held out.
+/// Name and text of each file of an amended model: airframe, effects, model, result. The logs are those of the fit,
+/// then those held out.
 ///
 /// # Errors
-/// The original is no model file, or the result holds a number that JSON cannot represent.
+/// The original is no model file or has a learned residual, the result holds a number that JSON cannot represent, or two
+/// files would have the same name.
 pub fn files(
     original: &Original,
     before: &GreyBox,
     amended: &Amended,
     [logs, hold_out]: [&[Hashed]; 2],
 ) -> Result<Vec<(String, String)>, DocumentError> {
+    without_residual(before)?;
     let airframe = original.airframe.clone();
     let text = edit(before, amended, logs, airframe.clone()).apply(&original.text)?;
     let model_file = original.path.display().to_string();
@@ -127,7 +146,26 @@ pub fn files(
     let mut files = vec![(airframe, original.airframe_text.clone())];
     files.extend(amended.model.written().map(|own| (effect_file(own), own.text.clone())));
     files.extend([(MODEL.into(), text), (STORY.into(), story)]);
+    distinct(&files)?;
     Ok(files)
+}
+
+/// Fails if `model` has a learned residual: the written model would name a file that is not written.
+fn without_residual(model: &GreyBox) -> Result<(), DocumentError> {
+    match &model.residual {
+        Some(_) => Err(DocumentError::Residual { model: model.name.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// Fails if two of `files` have the same name: one would replace the other.
+fn distinct(files: &[(String, String)]) -> Result<(), DocumentError> {
+    let mut names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    names.sort_unstable();
+    match names.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(DocumentError::Twice { name: pair[0].into() }),
+        None => Ok(()),
+    }
 }
 
 /// The changes to the model file.
@@ -191,4 +229,28 @@ pub fn differs(read: &GreyBox, meant: &GreyBox) -> Option<String> {
         read.coefficients().iter().any(|c| c.name == name && c.value.to_bits() == value.to_bits())
     };
     meant.coefficients().iter().find(|c| !same(&c.name, c.value)).map(|c| c.name.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use greylag_model::Residual;
+    use greylag_num::Dense;
+
+    #[test]
+    fn a_model_that_would_not_be_whole_is_not_written() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let mut model = GreyBox::load(&path).unwrap();
+        without_residual(&model).unwrap();
+        let network = Dense::new(&[9, 8], vec![0.0; 9 * 8 + 8]).unwrap();
+        model.residual = Some(Residual::new(network, &model.airframe, model.scale()).unwrap());
+        let why = without_residual(&model).unwrap_err().to_string();
+        assert!(why.contains("has a learned residual"), "{why}");
+        let named = |names: &[&str]| -> Vec<(String, String)> {
+            names.iter().map(|name| ((*name).to_owned(), String::new())).collect()
+        };
+        distinct(&named(&["airframe.toml", MODEL, STORY])).unwrap();
+        let why = distinct(&named(&["model.toml", MODEL, STORY])).unwrap_err().to_string();
+        assert!(why.contains("two files model.toml"), "{why}");
+    }
 }

@@ -26,6 +26,9 @@ const LEAST_ERROR: f64 = 1e-12;
 /// Flights disagree if the estimate of one flight differs from the common estimate by more than this number of standard
 /// deviations, and by more than [`DISAGREE_SHARE`].
 const DISAGREE: f64 = 4.0;
+/// Objection to an effect that no free run over held-out flights can judge.
+const UNJUDGED: &str =
+    "no flight that the fit did not see is long enough for a free run; hold out a longer one";
 /// Relative difference of estimates above which flights can disagree.
 const DISAGREE_SHARE: f64 = 0.3;
 
@@ -102,15 +105,17 @@ impl Judge<'_> {
         if !errors.is_some_and(|(a, b)| a < ACCEPTED_UNCONVERGED * b) {
             effect.refused.extend(fit.unsettled.clone());
         }
-        if let Some((a, b)) = errors
-            && (a.is_nan() || a >= (1.0 - IMPROVED) * b)
-        {
-            effect.refused.push(format!(
-                "free runs of {} s on flights that the fit did not see come no closer \
-                 ({b:.5} without it, {a:.5} with it){}",
-                judged_at(before).unwrap_or(JUDGED_AT_S),
-                confounded_with_model(&added.id, &fit.parameters)
-            ));
+        match errors {
+            Some((a, b)) if a.is_nan() || a >= (1.0 - IMPROVED) * b => {
+                effect.refused.push(format!(
+                    "free runs of {} s on flights that the fit did not see come no closer \
+                     ({b:.5} without it, {a:.5} with it){}",
+                    judged_at(before).unwrap_or(JUDGED_AT_S),
+                    confounded_with_model(&added.id, &fit.parameters)
+                ));
+            }
+            Some(_) => {}
+            None => effect.refused.push(UNJUDGED.into()),
         }
         effect.joined = effect.refused.is_empty() || refused == Refused::Kept;
         let kept = effect.joined.then_some((fit, after));
@@ -277,4 +282,34 @@ pub fn contradictions(parameters: &[Parameter]) -> Vec<String> {
             ))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::amend::normal::Weights;
+    use std::path::Path;
+
+    #[test]
+    fn an_effect_that_no_held_out_flight_can_judge_is_refused() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/x8/jsbsim.toml");
+        let fit = Fit {
+            model: GreyBox::load(&path).unwrap(),
+            parameters: Vec::new(),
+            flights: Vec::new(),
+            residual_sd: [0.0; 8],
+            shots: 0,
+            weakened: 0,
+            left: Vec::new(),
+            weights: Weights { output: [1.0; 8], start: [1.0; 8] },
+            iterations: 1,
+            unsettled: None,
+            notes: Vec::new(),
+        };
+        let judge = Judge { test: &[], horizons_s: &[1.0] };
+        let added = Added { id: "motor_torque".into(), start: None };
+        let (effect, kept) = judge.verdict(&added, Ok(fit), &[], Refused::Left).unwrap();
+        assert_eq!((effect.refused.as_slice(), effect.joined), (&[UNJUDGED.to_owned()][..], false));
+        assert!(kept.is_none());
+    }
 }

@@ -75,7 +75,7 @@ pub struct Scored {
 ///
 /// # Errors
 /// Fewer than [`LEAST_FLIGHTS`] flights are long enough for the shortest horizon, the sampling interval of a flight is not
-/// usable, an effect cannot join the model, or `progress` cancelled.
+/// usable, an effect cannot join the model, every fit fails, or `progress` cancelled.
 pub fn leave_one_out(
     model: &GreyBox,
     flights: &[Reconstruction],
@@ -102,13 +102,25 @@ pub fn leave_one_out(
     }
     let names: Vec<String> = judges.iter().map(|k| flights[*k].name.clone()).collect();
     let set = Set { judged: &ready, fitted: &right, judges: &judges, at };
-    let mut all = Vec::new();
+    let (mut all, mut failed, mut any_fit) = (Vec::new(), None, false);
     for (k, structure) in structures.iter().enumerate() {
         let doing = format!("{}: leaving out one flight after the other", structure.name);
         report(progress, &doing, k as f64 / structures.len() as f64)?;
         let one = |left: &usize| error_of(model, &set, *left, &structure.fitted);
-        let errors: Vec<f64> = judges.par_iter().map(one).collect::<Result<_, _>>()?;
+        let outcomes: Vec<Result<f64, AmendError>> =
+            judges.par_iter().map(one).collect::<Result<_, AmendError>>()?;
+        any_fit |=
+            !matches!(structure.fitted, Fitted::Nothing) && outcomes.iter().any(Result::is_ok);
+        let mut errors = Vec::with_capacity(outcomes.len());
+        for outcome in outcomes {
+            errors.push(*outcome.as_ref().unwrap_or(&f64::NAN));
+            failed = failed.or(outcome.err());
+        }
         all.push(scored(structure, free(model, &structure.fitted)?, errors));
+    }
+    // without any fit, the model as given would be chosen without a comparison
+    if let Some(why) = failed.filter(|_| !any_fit) {
+        return Err(why);
     }
     choose(&mut all);
     all.extend(black_boxes(model, &set));
@@ -156,8 +168,13 @@ fn scores(
     Judge { test, horizons_s }.scores(model)
 }
 
-/// Error of flight number `left` with the fit to all other flights; NaN if the fit fails.
-fn error_of(model: &GreyBox, set: &Set, left: usize, fitted: &Fitted) -> Result<f64, AmendError> {
+/// Error of flight number `left` with the fit to all other flights, or the reason why this fit fails.
+fn error_of(
+    model: &GreyBox,
+    set: &Set,
+    left: usize,
+    fitted: &Fitted,
+) -> Result<Result<f64, AmendError>, AmendError> {
     let anew = matches!(fitted, Fitted::Coefficients { per_flight, .. } if per_flight.angles() > 0);
     let flights = if anew { set.judged } else { set.fitted };
     let others = flights.iter().enumerate().filter(|(k, _)| *k != left);
@@ -165,7 +182,7 @@ fn error_of(model: &GreyBox, set: &Set, left: usize, fitted: &Fitted) -> Result<
     let test = std::slice::from_ref(&set.judged[left]);
     let error = |model: &GreyBox| judged(&scores(model, test, &[set.at])).unwrap_or(f64::NAN);
     let (start, options) = match fitted {
-        Fitted::Nothing => return Ok(error(model)),
+        Fitted::Nothing => return Ok(Ok(error(model))),
         Fitted::FromScratch => (parameters::from_scratch(model), FitOptions::default()),
         Fitted::Coefficients { effects, per_flight } => {
             let added = effects.iter().map(|a| a.id.clone()).collect();
@@ -173,10 +190,8 @@ fn error_of(model: &GreyBox, set: &Set, left: usize, fitted: &Fitted) -> Result<
             (with(model, effects)?, options)
         }
     };
-    match output_error::fit(&start, &others, &options, &ignore_progress) {
-        Ok(fit) => Ok(error(&fit.model)),
-        Err(_) => Ok(f64::NAN),
-    }
+    let fit = output_error::fit(&start, &others, &options, &ignore_progress);
+    Ok(fit.map(|fit| error(&fit.model)))
 }
 
 fn with(model: &GreyBox, effects: &[Added]) -> Result<GreyBox, AmendError> {
@@ -244,6 +259,48 @@ fn choose(all: &mut [Scored]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight_path::reconstruction::{Instant, Segment};
+    use greylag_logs::Sampling;
+    use greylag_physics::{Controls, State};
+
+    /// A flight of 3 s without motion.
+    fn short(name: &str) -> Reconstruction {
+        let instant = |k: usize| Instant {
+            time_s: 0.01 * k as f64,
+            state: State::NEUTRAL,
+            yaw: f64::NAN,
+            controls: Controls::default(),
+            command: None,
+            specific_force: [f64::NAN; 3],
+            altitude: 600.0,
+            density: 1.225,
+        };
+        Reconstruction {
+            name: name.into(),
+            step_s: 0.01,
+            sampling: Sampling::Held,
+            segments: vec![Segment { instants: (0..301).map(instant).collect() }],
+            nuisances: Vec::new(),
+            noise: [1e-3; 8],
+            left: [1e-3; 8],
+            force_noise: [0.1; 3],
+            rudder: None,
+            notes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_model_as_given_is_not_chosen_where_no_fit_was_possible() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/x8/jsbsim.toml");
+        let model = GreyBox::load(std::path::Path::new(path)).unwrap();
+        let flights = ["a", "b", "c"].map(short);
+        let tuned = Fitted::Coefficients { effects: Vec::new(), per_flight: PerFlight::default() };
+        let structures = [("given", Fitted::Nothing), ("tuned", tuned)]
+            .map(|(name, fitted)| Structure { name: name.into(), fitted });
+        let why = leave_one_out(&model, &flights, &structures, &[1.0], &ignore_progress);
+        // two flights of 3 s are shorter than the 10 s that a fit needs
+        assert!(matches!(why, Err(AmendError::TooLittle { .. })), "{why:?}");
+    }
 
     fn of(name: &str, free: usize, errors: &[f64]) -> Scored {
         let structure = Structure { name: name.into(), fitted: Fitted::Nothing };

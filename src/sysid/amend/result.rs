@@ -34,8 +34,8 @@ pub struct Parameter {
     pub at_bound: bool,
     /// Estimates of each flight alone, to first order.
     pub by_flight: Vec<FlightEstimate>,
-    /// The model's own coefficient that this one of an added effect is confounded with (error correlation beyond
-    /// 0.9), if there is one.
+    /// Coefficient of the model with which this coefficient of an added effect is confounded (error correlation above
+    /// 0.9); `None` if there is none.
     pub same_as: Option<String>,
 }
 
@@ -149,9 +149,9 @@ pub struct Amendment {
     pub version: &'static str,
     /// Name of the model as given.
     pub model: String,
-    /// Short answer in sentences, with their numbers.
+    /// Answer in sentences, with the numbers of these sentences.
     pub answer: Answer,
-    /// Result in plain sentences.
+    /// Sentences on conventions, on refused effects and on an unmodelled rudder.
     pub sentences: Vec<String>,
     /// Outcome for each requested effect.
     pub effects: Vec<AddedEffect>,
@@ -181,15 +181,16 @@ pub struct Amendment {
 }
 
 impl Amendment {
-    /// That the model as given is kept, in a sentence, if the fit predicts the flights for validation worse.
+    /// Sentence that the given model is kept because the fit predicts the validation flights worse; `None` if it does
+    /// not.
     pub fn worse(&self) -> Option<String> {
         let (given, after) = (judged(&self.given)?, judged(&self.after)?);
         (after > (1.0 + WORSE) * given || after.is_nan())
             .then(|| self.kept("the fit predicts the flights for validation worse"))
     }
 
-    /// That the model as given is kept, in a sentence, if only its coefficients were tuned and the 95 % interval of `decrease`
-    /// includes zero.
+    /// Sentence that the given model is kept because only its coefficients were tuned and the 95 % interval of
+    /// `decrease` includes zero; `None` otherwise.
     pub fn by_chance(&self) -> Option<String> {
         let [mean, error] = self.decrease?;
         // plus zero: no −0
@@ -204,7 +205,7 @@ impl Amendment {
         })
     }
 
-    /// That the model as given is kept, with the reason `why` and the errors.
+    /// Sentence that the given model is kept, with the reason `why` and the errors.
     fn kept(&self, why: &str) -> String {
         let error = |scores| judged(scores).unwrap_or(f64::NAN);
         format!(

@@ -42,10 +42,10 @@ pub struct Skew {
     pub deviation: f64,
 }
 
-/// Delays by roll and by pitch alone; `None` where the axis does not show one.
+/// Delays estimated from roll alone and from pitch alone; `None` if the axis does not determine one.
 pub type ByAxis = [Option<Skew>; 2];
 
-/// The delays of the recorded deflections by roll and by pitch alone.
+/// Delays of the recorded deflections, estimated from roll alone and from pitch alone.
 pub fn by_axis(segments: &[Segment], step: f64, sampling: Sampling) -> ByAxis {
     [
         from_axis(segments, step, sampling, |i| i.state.p, roll_terms),

@@ -57,9 +57,9 @@ impl<const W: usize> Left<W> {
     /// The neutral element of `add`.
     pub const ZERO: Self = Left { corner: [[0.0; W]; W], log_det: 0.0 };
 
-    /// Subtracts what an instant contributes once it is eliminated, in the rows down to the diagonal: see `mirror`.
+    /// Subtracts the contribution of an eliminated instant from the upper triangle; `mirror` completes the lower one.
     fn take<const N: usize>(&mut self, done: &Eliminated<N, W>) {
-        // The corner is most of the work, and symmetric: of a row, the columns before its eight are left out.
+        // The corner takes most of the computing time and is symmetric: each row begins at its block of eight columns.
         for (i, sums) in self.corner.iter_mut().enumerate() {
             let from = i / 8 * 8;
             for row in &done.rest {
@@ -72,7 +72,7 @@ impl<const W: usize> Left<W> {
         self.log_det += 2.0 * (0..N).map(|i| done.factor[i][i]).product::<f64>().ln();
     }
 
-    /// Copies the columns behind the diagonal to the rows below it.
+    /// Copies the upper triangle to the lower one.
     fn mirror(&mut self) {
         for i in 1..W {
             for j in 0..i {
@@ -97,22 +97,22 @@ struct Eliminated<const N: usize, const W: usize> {
     rest: Wide<N, W>,
 }
 
-/// What is kept of an elimination.
+/// Part of an elimination that stays in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keep {
     /// Only the equations of the constants.
     Constants,
-    /// Every instant after elimination, to solve for it.
+    /// All eliminated instants, for the back substitution.
     Instants,
-    /// The equations at every [`PART`]-th instant: the others are eliminated again when they are solved for. An
-    /// instant takes 2.6 kB with all constants, an hour of them a gigabyte.
+    /// The equations at every [`PART`]-th instant. The back substitution eliminates the instants between them again. An
+    /// instant with all constants takes 2.6 kB, an hour of flight a gigabyte.
     Parts,
 }
 
-/// Number of instants that are eliminated again at a time.
+/// Number of instants that the back substitution eliminates again at a time.
 const PART: usize = 512;
 
-/// A side of a stretch as it was eliminated, from its end towards the middle.
+/// Elimination of one side of a stretch, from its end towards the middle.
 #[derive(Clone, Debug)]
 struct Side<const N: usize, const W: usize> {
     done: Vec<Eliminated<N, W>>,
@@ -229,8 +229,8 @@ enum Towards {
 }
 
 impl Towards {
-    /// Eliminates instant `k`; `pending` holds the contributions to it from the one before, then those to the one
-    /// after it.
+    /// Eliminates instant `k`. `pending` holds the contributions to `k` of the instant eliminated before; on return it
+    /// holds the contributions of `k` to the next one.
     fn eliminate<const N: usize, const W: usize>(
         self,
         k: usize,
@@ -262,7 +262,7 @@ impl Towards {
         Some(done)
     }
 
-    /// Place of the instant that is eliminated after `before` others, of `count` in all.
+    /// Index of the instant that is eliminated after `before` other instants, in a stretch of `count` instants.
     fn place(self, before: usize, count: usize) -> usize {
         match self {
             Towards::Later => before,
@@ -297,7 +297,8 @@ impl Towards {
         Some((side, pending, left))
     }
 
-    /// The unknowns of a side of `length` instants, from the one nearest to the `middle` on.
+    /// The unknowns of a side of `length` instants, in order from the middle outwards. `middle` holds those of the
+    /// middle.
     fn solve<const N: usize, const W: usize>(
         self,
         side: &Side<N, W>,

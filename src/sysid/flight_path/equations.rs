@@ -241,7 +241,7 @@ impl Problem<'_> {
             let others = others.and_then(|o| o.get(i)).map(Vec::as_slice);
             let along = Along::<N, M, D>::new(self, track, path, found, bound, others);
             let (stretch, left) = band::eliminate::<N, W>(&along, keep)?;
-            // Of equations that are not solved for, nothing but the constants is needed.
+            // without a back substitution, only the equations of the constants are needed
             Some((Some((along, stretch)).filter(|_| keep != Keep::Constants), left))
         };
         let done: Vec<_> = pairs.map(one).collect::<Option<_>>()?;
@@ -254,7 +254,7 @@ impl Problem<'_> {
     }
 }
 
-/// Number of instants of a flight beyond which their equations are made again rather than held.
+/// Number of instants of a flight above which the back substitution computes equations again instead of storing them.
 const HELD: usize = 100_000;
 
 /// Huber's loss of a residual in standard deviations: quadratic up to `bound`, then linear.

@@ -16,6 +16,9 @@ use track::track;
 /// Smallest number of samples with which a sensor is used in a stretch.
 const FEWEST: usize = 10;
 
+/// Largest number of stretches that are left out with a note of their own. A log with many gaps has thousands.
+const NAMED: usize = 8;
+
 /// Note on a log without vanes.
 const ESTIMATED: &str = "α and β of this log are the flight controller's estimates, not measurements: left out. If the \
                          aircraft has vanes, map alpha_rad and beta_rad to them.";
@@ -145,7 +148,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let periods = channels.periods();
     let sensors = options.sensors.overridden_by(&flight.sensors);
     let mut log = Log { step, tracks: Vec::new(), has, periods, rudder, sensors, notes };
-    let mut longest = 0.0_f64;
+    let (mut longest, mut left_out) = (0.0_f64, Vec::new());
     for times in &stretches {
         let [start, end] = [times[0], times[times.len() - 1]];
         longest = longest.max(end - start);
@@ -158,9 +161,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
             None
         };
         match why {
-            Some(why) => log
-                .notes
-                .push(format!("The stretch from {start:.2} s to {end:.2} s is left out: {why}.")),
+            Some(why) => left_out.push(([start, end], why)),
             None => {
                 let mut track = track(&channels, &has, [start, end], [step, gap], options);
                 if let Some(at) = log.sensors.accelerometer_at() {
@@ -170,6 +171,7 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
             }
         }
     }
+    log.notes.extend(unused(&left_out));
     if log.tracks.is_empty() {
         let (flight, shortest_s) = (options.name.clone(), options.shortest_s);
         return Err(ReconstructError::TooShort { flight, longest_s: longest, shortest_s });
@@ -179,6 +181,23 @@ pub fn take_in(flight: &Flight, options: &Options) -> Result<Log, ReconstructErr
     let span = Span { middle: 0.5 * (start + end), length: end - start };
     log.tracks.iter_mut().for_each(|track| track.span = span);
     Ok(log)
+}
+
+/// Notes on the stretches `left_out`: start and end (s), and the reason.
+fn unused(left_out: &[([f64; 2], &str)]) -> Vec<String> {
+    let note = |([start, end], why): &([f64; 2], &str)| {
+        format!("The stretch from {start:.2} s to {end:.2} s is left out: {why}.")
+    };
+    let mut notes: Vec<String> = left_out.iter().take(NAMED).map(note).collect();
+    let rest = left_out.get(NAMED..).unwrap_or_default();
+    if !rest.is_empty() {
+        let seconds: f64 = rest.iter().map(|([start, end], _)| end - start).sum();
+        notes.push(format!(
+            "{} further stretches of {seconds:.1} s in all are left out for such reasons.",
+            rest.len()
+        ));
+    }
+    notes
 }
 
 fn declare(channels: &Channels, has: &Present, options: &Options, notes: &mut Vec<String>) {
@@ -214,4 +233,20 @@ fn declare(channels: &Channels, has: &Present, options: &Options, notes: &mut Ve
     } else {
         "Air density: standard atmosphere at sea level, for want of an altitude.".into()
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_of_gaps_has_few_notes() {
+        let of = |count: usize| -> Vec<([f64; 2], &'static str)> {
+            (0..count).map(|k| ([k as f64, k as f64 + 0.5], "too short")).collect()
+        };
+        assert_eq!(unused(&of(1)), ["The stretch from 0.00 s to 0.50 s is left out: too short."]);
+        let many = unused(&of(5000));
+        assert_eq!(many.len(), NAMED + 1);
+        assert!(many[NAMED].starts_with("4992 further stretches of 2496.0 s in all"), "{many:?}");
+    }
 }

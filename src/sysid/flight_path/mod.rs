@@ -170,7 +170,7 @@ pub enum ReconstructError {
 }
 
 /// Reconstructs `flight`: resamples each segment to one uniform clock, estimates and removes sensor errors and wind.
-/// A flight that is given away, not lent, is dropped as soon as it is resampled: a long one is large.
+/// A flight that is passed by value is dropped after the resampling, to free its memory.
 ///
 /// # Errors
 /// A required channel is missing, the log contains no flight or no stretch of it is long enough, or its sensors

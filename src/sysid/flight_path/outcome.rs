@@ -107,8 +107,8 @@ pub fn assemble(problem: &Problem, found: &Found) -> Result<Reconstruction, Reco
     })
 }
 
-/// What copies of the flight show, each with an additional error like those of the path: the root mean square of
-/// their errors in each state, the gyros' noise for the rates, and the delays of the actuators in each copy.
+/// Simulates the error of the path in copies of the flight. Returns the root mean square error of each state, with the
+/// gyros' noise for the rates, and the actuator delays estimated from each copy.
 fn draws(
     problem: &Problem,
     found: &Found,
@@ -118,7 +118,7 @@ fn draws(
     let mut random = stream(0, &[]);
     let (mut squares, mut count, mut delays) = ([0.0; 8], 0.0_f64, Vec::new());
     for _ in 0..DRAWS {
-        // A copy is as large as the flight: there is one at a time.
+        // a copy is as large as the flight, so only one is in memory at a time
         let erring = problem.erring(found, &mut random).ok_or_else(singular)?;
         let copy = path_as_segments(problem, found, &erring.paths, Some(&erring.gyro));
         drop(erring);

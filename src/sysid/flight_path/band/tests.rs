@@ -3,7 +3,7 @@
 use super::*;
 use nalgebra::{DMatrix, DVector};
 
-/// Equations that are given, with the prior of one at every unknown.
+/// Given equations, with unit prior information on every unknown of an instant.
 struct Given<const N: usize, const W: usize> {
     links: Vec<Link<N, W>>,
 }
