@@ -1,5 +1,6 @@
 //! Files that a user names on the command line.
 
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,7 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 
 pub use super::shipped::shipped;
+use crate::logs::quoted;
 use crate::report;
 
 /// Whether an existing file may be replaced.
@@ -102,5 +104,25 @@ pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
 
 /// The command line of this run, for reports.
 pub fn command_line() -> String {
-    std::env::args().skip(1).fold("greylag".into(), |line, a| line + " " + &a)
+    line_of(std::env::args_os().skip(1))
+}
+
+/// The command line with these arguments, quoted for a shell. An argument may be no Unicode text, such as the path of an
+/// old log: its invalid bytes are replaced.
+fn line_of(arguments: impl Iterator<Item = OsString>) -> String {
+    arguments.fold("greylag".into(), |line, word| line + " " + &quoted(Path::new(&word)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_command_line_is_written_whatever_its_words_are() {
+        use std::os::unix::ffi::OsStringExt;
+        let words = [b"compare".to_vec(), b"my flight.csv".to_vec(), b"fl\xfcg.csv".to_vec()];
+        let line = line_of(words.into_iter().map(OsString::from_vec));
+        assert_eq!(line, "greylag compare 'my flight.csv' 'fl\u{fffd}g.csv'");
+    }
 }
