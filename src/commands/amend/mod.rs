@@ -9,7 +9,7 @@ mod tables;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
 use places::{Places, hashed};
 use tables::print;
@@ -195,7 +195,10 @@ fn doubtful(story: &Amendment) -> bool {
 /// Carries out `--leave-one-out`: prints a table of structures and writes no model.
 fn structures(arguments: &Arguments, model: &GreyBox) -> Result<ExitCode> {
     let overwrite = arguments.force.into();
-    std::fs::create_dir_all(&arguments.out)?;
+    // a copy of the flight that is left out would be fitted to
+    distinct(&arguments.logs.paths, &[])?;
+    std::fs::create_dir_all(&arguments.out)
+        .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
     let json = arguments.out.join("leave-one-out.json");
     files::writable(&json, overwrite)?;
     let effects = named_effects(&arguments.effects)?;
@@ -353,4 +356,27 @@ fn wanted(
         }
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::{Command, command_of};
+
+    #[test]
+    fn a_flight_that_is_left_out_is_in_no_copy() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, copy] = ["a.csv", "copy.csv"].map(|name| folder.path().join(name));
+        for path in [&one, &copy] {
+            std::fs::write(path, "1").unwrap();
+        }
+        let out = folder.path().join("out");
+        let words = ["amend", "--tune-only", "--leave-one-out", "--model", "params/x8/prior.toml"];
+        let mut line: Vec<std::ffi::OsString> = words.map(Into::into).into();
+        line.extend(["--log".into(), one.into_os_string(), copy.into_os_string()]);
+        line.extend(["--out".into(), out.clone().into_os_string()]);
+        let Ok(Command::Amend(arguments)) = command_of(&line) else { panic!("no amendment") };
+        let error = run(&arguments).unwrap_err().to_string();
+        assert!(error.contains("hold the same flight") && !out.exists(), "{error}");
+    }
 }
