@@ -2,7 +2,7 @@
 
 use comfy_table::Table;
 
-use super::any::{Flight, kept};
+use super::any::{Flight, kept, percent};
 use crate::control::ControllerKind;
 use crate::control::aircraft_estimate::{AircraftEstimator, DERIVATIVES};
 use crate::model::GreyBox;
@@ -52,7 +52,7 @@ pub(super) fn table(kinds: &[ControllerKind], flights: &[Flight]) -> Table {
             let known = own.iter().filter_map(|f| *f.derivative_ratios.get(k)?);
             let errors: Vec<f64> = known.map(|ratio| 100.0 * (ratio - 1.0).abs()).collect();
             let mut row = vec![kind.name().to_owned(), (*name).to_owned()];
-            row.push(format!("{:.0}", 100.0 * errors.len() as f64 / own.len() as f64));
+            row.push(percent(errors.len(), own.len(), 0));
             row.extend([0.5, 0.9].map(|q| match errors.is_empty() {
                 true => "-".to_owned(),
                 false => format!("{:.0}", quantile(&errors, q)),
