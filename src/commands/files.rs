@@ -1,7 +1,7 @@
 //! Files that a user names on the command line.
 
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
@@ -92,8 +92,11 @@ pub fn writable(path: &Path, overwrite: Overwrite) -> Result<()> {
 pub fn write(path: &Path, content: &str, overwrite: Overwrite) -> Result<()> {
     writable(path, overwrite)?;
     if is_stdout(Some(path)) {
-        std::io::stdout().write_all(content.as_bytes())?;
-        return Ok(());
+        return match std::io::stdout().write_all(content.as_bytes()) {
+            // the reader has seen enough, as in `greylag … | head`
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
+            written => Ok(written?),
+        };
     }
     match overwrite {
         Overwrite::Never => report::write_new(path, content)?,
