@@ -155,6 +155,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                     .down_to(log.flies.sustained_s);
             let flight = flight_path::reconstruct(&log.flight, &options)?;
             csv_file(&flight.to_flight(), output, *force)?;
+            log.findings.iter().for_each(|finding| eprintln!("{finding}"));
             print_reconstruction(&flight, output);
             Ok(ExitCode::SUCCESS)
         }
