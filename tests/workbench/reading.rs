@@ -1,8 +1,17 @@
-//! The options for reading logs on the command line of `greylag workbench`.
+//! The model and the options for reading logs on the command line of `greylag workbench`.
 
 use crate::amend_support::{Manoeuvres, errors, fly, sensors};
-use crate::workbench_support::{Bench, MODEL};
+use crate::workbench_support::{Bench, MODEL, word};
 use greylag::logs::csv;
+use serde_json::json;
+
+#[test]
+fn a_learned_model_accepts_no_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = Bench::open(folder.path(), &["--model", "params/x8/learned/model.toml"]);
+    let (status, said) = bench.act(json!({ "do": "tick", "effect": "drag_beta2" }));
+    assert_eq!((status, word(&said).contains("residual")), (422, true), "{said}");
+}
 
 #[test]
 fn a_session_reads_its_logs_as_the_command_line_says() {

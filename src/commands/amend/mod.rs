@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.report {
         files::writable(path, overwrite)?;
     }
-    let places = Places::new(&path, &arguments.out, overwrite)?;
+    let places = Places::new(&path, &model, &arguments.out, overwrite)?;
     distinct(&arguments.logs.paths, &arguments.hold_out)?;
     let effects = named_effects(&arguments.effects)?;
     check_new(&effects, &model)?;
