@@ -125,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if in_doubt { ExitCode::from(IN_DOUBT) } else { ExitCode::SUCCESS })
 }
 
-/// Content of the JSON document: the diagnosis, with the answer that also leads screen and page.
+/// Content of the JSON document: the diagnosis, with the answer that the terminal and the page show first.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(flatten)]

@@ -66,8 +66,8 @@ pub(super) struct Flight {
     change: Option<&'static str>,
     /// `None` where no controller could be designed.
     minute: Option<Minute>,
-    /// Derivatives estimated in this flight over the aircraft's own, in the order of `DERIVATIVES`; `None` where they are
-    /// unknown. Empty after a change.
+    /// Ratios of the derivatives estimated in this flight to the aircraft's own, in the order of `DERIVATIVES`; `None` for
+    /// an unknown one. Empty after a change.
     pub(super) derivative_ratios: Vec<Option<f64>>,
 }
 
@@ -81,7 +81,7 @@ struct AnyDocument<'a> {
     flights: &'a [Flight],
 }
 
-/// Flies `count` drawn aircraft and those beside them, prints the tables, writes the JSON.
+/// Flies `count` drawn aircraft and those of `--beside`, prints the tables and writes the JSON.
 pub(super) fn fly(arguments: &Arguments, count: u32) -> Result<ExitCode> {
     let kinds = &arguments.controllers;
     if let Some(kind) =
@@ -199,7 +199,7 @@ fn of_controller(
     flight: [u64; 2],
     changes: &[Option<Changed>],
 ) -> Vec<Flight> {
-    // the design of an LQI takes longer than its flight
+    // designed once for all changes: the design of an LQI takes longer than its flight
     let mut controller = build(kind, from).ok();
     let mut fly = |changed: &Option<Changed>| {
         let mut estimator = AircraftEstimator::new(&exact.airframe);
